@@ -1,0 +1,37 @@
+"""The paper's comparator: did the robot get as far as the simulation says?"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from selfmodel.arrays import FloatArray
+from selfmodel.behaviour import Behaviour, forward_displacement
+from selfmodel.comparator import ClosedLoop
+from selfmodel.trial import Trial
+
+
+@dataclass(frozen=True)
+class ForwardDisplacement:
+    """The absolute difference of the forward displacements, m.
+
+    Source: the paper, section III (fitness of the diagnostic EA).
+
+    Limits: one number says little about a whole run. Without a reality gap the true hypothesis is
+    at exactly 0, but compounds of failures are hard to search for, because a half-right hypothesis
+    need not be closer than a wrong one; with a gap, contact is chaotic and the number is mostly
+    chance.
+    """
+
+    name: str = "forward-displacement"
+
+    def request(self, trial: Trial) -> ClosedLoop:
+        """Returns that the path of the root body is all it looks at."""
+        del trial  # every trial is judged by the same signal
+        return ClosedLoop(record=("base_position",))
+
+    def distances(self, simulated: Behaviour, trial: Trial) -> FloatArray:
+        """Returns the distance of each simulation, ``(n,)``, m."""
+        return np.abs(forward_displacement(simulated) - trial.displacement)
+
+
+FORWARD_DISPLACEMENT = ForwardDisplacement()

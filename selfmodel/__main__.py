@@ -1,0 +1,5 @@
+"""``python -m selfmodel``: the command line."""
+
+from selfmodel.cli import main
+
+main()

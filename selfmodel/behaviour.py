@@ -1,0 +1,158 @@
+"""What a run of a robot looked like: the record that simulation, logs and comparators share."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Literal, get_args
+
+import numpy as np
+
+from selfmodel.arrays import FloatArray, frozen
+
+Signal = Literal[
+    "sensors",
+    "commands",
+    "joint_positions",
+    "joint_velocities",
+    "joint_efforts",
+    "base_position",
+    "base_orientation",
+    "base_linear_velocity",
+    "base_angular_velocity",
+]
+
+SIGNALS: tuple[Signal, ...] = get_args(Signal)
+"""Every signal of a run, in the order in which a log lists them.
+
+``sensors``: what the controller received (touch 0 or 1, angles scaled to the joint's range).
+``commands``: motor targets, rad. ``joint_positions``: rad. ``joint_velocities``: rad/s.
+``joint_efforts``: torque at the joint, N m. ``base_position``: root body, world frame, m.
+``base_orientation``: unit quaternion, w x y z. ``base_linear_velocity``: world frame, m/s.
+``base_angular_velocity``: body frame, rad/s.
+"""
+
+
+@dataclass(frozen=True)
+class Names:
+    """The names that the columns of a behaviour's signals carry.
+
+    Attributes:
+        sensors: What feeds the controller, in its order.
+        motors: What the controller commands, in its order.
+        hinges: The single-degree joints of the model, in its order.
+    """
+
+    sensors: tuple[str, ...]
+    motors: tuple[str, ...]
+    hinges: tuple[str, ...]
+
+    def width(self, signal: Signal) -> int:
+        """Returns how many columns ``signal`` has."""
+        return len(self.columns(signal))
+
+    def columns(self, signal: Signal) -> tuple[str, ...]:
+        """Returns the name of each column of ``signal``."""
+        return {
+            "sensors": self.sensors,
+            "commands": self.motors,
+            "joint_positions": self.hinges,
+            "joint_velocities": self.hinges,
+            "joint_efforts": self.hinges,
+            "base_orientation": ("w", "x", "y", "z"),
+        }.get(signal, ("x", "y", "z"))
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One control step of a run, as it happened: the state, what was read, what was commanded.
+
+    Attributes:
+        time: Seconds since the start of the run, when the sensors were read.
+        values: Each signal's row at that moment, ``(width,)``.
+    """
+
+    time: float
+    values: Mapping[Signal, FloatArray]
+
+
+@dataclass(frozen=True, eq=False)
+class Behaviour:
+    """The signals of one run, or of a batch of runs.
+
+    Row k is the state in which command k was computed, so the last command has no consequence in
+    the record. A batch has a leading axis of runs.
+
+    Attributes:
+        names: What the columns are called.
+        time: ``(steps,)`` seconds since the start of the run, strictly increasing.
+        signals: What was recorded, each ``(..., steps, width)``.
+
+    Raises:
+        ValueError: A shape does not fit its names, or time does not increase.
+    """
+
+    names: Names
+    time: FloatArray
+    signals: Mapping[Signal, FloatArray]
+
+    def __post_init__(self) -> None:
+        if self.time.ndim != 1 or not np.all(np.diff(self.time) > 0):
+            raise ValueError(
+                f"time must be (steps,) and strictly increasing, got shape {self.time.shape}"
+            )
+        for signal, values in self.signals.items():
+            expected = (len(self.time), self.names.width(signal))
+            if values.shape[-2:] != expected:
+                raise ValueError(
+                    f"{signal} must have shape (..., steps, width) = (..., {expected[0]}, "
+                    f"{expected[1]}), got {values.shape}"
+                )
+        object.__setattr__(self, "signals", MappingProxyType(dict(self.signals)))
+
+    def __getitem__(self, signal: Signal) -> FloatArray:
+        """Returns one signal, ``(..., steps, width)``.
+
+        Raises:
+            KeyError: It was not recorded; a comparator asks for what it needs by ``needs``.
+        """
+        try:
+            return self.signals[signal]
+        except KeyError:
+            recorded = ", ".join(self.signals) or "nothing"
+            raise KeyError(f"{signal} was not recorded; recorded: {recorded}") from None
+
+    @property
+    def steps(self) -> int:
+        """How many control steps were recorded."""
+        return len(self.time)
+
+
+def collect(names: Names, samples: Iterable[Sample]) -> Behaviour:
+    """Returns the behaviour that ``samples`` make up, for a run that needs no log.
+
+    Raises:
+        ValueError: There are no samples, or their rows do not fit ``names``.
+    """
+    rows = list(samples)
+    if not rows:
+        raise ValueError("a behaviour needs at least one sample, got none")
+    return Behaviour(
+        names=names,
+        time=frozen(np.array([row.time for row in rows])),
+        signals={
+            signal: frozen(np.stack([row.values[signal] for row in rows]))
+            for signal in rows[0].values
+        },
+    )
+
+
+def forward_displacement(behaviour: Behaviour) -> FloatArray:
+    """Returns d(T) - d(1), how far the root body travelled along the world's x axis.
+
+    Source: the paper, section III (fitness of the repair EA).
+
+    Returns:
+        Metres, one number a run: shape ``(...)``, ``()`` for a single run.
+    """
+    x = behaviour["base_position"][..., 0]
+    return np.asarray(x[..., -1] - x[..., 0])

@@ -1,0 +1,38 @@
+"""The command line: one file a command."""
+
+import sys
+
+import typer
+
+from selfmodel.cli.recover import recover
+from selfmodel.cli.robots import robots
+from selfmodel.cli.trial import trial
+from selfmodel.errors import InputError
+
+app = typer.Typer(
+    name="selfmodel",
+    help="Find out what changed in a legged robot from a few logged trials, and get it walking.",
+    no_args_is_help=True,
+    add_completion=False,
+    # An error that nobody foresaw shows its plain traceback: it is a bug report.
+    pretty_exceptions_enable=False,
+)
+app.command()(robots)
+app.command()(recover)
+app.command()(trial)
+
+
+def main() -> None:
+    """Runs the command line; exits with 0 done, 1 the work failed, 2 wrong usage or bad input."""
+    try:
+        app()
+    except InputError as error:
+        _fail(str(error), 2)
+    except OSError as error:
+        # A disk that is full, a folder that may not be written: the file's name is in it.
+        _fail(str(error), 1)
+
+
+def _fail(message: str, status: int) -> None:
+    typer.echo(f"error: {message}", err=True)
+    sys.exit(status)

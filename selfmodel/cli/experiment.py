@@ -1,0 +1,92 @@
+"""A recovery whose truth is known: what is hidden from the algorithm, and how well it did."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+
+from selfmodel.comparator import Comparator
+from selfmodel.hypothesis import INTACT, Hypothesis
+from selfmodel.judge import is_correct
+from selfmodel.logs.journal import open_journal
+from selfmodel.physical import SimulatedRobot
+from selfmodel.recover import Event, Recovery, recover
+from selfmodel.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.simulator import Simulator, Tally
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """What to run.
+
+    Attributes:
+        robot: The robot as its model describes it.
+        case: Which failure of Table I it is, if it is one.
+        truth: What goes wrong with the physical robot.
+        comparator: Judges hypotheses by the logged trials.
+        settings: The paper's numbers.
+        seed: Every random choice comes from it.
+        threads: Threads for the physics.
+        folder: Where the run is kept.
+    """
+
+    robot: Robot
+    case: int | None
+    truth: Hypothesis
+    comparator: Comparator
+    settings: Settings
+    seed: int
+    threads: int
+    folder: Path
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What came of it.
+
+    Attributes:
+        recovery: How the recovery went.
+        correct: Whether the diagnosis is right.
+        tally: What the self-model simulated, up to the judgement.
+        seconds: Wall time of the recovery.
+    """
+
+    recovery: Recovery
+    correct: bool
+    tally: Tally
+    seconds: float
+
+
+def run(experiment: Experiment, watch: Callable[[Event], None]) -> Outcome:
+    """Runs an experiment; the algorithm gets physical robots and a journal, and no truth."""
+    start = perf_counter()
+    robot, truth = experiment.robot, experiment.truth
+    simulator = Simulator(robot, experiment.threads)
+    recovery = recover(
+        healthy=SimulatedRobot(robot),
+        damaged=SimulatedRobot(robot, truth),
+        simulator=simulator,
+        comparator=experiment.comparator,
+        journal=open_journal(
+            experiment.folder,
+            robot,
+            experiment.settings,
+            hidden={"before": str(INTACT), "after": str(truth), "recovery": str(truth)},
+        ),
+        settings=experiment.settings,
+        seed=experiment.seed,
+        watch=watch,
+    )
+    return Outcome(
+        recovery=recovery,
+        tally=simulator.tally,
+        seconds=perf_counter() - start,
+        correct=is_correct(
+            recovery.diagnosis.best,
+            truth,
+            recovery.trials[1:],
+            # Another simulator: judging is no part of what the recovery cost.
+            Simulator(robot, experiment.threads),
+        ),
+    )

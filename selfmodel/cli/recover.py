@@ -1,0 +1,76 @@
+"""``selfmodel recover``: a robot walks, fails, and is brought back."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from selfmodel.cli.options import Damage, Json, RobotName, Seed, Threads
+from selfmodel.comparators import DEFAULT
+
+
+def recover(
+    robot: RobotName,
+    *,
+    case: Annotated[
+        int | None, typer.Option(metavar="N", help="A failure of the paper's Table I, 1 to 10.")
+    ] = None,
+    damage: Damage = None,
+    comparator: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME|package.module:object",
+            help="How a simulation is compared with a logged trial.",
+        ),
+    ] = DEFAULT,
+    seed: Seed = 0,
+    trials: Annotated[int, typer.Option(min=1, help="Physical trials after the failing one.")] = 3,
+    population: Annotated[int, typer.Option(min=2, help="Genomes in a generation.")] = 100,
+    generations: Annotated[int, typer.Option(min=1, help="Generations of each EA.")] = 30,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder of the run, new or empty.  [default: in runs/]"),
+    ] = None,
+    threads: Threads = 0,
+    as_json: Json = False,
+) -> None:
+    """Recover a robot from a failure: diagnose it from logged trials, evolve a controller."""
+    # Whatever brings MuJoCo waits until the command runs.
+    from selfmodel.cli import resolve  # noqa: PLC0415
+    from selfmodel.cli.display import display  # noqa: PLC0415
+    from selfmodel.cli.experiment import Experiment, run  # noqa: PLC0415
+    from selfmodel.cli.report import as_object, print_report  # noqa: PLC0415
+    from selfmodel.notation import parse  # noqa: PLC0415
+    from selfmodel.settings import Settings  # noqa: PLC0415
+
+    entry = resolve.robot_entry(robot)
+    made = entry.robot()
+    experiment = Experiment(
+        robot=made,
+        case=case,
+        truth=parse(resolve.case_notation(entry, case, damage), made.anatomy),
+        comparator=resolve.comparator(comparator),
+        settings=Settings(trials=trials, generations=generations).scaled(population),
+        seed=seed,
+        threads=resolve.threads(threads),
+        folder=out or _new_folder(robot, case, seed),
+    )
+    try:
+        with display() as watch:
+            outcome = run(experiment, watch)
+    except KeyboardInterrupt:
+        typer.echo(f"interrupted: the finished trials are in {experiment.folder}", err=True)
+        raise typer.Exit(130) from None
+    if as_json:
+        typer.echo(as_object(experiment, outcome))
+    else:
+        print_report(experiment, outcome)
+
+
+def _new_folder(robot: str, case: int | None, seed: int) -> Path:
+    """A folder in ``runs/`` that no run has used: named by what it holds and when it began."""
+    from datetime import datetime  # noqa: PLC0415  # with the other work of the command
+
+    failure = "damage" if case is None else f"case{case}"
+    began = datetime.now().astimezone().strftime("%Y%m%d-%H%M%S-%f")
+    return Path("runs") / f"{robot}-{failure}-seed{seed}-{began}"

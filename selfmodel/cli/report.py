@@ -1,0 +1,93 @@
+"""What ``selfmodel recover`` says at the end, for people and for programs."""
+
+import json
+import math
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from selfmodel.cli.experiment import Experiment, Outcome
+
+
+def as_object(experiment: Experiment, outcome: Outcome) -> str:
+    """Returns the outcome as one JSON object."""
+    return json.dumps(_facts(experiment, outcome), indent=2, allow_nan=False)
+
+
+def print_report(experiment: Experiment, outcome: Outcome) -> None:
+    """Prints the trials, and the diagnosis beside the truth."""
+    facts = _facts(experiment, outcome)
+    console = Console()
+    trials = Table("trial", "controller evolved for", "forward, m", title="physical trials")
+    trials.columns[2].justify = "right"
+    for trial in facts["trials"]:
+        trials.add_row(trial["stage"], trial["hypothesis"], f"{trial['displacement']:.3f}")
+    diagnosis = Table("", "hypothesis", "distance, m", title="diagnosis")
+    diagnosis.columns[2].justify = "right"
+    for rank, candidate in enumerate(facts["diagnosis"], start=1):
+        mark = " (the truth)" if candidate["hypothesis"] == facts["truth"] else ""
+        distance = candidate["distance"]
+        diagnosis.add_row(
+            str(rank),
+            candidate["hypothesis"] + mark,
+            "diverged" if distance is None else f"{distance:.4f}",
+        )
+    console.print(trials, diagnosis)
+    evaluations = facts["evaluations"]
+    verdict = "right" if facts["correct"] else "wrong"
+    console.print(
+        f"truth: {facts['truth']}; the diagnosis is {verdict}.\n"
+        f"The robot went {facts['displacement']['before']:.2f} m before, "
+        f"{facts['displacement']['after']:.2f} m after the failure, and "
+        f"{facts['displacement']['recovered']:.2f} m at best in "
+        f"{facts['physical_trials']} trials since.\n"
+        f"{evaluations['repair']} controllers and {evaluations['distinct_hypotheses']} distinct "
+        f"hypotheses in {facts['seconds']:.0f} s; diverged: {evaluations['diverged']}.\n"
+        f"Logs: {experiment.folder}",
+        highlight=False,
+    )
+
+
+def _facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
+    recovery, tally = outcome.recovery, outcome.tally
+    return {
+        "robot": experiment.robot.name,
+        "case": experiment.case,
+        "truth": str(experiment.truth),
+        "comparator": experiment.comparator.name,
+        "gap": 0.0,
+        "seed": experiment.seed,
+        "trials": [
+            {
+                "log": trial.path,
+                "stage": trial.plan.stage,
+                "displacement": trial.displacement,
+                "hypothesis": str(tried),
+            }
+            for trial, tried in zip(recovery.trials, recovery.tried, strict=True)
+        ],
+        "diagnosis": [
+            {
+                "hypothesis": str(candidate.hypothesis),
+                "distance": candidate.distance if math.isfinite(candidate.distance) else None,
+            }
+            for candidate in recovery.diagnosis.ranked
+        ],
+        "correct": outcome.correct,
+        "displacement": {
+            "before": recovery.before,
+            "after": recovery.after,
+            "recovered": recovery.recovered,
+        },
+        "recovery": recovery.recovered / recovery.before if recovery.before else None,
+        "physical_trials": len(recovery.trials) - 2,
+        "evaluations": {
+            "repair": recovery.repair_evaluations,
+            "diagnostic": recovery.diagnostic_evaluations,
+            "distinct_hypotheses": recovery.distinct_hypotheses,
+            "simulated_steps": tally.steps,
+            "diverged": tally.diverged,
+        },
+        "seconds": outcome.seconds,
+    }

@@ -1,0 +1,95 @@
+"""From the names on the command line to the objects that they stand for."""
+
+import importlib
+import os
+from pathlib import Path
+
+from selfmodel.comparator import Comparator
+from selfmodel.comparators import COMPARATORS
+from selfmodel.controller import Controller, Network
+from selfmodel.errors import InputError, unknown_name
+from selfmodel.logs import LogError, load_controller, read_log
+from selfmodel.tasks import ROBOTS, Entry
+
+
+def robot_entry(name: str) -> Entry:
+    """Returns the robot of that name.
+
+    Raises:
+        InputError: There is none; the message names the nearest.
+    """
+    if name not in ROBOTS:
+        raise unknown_name("robot", name, ROBOTS)
+    return ROBOTS[name]
+
+
+def case_notation(entry: Entry, case: int | None, damage: str | None) -> str:
+    """Returns the notation of a failure given by its number in Table I or by itself.
+
+    Raises:
+        InputError: Neither or both are given, or there is no case of that number.
+    """
+    if (case is None) == (damage is None):
+        given = "neither" if case is None else "both"
+        raise InputError(
+            f"expected either --case N or --damage NOTATION, got {given}: cases are 1 to "
+            f"{len(entry.cases)}, a notation is like {entry.cases[1]}"
+        )
+    if damage is not None:
+        return damage
+    if case not in entry.cases:
+        raise unknown_name("case of Table I", str(case), map(str, entry.cases))
+    return entry.cases[case]
+
+
+def comparator(name: str) -> Comparator:
+    """Returns a comparator that comes with selfmodel, or another's ``package.module:object``.
+
+    Raises:
+        InputError: There is none of that name, or the object is no comparator.
+    """
+    if name in COMPARATORS:
+        return COMPARATORS[name]
+    module, colon, attribute = name.partition(":")
+    if not colon:
+        raise unknown_name("comparator", name, COMPARATORS)
+    try:
+        found = getattr(importlib.import_module(module), attribute)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise InputError(
+            f"cannot find the comparator {name!r}: {error}; expected package.module:object, "
+            f"importable from here, or one of {', '.join(COMPARATORS)}"
+        ) from error
+    if not isinstance(found, Comparator):
+        raise InputError(
+            f"{name!r} is no comparator: it needs the members of selfmodel.comparator.Comparator"
+        )
+    return found
+
+
+def controller(path: Path, network: Network) -> Controller:
+    """Returns the controller in a ``.npz`` file or in a trial's log.
+
+    Raises:
+        InputError: The file cannot be read as either, or its controller fits another robot.
+    """
+    try:
+        loaded = (
+            read_log(path).trial.plan.controller
+            if path.suffix == ".mcap"
+            else load_controller(path)
+        )
+    except LogError as error:
+        raise InputError(str(error)) from error
+    if loaded.network != network:
+        raise InputError(
+            f"{path} has a controller for sensors {', '.join(loaded.network.sensors)} and motors "
+            f"{', '.join(loaded.network.motors)}; this robot has {', '.join(network.sensors)} and "
+            f"{', '.join(network.motors)}: give one that was made for it"
+        )
+    return loaded
+
+
+def threads(requested: int) -> int:
+    """Returns how many threads to use: as many as processors where 0 are requested."""
+    return requested or os.cpu_count() or 1

@@ -1,0 +1,72 @@
+"""``selfmodel trial``: runs and logs one physical trial."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from selfmodel.cli.options import Damage, Json, RobotName, Seed
+
+
+def trial(
+    robot: RobotName,
+    *,
+    out: Annotated[
+        Path, typer.Option(metavar="FILE.mcap", help="The log to write; it must not exist.")
+    ],
+    damage: Damage = None,
+    controller: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.npz|LOG.mcap",
+            help="Whose controller drives the robot; without it, a random one from the seed.",
+        ),
+    ] = None,
+    seed: Seed = 0,
+    as_json: Json = False,
+) -> None:
+    """Run one trial of the simulated physical robot and write its log."""
+    # Whatever brings MuJoCo waits until the command runs.
+    import numpy as np  # noqa: PLC0415
+
+    from selfmodel.cli import resolve  # noqa: PLC0415
+    from selfmodel.controller import Controller, draw_weights  # noqa: PLC0415
+    from selfmodel.errors import InputError  # noqa: PLC0415
+    from selfmodel.logs import read_log  # noqa: PLC0415
+    from selfmodel.logs.writer import write_trial  # noqa: PLC0415
+    from selfmodel.notation import parse  # noqa: PLC0415
+    from selfmodel.physical import SimulatedRobot  # noqa: PLC0415
+    from selfmodel.settings import Settings  # noqa: PLC0415
+    from selfmodel.trial import Plan  # noqa: PLC0415
+
+    made = resolve.robot_entry(robot).robot()
+    if out.suffix != ".mcap":
+        raise InputError(f"--out needs a name that ends in .mcap, got {str(out)!r}")
+    hidden = parse(damage or "intact", made.anatomy)
+    if controller:
+        driver = resolve.controller(controller, made.network)
+    else:
+        rng = np.random.default_rng(seed)
+        driver = Controller(made.network, draw_weights(rng, (made.network.weights,)))
+    settings = Settings()
+    plan = Plan("trial", "single", driver, settings.steps, seed)
+    samples = SimulatedRobot(made, hidden).run(driver, settings.steps)
+    try:
+        write_trial(out, made, plan, samples, settings=settings, hidden=str(hidden))
+    except KeyboardInterrupt:
+        typer.echo(f"interrupted: the steps so far are in {out}.part", err=True)
+        raise typer.Exit(130) from None
+    log = read_log(out)
+    facts = {
+        "log": str(out),
+        "robot": robot,
+        "truth": str(hidden),
+        "seed": seed,
+        "steps": log.trial.behaviour.steps,
+        "displacement": log.trial.displacement,
+    }
+    if as_json:
+        typer.echo(json.dumps(facts, indent=2))
+    else:
+        typer.echo(f"{robot} ({hidden}) went {log.trial.displacement:.3f} m forward: {out}")

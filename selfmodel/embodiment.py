@@ -1,0 +1,118 @@
+"""A robot built with a hypothesis: a model of the same layout, edited by name.
+
+A hypothesis never changes the layout of the model, so that all hypotheses share one batch: a lost
+limb stays as a ghost that touches nothing, a jammed joint stays as one that nothing can turn.
+"""
+
+import copy
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from selfmodel.anatomy import Anatomy
+from selfmodel.arrays import FloatArray
+from selfmodel.faults import KINDS
+from selfmodel.hypothesis import Hypothesis
+
+GHOST_ARMATURE = 1.0
+"""Rotor inertia of a lost hinge, kg m^2; any positive value keeps the mass matrix invertible, and
+nothing couples it to what is left of the robot."""
+
+WELD_ARMATURE = 1e10
+"""Rotor inertia of a held hinge, kg m^2. In the limit of infinite inertia the equations of motion
+are those of welded bodies; at this value a torque of 10 N m turns it by 5e-8 rad in 10 s."""
+
+
+@dataclass(frozen=True, eq=False)
+class Embodiment:
+    """What a hypothesis makes of a robot; the kinds of fault work themselves into it.
+
+    A run starts in the model's reference configuration, ``model.qpos0``.
+
+    Attributes:
+        model: A copy of the robot's model, of the same layout.
+        gain: Multiplies each nominal sensor reading, ``(sensors,)``.
+        offset: Is added to it then, ``(sensors,)``.
+        neurons: 1 for each hidden neuron that works, 0 for a silent one, ``(hidden,)``.
+    """
+
+    model: mujoco.MjModel
+    gain: FloatArray
+    offset: FloatArray
+    neurons: FloatArray
+
+    def lose_body(self, name: str) -> None:
+        """Makes a body a ghost: no mass, no collisions, no force from its motors."""
+        model, body = self.model, self.model.body(name).id
+        model.body_mass[body] = 0.0
+        model.body_inertia[body] = 0.0
+        model.geom_contype[model.geom_bodyid == body] = 0
+        model.geom_conaffinity[model.geom_bodyid == body] = 0
+        model.dof_armature[model.dof_bodyid == body] = GHOST_ARMATURE
+        for motor in range(model.nu):
+            if model.jnt_bodyid[model.actuator_trnid[motor, 0]] == body:
+                self.release_motor(motor)
+
+    def hold_hinge(self, name: str, angle: float) -> None:
+        """Holds a hinge rigidly at an angle, rad.
+
+        The angle becomes the reference of the hinge and part of its body's frame, as in a model
+        whose bodies are welded there. All hinges of a body are held together, in their order.
+        """
+        model, hinge = self.model, self.model.joint(name)
+        body = model.body(hinge.bodyid[0])
+        turn, frame = np.empty(4), np.empty(4)
+        mujoco.mju_axisAngle2Quat(turn, hinge.axis, angle)
+        mujoco.mju_mulQuat(frame, body.quat, turn)
+        before, after = np.empty(3), np.empty(3)
+        mujoco.mju_rotVecQuat(before, hinge.pos, body.quat)
+        mujoco.mju_rotVecQuat(after, hinge.pos, frame)
+        body.pos += before - after
+        body.quat = frame
+        hinge.qpos0 = angle
+        model.dof_armature[hinge.dofadr[0]] = WELD_ARMATURE
+        # A limit that it touches must not push against the weld.
+        model.jnt_limited[hinge.id] = 0
+
+    def release_motor(self, motor: int) -> None:
+        """Takes all force from the motor of that number."""
+        self.model.actuator_gainprm[motor] = 0.0
+        self.model.actuator_biasprm[motor] = 0.0
+
+    def fix_reading(self, sensor: int, value: float) -> None:
+        """Makes the sensor of that column read ``value`` whatever happens."""
+        self.gain[sensor] = 0.0
+        self.offset[sensor] = value
+
+
+def embody(model: mujoco.MjModel, anatomy: Anatomy, hypothesis: Hypothesis) -> Embodiment:
+    """Returns the embodiment of a hypothesis about the robot that ``model`` describes.
+
+    Args:
+        model: The robot with nothing wrong; it is not changed.
+        anatomy: Its parts.
+        hypothesis: What is to be wrong, in canonical form.
+    """
+    embodiment = Embodiment(
+        model=copy.copy(model),
+        gain=np.ones(len(anatomy.sensors)),
+        offset=np.zeros(len(anatomy.sensors)),
+        neurons=np.ones(anatomy.neurons),
+    )
+    if not hypothesis.faults:
+        return embodiment
+    for fault in hypothesis.faults:
+        KINDS[fault.kind].strike(embodiment, anatomy, fault)
+    mujoco.mj_setConst(embodiment.model, mujoco.MjData(embodiment.model))
+    # The solver's tolerance is relative to the mean inertia; a held hinge's would make any answer
+    # good enough. Kept absolute, what is left of the robot is solved as exactly as ever.
+    embodiment.model.opt.tolerance *= _mean_inertia(model) / _mean_inertia(embodiment.model)
+    return embodiment
+
+
+def _mean_inertia(model: mujoco.MjModel) -> float:
+    """Mean of the diagonal of the mass matrix in the reference configuration."""
+    data = mujoco.MjData(model)
+    mujoco.mj_fwdPosition(model, data)
+    return float(data.M[model.M_rowadr + model.M_rownnz - 1].mean())

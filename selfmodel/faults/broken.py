@@ -1,0 +1,33 @@
+"""A broken joint: it and the limb beyond it fall off."""
+
+from typing import TYPE_CHECKING
+
+from selfmodel.anatomy import Anatomy
+from selfmodel.faults.kind import Fault, Kind
+
+if TYPE_CHECKING:
+    from selfmodel.embodiment import Embodiment
+
+
+def _parts(anatomy: Anatomy) -> tuple[str, ...]:
+    return tuple(joint.name for joint in anatomy.joints)
+
+
+def _strike(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+    """Loses the limb, and with it its readings."""
+    lost = anatomy.joint(fault.part).bodies
+    for name in lost:
+        embodiment.lose_body(name)
+    for column, sensor in enumerate(anatomy.sensors):
+        if sensor.body in lost:
+            embodiment.fix_reading(column, 0.0)
+
+
+def _absorbs(fault: Fault, other: Fault, anatomy: Anatomy) -> bool:
+    """Whatever is wrong with a part that fell off no longer matters."""
+    if other.part == fault.part:
+        return other.kind != fault.kind
+    return other.part in anatomy.joint(fault.part).lost
+
+
+BROKEN = Kind(name="break", parts=_parts, strike=_strike, absorbs=_absorbs)

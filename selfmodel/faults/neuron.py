@@ -1,0 +1,20 @@
+"""A silent hidden neuron: a fault of the physical robot that no hypothesis can express."""
+
+from typing import TYPE_CHECKING
+
+from selfmodel.anatomy import Anatomy
+from selfmodel.faults.kind import Fault, Kind
+
+if TYPE_CHECKING:
+    from selfmodel.embodiment import Embodiment
+
+
+def _parts(anatomy: Anatomy) -> tuple[str, ...]:
+    return tuple(str(neuron) for neuron in range(anatomy.neurons))
+
+
+def _strike(embodiment: "Embodiment", _anatomy: Anatomy, fault: Fault) -> None:
+    embodiment.neurons[int(fault.part)] = 0.0
+
+
+SILENT_NEURON = Kind(name="neuron", parts=_parts, strike=_strike, hypothesised=False)

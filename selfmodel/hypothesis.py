@@ -1,0 +1,53 @@
+"""A hypothesis: a set of faults that may be wrong with a robot, in canonical form."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from selfmodel.anatomy import Anatomy
+from selfmodel.faults import KINDS, Fault
+
+
+@dataclass(frozen=True, order=True)
+class Hypothesis:
+    """A set of faults; none means that nothing changed.
+
+    Make one with ``canonical`` or ``notation.parse``, which know the robot: only then do equal
+    hypotheses mean equal robots.
+
+    Attributes:
+        faults: Sorted, without those that another leaves no effect.
+    """
+
+    faults: tuple[Fault, ...] = ()
+
+    def __str__(self) -> str:
+        return "+".join(str(fault) for fault in self.faults) or "intact"
+
+    def __len__(self) -> int:
+        return len(self.faults)
+
+
+INTACT = Hypothesis()
+"""Nothing changed."""
+
+
+def canonical(faults: Iterable[Fault], anatomy: Anatomy) -> Hypothesis:
+    """Returns the hypothesis that says the same in the fewest words.
+
+    Order and repetition do not matter. A fault that another absorbs is dropped: what lies beyond
+    a broken joint is gone, whatever else was wrong with it. Of several degrees of one kind on one
+    part the first counts.
+    """
+    distinct: dict[tuple[str, str], Fault] = {}
+    for fault in faults:
+        distinct.setdefault((fault.kind, fault.part), fault)
+    kept = [
+        fault
+        for fault in distinct.values()
+        if not any(
+            KINDS[other.kind].absorbs(other, fault, anatomy)
+            for other in distinct.values()
+            if other is not fault
+        )
+    ]
+    return Hypothesis(tuple(sorted(kept)))

@@ -1,0 +1,137 @@
+"""The paper's algorithm: act, log, diagnose, repair, with as few physical trials as possible."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from selfmodel.comparator import Comparator
+from selfmodel.controller import Controller
+from selfmodel.database import Database, Journal
+from selfmodel.diagnose import Diagnose
+from selfmodel.diagnosis import Diagnosis
+from selfmodel.evolution import Generation
+from selfmodel.hypothesis import INTACT, Hypothesis
+from selfmodel.physical import PhysicalRobot
+from selfmodel.repair import Repair
+from selfmodel.settings import Settings
+from selfmodel.simulator import Simulator
+from selfmodel.trial import Plan, Stage, Trial
+
+
+@dataclass(frozen=True)
+class SearchBegins:
+    """A search begins.
+
+    Attributes:
+        kind: Which of the two EAs.
+        hypothesis: What a repair takes to be wrong; None for a diagnosis.
+    """
+
+    kind: str
+    hypothesis: Hypothesis | None = None
+
+
+Event = SearchBegins | Generation | Trial | Diagnosis
+"""What happens in a recovery, told as it happens."""
+
+
+@dataclass(frozen=True)
+class Recovery:
+    """How a recovery went.
+
+    Attributes:
+        trials: Every physical trial, in order: ``before``, ``after``, then the recoveries.
+        tried: The hypothesis that each trial's controller was evolved for.
+        diagnosis: The last one, which explains all trials.
+        repair_evaluations: Controllers that the repair EA asked about.
+        diagnostic_evaluations: Hypotheses that the diagnostic EA asked about.
+        distinct_hypotheses: How many of those differ.
+    """
+
+    trials: tuple[Trial, ...]
+    tried: tuple[Hypothesis, ...]
+    diagnosis: Diagnosis
+    repair_evaluations: int
+    diagnostic_evaluations: int
+    distinct_hypotheses: int
+
+    @property
+    def before(self) -> float:
+        """Forward displacement before the failure, m."""
+        return self.trials[0].displacement
+
+    @property
+    def after(self) -> float:
+        """Forward displacement of the same controller after the failure, m."""
+        return self.trials[1].displacement
+
+    @property
+    def recovered(self) -> float:
+        """Forward displacement of the best of the recovery trials, m."""
+        return max(trial.displacement for trial in self.trials[2:])
+
+
+def recover(
+    *,
+    healthy: PhysicalRobot,
+    damaged: PhysicalRobot,
+    simulator: Simulator,
+    comparator: Comparator,
+    journal: Journal,
+    settings: Settings,
+    seed: int,
+    watch: Callable[[Event], None],
+) -> Recovery:
+    """Lets a robot walk until it fails, then finds out what is wrong and how it walks again.
+
+    Args:
+        healthy: The physical robot before it fails.
+        damaged: The same robot afterwards.
+        simulator: The self-model.
+        comparator: Judges hypotheses by the logged trials.
+        journal: Keeps the trials and diagnoses; everything about the past is read back from it.
+        settings: The paper's numbers.
+        seed: Every random choice comes from it.
+        watch: Is told what happens.
+
+    Returns:
+        What the journal says at the end.
+    """
+    rng = np.random.default_rng(seed)
+    repair = Repair(simulator, settings)
+    diagnose = Diagnose(simulator, comparator, settings)
+    tried: list[Hypothesis] = []
+
+    def evolve_controller(hypothesis: Hypothesis) -> Controller:
+        watch(SearchBegins("repair", hypothesis))
+        return repair(hypothesis, journal.read().controllers, rng, watch)
+
+    def explain(known: Database) -> Diagnosis:
+        watch(SearchBegins("diagnostic"))
+        diagnosis = diagnose(known.evidence, known.hypotheses, rng, watch)
+        journal.note(diagnosis)
+        watch(diagnosis)
+        return diagnosis
+
+    def act(robot: PhysicalRobot, stage: Stage, believed: Hypothesis, by: Controller) -> None:
+        plan = Plan(f"{len(tried):02d}-{stage}", stage, by, settings.steps, seed)
+        tried.append(believed)
+        watch(journal.record(robot, plan))
+
+    gait = evolve_controller(INTACT)
+    act(healthy, "before", INTACT, gait)
+    act(damaged, "after", INTACT, gait)
+    for _ in range(settings.trials):
+        believed = explain(journal.read()).best
+        act(damaged, "recovery", believed, evolve_controller(believed))
+    diagnosis = explain(journal.read())
+
+    return Recovery(
+        trials=journal.read().trials,
+        tried=tuple(tried),
+        diagnosis=diagnosis,
+        repair_evaluations=repair.evaluations,
+        diagnostic_evaluations=diagnose.evaluations,
+        distinct_hypotheses=diagnose.distinct_hypotheses,
+    )

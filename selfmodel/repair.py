@@ -1,0 +1,67 @@
+"""The repair EA: evolves a controller that makes a robot with a given hypothesis walk."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from selfmodel.arrays import FloatArray
+from selfmodel.behaviour import forward_displacement
+from selfmodel.controller import Controller, draw_weights
+from selfmodel.evolution import Evolution, Observe, evolve
+from selfmodel.hypothesis import Hypothesis
+from selfmodel.memo import Memo
+from selfmodel.settings import Settings
+from selfmodel.simulator import Run, Simulator
+
+
+class Repair:
+    """Evolves controllers in simulation; it remembers the fitness of every run.
+
+    Fitness is the forward displacement in metres. Source: the paper, section III.
+
+    Args:
+        simulator: The self-model.
+        settings: The numbers of the search.
+    """
+
+    def __init__(self, simulator: Simulator, settings: Settings) -> None:
+        self._simulator = simulator
+        self._settings = settings
+        self._fitness: Memo[Run] = Memo()
+        self.evaluations = 0
+
+    def __call__(
+        self,
+        hypothesis: Hypothesis,
+        seeds: Sequence[Controller],
+        rng: np.random.Generator,
+        observe: Observe,
+    ) -> Controller:
+        """Returns the best controller found.
+
+        Args:
+            hypothesis: What is taken to be wrong with the robot.
+            seeds: Controllers to start from, beside random ones.
+            rng: Every random choice comes from it.
+            observe: Is told of every generation.
+        """
+        network = self._simulator.robot.network
+
+        def fitness(genomes: FloatArray) -> FloatArray:
+            runs = [(hypothesis, Controller(network, genome)) for genome in genomes]
+            return self._fitness.values(runs, self._simulate)
+
+        search = Evolution(
+            network.weights,
+            draw_weights,
+            self._settings,
+            rng,
+            [controller.genome for controller in seeds],
+        )
+        evolve(search, fitness, observe)
+        self.evaluations += search.evaluations
+        return Controller(network, search.best)
+
+    def _simulate(self, runs: list[Run]) -> FloatArray:
+        outcome = self._simulator.run(runs, self._settings.steps, ("base_position",))
+        return np.where(outcome.diverged, -np.inf, forward_displacement(outcome.behaviour))

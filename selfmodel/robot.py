@@ -1,0 +1,161 @@
+"""A robot: an MJCF model, its parts by name, and its rhythm."""
+
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+
+from selfmodel.anatomy import Anatomy, Joint, Sensor
+from selfmodel.controller import HIDDEN_NEURONS, Network
+from selfmodel.embodiment import Embodiment, embody
+from selfmodel.hypothesis import Hypothesis
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A body plan with nothing wrong, and how often it is controlled.
+
+    Everything but the control time step is read from the MJCF, so a log that carries both carries
+    the robot. Forward is the world's x axis at the start.
+
+    Attributes:
+        name: What it is called.
+        mjcf: The model, as one XML text that needs no other file.
+        control_timestep: Seconds between two commands.
+        model: The compiled model.
+        anatomy: Its joints, sensors and motors.
+        root: Its root body, whose travel counts.
+    """
+
+    name: str
+    mjcf: str
+    control_timestep: float
+    model: mujoco.MjModel = field(init=False, repr=False)
+    anatomy: Anatomy = field(init=False, repr=False)
+    root: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        model = mujoco.MjModel.from_xml_string(self.mjcf)
+        object.__setattr__(self, "model", model)
+        object.__setattr__(self, "anatomy", read_anatomy(model))
+        object.__setattr__(self, "root", _root(model))
+        if not np.isclose(self.substeps * model.opt.timestep, self.control_timestep, rtol=1e-9):
+            raise ValueError(
+                f"the control time step {self.control_timestep} s must be a multiple of the "
+                f"physics time step {model.opt.timestep} s"
+            )
+
+    @property
+    def substeps(self) -> int:
+        """Physics steps in a control step."""
+        return max(1, round(self.control_timestep / float(self.model.opt.timestep)))
+
+    @property
+    def network(self) -> Network:
+        """The network that controls it."""
+        names = self.anatomy.names
+        return Network(names.sensors, names.motors, self.anatomy.neurons)
+
+    @property
+    def standing_height(self) -> float:
+        """Height of the root body above the ground at the start, m."""
+        return float(self.model.body(self.root).pos[2])
+
+    def build(self, hypothesis: Hypothesis) -> Embodiment:
+        """Returns this robot with what the hypothesis says wrong with it."""
+        return embody(self.model, self.anatomy, hypothesis)
+
+
+def read_anatomy(model: mujoco.MjModel, neurons: int = HIDDEN_NEURONS) -> Anatomy:
+    """Returns the parts of a robot that its model names.
+
+    Hinges that move one body and have a motor are one joint, called by what their names share.
+    Touch sensors and joint position sensors feed the controller.
+
+    Args:
+        model: A compiled MJCF.
+        neurons: Hidden neurons of its controller.
+    """
+    sensors = _sensors(model)
+    hinges = [model.joint(j) for j in range(model.njnt) if model.jnt_type[j] == _HINGE]
+    by_body: dict[int, list[str]] = {}
+    for hinge in hinges:
+        by_body.setdefault(int(hinge.bodyid[0]), []).append(hinge.name)
+    bodies_beyond = {
+        body: frozenset(model.body(b).name for b in _subtree(model, body)) for body in by_body
+    }
+    names = {body: _shared_name(group) for body, group in by_body.items()}
+    joints = tuple(
+        Joint(
+            name=names[body],
+            hinges=tuple(group),
+            motors=tuple(name for hinge in group for name in _motors(model, hinge)),
+            bodies=bodies_beyond[body],
+            lost=frozenset(
+                [names[b] for b in by_body if b != body and model.body(b).name in lost_bodies]
+                + [sensor.name for sensor in sensors if sensor.body in lost_bodies]
+            ),
+            limits=tuple((float(r[0]), float(r[1])) for r in (model.joint(h).range for h in group)),
+        )
+        for body, group in by_body.items()
+        for lost_bodies in (bodies_beyond[body],)
+    )
+    return Anatomy(
+        joints=joints,
+        sensors=sensors,
+        motors=tuple(model.actuator(m).name for m in range(model.nu)),
+        hinges=tuple(hinge.name for hinge in hinges),
+        neurons=neurons,
+    )
+
+
+_HINGE = mujoco.mjtJoint.mjJNT_HINGE
+_TOUCH = mujoco.mjtSensor.mjSENS_TOUCH
+_ANGLE = mujoco.mjtSensor.mjSENS_JOINTPOS
+
+
+def _root(model: mujoco.MjModel) -> str:
+    for j in range(model.njnt):
+        if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_FREE:
+            return str(model.body(model.jnt_bodyid[j]).name)
+    raise ValueError("the model needs a root body with a free joint, and has none")
+
+
+def _subtree(model: mujoco.MjModel, body: int) -> list[int]:
+    """The body and all beyond it; a child comes after its parent in a model."""
+    found = [body]
+    found += [b for b in range(body + 1, model.nbody) if _descends(model, b, body)]
+    return found
+
+
+def _descends(model: mujoco.MjModel, body: int, ancestor: int) -> bool:
+    while body > ancestor:
+        body = model.body_parentid[body]
+    return body == ancestor
+
+
+def _motors(model: mujoco.MjModel, hinge: str) -> list[str]:
+    joint = model.joint(hinge).id
+    return [model.actuator(m).name for m in range(model.nu) if model.actuator_trnid[m, 0] == joint]
+
+
+def _shared_name(hinges: list[str]) -> str:
+    """What all names have in common: ``front_left_hip`` of its ``_swing`` and ``_lift``."""
+    shared = hinges[0]
+    while not all(name.startswith(shared) for name in hinges):
+        shared = shared[:-1]
+    return shared.rstrip("_")
+
+
+def _sensors(model: mujoco.MjModel) -> tuple[Sensor, ...]:
+    touch, angle = [], []
+    for s in range(model.nsensor):
+        name, target = model.sensor(s).name, int(model.sensor_objid[s])
+        if model.sensor_type[s] == _TOUCH:
+            body = model.body(model.site_bodyid[target]).name
+            touch.append(Sensor(name, "touch", body, "", 1.0))
+        elif model.sensor_type[s] == _ANGLE:
+            hinge = model.joint(target)
+            body = model.body(hinge.bodyid[0]).name
+            angle.append(Sensor(name, "angle", body, hinge.name, float(hinge.range[1])))
+    return tuple(touch + angle)

@@ -1,0 +1,78 @@
+"""The paper's numbers, as one record."""
+
+import dataclasses
+from dataclasses import dataclass
+
+from selfmodel.errors import InputError
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How long a run is, how both EAs search, and how many trials a recovery may spend.
+
+    Source: the paper, sections III and IV. Its surviving text has lost digits; the values of
+    ``steps``, ``population``, ``generations`` and ``survivors`` are reconstructed.
+
+    Attributes:
+        steps: Control steps of a run.
+        trials: Physical trials after the failing one.
+        population: Genomes in a generation.
+        generations: Generations of an EA, the random first one included.
+        survivors: How many of the best live on.
+        tournament: How many survivors compete to be a child's parent.
+        mutation: Probability that a value of a child is drawn anew.
+        crossovers: How many of the pairs of children cross over, at one point.
+        genes: Faults that a diagnostic genome has room for.
+        kept: Hypotheses that a diagnosis reports and that seed the next one.
+
+    Raises:
+        InputError: A number does not fit the others.
+    """
+
+    steps: int = 1000
+    trials: int = 3
+    population: int = 100
+    generations: int = 30
+    survivors: int = 50
+    tournament: int = 3
+    mutation: float = 0.01
+    crossovers: int = 12
+    genes: int = 4
+    kept: int = 10
+
+    def __post_init__(self) -> None:
+        for name in ("trials", "generations", "survivors", "tournament", "genes", "kept"):
+            if getattr(self, name) < 1:
+                raise InputError(f"{name} must be at least 1, got {getattr(self, name)}")
+        if self.steps < 2:
+            raise InputError(
+                f"steps must be at least 2, so that there is a first and a last, got {self.steps}"
+            )
+        if self.population <= self.survivors:
+            raise InputError(
+                f"population must exceed the {self.survivors} survivors, got {self.population}"
+            )
+        if not 0 <= self.mutation <= 1:
+            raise InputError(f"mutation is a probability in [0, 1], got {self.mutation}")
+        if not 0 <= self.crossovers <= (self.population - self.survivors) // 2:
+            raise InputError(
+                f"crossovers must be between 0 and the "
+                f"{(self.population - self.survivors) // 2} pairs of children, "
+                f"got {self.crossovers}"
+            )
+
+    def scaled(self, population: int) -> "Settings":
+        """Returns these settings for another population, in the paper's proportions.
+
+        Raises:
+            InputError: ``population`` is below 2.
+        """
+        if population < 2:
+            raise InputError(f"population must be at least 2, got {population}")
+        survivors = population // 2
+        return dataclasses.replace(
+            self,
+            population=population,
+            survivors=survivors,
+            crossovers=round((population - survivors) // 2 * 12 / 25),
+        )

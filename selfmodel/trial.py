@@ -1,0 +1,53 @@
+"""A trial: one run of the physical robot with one controller, as its log tells it."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from selfmodel.behaviour import Behaviour, forward_displacement
+from selfmodel.controller import Controller
+
+Stage = Literal["before", "after", "recovery", "single"]
+"""Where in a story a trial stands: the robot walks (``before``), no longer does as its model says
+(``after``), tries a compensating controller (``recovery``), or runs outside a recovery
+(``single``)."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is known of a trial before it starts.
+
+    Attributes:
+        name: Identifies the trial within its run, and names its file: letters, digits, ``-``.
+        stage: Where in the story it stands.
+        controller: What drives the robot.
+        steps: Control steps that it is to last.
+        seed: From which everything random about it is drawn.
+    """
+
+    name: str
+    stage: Stage
+    controller: Controller
+    steps: int
+    seed: int
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A finished trial.
+
+    Attributes:
+        plan: What was to be done.
+        robot: The name of the robot.
+        behaviour: What was observed, every signal of it.
+        path: The log it was read from.
+    """
+
+    plan: Plan
+    robot: str
+    behaviour: Behaviour
+    path: str
+
+    @property
+    def displacement(self) -> float:
+        """How far the robot travelled forward, m."""
+        return float(forward_displacement(self.behaviour))

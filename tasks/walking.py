@@ -1,0 +1,110 @@
+"""The walking task: get forward, in the form of a dm_control task."""
+
+from collections import OrderedDict
+from typing import Any
+
+import numpy as np
+from dm_control import mujoco
+from dm_control.mujoco.wrapper import core
+from dm_control.rl import control
+from dm_control.suite import base
+
+from selfmodel.arrays import FloatArray
+from selfmodel.embodiment import Embodiment
+from selfmodel.notation import parse
+from selfmodel.places import places
+from selfmodel.robot import Robot
+from selfmodel.senses import Senses
+
+
+def environment(
+    robot: Robot,
+    hypothesis: str,
+    time_limit: float,
+    random: int | np.random.RandomState | None,
+    environment_kwargs: dict[str, Any] | None,
+) -> control.Environment:
+    """Returns the environment in which a robot walks.
+
+    The physics, the readings and their timing are those of the simulator, to the bit.
+
+    Args:
+        robot: The robot with nothing wrong.
+        hypothesis: What is to be wrong, in notation; silent neurons are the controller's affair
+            and change nothing here.
+        time_limit: Length of an episode, s.
+        random: For dm_control's tasks; walking starts from one place, so nothing depends on it.
+        environment_kwargs: For ``control.Environment``.
+    """
+    embodiment = robot.build(parse(hypothesis, robot.anatomy))
+    return control.Environment(
+        Physics.from_model(core.MjModel(embodiment.model)),
+        Walk(robot, embodiment, random),
+        time_limit=time_limit,
+        control_timestep=robot.control_timestep,
+        **(environment_kwargs or {}),
+    )
+
+
+class Physics(mujoco.Physics):
+    """MuJoCo with the reading that walking is about."""
+
+    def forward_position(self) -> float:
+        """Returns where the root body is along the world's x axis, m."""
+        return float(self.data.qpos[0])
+
+
+class Walk(base.Task):
+    """Rewards forward speed, m/s: the sum of the rewards times the time step is the distance.
+
+    Args:
+        robot: The robot with nothing wrong.
+        embodiment: The same with what is wrong.
+        random: A seed or a numpy ``RandomState``.
+    """
+
+    def __init__(
+        self, robot: Robot, embodiment: Embodiment, random: int | np.random.RandomState | None
+    ) -> None:
+        super().__init__(random=random)
+        self._robot = robot
+        self._embodiment = embodiment
+        self._senses = Senses(embodiment.model, robot.anatomy, [embodiment])
+        self._places = places(robot)
+        self._start = self._end = 0.0
+
+    def initialize_episode(self, physics: Physics) -> None:
+        """Puts the robot at its start."""
+        super().initialize_episode(physics)
+        self._start = self._end = physics.forward_position()
+
+    def before_step(self, action: FloatArray, physics: Physics) -> None:
+        """Takes the motor targets, rad."""
+        self._start = physics.forward_position()
+        super().before_step(action, physics)
+
+    def after_step(self, physics: Physics) -> None:
+        """Sees where the step led."""
+        self._end = physics.forward_position()
+        super().after_step(physics)
+
+    def get_reward(self, _physics: Physics) -> float:
+        """Returns the forward speed over the last control step, m/s."""
+        return (self._end - self._start) / self._robot.control_timestep
+
+    def get_observation(self, physics: Physics) -> "OrderedDict[str, FloatArray]":
+        """Returns what the controller receives, and the rest of the state but for where it is."""
+        readings = np.empty((1, len(self._robot.anatomy.sensors)))
+        self._senses.read(physics.data.sensordata[np.newaxis], readings)
+        observation = OrderedDict(sensors=readings[0])
+        for signal in (
+            "joint_positions",
+            "joint_velocities",
+            "base_orientation",
+            "base_linear_velocity",
+            "base_angular_velocity",
+        ):
+            place = self._places[signal]
+            observation[signal] = getattr(physics.data, place.field)[place.columns].copy()
+        observation["base_height"] = physics.data.qpos[2:3].copy()
+        return observation
