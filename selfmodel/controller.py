@@ -40,7 +40,7 @@ class Network:
                 to motors with the bias last, each by rows of the neuron that receives.
 
         Returns:
-            ``(n, hidden, sensors + 1 + hidden)`` and ``(n, motors, hidden + 1)``.
+            ``(n, hidden, sensors + hidden + 1)`` and ``(n, motors, hidden + 1)``, the bias last.
         """
         blocks = []
         start = 0
@@ -49,7 +49,10 @@ class Network:
             blocks.append(block.reshape(-1, rows, columns))
             start += rows * columns
         from_input, from_hidden, to_motor = blocks
-        return np.concatenate([from_input, from_hidden], axis=2), np.ascontiguousarray(to_motor)
+        to_hidden = np.concatenate(
+            [from_input[..., :-1], from_hidden, from_input[..., -1:]], axis=2
+        )
+        return to_hidden, np.ascontiguousarray(to_motor)
 
     def _shapes(self) -> tuple[tuple[int, int], ...]:
         return (
@@ -118,11 +121,12 @@ class Population:
         self._to_hidden, self._to_motors = network.layers(genomes)
         self._neurons = None if np.all(neurons == 1) else neurons
         sensors = len(network.sensors)
-        self._inputs = np.zeros((len(genomes), sensors + 1 + network.hidden))
-        self._inputs[:, sensors] = 1.0
-        self._outputs = np.ones((len(genomes), network.hidden + 1))
+        # Sensors, hidden neurons and the bias in one row: what feeds either layer is a slice of it.
+        self._inputs = np.zeros((len(genomes), sensors + network.hidden + 1))
+        self._inputs[:, -1] = 1.0
         self.readings = self._inputs[:, :sensors]
-        self._hidden = self._inputs[:, sensors + 1 :]
+        self._hidden = self._inputs[:, sensors:-1]
+        self._outputs = self._inputs[:, sensors:]
 
     def step(self, targets: FloatArray) -> None:
         """Computes the motor targets for what stands in ``readings``.
@@ -132,11 +136,9 @@ class Population:
         """
         # einsum sums each row by itself, in an order that the number of rows does not change.
         hidden = np.einsum("nij,nj->ni", self._to_hidden, self._inputs)
-        np.tanh(hidden, out=hidden)
+        np.tanh(hidden, out=self._hidden)
         if self._neurons is not None:
-            hidden *= self._neurons
-        self._hidden[:] = hidden
-        self._outputs[:, :-1] = hidden
+            self._hidden *= self._neurons
         motors = np.einsum("nij,nj->ni", self._to_motors, self._outputs)
         np.tanh(motors, out=motors)
         np.multiply(motors, TARGET_RANGE, out=targets)

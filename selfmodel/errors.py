@@ -1,4 +1,4 @@
-"""The error for input that a user can mend, and the sentence for a name nobody knows."""
+"""The errors that a user meets, and the sentence for a name nobody knows."""
 
 import difflib
 from collections.abc import Iterable
@@ -10,6 +10,10 @@ class InputError(ValueError):
     The message is one sentence that says what was expected, what came, and how to mend it; the
     command line prints it as it is and exits with status 2.
     """
+
+
+class TrialError(RuntimeError):
+    """A physical robot could not finish a trial."""
 
 
 def unknown_name(what: str, name: str, known: Iterable[str]) -> InputError:

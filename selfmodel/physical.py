@@ -8,6 +8,7 @@ import numpy as np
 
 from selfmodel.behaviour import SIGNALS, Sample
 from selfmodel.controller import Controller, Population
+from selfmodel.errors import TrialError
 from selfmodel.hypothesis import INTACT, Hypothesis
 from selfmodel.places import places
 from selfmodel.robot import Robot
@@ -45,7 +46,11 @@ class SimulatedRobot:
         self._embodiment = robot.build(hidden)
 
     def run(self, controller: Controller, steps: int) -> Iterator[Sample]:
-        """Runs a controller; see ``PhysicalRobot``. The same bits as the ``Simulator``'s."""
+        """Runs a controller; see ``PhysicalRobot``. The same bits as the ``Simulator``'s.
+
+        Raises:
+            TrialError: The simulation diverged.
+        """
         robot, embodiment = self._robot, self._embodiment
         model, data = embodiment.model, mujoco.MjData(embodiment.model)
         mujoco.mj_forward(model, data)
@@ -53,7 +58,7 @@ class SimulatedRobot:
         brain = Population([controller], embodiment.neurons[np.newaxis])
         where = places(robot)
         for k in range(steps):
-            senses.read(data.sensordata[np.newaxis], brain.readings)
+            senses.read(data.sensordata[np.newaxis], data.qpos[np.newaxis], brain.readings)
             brain.step(data.ctrl[np.newaxis])
             yield Sample(
                 time=k * robot.control_timestep,
@@ -65,12 +70,9 @@ class SimulatedRobot:
                 },
             )
             if k + 1 < steps:
-                _step(model, data, robot.substeps)
-
-
-def _step(model: mujoco.MjModel, data: mujoco.MjData, substeps: int) -> None:
-    """Steps as dm_control's Physics does, so that sensors of position and velocity are current."""
-    mujoco.mj_step2(model, data)
-    if substeps > 1:
-        mujoco.mj_step(model, data, substeps - 1)
-    mujoco.mj_step1(model, data)
+                mujoco.mj_step(model, data, robot.substeps)
+                if data.warning.number.any():
+                    raise TrialError(
+                        f"the simulation of the physical robot broke down after step {k}: its "
+                        f"model is unstable under this controller; try a smaller physics time step"
+                    )

@@ -82,6 +82,7 @@ def recover(
     settings: Settings,
     seed: int,
     watch: Callable[[Event], None],
+    gait: Controller | None = None,
 ) -> Recovery:
     """Lets a robot walk until it fails, then finds out what is wrong and how it walks again.
 
@@ -94,22 +95,25 @@ def recover(
         settings: The paper's numbers.
         seed: Every random choice comes from it.
         watch: Is told what happens.
+        gait: How the robot walks before it fails; evolved if there is none. The rest of the
+            recovery is the same whether a gait was evolved here, or earlier from the same seed.
 
     Returns:
         What the journal says at the end.
     """
-    rng = np.random.default_rng(seed)
+    # A stream for each search, so that what one draws does not move the others.
+    streams = iter(np.random.default_rng(seed).spawn(2 + 2 * settings.trials))
     repair = Repair(simulator, settings)
     diagnose = Diagnose(simulator, comparator, settings)
     tried: list[Hypothesis] = []
 
     def evolve_controller(hypothesis: Hypothesis) -> Controller:
         watch(SearchBegins("repair", hypothesis))
-        return repair(hypothesis, journal.read().controllers, rng, watch)
+        return repair(hypothesis, journal.read().controllers, next(streams), watch)
 
     def explain(known: Database) -> Diagnosis:
         watch(SearchBegins("diagnostic"))
-        diagnosis = diagnose(known.evidence, known.hypotheses, rng, watch)
+        diagnosis = diagnose(known.evidence, known.hypotheses, next(streams), watch)
         journal.note(diagnosis)
         watch(diagnosis)
         return diagnosis
@@ -119,7 +123,10 @@ def recover(
         tried.append(believed)
         watch(journal.record(robot, plan))
 
-    gait = evolve_controller(INTACT)
+    if gait is None:
+        gait = evolve_controller(INTACT)
+    else:
+        next(streams)
     act(healthy, "before", INTACT, gait)
     act(damaged, "after", INTACT, gait)
     for _ in range(settings.trials):

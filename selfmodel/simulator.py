@@ -1,8 +1,9 @@
 """The self-model in motion: many robots, each with its hypothesis and controller, in one batch."""
 
-from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from time import perf_counter
 
 import mujoco
@@ -67,7 +68,7 @@ class Simulator:
         self.robot = robot
         self.tally = Tally()
         self._threads = threads
-        self._embodiments: OrderedDict[Hypothesis, Embodiment] = OrderedDict()
+        self._embodiment = lru_cache(REMEMBERED_EMBODIMENTS)(robot.build)
 
     def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> Simulated:
         """Simulates each run for ``steps`` control steps from its start.
@@ -85,22 +86,25 @@ class Simulator:
             [controller for _, controller in runs],
             np.array([embodiment.neurons for embodiment in embodiments]),
         )
-        sensordata, ctrl = batch.bind("sensordata"), batch.bind("ctrl")
+        sensordata, qpos, ctrl = (batch.bind(field) for field in ("sensordata", "qpos", "ctrl"))
         live = _live(robot, batch, population, record)
         signals = {
             signal: np.empty((n, steps, robot.anatomy.names.width(signal))) for signal in record
         }
+        # After every field is bound: one that is bound later stays zero until the next step.
+        batch.reset()
         alive = _Alive(batch)
-        for k in range(steps):
-            senses.read(sensordata, population.readings)
-            population.step(ctrl)
-            for signal, kept in signals.items():
-                values, chosen = live[signal]
-                kept[:, k] = values[:, chosen]
-            if k + 1 < steps:
-                start = perf_counter()
-                alive.step(robot.substeps)
-                self.tally.physics_seconds += perf_counter() - start
+        with _counted_not_printed():
+            for k in range(steps):
+                senses.read(sensordata, qpos, population.readings)
+                population.step(ctrl)
+                for signal, kept in signals.items():
+                    values, chosen = live[signal]
+                    kept[:, k] = values[:, chosen]
+                if k + 1 < steps:
+                    start = perf_counter()
+                    alive.step(robot.substeps)
+                    self.tally.physics_seconds += perf_counter() - start
         diverged = alive.diverged()
         self.tally.runs += n
         self.tally.steps += n * steps
@@ -108,15 +112,17 @@ class Simulator:
         time = np.arange(steps, dtype=np.float64) * robot.control_timestep
         return Simulated(Behaviour(robot.anatomy.names, time, signals), diverged)
 
-    def _embodiment(self, hypothesis: Hypothesis) -> Embodiment:
-        if hypothesis not in self._embodiments:
-            self._embodiments[hypothesis] = self.robot.build(hypothesis)
-            if len(self._embodiments) > REMEMBERED_EMBODIMENTS:
-                self._embodiments.popitem(last=False)
-        return self._embodiments[hypothesis]
 
-
-_SENSORS_CURRENT = mujoco.mjtStage.mjSTAGE_VEL.value
+@contextmanager
+def _counted_not_printed() -> Iterator[None]:
+    """Keeps MuJoCo's warnings off the terminal and out of a file: each is counted by its run."""
+    before, quiet = mujoco.MjLogConfig.get(), mujoco.MjLogConfig.get()
+    quiet.logto_console = quiet.logto_file = False
+    mujoco.MjLogConfig.set(quiet)
+    try:
+        yield
+    finally:
+        mujoco.MjLogConfig.set(before)
 
 
 class _Alive:
@@ -133,9 +139,7 @@ class _Alive:
 
     def step(self, substeps: int) -> None:
         try:
-            # In a persistent batch the next step continues from this stage: it costs nothing, and
-            # joint angles are those of now, not of one physics step ago.
-            self._batch.step(self._ids, nstep=substeps, stage=_SENSORS_CURRENT)
+            self._batch.step(self._ids, nstep=substeps)
         except SimulationError as error:
             self._failed[error.ids] = True
             self._ids = np.flatnonzero(~self._failed)
@@ -146,10 +150,9 @@ class _Alive:
 
 
 def _batch(model: mujoco.MjModel, embodiments: Sequence[Embodiment], threads: int) -> Batch:
-    """A batch with each simulation on its embodiment's model, at its start."""
-    batch = Batch(model, len(embodiments), nthread=threads, persistent=True)
+    """A batch with each simulation on its embodiment's model."""
+    batch = Batch(model, len(embodiments), nthread=threads)
     batch.set_models([embodiment.model for embodiment in embodiments])
-    batch.reset()
     return batch
 
 

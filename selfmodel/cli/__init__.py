@@ -7,7 +7,7 @@ import typer
 from selfmodel.cli.recover import recover
 from selfmodel.cli.robots import robots
 from selfmodel.cli.trial import trial
-from selfmodel.errors import InputError
+from selfmodel.errors import InputError, TrialError
 
 app = typer.Typer(
     name="selfmodel",
@@ -28,7 +28,7 @@ def main() -> None:
         app()
     except InputError as error:
         _fail(str(error), 2)
-    except OSError as error:
+    except (OSError, TrialError) as error:
         # A disk that is full, a folder that may not be written: the file's name is in it.
         _fail(str(error), 1)
 

@@ -37,7 +37,7 @@ def case_notation(entry: Entry, case: int | None, damage: str | None) -> str:
         )
     if damage is not None:
         return damage
-    if case not in entry.cases:
+    if case is None or case not in entry.cases:
         raise unknown_name("case of Table I", str(case), map(str, entry.cases))
     return entry.cases[case]
 

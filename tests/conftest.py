@@ -1,0 +1,48 @@
+"""What the tests share: the robots, seeded controllers, and a journal that needs no files."""
+
+import os
+
+# dm_control looks for a display as it is imported; nothing here is drawn.
+os.environ["MUJOCO_GL"] = "disable"
+
+import numpy as np
+import pytest
+
+from selfmodel.controller import Controller, draw_weights
+from selfmodel.hypothesis import Hypothesis
+from selfmodel.notation import parse
+from selfmodel.robot import Robot
+from selfmodel.simulator import Simulator
+from selfmodel.tasks import ROBOTS
+
+
+@pytest.fixture(scope="session", params=sorted(ROBOTS))
+def robot(request: pytest.FixtureRequest) -> Robot:
+    """Every registered robot in turn."""
+    return ROBOTS[request.param].robot()
+
+
+@pytest.fixture(scope="session")
+def quadruped() -> Robot:
+    return ROBOTS["quadruped"].robot()
+
+
+def random_controllers(robot: Robot, count: int, seed: int = 0) -> list[Controller]:
+    """Returns controllers with random weights for a robot."""
+    genomes = draw_weights(np.random.default_rng(seed), (count, robot.network.weights))
+    return [Controller(robot.network, genome) for genome in genomes]
+
+
+def random_motion(robot: Robot, steps: int, seed: int = 0) -> np.ndarray:
+    """Returns smooth motor targets that move every joint, ``(steps, motors)``, rad."""
+    rng = np.random.default_rng(seed)
+    phase = rng.uniform(0, 2 * np.pi, len(robot.anatomy.motors))
+    return 0.6 * np.sin(2 * np.pi * np.arange(steps)[:, None] * robot.control_timestep + phase)
+
+
+def exploding(simulator: Simulator, text: str) -> Hypothesis:
+    """Makes a hypothesis one whose model blows up: its joints are driven, not damped."""
+    hypothesis = parse(text, simulator.robot.anatomy)
+    built = simulator._embodiment(hypothesis)
+    built.model.dof_damping[6:] = -1e3
+    return hypothesis

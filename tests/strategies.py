@@ -1,0 +1,33 @@
+"""Strategies for property-based tests: faults and hypotheses about a robot."""
+
+from hypothesis import strategies as st
+
+from selfmodel.anatomy import Anatomy
+from selfmodel.faults import KINDS, Fault, Kind
+from selfmodel.hypothesis import Hypothesis, canonical
+
+
+def faults(anatomy: Anatomy, *, graded: bool) -> st.SearchStrategy[Fault]:
+    """Faults of the kinds that a diagnosis may propose, and of all kinds where ``graded``."""
+    kinds = [kind for kind in KINDS.values() if graded or kind.hypothesised]
+    return st.sampled_from(kinds).flatmap(lambda kind: _fault(kind, anatomy, graded=graded))
+
+
+def hypotheses(
+    anatomy: Anatomy, *, most: int = 4, graded: bool = False
+) -> st.SearchStrategy[Hypothesis]:
+    """Hypotheses in canonical form."""
+    sets = st.lists(faults(anatomy, graded=graded), max_size=most)
+    return sets.map(lambda chosen: canonical(chosen, anatomy))
+
+
+def _fault(kind: Kind, anatomy: Anatomy, *, graded: bool) -> st.SearchStrategy[Fault]:
+    parts = st.sampled_from(kind.parts(anatomy))
+    if kind.degrees is None or not graded:
+        return parts.map(lambda part: Fault(kind.name, part))
+    degrees = kind.degrees
+    return parts.flatmap(
+        lambda part: st.floats(*degrees(anatomy, part)).map(
+            lambda degree: Fault(kind.name, part, degree + 0.0)
+        )
+    )

@@ -1,0 +1,169 @@
+"""Promises of the evolutionary algorithm: the paper's numbers, and it finds what it seeks."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from selfmodel.errors import InputError
+from selfmodel.evolution import Evolution, Generation, evolve
+from selfmodel.memo import Memo
+from selfmodel.settings import Settings
+
+LENGTH = 12
+
+
+def draw(rng: np.random.Generator, shape: tuple[int, ...]) -> np.ndarray:
+    return rng.random(shape)
+
+
+def search(seed: int = 0, seeds: tuple = (), **changes: float) -> Evolution:
+    settings = dataclasses.replace(Settings(), **changes)
+    return Evolution(LENGTH, draw, settings, np.random.default_rng(seed), seeds)
+
+
+def test_the_defaults_are_the_papers_numbers():
+    assert dataclasses.asdict(Settings()) == {
+        "steps": 1000,
+        "trials": 3,
+        "population": 100,
+        "generations": 30,
+        "survivors": 50,
+        "tournament": 3,
+        "mutation": 0.01,
+        "crossovers": 12,
+        "genes": 4,
+        "kept": 10,
+    }
+
+
+def test_a_search_evaluates_everybody_once_and_then_only_children():
+    evolution = search()
+    asked = []
+    while not evolution.stop():
+        asked.append(len(evolution.ask()))
+        evolution.tell(evolution.ask().sum(axis=1))
+
+    assert asked == [100] + [50] * 29
+    assert evolution.evaluations == 1550
+    assert evolution.stop() == {"generations": 30}
+
+
+def test_fitness_rises_and_never_falls():
+    generations: list[Generation] = []
+    evolution = search()
+    evolve(evolution, lambda genomes: genomes.sum(axis=1), generations.append)
+    best = [generation.best for generation in generations]
+
+    assert best == sorted(best)
+    assert best[-1] > best[0] + 1
+    assert evolution.best.sum() == best[-1]
+    assert [generation.number for generation in generations] == list(range(1, 31))
+
+
+def test_the_same_seed_finds_the_same_and_another_seed_another():
+    def best(seed: int) -> bytes:
+        evolution = search(seed)
+        evolve(evolution, lambda genomes: genomes.sum(axis=1), lambda _: None)
+        return evolution.best.tobytes()
+
+    assert best(3) == best(3) != best(4)
+
+
+def test_seeds_start_in_the_population():
+    seed = np.full(LENGTH, 0.999)
+    evolution = search(seeds=(seed,))
+
+    assert len(evolution.ask()) == 100
+    assert evolution.ask()[0].tobytes() == seed.tobytes()
+
+
+def test_more_seeds_than_population_are_cut():
+    evolution = search(seeds=tuple(np.full(LENGTH, i / 200) for i in range(120)))
+
+    assert evolution.ask().shape == (100, LENGTH)
+
+
+def test_the_worst_fitness_does_not_survive():
+    evolution = search()
+    fitness = np.where(np.arange(100) < 50, -np.inf, np.arange(100))
+    losers = {genome.tobytes() for genome in evolution.ask()[:50]}
+    evolution.tell(fitness.astype(float))
+
+    assert evolution.best_fitness == 99
+    assert not losers & {genome.tobytes() for genome in evolution._genomes}
+
+
+def test_children_differ_from_survivors_by_one_percent_mutations_and_crossover():
+    counts = []
+    for seed in range(40):
+        evolution = search(seed, crossovers=0)
+        parents = {genome.tobytes() for genome in evolution.ask()}
+        evolution.tell(np.arange(100.0))
+        counts.append(sum(child.tobytes() not in parents for child in evolution.ask()))
+    expected = 50 * (1 - 0.99**LENGTH)
+
+    assert abs(np.mean(counts) - expected) < 1
+    crossed = search(crossovers=12, mutation=0.0)
+    parents = {genome.tobytes() for genome in crossed.ask()}
+    crossed.tell(np.arange(100.0))
+    new = [child for child in crossed.ask() if child.tobytes() not in parents]
+    values = {value for genome in parents for value in np.frombuffer(genome)}
+
+    assert 0 < len(new) <= 24
+    assert all(value in values for child in new for value in child)
+
+
+def test_tournaments_prefer_the_fit():
+    evolution = search(mutation=0.0, crossovers=0)
+    rank = {genome.tobytes(): i for i, genome in enumerate(evolution.ask())}
+    evolution.tell(-np.arange(100.0))
+    ranks = [rank[child.tobytes()] for child in evolution.ask()]
+
+    assert max(ranks) < 50
+    assert np.mean(ranks) < 20  # the least of three out of 0..49 is 12 on average
+
+
+@pytest.mark.parametrize("fitness", [np.zeros(99), np.full(100, np.nan)])
+def test_a_fitness_that_does_not_fit_is_refused(fitness: np.ndarray):
+    with pytest.raises(ValueError, match="expected a fitness for each of the 100 genomes"):
+        search().tell(fitness)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"steps": 1}, "steps must be at least 2"),
+        ({"generations": 0}, "generations must be at least 1, got 0"),
+        ({"population": 50}, "population must exceed the 50 survivors, got 50"),
+        ({"mutation": 1.1}, "mutation is a probability"),
+        ({"crossovers": 26}, "crossovers must be between 0 and the 25 pairs"),
+    ],
+)
+def test_settings_that_do_not_fit_each_other_are_refused(change: dict, said: str):
+    with pytest.raises(InputError, match=said):
+        dataclasses.replace(Settings(), **change)
+
+
+@pytest.mark.parametrize("population", [2, 3, 10, 100, 101, 1000])
+def test_another_population_keeps_the_papers_proportions(population: int):
+    scaled = Settings().scaled(population)
+
+    assert scaled.population == population
+    assert scaled.survivors == population // 2
+    assert abs(scaled.crossovers - 0.12 * population) <= 1
+
+
+def test_a_memo_computes_every_key_once():
+    computed: list[str] = []
+
+    def compute(keys: list[str]) -> np.ndarray:
+        computed.extend(keys)
+        return np.array([float(len(key)) for key in keys])
+
+    memo: Memo[str] = Memo()
+
+    assert memo.values(["a", "bb", "a"], compute).tolist() == [1, 2, 1]
+    assert memo.values(["bb", "ccc"], compute).tolist() == [2, 3]
+    assert computed == ["a", "bb", "ccc"]
+    assert len(memo) == 3

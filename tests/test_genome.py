@@ -1,0 +1,70 @@
+"""Promises of the diagnostic genome: every genome is a hypothesis, and back again."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from selfmodel.errors import InputError
+from selfmodel.genome import VALUES, decode, encode, hypothesised_kinds
+from selfmodel.hypothesis import INTACT
+from selfmodel.notation import parse
+from selfmodel.tasks import ROBOTS
+from tests.strategies import hypotheses
+
+ANATOMIES = {name: entry.robot().anatomy for name, entry in ROBOTS.items()}
+GENES = 4
+
+
+@pytest.mark.parametrize("name", ANATOMIES)
+@given(data=st.data())
+def test_a_hypothesis_encodes_to_a_genome_that_decodes_to_it(name: str, data: st.DataObject):
+    hypothesis = data.draw(hypotheses(ANATOMIES[name], most=GENES))
+
+    assert decode(encode(hypothesis, GENES, ANATOMIES[name]), ANATOMIES[name]) == hypothesis
+
+
+@pytest.mark.parametrize("name", ANATOMIES)
+@given(genome=arrays(float, GENES * VALUES, elements=st.floats(0, 1, exclude_max=True)))
+def test_any_genome_decodes_to_a_hypothesis_with_notation(name: str, genome: np.ndarray):
+    hypothesis = decode(genome, ANATOMIES[name])
+
+    assert len(hypothesis) <= GENES
+    assert parse(str(hypothesis), ANATOMIES[name]) == hypothesis
+
+
+def test_dormant_genes_say_nothing():
+    genome = np.full(GENES * VALUES, 0.9)
+    genome[::VALUES] = 0.49
+
+    assert decode(genome, ANATOMIES["quadruped"]) == INTACT
+
+
+@pytest.mark.parametrize("name", ANATOMIES)
+def test_every_part_of_every_kind_can_be_reached(name: str):
+    anatomy = ANATOMIES[name]
+    expected = {
+        f"{kind.name}:{part}" for kind in hypothesised_kinds() for part in kind.parts(anatomy)
+    }
+    kind_and_part = (np.arange(200) + 0.5) / 200
+    reached = {
+        str(decode(np.array([1.0, kind, part, 0.0]), anatomy))
+        for kind in kind_and_part[::20]
+        for part in kind_and_part
+    }
+
+    assert reached == expected
+
+
+@pytest.mark.parametrize("text", ["neuron:0", "jam:front_left_knee=0.3"])
+def test_what_no_genome_can_express_is_refused(text: str):
+    with pytest.raises(InputError, match="no diagnostic genome can express"):
+        encode(parse(text, ANATOMIES["quadruped"]), GENES, ANATOMIES["quadruped"])
+
+
+def test_more_faults_than_genes_are_refused():
+    both = parse("break:front_left_knee+jam:back_left_knee", ANATOMIES["quadruped"])
+
+    with pytest.raises(InputError, match="1 genes has no room for the 2 faults"):
+        encode(both, 1, ANATOMIES["quadruped"])

@@ -1,0 +1,73 @@
+"""Promises of canonical form: equal hypotheses are equal robots, in the fewest words."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from selfmodel.faults import Fault
+from selfmodel.hypothesis import INTACT, canonical
+from selfmodel.notation import parse
+from selfmodel.tasks import ROBOTS
+from tests.strategies import faults
+
+ANATOMIES = {name: entry.robot().anatomy for name, entry in ROBOTS.items()}
+
+
+@pytest.mark.parametrize("name", ANATOMIES)
+@given(data=st.data())
+def test_order_and_repetition_do_not_matter(name: str, data: st.DataObject):
+    anatomy = ANATOMIES[name]
+    chosen = data.draw(st.lists(faults(anatomy, graded=False), max_size=6))
+    shuffled = data.draw(st.permutations(chosen + chosen[:2]))
+
+    assert canonical(chosen, anatomy) == canonical(shuffled, anatomy)
+
+
+@pytest.mark.parametrize("name", ANATOMIES)
+@given(data=st.data())
+def test_canonical_form_is_a_fixed_point(name: str, data: st.DataObject):
+    anatomy = ANATOMIES[name]
+    chosen = data.draw(st.lists(faults(anatomy, graded=True), max_size=6))
+    once = canonical(chosen, anatomy)
+
+    assert canonical(once.faults, anatomy) == once
+
+
+@pytest.mark.parametrize(
+    ("said", "meant"),
+    [
+        ("break:front_left_shoulder+break:front_left_knee", "break:front_left_shoulder"),
+        ("break:front_left_shoulder+jam:front_left_knee", "break:front_left_shoulder"),
+        ("break:front_left_shoulder+jam:front_left_shoulder", "break:front_left_shoulder"),
+        ("break:front_left_knee+sensor:front_left_touch", "break:front_left_knee"),
+        ("break:front_left_shoulder+sensor:front_left_angle", "break:front_left_shoulder"),
+        ("jam:front_left_shoulder+sensor:front_left_angle", "jam:front_left_shoulder"),
+    ],
+)
+def test_what_another_fault_leaves_without_effect_is_absorbed(said: str, meant: str):
+    assert str(parse(said, ANATOMIES["quadruped"])) == meant
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "break:front_left_knee+jam:front_left_shoulder",
+        "break:front_left_knee+sensor:front_left_angle",
+        "break:front_left_shoulder+sensor:front_right_touch",
+        "jam:front_left_knee+sensor:front_left_touch",
+        "jam:front_left_shoulder=0.3+sensor:front_left_angle",
+    ],
+)
+def test_faults_that_both_matter_are_both_kept(said: str):
+    assert len(parse(said, ANATOMIES["quadruped"])) == 2
+
+
+def test_no_faults_mean_intact():
+    assert canonical([], ANATOMIES["quadruped"]) == INTACT
+    assert str(INTACT) == "intact"
+
+
+def test_one_degree_a_part_is_kept():
+    twice = [Fault("jam", "front_left_knee", 0.1), Fault("jam", "front_left_knee", 0.2)]
+
+    assert canonical(twice, ANATOMIES["quadruped"]).faults == (twice[0],)
