@@ -57,7 +57,7 @@ class Diagnose:
             hypotheses = [decode(genome, anatomy) for genome in genomes]
             distances = self.distances(hypotheses, trials)
             totals.update(zip(hypotheses, map(float, distances), strict=True))
-            return -distances
+            return 0.0 - distances  # not -distances: a perfect fitness reads 0, not -0
 
         search = Evolution(
             genes * VALUES,

@@ -6,6 +6,7 @@ from pathlib import Path
 from time import perf_counter
 
 from selfmodel.comparator import Comparator
+from selfmodel.controller import Controller
 from selfmodel.hypothesis import INTACT, Hypothesis
 from selfmodel.judge import is_correct
 from selfmodel.logs.journal import open_journal
@@ -29,6 +30,7 @@ class Experiment:
         seed: Every random choice comes from it.
         threads: Threads for the physics.
         folder: Where the run is kept.
+        gait: How the robot walks before it fails; evolved if there is none.
     """
 
     robot: Robot
@@ -39,6 +41,7 @@ class Experiment:
     seed: int
     threads: int
     folder: Path
+    gait: Controller | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +80,7 @@ def run(experiment: Experiment, watch: Callable[[Event], None]) -> Outcome:
         settings=experiment.settings,
         seed=experiment.seed,
         watch=watch,
+        gait=experiment.gait,
     )
     return Outcome(
         recovery=recovery,

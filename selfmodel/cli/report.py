@@ -12,21 +12,23 @@ from selfmodel.cli.experiment import Experiment, Outcome
 
 def as_object(experiment: Experiment, outcome: Outcome) -> str:
     """Returns the outcome as one JSON object."""
-    return json.dumps(_facts(experiment, outcome), indent=2, allow_nan=False)
+    return json.dumps(facts(experiment, outcome), indent=2, allow_nan=False)
 
 
 def print_report(experiment: Experiment, outcome: Outcome) -> None:
     """Prints the trials, and the diagnosis beside the truth."""
-    facts = _facts(experiment, outcome)
+    found = facts(experiment, outcome)
     console = Console()
     trials = Table("trial", "controller evolved for", "forward, m", title="physical trials")
+    trials.columns[1].overflow = "fold"
     trials.columns[2].justify = "right"
-    for trial in facts["trials"]:
+    for trial in found["trials"]:
         trials.add_row(trial["stage"], trial["hypothesis"], f"{trial['displacement']:.3f}")
-    diagnosis = Table("", "hypothesis", "distance, m", title="diagnosis")
+    diagnosis = Table("", "hypothesis", "distance", title="diagnosis")
+    diagnosis.columns[1].overflow = "fold"
     diagnosis.columns[2].justify = "right"
-    for rank, candidate in enumerate(facts["diagnosis"], start=1):
-        mark = " (the truth)" if candidate["hypothesis"] == facts["truth"] else ""
+    for rank, candidate in enumerate(found["diagnosis"], start=1):
+        mark = " (the truth)" if candidate["hypothesis"] == found["truth"] else ""
         distance = candidate["distance"]
         diagnosis.add_row(
             str(rank),
@@ -34,22 +36,23 @@ def print_report(experiment: Experiment, outcome: Outcome) -> None:
             "diverged" if distance is None else f"{distance:.4f}",
         )
     console.print(trials, diagnosis)
-    evaluations = facts["evaluations"]
-    verdict = "right" if facts["correct"] else "wrong"
+    evaluations = found["evaluations"]
+    verdict = "right" if found["correct"] else "wrong"
     console.print(
-        f"truth: {facts['truth']}; the diagnosis is {verdict}.\n"
-        f"The robot went {facts['displacement']['before']:.2f} m before, "
-        f"{facts['displacement']['after']:.2f} m after the failure, and "
-        f"{facts['displacement']['recovered']:.2f} m at best in "
-        f"{facts['physical_trials']} trials since.\n"
+        f"truth: {found['truth']}; the diagnosis is {verdict}.\n"
+        f"The robot went {found['displacement']['before']:.2f} m before, "
+        f"{found['displacement']['after']:.2f} m after the failure, and "
+        f"{found['displacement']['recovered']:.2f} m at best in "
+        f"{found['physical_trials']} trials since.\n"
         f"{evaluations['repair']} controllers and {evaluations['distinct_hypotheses']} distinct "
-        f"hypotheses in {facts['seconds']:.0f} s; diverged: {evaluations['diverged']}.\n"
+        f"hypotheses in {found['seconds']:.0f} s; diverged: {evaluations['diverged']}.\n"
         f"Logs: {experiment.folder}",
         highlight=False,
     )
 
 
-def _facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
+def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
+    """Returns the outcome as plain values, as ``recover --json`` prints it."""
     recovery, tally = outcome.recovery, outcome.tally
     return {
         "robot": experiment.robot.name,

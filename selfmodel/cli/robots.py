@@ -71,6 +71,7 @@ def _print_one(facts: dict[str, Any]) -> None:
     for kind in ("joints", "hinges", "sensors", "motors"):
         table.add_row(kind, ", ".join(facts[kind]))
     cases = Table("case", "damage", title="failures of Table I")
+    cases.columns[1].overflow = "fold"
     for number, notation in facts["cases"].items():
         cases.add_row(number, notation)
     Console().print(table, cases)

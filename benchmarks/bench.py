@@ -1,0 +1,69 @@
+"""``make bench``: speed, memory and their growth, measured in one run and kept as JSON.
+
+Every figure is a median of at least five rounds, after one that warms up. Ratios compare things
+that took turns in one process, with the same model, threads, starts and motor targets.
+"""
+
+import json
+import os
+import platform
+import resource
+import subprocess
+import sys
+from pathlib import Path
+from statistics import median
+
+import mujoco
+import numpy as np
+
+from benchmarks import recovery, simulation, trial_log
+from selfmodel.tasks import ROBOTS
+
+RESULTS = Path(__file__).with_name("results.json")
+POPULATION, STEPS = 100, 1000
+
+
+def main() -> None:
+    """Measures everything, prints it, and writes ``benchmarks/results.json``."""
+    threads = os.cpu_count() or 1
+    robots = [ROBOTS[name].robot() for name in ("quadruped", "hexapod")]
+    quadruped = robots[0]
+    loops = [
+        simulation.closed_loop_over_rollout(robot, POPULATION, STEPS, threads) for robot in robots
+    ]
+    results = {
+        "machine": {
+            "processors": threads,
+            "python": platform.python_version(),
+            "mujoco": mujoco.__version__,
+            "numpy": np.__version__,
+        },
+        "closed_loop_over_rollout": loops[0]["ratio"],
+        "closed_loop_over_environment": simulation.closed_loop_over_environment(
+            quadruped, POPULATION, STEPS, threads
+        ),
+        **recovery.measure(),
+        **trial_log.measure(quadruped),
+        "help_cpu_seconds": help_cpu_seconds(),
+        "closed_loop": loops,
+        "growth": simulation.growth(robots, threads),
+    }
+    text = json.dumps(results, indent=2)
+    RESULTS.write_text(text + "\n", encoding="utf-8")
+    print(text)
+
+
+def help_cpu_seconds() -> float:
+    """Returns the processor time of ``selfmodel --help``."""
+    command = [sys.executable, "-m", "selfmodel", "--help"]
+    seconds = []
+    for _ in range(6):
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        subprocess.run(command, check=True, capture_output=True)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        seconds.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+    return median(seconds[1:])
+
+
+if __name__ == "__main__":
+    main()

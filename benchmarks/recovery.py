@@ -1,0 +1,131 @@
+"""Where the time of one recovery goes, and how much memory it takes.
+
+Run by itself (``python -m benchmarks.recovery``) it measures one recovery in this process and
+prints one JSON object; ``measure`` does that several times in processes of their own.
+"""
+
+import json
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from statistics import median
+from time import perf_counter
+
+from selfmodel.behaviour import Sample
+from selfmodel.comparators import FORWARD_DISPLACEMENT
+from selfmodel.controller import Controller
+from selfmodel.database import Database, Journal
+from selfmodel.diagnosis import Diagnosis
+from selfmodel.logs.journal import open_journal
+from selfmodel.notation import parse
+from selfmodel.physical import PhysicalRobot, SimulatedRobot
+from selfmodel.recover import recover
+from selfmodel.settings import Settings
+from selfmodel.simulator import Simulator
+from selfmodel.tasks import ROBOTS
+from selfmodel.trial import Plan, Trial
+
+ROUNDS = 5
+
+
+class TimedRobot:
+    """A physical robot, and the seconds that its own simulation took."""
+
+    def __init__(self, robot: PhysicalRobot) -> None:
+        self._robot = robot
+        self.seconds = 0.0
+
+    def run(self, controller: Controller, steps: int) -> Iterator[Sample]:
+        """Runs a controller."""
+        samples = self._robot.run(controller, steps)
+        while True:
+            start = perf_counter()
+            sample = next(samples, None)
+            self.seconds += perf_counter() - start
+            if sample is None:
+                return
+            yield sample
+
+
+class TimedJournal:
+    """A journal, and the seconds that writing and reading took, without those of the robots."""
+
+    def __init__(self, journal: Journal, robots: tuple[TimedRobot, ...]) -> None:
+        self._journal = journal
+        self._robots = robots
+        self._seconds = 0.0
+
+    @property
+    def seconds(self) -> float:
+        """Seconds so far."""
+        return self._seconds - sum(robot.seconds for robot in self._robots)
+
+    def record(self, physical: PhysicalRobot, plan: Plan) -> Trial:
+        """Runs and logs a trial."""
+        start = perf_counter()
+        trial = self._journal.record(physical, plan)
+        self._seconds += perf_counter() - start
+        return trial
+
+    def note(self, diagnosis: Diagnosis) -> None:
+        """Keeps a diagnosis."""
+        start = perf_counter()
+        self._journal.note(diagnosis)
+        self._seconds += perf_counter() - start
+
+    def read(self) -> Database:
+        """Reads everything back."""
+        start = perf_counter()
+        database = self._journal.read()
+        self._seconds += perf_counter() - start
+        return database
+
+
+def measure() -> dict[str, float]:
+    """Returns the medians over recoveries with the paper's budget, each in its own process."""
+    command = [sys.executable, "-m", "benchmarks.recovery"]
+    rounds = [
+        json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+        for _ in range(ROUNDS)
+    ]
+    return {key: median(one[key] for one in rounds) for key in rounds[0]}
+
+
+def measure_once() -> dict[str, float]:
+    """Returns the shares of one recovery of a quadruped from case 1, and its peak memory."""
+    start = perf_counter()
+    entry, settings = ROBOTS["quadruped"], Settings()
+    robot = entry.robot()
+    simulator = Simulator(robot, os.cpu_count() or 1)
+    healthy = TimedRobot(SimulatedRobot(robot))
+    damaged = TimedRobot(SimulatedRobot(robot, parse(entry.cases[1], robot.anatomy)))
+    with tempfile.TemporaryDirectory() as folder:
+        journal = open_journal(Path(folder) / "run", robot, settings, {})
+        timed = TimedJournal(journal, (healthy, damaged))
+        recover(
+            healthy=healthy,
+            damaged=damaged,
+            simulator=simulator,
+            comparator=FORWARD_DISPLACEMENT,
+            journal=timed,
+            settings=settings,
+            seed=0,
+            watch=lambda _: None,
+        )
+    seconds = perf_counter() - start
+    return {
+        "recover_seconds": seconds,
+        "physics_share_of_recover": simulator.tally.physics_seconds / seconds,
+        "logs_share_of_recover": timed.seconds / seconds,
+        "physical_robot_share_of_recover": (healthy.seconds + damaged.seconds) / seconds,
+        "recover_peak_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+        "recover_simulated_steps": simulator.tally.steps,
+    }
+
+
+if __name__ == "__main__":
+    print(json.dumps(measure_once()))

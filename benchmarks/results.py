@@ -1,0 +1,106 @@
+"""Writes docs/results.md from the runs of ``benchmarks.table_one``."""
+
+from pathlib import Path
+from statistics import median
+
+RESULTS = Path("docs/results.md")
+
+HEAD = """# Results: Table I of the paper, on both robots
+
+Made by `make results` (`python -m benchmarks.table_one`), which runs what has not been run yet and
+writes this page. Forward-displacement comparator, the paper's budget (population 100, 30
+generations, 1,000 control steps, 3 trials after the failing one), no reality gap. One thread a
+run, as many runs at once as there are processors, and the seconds are those of such a run,
+without evolving the gait that the robot walks with before it fails (see the last table).
+
+*before*, *after*, *recovered*: forward displacement in m before the failure, with the same
+controller after it, and of the best of the three recovery trials. *right*: the best hypothesis is
+the truth, or behaves like it to the bit under every logged controller. *distinct*: distinct
+hypotheses that were simulated.
+"""
+
+
+def write_results(walks: list[dict], runs: list[dict]) -> None:
+    """Writes the page.
+
+    Args:
+        walks: What ``table_one.evolve_gait`` returns, for each robot and seed.
+        runs: What ``table_one.recover_once`` returns.
+    """
+    robots = list(dict.fromkeys(walk["robot"] for walk in walks))
+    parts = [HEAD]
+    for robot in robots:
+        parts += [f"\n## {robot.capitalize()}, all ten cases, seed 0\n", _table_one(robot, runs)]
+    parts += ["\n## How often the diagnosis is right, by case\n", _by_case(runs)]
+    parts += ["\n## The repair EA on the intact robots\n", _gaits(robots, walks)]
+    RESULTS.write_text("\n".join(parts), encoding="utf-8")
+
+
+def _table_one(robot: str, runs: list[dict]) -> str:
+    rows = [
+        (
+            "| case | truth | before | after | recovered | ÷ before | right | best hypothesis, "
+            "where wrong | distinct | seconds |"
+        ),
+        "|---|---|---:|---:|---:|---:|---|---|---:|---:|",
+    ]
+    for run in runs:
+        if run["robot"] == robot and run["seed"] == 0:
+            ways = run["displacement"]
+            best = "" if run["correct"] else f"`{run['diagnosis'][0]['hypothesis']}`"
+            rows.append(
+                f"| {run['case']} | `{run['truth']}` | {ways['before']:.2f} | {ways['after']:.2f} "
+                f"| {ways['recovered']:.2f} | {run['recovery']:.2f} "
+                f"| {'yes' if run['correct'] else 'no'} | {best} "
+                f"| {run['evaluations']['distinct_hypotheses']} | {run['seconds']:.0f} |"
+            )
+    return "\n".join(rows) + "\n"
+
+
+def _by_case(runs: list[dict]) -> str:
+    rows = [
+        (
+            "The quadruped, one run a seed; *÷ before* is recovered over before, with its lowest and "
+            "highest.\n"
+        ),
+        "| case | truth | right | median ÷ before | lowest | highest | diverged simulations |",
+        "|---|---|---:|---:|---:|---:|---:|",
+    ]
+    cases: dict[int, list[dict]] = {}
+    for run in runs:
+        if run["robot"] == "quadruped":
+            cases.setdefault(run["case"], []).append(run)
+    for case, same in sorted(cases.items()):
+        if len(same) > 1:
+            right = sum(run["correct"] for run in same)
+            kept = [run["recovery"] for run in same]
+            diverged = sum(run["evaluations"]["diverged"] for run in same)
+            rows.append(
+                f"| {case} | `{same[0]['truth']}` | {right} of {len(same)} | {median(kept):.2f} "
+                f"| {min(kept):.2f} | {max(kept):.2f} | {diverged} |"
+            )
+    return "\n".join(rows) + "\n"
+
+
+def _gaits(robots: list[str], walks: list[dict]) -> str:
+    rows = [
+        (
+            "The paper's budget, one gait a seed. *torso*: its lowest and highest height over all "
+            "seeds, over its standing height, and *deepest* the deepest penetration of any contact, at "
+            "every physics step; *walking* counts the gaits whose torso stays above the ground and "
+            "below twice its height, with no contact deeper than 1 cm.\n"
+        ),
+        "| robot | median m | lowest | highest | torso | deepest, mm | walking | median seconds |",
+        "|---|---:|---:|---:|---|---:|---:|---:|",
+    ]
+    for robot in robots:
+        same = [walk for walk in walks if walk["robot"] == robot]
+        ways = [walk["displacement"] for walk in same]
+        low, high = min(w["lowest"] for w in same), max(w["highest"] for w in same)
+        rows.append(
+            f"| {robot} | {median(ways):.2f} | {min(ways):.2f} | {max(ways):.2f} "
+            f"| {low:.2f} to {high:.2f} | {1000 * max(w['deepest'] for w in same):.1f} "
+            f"| {sum(w['walking'] for w in same)} of {len(same)} "
+            f"| {median(w['seconds'] for w in same):.0f} |"
+        )
+    return "\n".join(rows) + "\n"

@@ -1,0 +1,54 @@
+"""Whether a controller walks: how far, how high the torso goes, how deep the feet sink."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from selfmodel.controller import Controller, Population
+from selfmodel.hypothesis import INTACT
+from selfmodel.robot import Robot
+from selfmodel.senses import Senses
+
+
+@dataclass(frozen=True)
+class Walk:
+    """What a run of an intact robot looked like, at every physics step.
+
+    Attributes:
+        displacement: How far it travelled forward, m.
+        lowest: Least height of the root body over its standing height.
+        highest: Greatest height of the root body over its standing height.
+        deepest: Deepest penetration of any contact, m.
+    """
+
+    displacement: float
+    lowest: float
+    highest: float
+    deepest: float
+
+    @property
+    def is_walking(self) -> bool:
+        """Whether the torso stays between the ground and twice its height, and feet on top."""
+        return self.lowest > 0 and self.highest < 2 and self.deepest <= 0.01
+
+
+def walk(robot: Robot, controller: Controller, steps: int) -> Walk:
+    """Returns how a controller makes an intact robot walk."""
+    embodiment = robot.build(INTACT)
+    model, data = embodiment.model, mujoco.MjData(embodiment.model)
+    mujoco.mj_forward(model, data)
+    senses = Senses(model, robot.anatomy, [embodiment])
+    brain = Population([controller], embodiment.neurons[np.newaxis])
+    start, heights, deepest = data.qpos[0], [data.qpos[2]], 0.0
+    for step in range(steps):
+        senses.read(data.sensordata[np.newaxis], data.qpos[np.newaxis], brain.readings)
+        brain.step(data.ctrl[np.newaxis])
+        for _ in range(robot.substeps if step + 1 < steps else 0):
+            mujoco.mj_step(model, data)
+            heights.append(data.qpos[2])
+            deepest = max(deepest, -data.contact.dist.min(initial=0.0))
+    ratios = np.array(heights) / robot.standing_height
+    return Walk(
+        float(data.qpos[0] - start), float(ratios.min()), float(ratios.max()), float(deepest)
+    )

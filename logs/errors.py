@@ -1,0 +1,78 @@
+"""What can be wrong with a log: one small family, each sentence with the file and the way out."""
+
+import errno
+from os import PathLike
+
+AGAIN = "make the trial again"
+FROM_PART = (
+    "the steps that are complete stay in the file, which nothing here deletes or changes; "
+    "make the trial again under another name"
+)
+
+
+class LogError(ValueError):
+    """A log cannot be used.
+
+    Args:
+        path: The file.
+        what: What is wrong with it.
+        good: How much of it is good; left out where nothing is known.
+        advice: What can be done.
+    """
+
+    def __init__(
+        self, path: str | PathLike[str], what: str, *, good: str = "", advice: str = AGAIN
+    ) -> None:
+        self.path = str(path)
+        super().__init__(f"{path}: " + "; ".join(part for part in (what, good, advice) if part))
+
+
+class NotMcapError(LogError):
+    """The file is not MCAP, or too short to tell."""
+
+
+class TruncatedError(LogError):
+    """The file ends before its end: it was cut, or its writer was."""
+
+
+class CorruptError(LogError):
+    """The file's bytes are not those that were written, or contradict each other."""
+
+
+class UnsupportedError(LogError):
+    """The file is sound, but of a kind or version that is not known here."""
+
+
+class IncompleteError(LogError):
+    """The trial did not run to its end."""
+
+
+class SchemaMismatchError(LogError):
+    """The file is sound, but what stands in it does not fit the format of a trial log."""
+
+
+class LogWriteError(OSError):
+    """A log could not be written on; what had been written stays.
+
+    Args:
+        path: The file that was being written.
+        cause: What the operating system said.
+    """
+
+    def __init__(self, path: str | PathLike[str], cause: OSError) -> None:
+        super().__init__(f"{path}: {_reason(cause)}; what was written before stays in that file")
+        self.errno = cause.errno
+        self.filename = str(path)
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+def _reason(cause: OSError) -> str:
+    if cause.errno in (errno.ENOSPC, errno.EDQUOT):
+        return (
+            "the disk is full: free some space, or choose another folder, and make the trial again"
+        )
+    if cause.errno == errno.EFBIG:
+        return "the file has reached the size that this system allows (see ulimit -f)"
+    return f"cannot be written: {cause.strerror or cause}"

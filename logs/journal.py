@@ -1,0 +1,169 @@
+"""A recovery's journal as a folder: a log a trial, and the diagnoses."""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from selfmodel.anatomy import Anatomy
+from selfmodel.database import Database
+from selfmodel.diagnosis import Candidate, Diagnosis
+from selfmodel.errors import InputError
+from selfmodel.logs.errors import CorruptError, SchemaMismatchError
+from selfmodel.logs.files import explained, replace
+from selfmodel.logs.reader import read_log
+from selfmodel.logs.records import checked_name
+from selfmodel.logs.writer import write_trial
+from selfmodel.notation import parse
+from selfmodel.physical import PhysicalRobot
+from selfmodel.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.trial import Plan, Stage, Trial
+
+TRIALS = "trials"
+DIAGNOSES = "diagnoses.json"
+
+
+@dataclass(frozen=True, eq=False)
+class FolderJournal:
+    """Keeps a recovery in a folder; see ``selfmodel.database.Journal``. ``open_journal`` makes it.
+
+    Attributes:
+        folder: ``trials/NAME.mcap`` for each trial, and ``diagnoses.json``.
+        robot: Whose recovery it is.
+        settings: The paper's numbers, for the record.
+        hidden: What is wrong with the physical robot at each stage, in notation, for those who
+            score; a stage that is missing is logged without.
+    """
+
+    folder: Path
+    robot: Robot
+    settings: Settings
+    hidden: Mapping[Stage, str]
+
+    def record(self, physical: PhysicalRobot, plan: Plan) -> Trial:
+        """Runs a trial, logs it while it runs, and returns it as its file says it.
+
+        Raises:
+            InputError: The plan's name cannot name a file, or names one that exists.
+            LogError: The robot stopped early, or the file does not say what was written.
+            LogWriteError: The disk is full, or failed.
+        """
+        path = write_trial(
+            self.folder / TRIALS / f"{checked_name(plan.name)}.mcap",
+            self.robot,
+            plan,
+            physical.run(plan.controller, plan.steps),
+            settings=self.settings,
+            hidden=self.hidden.get(plan.stage),
+        )
+        return read_log(path).trial
+
+    def note(self, diagnosis: Diagnosis) -> None:
+        """Keeps a diagnosis beside the earlier ones."""
+        kept = _read_diagnoses(self.folder, self.robot.anatomy)
+        texts = [_as_json(each) for each in (*kept, diagnosis)]
+        replace(self.folder / DIAGNOSES, json.dumps(texts, indent=1, allow_nan=False).encode())
+
+    def read(self) -> Database:
+        """Returns everything kept so far, read from the files and checked."""
+        return read_database(self.folder, self.robot.anatomy)
+
+
+def open_journal(
+    folder: Path, robot: Robot, settings: Settings, hidden: Mapping[Stage, str]
+) -> FolderJournal:
+    """Makes the folder of a new run; the arguments are those of ``FolderJournal``.
+
+    Raises:
+        InputError: The folder holds something, or cannot be one.
+        LogWriteError: It could not be made.
+    """
+    try:
+        holds = sorted(entry.name for entry in folder.iterdir()) if folder.exists() else []
+    except NotADirectoryError:
+        raise InputError(f"{folder} is a file: choose a folder for the run") from None
+    if holds:
+        raise InputError(
+            f"{folder} holds another run or other files ({', '.join(holds[:3])}): nothing is "
+            f"overwritten, choose a folder that is empty or does not exist"
+        )
+    with explained(folder / TRIALS):
+        (folder / TRIALS).mkdir(parents=True)
+    return FolderJournal(folder, robot, settings, dict(hidden))
+
+
+def read_database(folder: Path, anatomy: Anatomy) -> Database:
+    """Returns what the folder of a run holds: every finished trial and every diagnosis.
+
+    A ``.part``, which is a trial that was interrupted, is passed over.
+
+    Args:
+        folder: As ``FolderJournal`` keeps it.
+        anatomy: The robot's parts, to read the hypotheses.
+
+    Raises:
+        InputError: There is no such run.
+        LogError: A file is damaged, or of another robot.
+    """
+    if not (folder / TRIALS).is_dir():
+        raise InputError(f"{folder}: expected the folder of a run, with a folder {TRIALS} in it")
+    # recover's names begin with their number, of two digits or more: shorter ones come first.
+    paths = sorted((folder / TRIALS).glob("*.mcap"), key=_number)
+    trials = tuple(read_log(path).trial for path in paths)
+    for trial in trials:
+        if trial.behaviour.names != anatomy.names:
+            raise SchemaMismatchError(
+                trial.path,
+                f"it is of the robot {trial.robot!r}, with other sensors, motors or hinges",
+                advice="give the folder of a run of one robot",
+            )
+    return Database(trials, _read_diagnoses(folder, anatomy))
+
+
+def _number(path: Path) -> tuple[int, str]:
+    digits = path.stem.partition("-")[0]
+    return (int(digits) if digits.isdecimal() else 0, path.name)
+
+
+def _as_json(diagnosis: Diagnosis) -> dict[str, Any]:
+    return {
+        "trials": diagnosis.trials,
+        "ranked": [
+            {
+                "hypothesis": str(candidate.hypothesis),
+                # JSON has no infinity, which is the distance of a simulation that diverged.
+                "distance": candidate.distance if math.isfinite(candidate.distance) else None,
+            }
+            for candidate in diagnosis.ranked
+        ],
+    }
+
+
+def _read_diagnoses(folder: Path, anatomy: Anatomy) -> tuple[Diagnosis, ...]:
+    path = folder / DIAGNOSES
+    try:
+        items: Any = json.loads(path.read_bytes())
+        return tuple(
+            Diagnosis(
+                ranked=tuple(
+                    Candidate(
+                        parse(candidate["hypothesis"], anatomy),
+                        math.inf if candidate["distance"] is None else float(candidate["distance"]),
+                    )
+                    for candidate in item["ranked"]
+                ),
+                trials=int(item["trials"]),
+            )
+            for item in items
+        )
+    except FileNotFoundError:
+        return ()
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise CorruptError(
+            path,
+            f"expected the diagnoses of a run: {error or type(error).__name__}",
+            advice="move it away; the diagnoses can be made again from the trials",
+        ) from error

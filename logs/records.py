@@ -1,0 +1,176 @@
+"""What a log says of its trial beside the messages: metadata records and attachments."""
+
+import dataclasses
+import hashlib
+import json
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, get_args
+
+from selfmodel.errors import InputError
+from selfmodel.settings import Settings
+from selfmodel.trial import Stage
+
+FORMAT = "1"
+"""The version of the log's format; a reader refuses others."""
+
+TRIAL = "selfmodel.trial"
+SOFTWARE = "selfmodel.software"
+HIDDEN = "selfmodel.hidden"
+"""The record with what a simulated physical robot hides; diagnosis never reads it."""
+RESULT = "selfmodel.result"
+
+MODEL_FILE = "model.xml"
+CONTROLLER_FILE = "controller.npz"
+SETTINGS_FILE = "settings.json"
+
+TRUTH = "truth"
+FINISHED = "finished"
+
+_NAME = re.compile(r"[A-Za-z0-9-]{1,100}")
+
+
+@dataclass(frozen=True)
+class TrialRecord:
+    """The record ``selfmodel.trial``, written before the trial starts.
+
+    Attributes:
+        format: Version of the log's format.
+        name: The trial's name within its run.
+        stage: Where in the story it stands.
+        robot: The robot's name.
+        root: The body that ``/odom`` tells of.
+        control_timestep: Seconds between two commands; step k is at k times this.
+        steps: Control steps that it is to last.
+        seed: From which everything random about it is drawn.
+        controller_sha256: Of the attached controller.
+        model_sha256: Of the attached model.
+    """
+
+    format: str
+    name: str
+    stage: Stage
+    robot: str
+    root: str
+    control_timestep: float
+    steps: int
+    seed: int
+    controller_sha256: str
+    model_sha256: str
+
+    def texts(self) -> dict[str, str]:
+        """Returns the record as MCAP holds it."""
+        return {
+            name: value if isinstance(value, str) else repr(value)
+            for name, value in dataclasses.asdict(self).items()
+        }
+
+
+@dataclass(frozen=True)
+class Result:
+    """The record ``selfmodel.result``, written last.
+
+    Attributes:
+        status: ``finished``.
+        steps: Control steps that were logged.
+        displacement: How far the robot travelled forward, m.
+    """
+
+    status: str
+    steps: int
+    displacement: float
+
+    def texts(self) -> dict[str, str]:
+        """Returns the record as MCAP holds it."""
+        return {
+            "status": self.status,
+            "steps": str(self.steps),
+            "displacement": repr(self.displacement),
+        }
+
+
+def trial_record(texts: Mapping[str, str]) -> TrialRecord:
+    """Returns the record that stands in a log.
+
+    Raises:
+        ValueError: A field is missing or cannot be what it says; the sentence names it.
+    """
+    fields = [field.name for field in dataclasses.fields(TrialRecord)]
+    missing = [name for name in fields if name not in texts]
+    if missing:
+        raise ValueError(f"it lacks {', '.join(missing)}")
+    stages: tuple[Stage, ...] = get_args(Stage)
+    stage = next((known for known in stages if known == texts["stage"]), None)
+    if stage is None:
+        raise ValueError(f"stage must be one of {', '.join(stages)}, got {texts['stage']!r}")
+    timestep = float(texts["control_timestep"])
+    if not (math.isfinite(timestep) and timestep > 0):
+        raise ValueError(f"control_timestep must be above 0 s, got {texts['control_timestep']!r}")
+    return TrialRecord(
+        format=texts["format"],
+        name=texts["name"],
+        stage=stage,
+        robot=texts["robot"],
+        root=texts["root"],
+        control_timestep=timestep,
+        steps=int(texts["steps"]),
+        seed=int(texts["seed"]),
+        controller_sha256=texts["controller_sha256"],
+        model_sha256=texts["model_sha256"],
+    )
+
+
+def result_record(texts: Mapping[str, str]) -> Result:
+    """Returns the record that stands in a log.
+
+    Raises:
+        ValueError: A field is missing or cannot be what it says.
+    """
+    missing = [name for name in ("status", "steps", "displacement") if name not in texts]
+    if missing:
+        raise ValueError(f"it lacks {', '.join(missing)}")
+    return Result(texts["status"], int(texts["steps"]), float(texts["displacement"]))
+
+
+def settings_json(settings: Settings) -> bytes:
+    """Returns settings as JSON."""
+    return json.dumps(dataclasses.asdict(settings), indent=1).encode()
+
+
+def parse_settings(data: bytes) -> Settings:
+    """Returns the settings that stand in a log; those that it does not name have their defaults.
+
+    Raises:
+        ValueError: It is not JSON, or names what is no setting, or a value does not fit.
+    """
+    values: Any = json.loads(data)
+    if not isinstance(values, dict):
+        raise TypeError(f"expected an object, got {type(values).__name__}")
+    defaults = dataclasses.asdict(Settings())
+    for name, value in values.items():
+        if name not in defaults:
+            raise ValueError(f"there is no setting {name!r}")
+        if type(value) not in (int, type(defaults[name])):
+            raise TypeError(f"{name} must be a number such as {defaults[name]}, got {value!r}")
+    return Settings(**values)
+
+
+def sha256(data: bytes) -> str:
+    """Returns the SHA-256 of ``data``, in hexadecimal."""
+    return hashlib.sha256(data).hexdigest()
+
+
+def checked_name(name: str) -> str:
+    """Returns ``name`` if it can name a trial and its file.
+
+    Raises:
+        InputError: It has other characters than letters, digits and ``-``.
+    """
+    if not _NAME.fullmatch(name):
+        raise InputError(
+            f"a trial's name names its file: expected 1 to 100 letters, digits and '-', "
+            f"got {name!r}"
+        )
+    return name

@@ -1,0 +1,89 @@
+"""A behaviour from the messages of its log."""
+
+from pathlib import Path
+
+import numpy as np
+
+from selfmodel.arrays import FloatArray, frozen
+from selfmodel.behaviour import SIGNALS, Behaviour, Names, Signal
+from selfmodel.controller import Controller
+from selfmodel.logs.cdr import names_of
+from selfmodel.logs.contents import Contents, Messages
+from selfmodel.logs.errors import CorruptError, SchemaMismatchError
+from selfmodel.logs.records import TrialRecord
+from selfmodel.logs.topics import Part, Topic, topics
+
+
+def read_behaviour(
+    path: Path, contents: Contents, record: TrialRecord, controller: Controller
+) -> Behaviour:
+    """Returns what the messages of a log say.
+
+    Args:
+        path: The log, for errors.
+        contents: What stands in it.
+        record: What was to be done.
+        controller: What drove the robot; the messages must have the names that it has.
+
+    Raises:
+        LogError: The messages do not fit the record, the controller or their types.
+    """
+    names = Names(
+        sensors=_names(path, contents, "/sensors"),
+        motors=_names(path, contents, "/joint_commands"),
+        hinges=_names(path, contents, "/joint_states"),
+    )
+    network = controller.network
+    if (names.sensors, names.motors) != (network.sensors, network.motors):
+        raise SchemaMismatchError(
+            path,
+            f"its controller is for the sensors {network.sensors} and motors {network.motors}, "
+            f"its messages have {names.sensors} and {names.motors}",
+        )
+    held = len(_messages(path, contents, "/joint_states").payloads)
+    if held != record.steps:
+        raise CorruptError(path, f"{held} messages on /joint_states for {record.steps} steps")
+    time: FloatArray = np.arange(record.steps, dtype=np.float64) * record.control_timestep
+    parts: dict[Part, FloatArray] = {}
+    for topic in topics(names, record.root):
+        parts |= _rows(path, _messages(path, contents, topic.name), topic, time)
+    signals: dict[Signal, FloatArray] = {signal: frozen(parts[signal]) for signal in SIGNALS}
+    return Behaviour(names, frozen(time), signals)
+
+
+def _messages(path: Path, contents: Contents, topic: str) -> Messages:
+    messages = contents.topics.get(topic)
+    if messages is None or not messages.payloads:
+        raise SchemaMismatchError(path, f"it has no messages on {topic}")
+    return messages
+
+
+def _names(path: Path, contents: Contents, topic: str) -> tuple[str, ...]:
+    try:
+        return names_of(_messages(path, contents, topic).payloads[0])
+    except ValueError as error:
+        raise SchemaMismatchError(path, f"on {topic}: {error}") from error
+
+
+def _rows(path: Path, messages: Messages, topic: Topic, time: FloatArray) -> dict[Part, FloatArray]:
+    if (messages.type, messages.encoding) != (topic.type, "cdr"):
+        raise SchemaMismatchError(
+            path,
+            f"expected {topic.type} in cdr on {topic.name}, "
+            f"got {messages.type!r} in {messages.encoding!r}",
+        )
+    if len(messages.payloads) != len(time):
+        raise CorruptError(
+            path, f"{len(messages.payloads)} messages on {topic.name} for {len(time)} steps"
+        )
+    try:
+        stamps, values = topic.template.decode(messages.payloads)
+    except ValueError as error:
+        raise SchemaMismatchError(path, f"on {topic.name}: {error}") from error
+    expected = np.rint(time * 1e9)
+    times = np.array(messages.times, dtype=np.float64)  # exact for the first hundred days
+    if np.any(stamps != expected) or np.any(times != expected[:, np.newaxis]):
+        raise SchemaMismatchError(
+            path, f"the times on {topic.name} are not the multiples of the control time step"
+        )
+    return topic.unpack(values)

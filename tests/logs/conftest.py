@@ -1,0 +1,93 @@
+"""What the tests of the log share: a small robot, made-up trials of it, and one log."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from selfmodel.behaviour import SIGNALS, Sample
+from selfmodel.controller import Controller, draw_weights
+from selfmodel.logs.writer import write_trial
+from selfmodel.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.trial import Plan
+
+MJCF = """
+<mujoco model="biped">
+  <option timestep="0.005"/>
+  <worldbody>
+    <geom name="ground" type="plane" size="0 0 1"/>
+    <body name="torso" pos="0 0 0.6">
+      <freejoint name="root"/>
+      <geom type="box" size="0.1 0.15 0.05"/>
+      <body name="left_leg" pos="0 0.2 0" euler="10 90 20">
+        <joint name="left_hip_x" axis="1 0 0" range="-30 30" pos="0.01 0 0"/>
+        <joint name="left_hip_y" axis="0 1 0" range="-30 30" pos="0.02 0 0.03"/>
+        <geom type="capsule" size="0.03" fromto="0 0 0 0 0 -0.3"/>
+        <body name="left_foot" pos="0 0 -0.3">
+          <geom type="sphere" size="0.04"/>
+          <site name="left_sole" type="sphere" size="0.05"/>
+        </body>
+      </body>
+      <body name="right_leg" pos="0 -0.2 0">
+        <joint name="right_hip_x" axis="1 0 0" range="-30 30"/>
+        <joint name="right_hip_y" axis="0 1 0" range="-30 30"/>
+        <geom type="capsule" size="0.03" fromto="0 0 0 0.3 0 0"/>
+        <body name="right_foot" pos="0 0 -0.3">
+          <geom type="cylinder" size="0.04 0.02"/>
+          <site name="right_sole" type="sphere" size="0.05"/>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+  <actuator>
+    <position name="left_hip_x" joint="left_hip_x" kp="10"/>
+    <position name="left_hip_y" joint="left_hip_y" kp="10"/>
+    <position name="right_hip_x" joint="right_hip_x" kp="10"/>
+    <position name="right_hip_y" joint="right_hip_y" kp="10"/>
+  </actuator>
+  <sensor>
+    <touch name="left_touch" site="left_sole"/>
+    <touch name="right_touch" site="right_sole"/>
+    <jointpos name="left_angle" joint="left_hip_y"/>
+  </sensor>
+</mujoco>
+"""
+
+STEPS = 120
+
+
+@pytest.fixture(scope="session")
+def biped() -> Robot:
+    """A robot whose legs have two hinges each, some beside their body's origin."""
+    return Robot("biped", MJCF, 0.01)
+
+
+@pytest.fixture(scope="session")
+def plan(biped: Robot) -> Plan:
+    """A trial of the biped that is long enough for some flushes."""
+    return plan_of(biped, STEPS)
+
+
+@pytest.fixture
+def log(biped: Robot, plan: Plan, tmp_path: Path) -> Path:
+    """A finished log of a made-up trial."""
+    path = tmp_path / "trial.mcap"
+    samples = made_up(biped, STEPS)
+    return write_trial(path, biped, plan, samples, settings=Settings(), hidden="intact")
+
+
+def plan_of(robot: Robot, steps: int, name: str = "00-before") -> Plan:
+    """Returns a plan with a random controller."""
+    genome = draw_weights(np.random.default_rng(1), (robot.network.weights,))
+    return Plan(name, "before", Controller(robot.network, genome), steps, seed=7)
+
+
+def made_up(robot: Robot, steps: int, seed: int = 0) -> Iterator[Sample]:
+    """Yields samples of random numbers, of which no two are alike."""
+    rng = np.random.default_rng(seed)
+    names = robot.anatomy.names
+    for k in range(steps):
+        rows = {signal: rng.normal(size=names.width(signal)) for signal in SIGNALS}
+        yield Sample(k * robot.control_timestep, rows)

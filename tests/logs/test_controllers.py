@@ -1,0 +1,125 @@
+import contextlib
+import io
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from selfmodel.controller import Controller, Network, draw_weights
+from selfmodel.errors import InputError
+from selfmodel.logs import load_controller, save_controller
+from selfmodel.logs.controllers import LARGEST, controller_bytes, parse_controller
+
+PARTS = st.lists(st.text("abc_é", min_size=1, max_size=5), max_size=5).map(tuple)
+
+
+def controller() -> Controller:
+    network = Network(("touch", "angle"), ("hip", "knee"), 3)
+    return Controller(network, draw_weights(np.random.default_rng(0), (network.weights,)))
+
+
+def archive(**replaced: object) -> bytes:
+    """The bytes of a controller's file with some of its arrays replaced, None for left out."""
+    good = controller()
+    arrays: dict[str, object] = {
+        "kind": np.array("network"),
+        "sensors": np.array(good.network.sensors),
+        "motors": np.array(good.network.motors),
+        "hidden": np.array(3),
+        "genome": good.genome,
+    } | replaced
+    file = io.BytesIO()
+    np.savez(file, **{name: array for name, array in arrays.items() if array is not None})
+    return file.getvalue()
+
+
+@given(sensors=PARTS, motors=PARTS, hidden=st.integers(0, 4), seed=st.integers(0, 99))
+def test_a_controller_comes_back_equal(
+    sensors: tuple[str, ...], motors: tuple[str, ...], hidden: int, seed: int
+):
+    network = Network(sensors, motors, hidden)
+    genome = draw_weights(np.random.default_rng(seed), (network.weights,))
+    before = Controller(network, genome)
+    data = controller_bytes(before)
+    assert parse_controller(data, "here") == before
+    assert controller_bytes(parse_controller(data, "here")) == data
+
+
+def test_a_controller_comes_back_from_a_file_that_any_numpy_reads(tmp_path: Path):
+    path = tmp_path / "gait.npz"
+    save_controller(path, controller())
+    assert load_controller(path) == controller()
+    with np.load(path, allow_pickle=False) as arrays:
+        assert arrays["genome"].tolist() == controller().genome.tolist()
+    with pytest.raises(InputError, match=r"gait\.npz exists, and is not overwritten"):
+        save_controller(path, controller())
+
+
+def test_equal_controllers_give_equal_bytes_at_any_time():
+    with zipfile.ZipFile(io.BytesIO(controller_bytes(controller()))) as file:
+        assert {info.date_time[0] for info in file.infolist()} == {1980}
+
+
+@pytest.mark.parametrize(
+    ("data", "match"),
+    [
+        (b"", "expected a controller"),
+        (b"PK not a zip", "expected a controller"),
+        (archive(genome=None), "it holds hidden.npy, kind.npy"),
+        (archive(extra=np.zeros(1)), "it holds extra.npy"),
+        (archive(kind=np.array("tree")), "expected the kind 'network', got 'tree'"),
+        (archive(genome=np.zeros(9)), "got a genome of shape"),
+        (archive(genome=np.full(26, 2.0)), "every weight must lie in"),
+        (archive(genome=np.full(26, np.nan)), "every weight must lie in"),
+        (archive(genome=np.zeros(26, np.float32)), "expected float64"),
+        (archive(genome=np.zeros((2, 13))), "its arrays have the ranks"),
+        (archive(hidden=np.array(3.0)), "its arrays have the types"),
+        (archive(hidden=np.array(-3)), "got a genome of shape"),
+        (archive(sensors=np.array([None, "x"])), "does not fit its size"),
+        (archive(genome=np.zeros(LARGEST)), "more than 1048576 bytes"),
+    ],
+)
+def test_what_is_no_controller_is_refused(tmp_path: Path, data: bytes, match: str):
+    path = tmp_path / "bad.npz"
+    path.write_bytes(data)
+    with pytest.raises(InputError, match=rf"bad\.npz: expected a controller.*{match}|{match}"):
+        load_controller(path)
+
+
+def test_a_size_is_not_believed_before_there_are_bytes_for_it():
+    file = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(archive())) as old, zipfile.ZipFile(file, "w") as new:
+        for name in old.namelist():
+            member = old.read(name)
+            if name == "genome.npy":
+                member = member.replace(b"(26,), }         ", b"(26000000000,), }")
+            new.writestr(name, member)
+    with pytest.raises(InputError, match=r"shape \(26000000000,\) .* does not fit its size"):
+        parse_controller(file.getvalue(), "here")
+
+
+def test_a_bomb_is_not_unpacked():
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive_file:
+        for name in ("kind", "sensors", "motors", "hidden", "genome"):
+            archive_file.writestr(f"{name}.npy", bytes(50 * LARGEST))
+    with pytest.raises(InputError, match="unpacks to more than"):
+        parse_controller(file.getvalue(), "here")
+
+
+def test_no_damage_to_a_controller_raises_anything_else():
+    good, rng = controller_bytes(controller()), np.random.default_rng(3)
+    for _ in range(1000):
+        damaged = bytearray(good)
+        for _ in range(rng.integers(1, 4)):
+            damaged[rng.integers(len(damaged))] = rng.integers(256)
+        with contextlib.suppress(InputError):
+            parse_controller(bytes(damaged), "here")
+
+
+def test_a_file_that_is_not_there_is_said_so(tmp_path: Path):
+    with pytest.raises(InputError, match=r"no\.npz: expected a controller file that can be read"):
+        load_controller(tmp_path / "no.npz")

@@ -1,0 +1,381 @@
+import hashlib
+import io
+import json
+from collections.abc import Callable, Collection
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.data_stream import RecordBuilder
+from mcap.records import Attachment, Chunk, McapRecord, Message, Metadata, Statistics
+from mcap.writer import CompressionType, IndexType, Writer
+
+from selfmodel.errors import InputError
+from selfmodel.logs import (
+    CorruptError,
+    IncompleteError,
+    LogError,
+    NotMcapError,
+    SchemaMismatchError,
+    TruncatedError,
+    UnsupportedError,
+    read_log,
+    read_truth,
+)
+from selfmodel.logs import reader as reader_module
+from selfmodel.logs.contents import Contents, read_contents
+from selfmodel.logs.records import HIDDEN, RESULT, TRIAL
+from selfmodel.logs.scan import scan
+
+CASES = Path(__file__).parents[3] / "shared" / "samples" / "mcap-conformance"
+Change = Callable[[McapRecord], McapRecord | None]
+
+COUNTED = (Attachment, Message, Metadata)
+
+
+def flip(data: bytes, rng: np.random.Generator) -> bytes:
+    damaged = bytearray(data)
+    damaged[rng.integers(len(data))] ^= 1 << int(rng.integers(8))
+    return bytes(damaged)
+
+
+def cut(data: bytes, rng: np.random.Generator) -> bytes:
+    return data[: rng.integers(len(data))]
+
+
+def garbage(data: bytes, rng: np.random.Generator) -> bytes:
+    start = int(rng.integers(len(data) - 512))
+    return data[:start] + rng.bytes(512) + data[start + 512 :]
+
+
+def zeros(data: bytes, rng: np.random.Generator) -> bytes:
+    start = int(rng.integers(len(data) - 4096))
+    return data[:start] + bytes(4096) + data[start + 4096 :]
+
+
+def doubled(data: bytes, rng: np.random.Generator) -> bytes:
+    start = int(rng.integers(len(data) - 200))
+    return data[: start + 200] + data[start:]
+
+
+@pytest.mark.parametrize("damage", [flip, cut, garbage, zeros, doubled])
+def test_no_damage_passes(log: Path, damage: Callable[[bytes, np.random.Generator], bytes]):
+    rng = np.random.default_rng(5)
+    data = log.read_bytes()
+    for _ in range(100):
+        damaged = damage(data, rng)
+        log.write_bytes(damaged)
+        if damaged == data:
+            continue
+        with pytest.raises(LogError, match=r"trial\.mcap: "):
+            read_log(log)
+        with pytest.raises(LogError, match=r"trial\.mcap: "):
+            read_truth(log)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "error", "match"),
+    [
+        (lambda _: b"", NotMcapError, "empty or too short"),
+        (lambda d: d[:5], NotMcapError, "empty or too short"),
+        (lambda _: b"no log at all", NotMcapError, "not an MCAP file"),
+        (lambda d: d[:9000], TruncatedError, "ends too early; .* messages .* complete"),
+        (lambda d: d[:-1], TruncatedError, "721 messages on 7 topics"),
+        (lambda d: d + b"x", CorruptError, "something follows its end"),
+        (lambda d: d[:-8] + bytes(8), CorruptError, "last bytes are damaged"),
+    ],
+)
+def test_damage_is_called_by_its_name(
+    log: Path, spoil: Callable[[bytes], bytes], error: type[LogError], match: str
+):
+    log.write_bytes(spoil(log.read_bytes()))
+    with pytest.raises(error, match=match):
+        read_log(log)
+
+
+def test_a_file_that_is_not_there_is_said_so(tmp_path: Path):
+    with pytest.raises(InputError, match=r"nothing\.mcap: expected a log file that can be read"):
+        read_log(tmp_path / "nothing.mcap")
+    with pytest.raises(InputError, match="Is a directory"):
+        read_log(tmp_path)
+
+
+def rewritten(path: Path, change: Change) -> None:
+    """Writes a sound file of what ``change`` makes of each record, None for nothing."""
+    with path.open("rb") as file:
+        records = list(scan(file))
+    output = io.BytesIO()
+    writer = Writer(output, enable_data_crcs=True)
+    writer.start("ros2")
+    schemas: dict[int, int] = {}
+    channels: dict[int, int] = {}
+    for original in records:
+        record: McapRecord | None = change(original)
+        match type(record).__name__, record:
+            case "Schema", schema if schema.id not in schemas:
+                number = writer.register_schema(schema.name, schema.encoding, schema.data)
+                schemas[schema.id] = number
+            case "Channel", channel if channel.id not in channels:
+                channels[channel.id] = writer.register_channel(
+                    channel.topic, channel.message_encoding, schemas[channel.schema_id]
+                )
+            case "Metadata", metadata:
+                writer.add_metadata(metadata.name, metadata.metadata)
+            case "Attachment", attached:
+                writer.add_attachment(0, 0, attached.name, attached.media_type, attached.data)
+            case "Message", told:
+                writer.add_message(
+                    channels[told.channel_id], told.log_time, told.data, told.publish_time
+                )
+    writer.finish()
+    path.write_bytes(output.getvalue())
+
+
+def metadata(name: str, **texts: str):
+    def change(record: McapRecord) -> McapRecord:
+        if isinstance(record, Metadata) and record.name == name:
+            return Metadata(name, {**record.metadata, **texts})
+        return record
+
+    return change
+
+
+def attachment(name: str, old: bytes, new: bytes):
+    def change(record: McapRecord) -> McapRecord:
+        if isinstance(record, Attachment) and record.name == name:
+            assert old in record.data
+            record.data = record.data.replace(old, new)
+        return record
+
+    return change
+
+
+def without(kind: type[McapRecord], name: str):
+    return lambda r: None if isinstance(r, kind) and r.name == name else r
+
+
+def later(record: McapRecord) -> McapRecord:
+    if isinstance(record, Message) and record.log_time == 50 * 10**7:
+        record.log_time += 1
+    return record
+
+
+def stamped(record: McapRecord) -> McapRecord:
+    if isinstance(record, Message) and record.log_time == 50 * 10**7:
+        record.data = record.data[:4] + b"\1" + record.data[5:]  # a second later
+    return record
+
+
+def missing(record: McapRecord) -> McapRecord | None:
+    return None if isinstance(record, Message) and record.log_time == 50 * 10**7 else record
+
+
+def renamed(record: McapRecord) -> McapRecord:
+    if isinstance(record, Message):
+        record.data = record.data.replace(b"left_touch", b"left_torch")
+    return record
+
+
+def moved(record: McapRecord) -> McapRecord:
+    if type(record).__name__ == "Channel" and record.topic == "/odom":
+        record.topic = "/odometry"
+    return record
+
+
+def retyped(record: McapRecord) -> McapRecord:
+    if type(record).__name__ == "Schema" and record.name == "nav_msgs/msg/Odometry":
+        record.name = "nav_msgs/msg/Path"
+    return record
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "match"),
+    [
+        (without(Metadata, TRIAL), SchemaMismatchError, r"no record selfmodel\.trial"),
+        (without(Metadata, RESULT), IncompleteError, "did not finish; 721 messages"),
+        (metadata(TRIAL, format="2"), UnsupportedError, "expected format 1, got '2'"),
+        (metadata(TRIAL, stage="later"), SchemaMismatchError, "stage must be one of before"),
+        (metadata(TRIAL, steps="many"), SchemaMismatchError, "invalid literal"),
+        (metadata(TRIAL, steps=str(10**15)), CorruptError, "120 messages on /joint_states for"),
+        (metadata(TRIAL, control_timestep="0.02"), SchemaMismatchError, "times on /joint_states"),
+        (metadata(TRIAL, control_timestep="nan"), SchemaMismatchError, "must be above 0 s"),
+        (metadata(TRIAL, root="hip"), SchemaMismatchError, "on /odom: message 0 has"),
+        (metadata(RESULT, status="interrupted"), IncompleteError, "'interrupted' after 120"),
+        (metadata(RESULT, steps="119"), IncompleteError, "after 119 of 120 steps"),
+        (metadata(RESULT, displacement="1.5"), CorruptError, r"says 1\.5 m of displacement"),
+        (without(Attachment, "model.xml"), SchemaMismatchError, r"no attachment model\.xml"),
+        (attachment("model.xml", b"0.6", b"0.7"), CorruptError, r"model\.xml is not the one"),
+        (attachment("controller.npz", b"<f8", b"<f4"), CorruptError, r"controller\.npz is not"),
+        (
+            attachment("settings.json", b"steps", b"stops"),
+            SchemaMismatchError,
+            "no setting 'stops'",
+        ),
+        (attachment("settings.json", b"1000", b"true"), SchemaMismatchError, "must be a number"),
+        (attachment("settings.json", b"{", b"["), SchemaMismatchError, "cannot be read"),
+        (later, SchemaMismatchError, "times on /joint_states are not the multiples"),
+        (stamped, SchemaMismatchError, "times on /joint_states are not the multiples"),
+        (missing, CorruptError, "119 messages on /joint_states for 120 steps"),
+        (renamed, SchemaMismatchError, "its controller is for the sensors"),
+        (moved, SchemaMismatchError, "no messages on /odom"),
+        (retyped, SchemaMismatchError, "expected nav_msgs/msg/Odometry in cdr on /odom"),
+    ],
+)
+def test_a_sound_file_that_contradicts_itself_is_refused(
+    log: Path, change: Change, error: type[LogError], match: str
+):
+    rewritten(log, lambda record: record)
+    read_log(log)  # rewriting alone harms nothing
+    rewritten(log, change)
+    with pytest.raises(error, match=match):
+        read_log(log)
+
+
+def test_the_hidden_record_may_say_anything_or_be_missing(log: Path):
+    before = read_log(log).trial.behaviour
+    for change in (
+        metadata(HIDDEN, truth="no notation at all", more="text"),
+        without(Metadata, HIDDEN),
+    ):
+        rewritten(log, change)
+        after = read_log(log).trial.behaviour
+        assert all(after[signal].tobytes() == before[signal].tobytes() for signal in after.signals)
+
+
+def test_the_hidden_record_does_not_reach_the_reader(log: Path, monkeypatch: pytest.MonkeyPatch):
+    reached = []
+
+    def watched(path: Path, unread: Collection[str] = ()) -> Contents:
+        contents = read_contents(path, unread)
+        reached.append(HIDDEN in contents.metadata)
+        return contents
+
+    monkeypatch.setattr(reader_module, "read_contents", watched)
+    read_log(log)
+    assert reached == [False]
+
+
+def test_a_file_without_checksums_is_refused(log: Path):
+    output = io.BytesIO()
+    writer = Writer(output)
+    writer.start("ros2")
+    writer.finish()
+    log.write_bytes(output.getvalue())
+    with pytest.raises(CorruptError, match="no checksum over its data"):
+        read_log(log)
+
+
+@pytest.mark.parametrize(
+    ("count", "match"),
+    [
+        ("message_count", "720 messages, it holds 721"),
+        ("attachment_count", "2 attachments, it holds 3"),
+        ("metadata_count", "3 metadata records, it holds 4"),
+        ("schema_count", "5 schemas, it holds 6"),
+        ("channel_count", "6 channels, it holds 7"),
+    ],
+)
+def test_counts_that_do_not_agree_are_refused(
+    log: Path, monkeypatch: pytest.MonkeyPatch, count: str, match: str
+):
+    honest = Statistics.write
+
+    def wrong(self: Statistics, stream: RecordBuilder) -> None:
+        setattr(self, count, getattr(self, count) - 1)
+        honest(self, stream)
+
+    monkeypatch.setattr(Statistics, "write", wrong)
+    rewritten(log, lambda record: record)
+    with pytest.raises(CorruptError, match=f"its statistics say {match}"):
+        read_log(log)
+
+
+def test_a_chunk_that_would_fill_the_memory_is_refused(log: Path, monkeypatch: pytest.MonkeyPatch):
+    honest = Chunk.write
+
+    def boastful(self: Chunk, stream: RecordBuilder) -> None:
+        self.uncompressed_size = 2**40
+        honest(self, stream)
+
+    monkeypatch.setattr(Chunk, "write", boastful)
+    rewritten(log, lambda record: record)
+    with pytest.raises(CorruptError, match="a chunk claims 1099511627776 bytes"):
+        read_log(log)
+
+
+@pytest.mark.parametrize("case", sorted(CASES.glob("*/*.json")), ids=lambda path: path.stem)
+def test_the_strict_pass_reads_the_conformance_suite(case: Path):
+    described = json.loads(case.read_text())
+    data = built(described)
+    expected = (CASES / "sha256.txt").read_text()
+    assert hashlib.sha256(data).hexdigest() in expected
+    found = [record for record in scan(io.BytesIO(data)) if isinstance(record, COUNTED)]
+    told = [record for record in described["records"] if record["type"] in NAMES]
+    assert [type(record).__name__ for record in found] == [record["type"] for record in told]
+    for record, other in zip(found, told, strict=True):
+        for field, text in other["fields"]:
+            value = getattr(record, field)
+            assert ([str(b) for b in value] if isinstance(value, bytes) else value) == (
+                int(text) if isinstance(value, int) else text
+            )
+
+
+NAMES = {kind.__name__ for kind in COUNTED}
+
+
+def built(described: dict) -> bytes:
+    """Rebuilds a case of the suite from its description."""
+    features = set(described["meta"]["variant"]["features"])
+    kinds = {"chx": "CHUNK", "mx": "MESSAGE", "ax": "ATTACHMENT", "mdx": "METADATA"}
+    indexes = IndexType.NONE
+    for feature in features & set(kinds):
+        indexes |= IndexType[kinds[feature]]
+    output = io.BytesIO()
+    writer = Writer(
+        output,
+        compression=CompressionType.NONE,
+        index_types=indexes,
+        repeat_channels="rch" in features,
+        repeat_schemas="rsh" in features,
+        use_chunking="ch" in features,
+        use_statistics="st" in features,
+        use_summary_offsets="sum" in features,
+        enable_data_crcs=True,
+    )
+    for record in described["records"]:
+        fields = dict(record["fields"])
+        data = bytes(int(b) for b in fields.get("data", []))
+        match record["type"]:
+            case "Header":
+                writer.start(fields["profile"], fields["library"])
+            case "Schema":
+                writer.register_schema(fields["name"], fields["encoding"], data)
+            case "Channel":
+                writer.register_channel(
+                    fields["topic"],
+                    fields["message_encoding"],
+                    int(fields["schema_id"]),
+                    fields["metadata"],
+                )
+            case "Message":
+                writer.add_message(
+                    int(fields["channel_id"]),
+                    int(fields["log_time"]),
+                    data,
+                    int(fields["publish_time"]),
+                    int(fields["sequence"]),
+                )
+            case "Attachment":
+                writer.add_attachment(
+                    int(fields["create_time"]),
+                    int(fields["log_time"]),
+                    fields["name"],
+                    fields["media_type"],
+                    data,
+                )
+            case "Metadata":
+                writer.add_metadata(fields["name"], fields["metadata"])
+            case "DataEnd":
+                break
+    writer.finish()
+    return output.getvalue()

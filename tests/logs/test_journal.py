@@ -1,0 +1,161 @@
+import json
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from selfmodel.behaviour import Sample
+from selfmodel.controller import Controller
+from selfmodel.diagnosis import Candidate, Diagnosis
+from selfmodel.errors import InputError
+from selfmodel.hypothesis import INTACT
+from selfmodel.logs import CorruptError, LogError, SchemaMismatchError, read_truth
+from selfmodel.logs.journal import FolderJournal, open_journal, read_database
+from selfmodel.notation import parse
+from selfmodel.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.trial import Plan
+from tests.logs.conftest import made_up, plan_of
+
+
+class MadeUpRobot:
+    """A physical robot that does nothing but tell numbers."""
+
+    def __init__(self, robot: Robot, stops_after: int = 10**6) -> None:
+        self._robot = robot
+        self._steps = stops_after
+
+    def run(self, controller: Controller, steps: int) -> Iterator[Sample]:
+        """Yields samples that depend on the controller."""
+        seed = int(controller.genome.sum() * 100) % 1000
+        return made_up(self._robot, min(steps, self._steps), seed)
+
+
+@pytest.fixture
+def journal(biped: Robot, tmp_path: Path) -> FolderJournal:
+    return open_journal(tmp_path / "run", biped, Settings(), {"before": "neuron:0"})
+
+
+def diagnosis(robot: Robot) -> Diagnosis:
+    worse = parse("break:left_hip", robot.anatomy)
+    ranked = (Candidate(INTACT, 0.1 + 0.2), Candidate(worse, math.inf))
+    return Diagnosis(ranked, trials=3)
+
+
+def test_a_journal_reads_what_it_recorded(journal: FolderJournal, biped: Robot):
+    trials = [
+        journal.record(MadeUpRobot(biped), plan_of(biped, 30, f"{k:02d}-before")) for k in range(3)
+    ]
+    journal.note(diagnosis(biped))
+    journal.note(Diagnosis(diagnosis(biped).ranked[:1], trials=4))
+    for database in (journal.read(), read_database(journal.folder, biped.anatomy)):
+        assert [trial.plan for trial in database.trials] == [trial.plan for trial in trials]
+        assert database.diagnoses == (
+            diagnosis(biped),
+            Diagnosis(diagnosis(biped).ranked[:1], trials=4),
+        )
+    assert sorted(path.name for path in (journal.folder / "trials").iterdir()) == [
+        "00-before.mcap",
+        "01-before.mcap",
+        "02-before.mcap",
+    ]
+    assert read_truth(trials[0].path) == "neuron:0"
+
+
+def test_a_new_journal_is_empty(journal: FolderJournal):
+    database = journal.read()
+    assert (database.trials, database.diagnoses) == ((), ())
+
+
+def test_the_hundredth_trial_comes_after_the_ninety_ninth(journal: FolderJournal, biped: Robot):
+    for name in ("100-before", "99-before", "09-before"):
+        journal.record(MadeUpRobot(biped), plan_of(biped, 3, name))
+    names = [trial.plan.name for trial in journal.read().trials]
+    assert names == ["09-before", "99-before", "100-before"]
+
+
+def test_a_stage_without_a_truth_is_logged_without(journal: FolderJournal, biped: Robot):
+    plan = plan_of(biped, 3)
+    other = Plan("01-after", "after", plan.controller, plan.steps, plan.seed)
+    assert read_truth(journal.record(MadeUpRobot(biped), other).path) is None
+
+
+def test_an_interrupted_trial_stays_and_is_passed_over(journal: FolderJournal, biped: Robot):
+    journal.record(MadeUpRobot(biped), plan_of(biped, 30))
+    with pytest.raises(LogError, match="stopped after 12 of 30 steps"):
+        journal.record(MadeUpRobot(biped, 12), plan_of(biped, 30, "01-before"))
+    assert (journal.folder / "trials" / "01-before.mcap.part").exists()
+    assert len(journal.read().trials) == 1
+
+
+def test_a_trial_is_not_recorded_twice(journal: FolderJournal, biped: Robot):
+    journal.record(MadeUpRobot(biped), plan_of(biped, 3))
+    with pytest.raises(InputError, match=r"00-before\.mcap exists, and is not overwritten"):
+        journal.record(MadeUpRobot(biped), plan_of(biped, 3))
+
+
+def test_a_damaged_log_is_not_passed_over(journal: FolderJournal, biped: Robot):
+    path = Path(journal.record(MadeUpRobot(biped), plan_of(biped, 30)).path)
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(LogError, match=r"00-before\.mcap"):
+        journal.read()
+
+
+@pytest.mark.parametrize("held", ["trials/old.mcap", "diagnoses.json", "notes.txt"])
+def test_a_folder_that_holds_something_is_refused(biped: Robot, tmp_path: Path, held: str):
+    (tmp_path / held).parent.mkdir(exist_ok=True)
+    (tmp_path / held).write_text("precious")
+    with pytest.raises(InputError, match=f"holds another run or other files.*{held[:6]}"):
+        open_journal(tmp_path, biped, Settings(), {})
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == [tmp_path / held]
+
+
+def test_an_empty_folder_will_do_and_a_file_will_not(biped: Robot, tmp_path: Path):
+    (tmp_path / "empty").mkdir()
+    open_journal(tmp_path / "empty", biped, Settings(), {})
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match="is a file"):
+        open_journal(tmp_path / "file", biped, Settings(), {})
+
+
+def test_a_run_of_another_robot_is_refused(journal: FolderJournal, biped: Robot, quadruped: Robot):
+    journal.record(MadeUpRobot(biped), plan_of(biped, 3))
+    with pytest.raises(SchemaMismatchError, match="it is of the robot 'biped'"):
+        read_database(journal.folder, quadruped.anatomy)
+
+
+def test_a_folder_without_a_run_is_said_so(biped: Robot, tmp_path: Path):
+    with pytest.raises(InputError, match="expected the folder of a run"):
+        read_database(tmp_path, biped.anatomy)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "{}x",
+        "[1]",
+        '[{"trials": 1}]',
+        '[{"trials": 1, "ranked": [{"hypothesis": "break:nose", "distance": 1}]}]',
+        '[{"trials": 1, "ranked": [{"hypothesis": 3, "distance": 1}]}]',
+        "[" * 100_000,
+        "\xff",
+    ],
+)
+def test_damaged_diagnoses_are_said_so(journal: FolderJournal, text: str):
+    (journal.folder / "diagnoses.json").write_bytes(text.encode("latin-1"))
+    with pytest.raises(CorruptError, match=r"diagnoses\.json: expected the diagnoses of a run"):
+        journal.read()
+
+
+def test_diagnoses_are_json_without_surprises(journal: FolderJournal, biped: Robot):
+    journal.note(diagnosis(biped))
+    [item] = json.loads((journal.folder / "diagnoses.json").read_text())
+    assert item["ranked"] == [
+        {"hypothesis": "intact", "distance": 0.1 + 0.2},
+        {"hypothesis": "break:left_hip", "distance": None},
+    ]
+    assert not list(journal.folder.glob("*.part"))

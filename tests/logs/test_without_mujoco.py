@@ -1,0 +1,31 @@
+import subprocess
+import sys
+from pathlib import Path
+
+SCRIPT = """
+import sys
+
+class Blocker:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in ("mujoco", "dm_control", "rosbags"):
+            raise ImportError(f"{name} is blocked")
+
+sys.meta_path.insert(0, Blocker())
+import selfmodel.logs
+log = selfmodel.logs.read_log(sys.argv[1])
+print(log.trial.behaviour.steps, selfmodel.logs.read_truth(sys.argv[1]))
+"""
+
+
+def test_a_log_is_read_where_there_is_no_mujoco(log: Path):
+    result = subprocess.run(
+        [sys.executable, "-c", SCRIPT, log], check=True, capture_output=True, text=True
+    )
+    assert result.stdout == "120 intact\n"
+
+
+def test_every_name_that_is_listed_is_there():
+    import selfmodel.logs  # noqa: PLC0415 - what is tested
+
+    assert sorted(selfmodel.logs.__all__) == sorted(set(selfmodel.logs.__all__))
+    assert all(hasattr(selfmodel.logs, name) for name in selfmodel.logs.__all__)
