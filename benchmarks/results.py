@@ -59,10 +59,7 @@ def _table_one(robot: str, runs: list[dict]) -> str:
 
 def _by_case(runs: list[dict]) -> str:
     rows = [
-        (
-            "The quadruped, one run a seed; *÷ before* is recovered over before, with its lowest and "
-            "highest.\n"
-        ),
+        ("The quadruped, one run a seed; *÷ before* is recovered over before, over the seeds.\n"),
         "| case | truth | right | median ÷ before | lowest | highest | diverged simulations |",
         "|---|---|---:|---:|---:|---:|---:|",
     ]
@@ -86,9 +83,9 @@ def _gaits(robots: list[str], walks: list[dict]) -> str:
     rows = [
         (
             "The paper's budget, one gait a seed. *torso*: its lowest and highest height over all "
-            "seeds, over its standing height, and *deepest* the deepest penetration of any contact, at "
-            "every physics step; *walking* counts the gaits whose torso stays above the ground and "
-            "below twice its height, with no contact deeper than 1 cm.\n"
+            "seeds, over its standing height; *deepest*: the deepest penetration of any contact; "
+            "both at every physics step. *walking* counts the gaits whose torso stays above the "
+            "ground and below twice its height, with no contact deeper than 1 cm.\n"
         ),
         "| robot | median m | lowest | highest | torso | deepest, mm | walking | median seconds |",
         "|---|---:|---:|---:|---|---:|---:|---:|",

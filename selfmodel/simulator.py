@@ -88,8 +88,9 @@ class Simulator:
         )
         sensordata, qpos, ctrl = (batch.bind(field) for field in ("sensordata", "qpos", "ctrl"))
         live = _live(robot, batch, population, record)
-        signals = {
-            signal: np.empty((n, steps, robot.anatomy.names.width(signal))) for signal in record
+        # By step while it runs, so that a step is written in one piece.
+        kept = {
+            signal: np.empty((steps, n, robot.anatomy.names.width(signal))) for signal in record
         }
         # After every field is bound: one that is bound later stays zero until the next step.
         batch.reset()
@@ -98,9 +99,9 @@ class Simulator:
             for k in range(steps):
                 senses.read(sensordata, qpos, population.readings)
                 population.step(ctrl)
-                for signal, kept in signals.items():
+                for signal, rows in kept.items():
                     values, chosen = live[signal]
-                    kept[:, k] = values[:, chosen]
+                    rows[k] = values[:, chosen]
                 if k + 1 < steps:
                     start = perf_counter()
                     alive.step(robot.substeps)
@@ -109,6 +110,9 @@ class Simulator:
         self.tally.runs += n
         self.tally.steps += n * steps
         self.tally.diverged += int(diverged.sum())
+        signals = {
+            signal: np.ascontiguousarray(rows.swapaxes(0, 1)) for signal, rows in kept.items()
+        }
         time = np.arange(steps, dtype=np.float64) * robot.control_timestep
         return Simulated(Behaviour(robot.anatomy.names, time, signals), diverged)
 

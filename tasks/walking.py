@@ -95,7 +95,8 @@ class Walk(base.Task):
     def get_observation(self, physics: Physics) -> "OrderedDict[str, FloatArray]":
         """Returns what the controller receives, and the rest of the state but for where it is."""
         readings = np.empty((1, len(self._robot.anatomy.sensors)))
-        self._senses.read(physics.data.sensordata[np.newaxis], readings)
+        data = physics.data
+        self._senses.read(data.sensordata[np.newaxis], data.qpos[np.newaxis], readings)
         observation = OrderedDict(sensors=readings[0])
         for signal in (
             "joint_positions",
@@ -105,6 +106,6 @@ class Walk(base.Task):
             "base_angular_velocity",
         ):
             place = self._places[signal]
-            observation[signal] = getattr(physics.data, place.field)[place.columns].copy()
-        observation["base_height"] = physics.data.qpos[2:3].copy()
+            observation[signal] = getattr(data, place.field)[place.columns].copy()
+        observation["base_height"] = data.qpos[2:3].copy()
         return observation

@@ -40,6 +40,7 @@ def recover(
     from selfmodel.cli.display import display  # noqa: PLC0415
     from selfmodel.cli.experiment import Experiment, run  # noqa: PLC0415
     from selfmodel.cli.report import as_object, print_report  # noqa: PLC0415
+    from selfmodel.logs.files import replace  # noqa: PLC0415
     from selfmodel.notation import parse  # noqa: PLC0415
     from selfmodel.settings import Settings  # noqa: PLC0415
 
@@ -61,8 +62,10 @@ def recover(
     except KeyboardInterrupt:
         typer.echo(f"interrupted: the finished trials are in {experiment.folder}", err=True)
         raise typer.Exit(130) from None
+    result = as_object(experiment, outcome)
+    replace(experiment.folder / "result.json", f"{result}\n".encode())
     if as_json:
-        typer.echo(as_object(experiment, outcome))
+        typer.echo(result)
     else:
         print_report(experiment, outcome)
 
