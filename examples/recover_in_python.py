@@ -1,0 +1,41 @@
+"""One recovery through the Python API: your robot, your comparator, your journal.
+
+Usage: python examples/recover_in_python.py RUN_FOLDER
+"""
+
+import sys
+from pathlib import Path
+
+from selfmodel.comparators import FORWARD_DISPLACEMENT
+from selfmodel.logs.journal import open_journal
+from selfmodel.notation import parse
+from selfmodel.physical import SimulatedRobot
+from selfmodel.recover import recover
+from selfmodel.settings import Settings
+from selfmodel.simulator import Simulator
+from selfmodel.tasks import ROBOTS
+
+
+def main(folder: Path) -> None:
+    """Recovers a quadruped that lost a leg, with a small budget."""
+    robot = ROBOTS["quadruped"].robot()
+    truth = parse("break:back_left_shoulder", robot.anatomy)
+    settings = Settings(generations=5).scaled(20)
+    recovery = recover(
+        healthy=SimulatedRobot(robot),  # anything with a `run` like PhysicalRobot's will do
+        damaged=SimulatedRobot(robot, truth),
+        simulator=Simulator(robot, threads=2),
+        comparator=FORWARD_DISPLACEMENT,
+        journal=open_journal(folder, robot, settings, hidden={}),
+        settings=settings,
+        seed=0,
+        watch=lambda _event: None,
+    )
+    print(f"best explanation: {recovery.diagnosis.best} (the truth: {truth})")
+    print(f"{recovery.before:.2f} m, {recovery.after:.2f} m, {recovery.recovered:.2f} m")
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        sys.exit(__doc__)
+    main(Path(sys.argv[1]))
