@@ -27,6 +27,7 @@ lint: $(READY) ## check style and formatting
 
 types: $(READY) ## check types, strictly
 	$(BIN)/mypy
+	$(BIN)/mypy benchmarks examples .ci
 
 wheel: $(READY) ## build the wheel and check what it holds
 	rm -rf build dist

@@ -32,10 +32,10 @@ def run_installed(wheel: Path, folder: Path) -> None:
     venv.create(folder / "venv", with_pip=True)
     python = folder / "venv" / "bin" / "python"
     constraints = Path("constraints.txt").resolve()
-    install = [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-    subprocess.run([*install, "--constraint", constraints, wheel], check=True)
+    install = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    subprocess.run([*install, "--constraint", str(constraints), str(wheel)], check=True)
     for arguments in (["robots"], ["trial", "hexapod", "--out", "trial.mcap"]):
-        subprocess.run([python, "-m", "selfmodel", *arguments], check=True, cwd=folder)
+        subprocess.run([str(python), "-m", "selfmodel", *arguments], check=True, cwd=folder)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,10 @@
 
 from pathlib import Path
 from statistics import median
+from typing import Any
+
+Facts = dict[str, Any]
+"""Plain values by name, as JSON keeps them."""
 
 RESULTS = Path("docs/results.md")
 
@@ -20,7 +24,7 @@ hypotheses that were simulated.
 """
 
 
-def write_results(walks: list[dict], runs: list[dict]) -> None:
+def write_results(walks: list[Facts], runs: list[Facts]) -> None:
     """Writes the page.
 
     Args:
@@ -36,7 +40,7 @@ def write_results(walks: list[dict], runs: list[dict]) -> None:
     RESULTS.write_text("\n".join(parts), encoding="utf-8")
 
 
-def _table_one(robot: str, runs: list[dict]) -> str:
+def _table_one(robot: str, runs: list[Facts]) -> str:
     rows = [
         (
             "| case | truth | before | after | recovered | ÷ before | right | best hypothesis, "
@@ -57,13 +61,13 @@ def _table_one(robot: str, runs: list[dict]) -> str:
     return "\n".join(rows) + "\n"
 
 
-def _by_case(runs: list[dict]) -> str:
+def _by_case(runs: list[Facts]) -> str:
     rows = [
         ("The quadruped, one run a seed; *÷ before* is recovered over before, over the seeds.\n"),
         "| case | truth | right | median ÷ before | lowest | highest | diverged simulations |",
         "|---|---|---:|---:|---:|---:|---:|",
     ]
-    cases: dict[int, list[dict]] = {}
+    cases: dict[int, list[Facts]] = {}
     for run in runs:
         if run["robot"] == "quadruped":
             cases.setdefault(run["case"], []).append(run)
@@ -79,7 +83,7 @@ def _by_case(runs: list[dict]) -> str:
     return "\n".join(rows) + "\n"
 
 
-def _gaits(robots: list[str], walks: list[dict]) -> str:
+def _gaits(robots: list[str], walks: list[Facts]) -> str:
     rows = [
         (
             "The paper's budget, one gait a seed. *torso*: its lowest and highest height over all "

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from mujoco import rollout
 
+from benchmarks.results import Facts
 from selfmodel import tasks
 from selfmodel.controller import Controller, Population, draw_weights
 from selfmodel.hypothesis import INTACT
@@ -24,7 +25,7 @@ def runs(robot: Robot, count: int) -> list[Run]:
     return [(INTACT, Controller(robot.network, genome)) for genome in genomes]
 
 
-def closed_loop_over_rollout(robot: Robot, count: int, steps: int, threads: int) -> dict:
+def closed_loop_over_rollout(robot: Robot, count: int, steps: int, threads: int) -> Facts:
     """Compares closed-loop steps per second with those of open-loop ``mujoco.rollout``.
 
     The same model, threads, starts and motor targets: what the closed loop commanded, replayed.
@@ -69,7 +70,7 @@ def closed_loop_over_environment(robot: Robot, count: int, steps: int, threads: 
     return (count * steps / closed) / (steps / looped)
 
 
-def growth(robots: list[Robot], threads: int) -> list[dict]:
+def growth(robots: list[Robot], threads: int) -> list[Facts]:
     """Returns how the cost grows with population, steps and joints."""
     cells = [(robot, 100, 500) for robot in robots]
     cells += [(robots[0], count, 500) for count in (10, 25, 50, 200, 400)]

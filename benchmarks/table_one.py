@@ -17,7 +17,7 @@ from time import perf_counter
 
 import numpy as np
 
-from benchmarks.results import write_results
+from benchmarks.results import Facts, write_results
 from benchmarks.walking import walk
 from selfmodel.cli.experiment import Experiment, run
 from selfmodel.cli.report import facts
@@ -56,7 +56,7 @@ def main() -> None:
     write_results(walks, runs)
 
 
-def evolve_gait(name: str, seed: int, out: Path) -> dict:
+def evolve_gait(name: str, seed: int, out: Path) -> Facts:
     """Evolves the gait that a recovery with this seed starts with, and says how it walks."""
     folder = out / "gaits" / f"{name}-seed{seed}"
     facts_file = folder / "facts.json"
@@ -81,10 +81,10 @@ def evolve_gait(name: str, seed: int, out: Path) -> dict:
         }
         facts_file.write_text(json.dumps(found, indent=2), encoding="utf-8")
         print(found, flush=True)
-    return json.loads(facts_file.read_text(encoding="utf-8"))
+    return _read(facts_file)
 
 
-def recover_once(name: str, case: int, seed: int, out: Path) -> dict:
+def recover_once(name: str, case: int, seed: int, out: Path) -> Facts:
     """Recovers a robot from one case, starting with the gait of that seed."""
     folder = out / f"{name}-case{case:02d}-seed{seed}"
     facts_file = folder.with_suffix(".json")
@@ -104,7 +104,12 @@ def recover_once(name: str, case: int, seed: int, out: Path) -> dict:
         found = facts(experiment, run(experiment, lambda _: None))
         facts_file.write_text(json.dumps(found, indent=2), encoding="utf-8")
         print(name, case, seed, found["correct"], found["recovery"], found["seconds"], flush=True)
-    return json.loads(facts_file.read_text(encoding="utf-8"))
+    return _read(facts_file)
+
+
+def _read(file: Path) -> Facts:
+    found: Facts = json.loads(file.read_text(encoding="utf-8"))
+    return found
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ from selfmodel.logs import TrialLog, read_log
 mpl.use("Agg")  # a figure in a file needs no display
 
 from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
 
 COLOURS = {"before": "tab:green", "after": "tab:red", "recovery": "tab:blue"}
 
@@ -31,7 +32,7 @@ def main(folder: Path, figure: Path) -> None:
     plt.savefig(figure, dpi=150)
 
 
-def draw(axes: plt.Axes, log: TrialLog, shade: float) -> None:
+def draw(axes: Axes, log: TrialLog, shade: float) -> None:
     """Draws one trial."""
     behaviour, plan = log.trial.behaviour, log.trial.plan
     x = behaviour["base_position"][:, 0]

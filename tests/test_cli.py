@@ -163,7 +163,7 @@ def test_progress_goes_to_standard_error_in_plain_lines_when_piped(tmp_path: Pat
     lines = done.stderr.splitlines()
     begins = [
         *("repair EA for intact:", "trial 00-before:", "trial 01-after:", "diagnostic EA:"),
-        *("diagnosis from 1 trials:", "repair EA for ", "trial 02-recovery:", "diagnostic EA:"),
+        *("diagnosis from 1 trial:", "repair EA for ", "trial 02-recovery:", "diagnostic EA:"),
         "diagnosis from 2 trials:",
     ]
     assert len(lines) == len(begins)

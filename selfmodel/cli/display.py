@@ -5,6 +5,7 @@ from contextlib import contextmanager
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn
+from rich.table import Column
 
 from selfmodel.diagnosis import Diagnosis
 from selfmodel.evolution import Generation
@@ -20,12 +21,17 @@ def display() -> Iterator[Callable[[Event], None]]:
         yield _Lines(console)
         return
     progress = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(bar_width=None),
+        # A long hypothesis gives way to the bar and the numbers, not they to it.
+        TextColumn(
+            "{task.description}",
+            table_column=Column(ratio=3, no_wrap=True, overflow="ellipsis"),
+        ),
+        BarColumn(bar_width=None, table_column=Column(ratio=1)),
         MofNCompleteColumn(),
         TextColumn("best {task.fields[best]}"),
         TextColumn("{task.fields[rate]}/s"),
         console=console,
+        expand=True,
     )
     with progress:
         yield _Bars(progress)
@@ -89,4 +95,5 @@ def _sentence(event: Trial | Diagnosis) -> str:
     if isinstance(event, Trial):
         return f"trial {event.plan.name}: {event.displacement:.3f} m forward"
     best = event.ranked[0]
-    return f"diagnosis from {event.trials} trials: {best.hypothesis} (distance {best.distance:.4f})"
+    trials = "1 trial" if event.trials == 1 else f"{event.trials} trials"
+    return f"diagnosis from {trials}: {best.hypothesis} (distance {best.distance:.4f})"

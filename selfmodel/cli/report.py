@@ -36,14 +36,14 @@ def print_report(experiment: Experiment, outcome: Outcome) -> None:
             "diverged" if distance is None else f"{distance:.4f}",
         )
     console.print(trials, diagnosis)
-    evaluations = found["evaluations"]
+    evaluations, trials_since = found["evaluations"], found["physical_trials"]
     verdict = "right" if found["correct"] else "wrong"
     console.print(
         f"truth: {found['truth']}; the diagnosis is {verdict}.\n"
         f"The robot went {found['displacement']['before']:.2f} m before, "
         f"{found['displacement']['after']:.2f} m after the failure, and "
         f"{found['displacement']['recovered']:.2f} m at best in "
-        f"{found['physical_trials']} trials since.\n"
+        f"{'1 trial' if trials_since == 1 else f'{trials_since} trials'} since.\n"
         f"{evaluations['repair']} controllers and {evaluations['distinct_hypotheses']} distinct "
         f"hypotheses in {found['seconds']:.0f} s; diverged: {evaluations['diverged']}.\n"
         f"Logs: {experiment.folder}",
