@@ -1,16 +1,19 @@
 """``make results``: Table I of the paper on both robots, and how often the diagnosis is right.
 
-Every run is kept in a folder of its own and is not run again when the command is. Each uses one
-thread, and as many run at once as there are processors. Cost: a gait takes about 15 (quadruped)
+Every run is kept in a folder of its own and is not run again when the command is, unless the robot,
+the settings or the version have changed since. Each uses one thread, and as many run at once as
+there are processors. Cost: a gait takes about 15 (quadruped)
 or 30 s (hexapod), the rest of a recovery three to four times that; it grows in proportion to
 seeds, cases, population, generations and steps.
 """
 
 import argparse
 import dataclasses
+import hashlib
 import json
 import multiprocessing
 import os
+import shutil
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from time import perf_counter
@@ -19,6 +22,7 @@ import numpy as np
 
 from benchmarks.results import Facts, write_results
 from benchmarks.walking import walk
+from selfmodel import __version__
 from selfmodel.cli.experiment import Experiment, run
 from selfmodel.cli.report import facts
 from selfmodel.comparators import FORWARD_DISPLACEMENT
@@ -26,6 +30,7 @@ from selfmodel.hypothesis import INTACT
 from selfmodel.logs import load_controller, save_controller
 from selfmodel.notation import parse
 from selfmodel.repair import Repair
+from selfmodel.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulator import Simulator
 from selfmodel.tasks import ROBOTS
@@ -60,19 +65,20 @@ def evolve_gait(name: str, seed: int, out: Path) -> Facts:
     """Evolves the gait that a recovery with this seed starts with, and says how it walks."""
     folder = out / "gaits" / f"{name}-seed{seed}"
     facts_file = folder / "facts.json"
-    if not facts_file.exists():
-        folder.mkdir(parents=True, exist_ok=True)
-        start, settings = perf_counter(), Settings()
-        robot = ROBOTS[name].robot()
+    start, settings = perf_counter(), Settings()
+    robot = ROBOTS[name].robot()
+    if not _is_made(facts_file, robot):
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
         # The first of the streams that `recover` draws from: the same gait as its own.
         (stream,) = np.random.default_rng(seed).spawn(1)
         repair = Repair(Simulator(robot, threads=1), settings)
         gait = repair(INTACT, [], stream, lambda _: None)
         seconds = perf_counter() - start
-        (folder / "gait.npz").unlink(missing_ok=True)
         save_controller(folder / "gait.npz", gait)
         walked = walk(robot, gait, settings.steps)
         found = {
+            "made_of": _made_of(robot),
             "robot": name,
             "seed": seed,
             "seconds": seconds,
@@ -88,8 +94,9 @@ def recover_once(name: str, case: int, seed: int, out: Path) -> Facts:
     """Recovers a robot from one case, starting with the gait of that seed."""
     folder = out / f"{name}-case{case:02d}-seed{seed}"
     facts_file = folder.with_suffix(".json")
-    if not facts_file.exists():
-        robot = ROBOTS[name].robot()
+    robot = ROBOTS[name].robot()
+    if not _is_made(facts_file, robot):
+        shutil.rmtree(folder, ignore_errors=True)
         experiment = Experiment(
             robot=robot,
             case=case,
@@ -101,10 +108,23 @@ def recover_once(name: str, case: int, seed: int, out: Path) -> Facts:
             folder=folder,
             gait=load_controller(out / "gaits" / f"{name}-seed{seed}" / "gait.npz"),
         )
-        found = facts(experiment, run(experiment, lambda _: None))
+        found = {
+            "made_of": _made_of(robot),
+            **facts(experiment, run(experiment, lambda _: None)),
+        }
         facts_file.write_text(json.dumps(found, indent=2), encoding="utf-8")
         print(name, case, seed, found["correct"], found["recovery"], found["seconds"], flush=True)
     return _read(facts_file)
+
+
+def _made_of(robot: Robot) -> str:
+    """What a result depends on, as a digest."""
+    settings = json.dumps(dataclasses.asdict(Settings()))
+    return hashlib.sha256(f"{__version__} {settings} {robot.mjcf}".encode()).hexdigest()
+
+
+def _is_made(file: Path, robot: Robot) -> bool:
+    return file.exists() and _read(file).get("made_of") == _made_of(robot)
 
 
 def _read(file: Path) -> Facts:

@@ -3,6 +3,8 @@
 import errno
 from os import PathLike
 
+from selfmodel.errors import WorkError
+
 AGAIN = "make the trial again"
 FROM_PART = (
     "the steps that are complete stay in the file, which nothing here deletes or changes; "
@@ -10,7 +12,7 @@ FROM_PART = (
 )
 
 
-class LogError(ValueError):
+class LogError(WorkError):
     """A log cannot be used.
 
     Args:

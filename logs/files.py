@@ -1,5 +1,6 @@
 """Files that come to be whole or not at all, and never in the place of another."""
 
+import errno
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -43,7 +44,8 @@ def publish(file: IO[bytes], path: Path) -> None:
     """Closes a finished part, and gives it its name once the disk has it.
 
     Raises:
-        InputError: ``path`` has come to exist meanwhile; the part stays.
+        InputError: ``path`` has come to exist meanwhile, or the file system has no hard links;
+            the part stays.
         OSError: The disk failed.
     """
     sync(file)
@@ -55,6 +57,13 @@ def publish(file: IO[bytes], path: Path) -> None:
             f"{path} has come to exist meanwhile, and is not overwritten; the finished log is "
             f"{part_of(path)}: give it another name"
         ) from None
+    except OSError as error:
+        if error.errno not in (errno.EPERM, errno.ENOTSUP):
+            raise
+        raise InputError(
+            f"{path}: this file system has no hard links ({error.strerror}); the finished log is "
+            f"{part_of(path)}: rename it, and choose another folder for the next"
+        ) from error
     part_of(path).unlink()
     sync_folder(path.parent)
 

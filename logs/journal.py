@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ from selfmodel.database import Database
 from selfmodel.diagnosis import Candidate, Diagnosis
 from selfmodel.errors import InputError
 from selfmodel.logs.errors import CorruptError, SchemaMismatchError
-from selfmodel.logs.files import explained, replace
+from selfmodel.logs.files import replace
 from selfmodel.logs.reader import read_log
 from selfmodel.logs.records import checked_name
 from selfmodel.logs.writer import write_trial
@@ -34,14 +34,12 @@ class FolderJournal:
         folder: ``trials/NAME.mcap`` for each trial, and ``diagnoses.json``.
         robot: Whose recovery it is.
         settings: The paper's numbers, for the record.
-        hidden: What is wrong with the physical robot at each stage, in notation, for those who
-            score; a stage that is missing is logged without.
     """
 
     folder: Path
     robot: Robot
     settings: Settings
-    hidden: Mapping[Stage, str]
+    _hidden: Mapping[Stage, str] = field(repr=False)
 
     def record(self, physical: PhysicalRobot, plan: Plan) -> Trial:
         """Runs a trial, logs it while it runs, and returns it as its file says it.
@@ -57,7 +55,7 @@ class FolderJournal:
             plan,
             physical.run(plan.controller, plan.steps),
             settings=self.settings,
-            hidden=self.hidden.get(plan.stage),
+            hidden=self._hidden.get(plan.stage),
         )
         return read_log(path).trial
 
@@ -75,11 +73,17 @@ class FolderJournal:
 def open_journal(
     folder: Path, robot: Robot, settings: Settings, hidden: Mapping[Stage, str]
 ) -> FolderJournal:
-    """Makes the folder of a new run; the arguments are those of ``FolderJournal``.
+    """Makes the folder of a new run.
+
+    Args:
+        folder: New, or empty.
+        robot: Whose recovery it is.
+        settings: The paper's numbers, for the record.
+        hidden: What is wrong with the physical robot at each stage, in notation, for those who
+            score: it goes into the logs and nowhere else. A stage that is missing has none.
 
     Raises:
-        InputError: The folder holds something, or cannot be one.
-        LogWriteError: It could not be made.
+        InputError: The folder holds something, or cannot be made.
     """
     try:
         holds = sorted(entry.name for entry in folder.iterdir()) if folder.exists() else []
@@ -90,8 +94,12 @@ def open_journal(
             f"{folder} holds another run or other files ({', '.join(holds[:3])}): nothing is "
             f"overwritten, choose a folder that is empty or does not exist"
         )
-    with explained(folder / TRIALS):
+    try:
         (folder / TRIALS).mkdir(parents=True)
+    except OSError as error:
+        raise InputError(
+            f"{folder} cannot be made: {error.strerror}; choose another folder"
+        ) from error
     return FolderJournal(folder, robot, settings, dict(hidden))
 
 

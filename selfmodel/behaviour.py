@@ -26,9 +26,9 @@ SIGNALS: tuple[Signal, ...] = get_args(Signal)
 
 ``sensors``: what the controller received (touch 0 or 1, angles scaled to the joint's range).
 ``commands``: motor targets, rad. ``joint_positions``: rad. ``joint_velocities``: rad/s.
-``joint_efforts``: torque at the joint, N m. ``base_position``: root body, world frame, m.
-``base_orientation``: unit quaternion, w x y z. ``base_linear_velocity``: world frame, m/s.
-``base_angular_velocity``: body frame, rad/s.
+``joint_efforts``: torque at the joint over the last physics step, N m; 0 at the start.
+``base_position``: root body, world frame, m. ``base_orientation``: unit quaternion, w x y z.
+``base_linear_velocity``: world frame, m/s. ``base_angular_velocity``: body frame, rad/s.
 """
 
 

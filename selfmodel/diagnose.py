@@ -6,8 +6,10 @@ from functools import partial
 import numpy as np
 
 from selfmodel.arrays import FloatArray
+from selfmodel.behaviour import SIGNALS
 from selfmodel.comparator import Comparator
 from selfmodel.diagnosis import Candidate, Diagnosis
+from selfmodel.errors import InputError
 from selfmodel.evolution import Evolution, Observe, evolve
 from selfmodel.genome import VALUES, decode, encode
 from selfmodel.hypothesis import Hypothesis
@@ -94,10 +96,20 @@ class Diagnose:
 
     def _simulate(self, trial: Trial, hypotheses: list[Hypothesis]) -> FloatArray:
         controller, steps = trial.plan.controller, trial.behaviour.steps
-        outcome = self._simulator.run(
-            [(hypothesis, controller) for hypothesis in hypotheses],
-            steps,
-            self._comparator.request(trial).record,
-        )
-        distances = self._comparator.distances(outcome.behaviour, trial)
+        record = self._comparator.request(trial).record
+        if not record or not set(record) <= set(SIGNALS):
+            raise self._broken(f"asked for the signals {record!r}, of {', '.join(SIGNALS)}")
+        runs = [(hypothesis, controller) for hypothesis in hypotheses]
+        outcome = self._simulator.run(runs, steps, record)
+        distances = np.asarray(self._comparator.distances(outcome.behaviour, trial))
+        if distances.shape != (len(runs),):
+            raise self._broken(f"gave {distances.shape} distances for {len(runs)} simulations")
+        if not np.all((distances >= 0) | outcome.diverged):
+            raise self._broken(f"gave a distance that is not a number of at least 0: {distances}")
         return np.where(outcome.diverged, np.inf, distances)
+
+    def _broken(self, what: str) -> InputError:
+        return InputError(
+            f"the comparator {self._comparator.name!r} {what}: run "
+            f"selfmodel.contract.check_comparator on it"
+        )

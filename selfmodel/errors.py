@@ -12,7 +12,11 @@ class InputError(ValueError):
     """
 
 
-class TrialError(RuntimeError):
+class WorkError(RuntimeError):
+    """The work could not be done, through no fault of what the user gave."""
+
+
+class TrialError(WorkError):
     """A physical robot could not finish a trial."""
 
 

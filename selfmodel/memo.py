@@ -1,4 +1,9 @@
-"""Numbers that are computed once: nothing is simulated twice."""
+"""Numbers that are computed once.
+
+Each of the EAs has its own: a repair keeps the way that a run went, a diagnosis its distance to one
+trial. Behaviours are not kept, so a controller that was tried is simulated once more for each trial
+it is compared with; everything else is simulated once.
+"""
 
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from typing import Generic, TypeVar

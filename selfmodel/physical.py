@@ -28,7 +28,9 @@ class PhysicalRobot(Protocol):
             steps: Control steps to run.
 
         Yields:
-            The state, the readings and the commands of each step, ``steps`` of them.
+            The state, the readings and the commands of each step, ``steps`` of them. Times are
+            those that the control loop aims at, multiples of the control time step to the bit: a
+            log of this format has no place for jitter.
         """
         ...
 

@@ -101,19 +101,22 @@ def recover(
     Returns:
         What the journal says at the end.
     """
-    # A stream for each search, so that what one draws does not move the others.
-    streams = iter(np.random.default_rng(seed).spawn(2 + 2 * settings.trials))
+    rng = np.random.default_rng(seed)
     repair = Repair(simulator, settings)
     diagnose = Diagnose(simulator, comparator, settings)
     tried: list[Hypothesis] = []
 
+    def stream() -> np.random.Generator:
+        """One for each search, so that what one draws does not move the others."""
+        return rng.spawn(1)[0]
+
     def evolve_controller(hypothesis: Hypothesis) -> Controller:
         watch(SearchBegins("repair", hypothesis))
-        return repair(hypothesis, journal.read().controllers, next(streams), watch)
+        return repair(hypothesis, journal.read().controllers, stream(), watch)
 
     def explain(known: Database) -> Diagnosis:
         watch(SearchBegins("diagnostic"))
-        diagnosis = diagnose(known.evidence, known.hypotheses, next(streams), watch)
+        diagnosis = diagnose(known.evidence, known.hypotheses, stream(), watch)
         journal.note(diagnosis)
         watch(diagnosis)
         return diagnosis
@@ -126,7 +129,7 @@ def recover(
     if gait is None:
         gait = evolve_controller(INTACT)
     else:
-        next(streams)
+        stream()
     act(healthy, "before", INTACT, gait)
     act(damaged, "after", INTACT, gait)
     for _ in range(settings.trials):

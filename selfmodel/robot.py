@@ -75,12 +75,17 @@ def read_anatomy(model: mujoco.MjModel, neurons: int = HIDDEN_NEURONS) -> Anatom
     Args:
         model: A compiled MJCF.
         neurons: Hidden neurons of its controller.
+
+    Raises:
+        ValueError: The hinges of a body share no name, or the range of an angle sensor's hinge is
+            not symmetric about 0.
     """
     sensors = _sensors(model)
     hinges = [model.joint(j) for j in range(model.njnt) if model.jnt_type[j] == _HINGE]
     by_body: dict[int, list[str]] = {}
     for hinge in hinges:
-        by_body.setdefault(int(hinge.bodyid[0]), []).append(hinge.name)
+        if _motors(model, hinge.name):
+            by_body.setdefault(int(hinge.bodyid[0]), []).append(hinge.name)
     bodies_beyond = {
         body: frozenset(model.body(b).name for b in _subtree(model, body)) for body in by_body
     }
@@ -144,6 +149,10 @@ def _shared_name(hinges: list[str]) -> str:
     shared = hinges[0]
     while not all(name.startswith(shared) for name in hinges):
         shared = shared[:-1]
+    if not shared.rstrip("_"):
+        raise ValueError(
+            f"hinges of one body fail together and need names that begin alike, got {hinges}"
+        )
     return shared.rstrip("_")
 
 
@@ -156,6 +165,11 @@ def _sensors(model: mujoco.MjModel) -> tuple[Sensor, ...]:
             touch.append(Sensor(name, "touch", body, "", 1.0))
         elif model.sensor_type[s] == _ANGLE:
             hinge = model.joint(target)
+            if not hinge.range[1] == -hinge.range[0] > 0:
+                raise ValueError(
+                    f"the angle sensor {name} needs a hinge whose range is symmetric about 0, got "
+                    f"{hinge.name} with {hinge.range[0]} to {hinge.range[1]} rad"
+                )
             body = model.body(hinge.bodyid[0]).name
             angle.append(Sensor(name, "angle", body, hinge.name, float(hinge.range[1])))
     return tuple(touch + angle)

@@ -41,6 +41,11 @@ def test_dormant_genes_say_nothing():
     assert decode(genome, ANATOMIES["quadruped"]) == INTACT
 
 
+@pytest.mark.parametrize(("active", "faults"), [(0.0, 0), (0.499, 0), (0.5, 1), (0.999, 1)])
+def test_a_gene_is_active_from_one_half_on(active: float, faults: int):
+    assert len(decode(np.array([active, 0.0, 0.0, 0.0]), ANATOMIES["quadruped"])) == faults
+
+
 @pytest.mark.parametrize("name", ANATOMIES)
 def test_every_part_of_every_kind_can_be_reached(name: str):
     anatomy = ANATOMIES[name]

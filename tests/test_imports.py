@@ -53,6 +53,41 @@ def test_dependencies_point_one_way(module: str):
     assert not wrong, f"{module} must not import {wrong}"
 
 
+LAYERS = (
+    # Plain data and plain algorithms; then MuJoCo; then what takes a comparator; then the story.
+    ("errors", "arrays", "behaviour", "anatomy", "controller", "settings", "memo", "evolution"),
+    ("faults", "hypothesis", "notation", "genome", "diagnosis", "trial", "comparator", "contract"),
+    ("embodiment", "robot", "places", "senses", "simulator", "physical", "judge"),
+    ("database", "diagnose", "repair"),
+    ("recover",),
+)
+
+
+def layer(module: str) -> int:
+    """The layer of a module of the core."""
+    name = module.split(".")[1]
+    return next(i for i, names in enumerate(LAYERS) if name in names)
+
+
+@pytest.mark.parametrize(
+    "module",
+    sorted(m for m in modules() if m.count(".") and not m.startswith((*ADDED, "selfmodel.cli"))),
+)
+def test_a_layer_of_the_core_imports_none_above_it(module: str):
+    if module == "selfmodel.__main__":
+        return
+    # What stands under TYPE_CHECKING is not imported.
+    source = modules()[module].read_text(encoding="utf-8")
+    runtime = ast.parse(source.split("if TYPE_CHECKING:\n    from")[0])
+    imported = {
+        node.module
+        for node in ast.walk(runtime)
+        if isinstance(node, ast.ImportFrom) and str(node.module).startswith("selfmodel.")
+    }
+
+    assert [name for name in imported if layer(name) > layer(module)] == []
+
+
 @pytest.mark.parametrize("module", sorted(modules()))
 def test_the_folders_are_imported_under_one_name(module: str):
     roots = {name.split(".")[0] for name in imports(modules()[module])}

@@ -2,28 +2,30 @@
 
 import dataclasses
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.random import Generator
 
 from selfmodel.behaviour import Sample, Signal
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.controller import Controller
-from selfmodel.diagnose import Diagnose
+from selfmodel.database import Journal
 from selfmodel.diagnosis import Diagnosis
-from selfmodel.evolution import Generation
+from selfmodel.evolution import Draw, Evolution, Generation
+from selfmodel.genome import encode
 from selfmodel.hypothesis import INTACT, Hypothesis
-from selfmodel.judge import is_correct
+from selfmodel.logs import read_truth
+from selfmodel.logs.journal import open_journal
 from selfmodel.notation import parse
 from selfmodel.physical import SimulatedRobot
 from selfmodel.recover import Event, Recovery, SearchBegins, recover
-from selfmodel.repair import Repair
 from selfmodel.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulator import Run, Simulated, Simulator
-from selfmodel.trial import Plan, Trial
-from tests.conftest import exploding, random_controllers
+from selfmodel.trial import Trial
 from tests.memory import MemoryJournal
 
 SMALL = dataclasses.replace(Settings().scaled(20), generations=5, steps=200)
@@ -35,10 +37,12 @@ class CountingSimulator(Simulator):
     def __init__(self, robot: Robot) -> None:
         super().__init__(robot, threads=2)
         self.seen: Counter = Counter()
+        self.on_run: Callable[[Sequence[Run]], object] = lambda _runs: None
 
     def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> Simulated:
         """Simulates as ever."""
         self.seen.update((*run, steps) for run in runs)
+        self.on_run(runs)
         return super().run(runs, steps, record)
 
 
@@ -65,6 +69,9 @@ def recovery(
     events: list[Event],
     *,
     sealed: bool = True,
+    seed: int = 5,
+    trials: int = 3,
+    gait: Controller | None = None,
 ) -> Recovery:
     """A small recovery from a failure."""
     physical = SimulatedRobot(robot), SimulatedRobot(robot, truth)
@@ -75,9 +82,10 @@ def recovery(
         simulator=simulator,
         comparator=FORWARD_DISPLACEMENT,
         journal=MemoryJournal(robot),
-        settings=SMALL,
-        seed=5,
+        settings=dataclasses.replace(SMALL, trials=trials),
+        seed=seed,
         watch=events.append,
+        gait=gait,
     )
 
 
@@ -178,62 +186,98 @@ def test_the_same_seed_recovers_the_same_way_at_any_number_of_threads(quadruped:
     assert ways[0] == ways[1]
 
 
-def logged(robot: Robot, truth: str, controller: Controller, steps: int = 300) -> Trial:
-    """A trial of a damaged robot."""
-    physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
-    return MemoryJournal(robot).record(physical, Plan(truth, "after", controller, steps, 0))
+def test_every_search_starts_from_what_the_database_holds(
+    quadruped: Robot, monkeypatch: pytest.MonkeyPatch
+):
+    started: list[list[bytes]] = []
+
+    class Spy(Evolution):
+        def __init__(
+            self, length: int, draw: Draw, settings: Settings, rng: Generator, seeds: list
+        ) -> None:
+            started.append([np.asarray(seed).tobytes() for seed in seeds])
+            super().__init__(length, draw, settings, rng, seeds)
+
+    monkeypatch.setattr("selfmodel.repair.Evolution", Spy)
+    monkeypatch.setattr("selfmodel.diagnose.Evolution", Spy)
+    events: list[Event] = []
+    truth = parse("break:back_left_knee", quadruped.anatomy)
+    outcome = recovery(quadruped, truth, Simulator(quadruped, 2), events)
+    diagnoses = [event for event in events if isinstance(event, Diagnosis)]
+    genomes = [trial.plan.controller.genome.tobytes() for trial in outcome.trials]
+    encoded = [
+        [encode(c.hypothesis, SMALL.genes, quadruped.anatomy).tobytes() for c in d.ranked]
+        for d in diagnoses
+    ]
+
+    def newest_first(count: int) -> list[bytes]:
+        return list(dict.fromkeys(reversed(genomes[:count])))
+
+    assert started[0] == []
+    assert started[1::2] == [[], *encoded[:3]]
+    assert started[2::2] == [newest_first(2), newest_first(3), newest_first(4)]
 
 
-@pytest.mark.parametrize("truth", ["break:front_left_knee", "jam:back_right_shoulder", "intact"])
-def test_the_truth_is_at_distance_zero_and_ranks_first(quadruped: Robot, truth: str):
-    trials = [logged(quadruped, truth, c) for c in random_controllers(quadruped, 2)]
-    diagnose = Diagnose(Simulator(quadruped, 2), FORWARD_DISPLACEMENT, Settings())
-    seeds = [parse(truth, quadruped.anatomy), parse("jam:front_right_knee", quadruped.anatomy)]
-    diagnosis = diagnose(trials, seeds, np.random.default_rng(0), lambda _: None)
+def test_every_repair_simulates_the_robot_that_was_diagnosed(quadruped: Robot):
+    simulator, events = CountingSimulator(quadruped), []
+    batches: list[tuple[object, set[Hypothesis]]] = []
+    simulator.on_run = lambda runs: batches.append((events[-1], {h for h, _ in runs}))
+    truth = parse("break:back_left_knee", quadruped.anatomy)
+    recovery(quadruped, truth, simulator, events)
+    repairs = [event for event in events if isinstance(event, SearchBegins) and event.hypothesis]
 
-    assert str(diagnosis.best) == truth
-    assert diagnosis.ranked[0].distance == 0
-    distances = [candidate.distance for candidate in diagnosis.ranked]
-    assert len(distances) == 10
-    assert distances == sorted(distances)
+    assert {event.hypothesis for event in repairs} - {INTACT}
+    searched = [(event, hypotheses) for event, hypotheses in batches if event in repairs]
+    assert searched
+    assert all(hypotheses == {event.hypothesis} for event, hypotheses in searched)
 
 
-def test_a_diverging_hypothesis_is_infinitely_far_and_a_diverging_gait_is_worst(quadruped: Robot):
+def test_another_seed_recovers_another_way(quadruped: Robot):
+    truth = parse("jam:front_left_shoulder", quadruped.anatomy)
     simulator = Simulator(quadruped, 2)
-    bad = exploding(simulator, "jam:front_left_knee")
-    (controller,) = random_controllers(quadruped, 1)
-    trial = logged(quadruped, "break:front_left_knee", controller)
-    diagnose = Diagnose(simulator, FORWARD_DISPLACEMENT, SMALL)
+    gaits = {
+        recovery(quadruped, truth, simulator, [], seed=seed, trials=1).trials[0].plan.controller
+        for seed in (1, 2)
+    }
 
-    distances = diagnose.distances([bad, INTACT], [trial])
-    assert distances[0] == np.inf
-    assert np.isfinite(distances[1])
-    ways = Repair(simulator, SMALL)._simulate([(bad, controller), (INTACT, controller)])
-    assert ways[0] == -np.inf
-    assert np.isfinite(ways[1])
-    assert simulator.tally.diverged == 2
+    assert len(gaits) == 2
 
 
-def test_a_diagnosis_is_correct_if_it_cannot_be_told_from_the_truth(quadruped: Robot):
-    simulator = Simulator(quadruped, 2)
-    deaf = Controller(quadruped.network, np.zeros(quadruped.network.weights))
-    (awake,) = random_controllers(quadruped, 1)
-    truth = parse("neuron:0", quadruped.anatomy)
+def test_a_gait_that_is_given_changes_nothing_but_the_search_for_it(quadruped: Robot):
+    truth = parse("jam:front_left_shoulder", quadruped.anatomy)
+    evolved = recovery(quadruped, truth, Simulator(quadruped, 2), [], trials=1)
+    gait = evolved.trials[0].plan.controller
+    given = recovery(quadruped, truth, Simulator(quadruped, 2), [], trials=1, gait=gait)
 
-    asleep = [logged(quadruped, "neuron:0", deaf)]
-    assert is_correct(INTACT, truth, asleep, simulator)  # its neurons do nothing anyway
-    assert not is_correct(INTACT, truth, [*asleep, logged(quadruped, "neuron:0", awake)], simulator)
-    assert is_correct(truth, truth, [logged(quadruped, "neuron:0", awake)], simulator)
+    assert given.diagnosis == evolved.diagnosis
+    assert [t.displacement for t in given.trials] == [t.displacement for t in evolved.trials]
+    assert given.repair_evaluations < evolved.repair_evaluations
 
 
-def test_a_repair_starts_from_the_controllers_it_is_given(quadruped: Robot):
-    settings = dataclasses.replace(SMALL, generations=1)
-    repair = Repair(Simulator(quadruped, 2), settings)
-    good = repair(
-        INTACT, random_controllers(quadruped, 20), np.random.default_rng(0), lambda _: None
-    )
-    kept = repair(INTACT, [good], np.random.default_rng(1), lambda _: None)
-    runs = [(INTACT, good), (INTACT, kept)]
-    ways = repair._fitness.values(runs, lambda _: np.empty(0))
+def test_a_journal_of_files_shows_the_algorithm_no_more_than_its_three_methods(
+    quadruped: Robot, tmp_path: Path
+):
+    class SealedJournal:
+        def __init__(self, journal: Journal) -> None:
+            self.record, self.note, self.read = journal.record, journal.note, journal.read
 
-    assert ways[1] >= ways[0]
+    truth = parse("break:back_left_knee", quadruped.anatomy)
+    outcomes = []
+    for name, hidden in (("told", {"after": str(truth)}), ("not-told", {})):
+        journal = open_journal(tmp_path / name, quadruped, SMALL, hidden)
+        outcomes.append(
+            recover(
+                healthy=SimulatedRobot(quadruped),
+                damaged=SimulatedRobot(quadruped, truth),
+                simulator=Simulator(quadruped, 2),
+                comparator=FORWARD_DISPLACEMENT,
+                journal=SealedJournal(journal),
+                settings=dataclasses.replace(SMALL, trials=1),
+                seed=1,
+                watch=lambda _: None,
+            )
+        )
+
+    assert outcomes[0].diagnosis == outcomes[1].diagnosis
+    assert read_truth(tmp_path / "told" / "trials" / "01-after.mcap") == str(truth)
+    assert read_truth(tmp_path / "not-told" / "trials" / "01-after.mcap") is None

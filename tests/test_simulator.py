@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from selfmodel.behaviour import SIGNALS, collect
+from selfmodel.hypothesis import INTACT
 from selfmodel.notation import parse
 from selfmodel.physical import SimulatedRobot
 from selfmodel.robot import Robot
+from selfmodel.senses import Senses
 from selfmodel.simulator import Run, Simulator
 from tests.conftest import exploding, random_controllers
 
@@ -89,6 +91,15 @@ def test_readings_are_what_the_paper_says(quadruped: Robot):
     assert set(np.unique(touch)) == {0.0, 1.0}
     np.testing.assert_allclose(angle[0], intact, rtol=1e-6)
     assert np.abs(behaviour["commands"]).max() <= np.pi / 4
+
+
+def test_touch_is_felt_from_the_smallest_force_on(quadruped: Robot):
+    senses = Senses(quadruped.model, quadruped.anatomy, [quadruped.build(INTACT)])
+    forces = np.array([[0.0, 1e-9, 1.0, 1e4, 0.0, 0.0, 0.0, 0.0]])
+    readings = np.empty((1, 8))
+    senses.read(forces, quadruped.model.qpos0[np.newaxis], readings)
+
+    assert readings[0, :4].tolist() == [0, 1, 1, 1]
 
 
 def test_a_diverging_simulation_is_flagged_counted_and_alone(robot: Robot):

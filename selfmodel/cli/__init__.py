@@ -7,7 +7,7 @@ import typer
 from selfmodel.cli.recover import recover
 from selfmodel.cli.robots import robots
 from selfmodel.cli.trial import trial
-from selfmodel.errors import InputError, TrialError
+from selfmodel.errors import InputError, WorkError
 
 app = typer.Typer(
     name="selfmodel",
@@ -28,9 +28,13 @@ def main() -> None:
         app()
     except InputError as error:
         _fail(str(error), 2)
-    except (OSError, TrialError) as error:
+    except (OSError, WorkError) as error:
         # A disk that is full, a folder that may not be written: the file's name is in it.
         _fail(str(error), 1)
+    except MemoryError as error:
+        _fail(f"there is not enough memory ({error}): ask for a smaller population", 1)
+    except KeyboardInterrupt:
+        _fail("interrupted", 130)
 
 
 def _fail(message: str, status: int) -> None:

@@ -1,11 +1,15 @@
-"""What ``selfmodel recover`` shows while it works: bars on a terminal, plain lines elsewhere."""
+"""What ``selfmodel recover`` shows while it works: a line for all that is done, a bar for the rest.
 
+The bar is for terminals; its hypothesis stands in the line that follows, so that no terminal is too
+narrow for the numbers.
+"""
+
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn
-from rich.table import Column
 
 from selfmodel.diagnosis import Diagnosis
 from selfmodel.evolution import Generation
@@ -16,17 +20,13 @@ from selfmodel.trial import Trial
 @contextmanager
 def display() -> Iterator[Callable[[Event], None]]:
     """Gives a function that shows the events it is told of, on standard error."""
-    console = Console(stderr=True, highlight=False)
-    if not console.is_terminal:
+    console = Console(stderr=True, highlight=False, markup=False, emoji=False)
+    if not sys.stderr.isatty():
         yield _Lines(console)
         return
     progress = Progress(
-        # A long hypothesis gives way to the bar and the numbers, not they to it.
-        TextColumn(
-            "{task.description}",
-            table_column=Column(ratio=3, no_wrap=True, overflow="ellipsis"),
-        ),
-        BarColumn(bar_width=None, table_column=Column(ratio=1)),
+        TextColumn("{task.description}"),
+        BarColumn(bar_width=None),
         MofNCompleteColumn(),
         TextColumn("best {task.fields[best]}"),
         TextColumn("{task.fields[rate]}/s"),
@@ -34,7 +34,7 @@ def display() -> Iterator[Callable[[Event], None]]:
         expand=True,
     )
     with progress:
-        yield _Bars(progress)
+        yield _Bar(progress)
 
 
 class _Lines:
@@ -46,31 +46,40 @@ class _Lines:
 
     def __call__(self, event: Event) -> None:
         match event:
-            case SearchBegins():
-                self._search = _title(event)
+            case SearchBegins(kind, hypothesis):
+                self._search = f"{kind} EA" if hypothesis is None else f"{kind} EA for {hypothesis}"
             case Generation() if event.number == event.total:
                 self._say(
                     f"{self._search}: {event.number} generations, {event.evaluations} "
                     f"evaluations, {_rate(event)}/s, best {event.best:.4f}"
                 )
-            case Trial() | Diagnosis():
-                self._say(_sentence(event))
+            case Trial():
+                self._say(f"trial {event.plan.name}: {event.displacement:.3f} m forward")
+            case Diagnosis():
+                best, trials = event.ranked[0], event.trials
+                self._say(
+                    f"diagnosis from {trials} {'trial' if trials == 1 else 'trials'}: "
+                    f"{best.hypothesis} (distance {best.distance:.4f})"
+                )
 
     def _say(self, line: str) -> None:
         self._console.print(line, soft_wrap=True)
 
 
-class _Bars:
-    """A bar for each search, with generation, best fitness and evaluations per second."""
+class _Bar:
+    """The same lines, above a bar for the search that is going on."""
 
     def __init__(self, progress: Progress) -> None:
         self._progress = progress
+        self._lines = _Lines(progress.console)
         self._task: TaskID | None = None
 
     def __call__(self, event: Event) -> None:
         match event:
             case SearchBegins():
-                self._task = self._progress.add_task(_title(event), total=None, best="-", rate="-")
+                self._task = self._progress.add_task(
+                    f"{event.kind} EA", total=None, best="-", rate="-"
+                )
             case Generation() if self._task is not None:
                 self._progress.update(
                     self._task,
@@ -79,21 +88,10 @@ class _Bars:
                     best=f"{event.best:.3f}",
                     rate=_rate(event),
                 )
-            case Trial() | Diagnosis():
-                self._progress.console.print(_sentence(event))
-
-
-def _title(search: SearchBegins) -> str:
-    return f"{search.kind} EA" + ("" if search.hypothesis is None else f" for {search.hypothesis}")
+                if event.number == event.total:
+                    self._progress.remove_task(self._task)
+        self._lines(event)
 
 
 def _rate(generation: Generation) -> str:
     return f"{generation.evaluations / generation.seconds:.0f}" if generation.seconds else "-"
-
-
-def _sentence(event: Trial | Diagnosis) -> str:
-    if isinstance(event, Trial):
-        return f"trial {event.plan.name}: {event.displacement:.3f} m forward"
-    best = event.ranked[0]
-    trials = "1 trial" if event.trials == 1 else f"{event.trials} trials"
-    return f"diagnosis from {trials}: {best.hypothesis} (distance {best.distance:.4f})"

@@ -1,6 +1,5 @@
 """The options that several commands share, so that they read the same everywhere."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -18,7 +17,7 @@ Damage = Annotated[
 ]
 Seed = Annotated[int, typer.Option(min=0, help="Every random choice comes from it.")]
 Threads = Annotated[
-    int, typer.Option(min=0, help="Threads for the physics; 0 means one for each processor.")
+    int,
+    typer.Option(min=0, max=1024, help="Threads for the physics; 0 means one for each processor."),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
-Out = Path

@@ -24,12 +24,18 @@ def recover(
         ),
     ] = DEFAULT,
     seed: Seed = 0,
-    trials: Annotated[int, typer.Option(min=1, help="Physical trials after the failing one.")] = 3,
-    population: Annotated[int, typer.Option(min=2, help="Genomes in a generation.")] = 100,
+    trials: Annotated[
+        int, typer.Option(min=1, max=99, help="Physical trials after the failing one.")
+    ] = 3,
+    population: Annotated[
+        int, typer.Option(min=2, max=10**6, help="Genomes in a generation.")
+    ] = 100,
     generations: Annotated[int, typer.Option(min=1, help="Generations of each EA.")] = 30,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Folder of the run, new or empty.  [default: in runs/]"),
+        typer.Option(
+            metavar="DIR", help="Folder of the run, new or empty.", show_default="a new one in runs"
+        ),
     ] = None,
     threads: Threads = 0,
     as_json: Json = False,
@@ -54,7 +60,7 @@ def recover(
         settings=Settings(trials=trials, generations=generations).scaled(population),
         seed=seed,
         threads=resolve.threads(threads),
-        folder=out or _new_folder(robot, case, seed),
+        folder=out or _new_folder(robot),
     )
     try:
         with display() as watch:
@@ -63,17 +69,15 @@ def recover(
         typer.echo(f"interrupted: the finished trials are in {experiment.folder}", err=True)
         raise typer.Exit(130) from None
     result = as_object(experiment, outcome)
-    replace(experiment.folder / "result.json", f"{result}\n".encode())
     if as_json:
         typer.echo(result)
     else:
         print_report(experiment, outcome)
+    replace(experiment.folder / "result.json", f"{result}\n".encode())
 
 
-def _new_folder(robot: str, case: int | None, seed: int) -> Path:
-    """A folder in ``runs/`` that no run has used: named by what it holds and when it began."""
+def _new_folder(robot: str) -> Path:
+    """A folder in ``runs/`` that no run has used, whose name tells nothing of what is hidden."""
     from datetime import datetime  # noqa: PLC0415  # with the other work of the command
 
-    failure = "damage" if case is None else f"case{case}"
-    began = datetime.now().astimezone().strftime("%Y%m%d-%H%M%S-%f")
-    return Path("runs") / f"{robot}-{failure}-seed{seed}-{began}"
+    return Path("runs") / f"{robot}-{datetime.now().astimezone():%Y%m%d-%H%M%S-%f}"

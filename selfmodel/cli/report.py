@@ -4,6 +4,7 @@ import json
 import math
 from typing import Any
 
+import typer
 from rich.console import Console
 from rich.table import Table
 
@@ -38,7 +39,8 @@ def print_report(experiment: Experiment, outcome: Outcome) -> None:
     console.print(trials, diagnosis)
     evaluations, trials_since = found["evaluations"], found["physical_trials"]
     verdict = "right" if found["correct"] else "wrong"
-    console.print(
+    # Not through rich: a folder's name may look like markup, and must not be folded.
+    typer.echo(
         f"truth: {found['truth']}; the diagnosis is {verdict}.\n"
         f"The robot went {found['displacement']['before']:.2f} m before, "
         f"{found['displacement']['after']:.2f} m after the failure, and "
@@ -46,8 +48,7 @@ def print_report(experiment: Experiment, outcome: Outcome) -> None:
         f"{'1 trial' if trials_since == 1 else f'{trials_since} trials'} since.\n"
         f"{evaluations['repair']} controllers and {evaluations['distinct_hypotheses']} distinct "
         f"hypotheses in {found['seconds']:.0f} s; diverged: {evaluations['diverged']}.\n"
-        f"Logs: {experiment.folder}",
-        highlight=False,
+        f"Logs: {experiment.folder}"
     )
 
 
@@ -83,7 +84,7 @@ def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
             "after": recovery.after,
             "recovered": recovery.recovered,
         },
-        "recovery": recovery.recovered / recovery.before if recovery.before else None,
+        "recovery": recovery.recovered / recovery.before if recovery.before > 0 else None,
         "physical_trials": len(recovery.trials) - 2,
         "evaluations": {
             "repair": recovery.repair_evaluations,

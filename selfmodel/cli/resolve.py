@@ -55,14 +55,15 @@ def comparator(name: str) -> Comparator:
         raise unknown_name("comparator", name, COMPARATORS)
     try:
         found = getattr(importlib.import_module(module), attribute)
-    except (ImportError, AttributeError, ValueError) as error:
+    except (ImportError, AttributeError, SyntaxError, TypeError, ValueError) as error:
         raise InputError(
             f"cannot find the comparator {name!r}: {error}; expected package.module:object, "
             f"importable from here, or one of {', '.join(COMPARATORS)}"
         ) from error
-    if not isinstance(found, Comparator):
+    if isinstance(found, type) or not isinstance(found, Comparator):
         raise InputError(
-            f"{name!r} is no comparator: it needs the members of selfmodel.comparator.Comparator"
+            f"{name!r} is no comparator: expected an object, not a class, with the members of "
+            f"selfmodel.comparator.Comparator, got {found!r}"
         )
     return found
 
@@ -76,20 +77,24 @@ def controller(path: Path, network: Network) -> Controller:
     try:
         loaded = (
             read_log(path).trial.plan.controller
-            if path.suffix == ".mcap"
+            if path.suffix.lower() == ".mcap"
             else load_controller(path)
         )
     except LogError as error:
         raise InputError(str(error)) from error
     if loaded.network != network:
         raise InputError(
-            f"{path} has a controller for sensors {', '.join(loaded.network.sensors)} and motors "
-            f"{', '.join(loaded.network.motors)}; this robot has {', '.join(network.sensors)} and "
-            f"{', '.join(network.motors)}: give one that was made for it"
+            f"{path} has a controller for {_described(loaded.network)}; this robot needs one for "
+            f"{_described(network)}: give one that was made for it"
         )
     return loaded
 
 
+def _described(network: Network) -> str:
+    sensors, motors = ", ".join(network.sensors), ", ".join(network.motors)
+    return f"the sensors {sensors}, the motors {motors}, with {network.hidden} hidden neurons"
+
+
 def threads(requested: int) -> int:
     """Returns how many threads to use: as many as processors where 0 are requested."""
-    return requested or os.cpu_count() or 1
+    return requested or len(os.sched_getaffinity(0))

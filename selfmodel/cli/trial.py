@@ -43,7 +43,7 @@ def trial(
     made = resolve.robot_entry(robot).robot()
     if out.suffix != ".mcap":
         raise InputError(f"--out needs a name that ends in .mcap, got {str(out)!r}")
-    hidden = parse(damage or "intact", made.anatomy)
+    hidden = parse("intact" if damage is None else damage, made.anatomy)
     if controller:
         driver = resolve.controller(controller, made.network)
     else:
