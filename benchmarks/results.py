@@ -19,11 +19,11 @@ without evolving the gait that the robot walks with before it fails (see the las
 
 Of the ten hypotheses ranked, the best counts. A compound is found when the search happens upon it:
 with one number a trial, a half-right hypothesis is no closer than a wrong one. The silent neuron of
-case 10 is none of the hypotheses, and is never "right". A recovery above 1 is a controller that
+case 10 is none of the hypotheses, and is never correct. A recovery above 1 is a controller that
 walks better than the gait it began with: three more searches had that gait to start from.
 
 *before*, *after*, *recovered*: forward displacement in m before the failure, with the same
-controller after it, and of the best of the three recovery trials. *right*: the best hypothesis is
+controller after it, and of the best of the three recovery trials. *correct*: the best hypothesis is
 the truth, or behaves like it to the bit under every logged controller. *distinct*: distinct
 hypotheses that were simulated.
 """
@@ -51,7 +51,7 @@ def write_results(walks: list[Facts], runs: list[Facts]) -> None:
     parts = [HEAD]
     for robot in robots:
         parts += [f"\n## {robot.capitalize()}, all ten cases, seed 0\n", _table_one(robot, runs)]
-    parts += ["\n## How often the diagnosis is right, by case\n", _by_case(runs)]
+    parts += ["\n## How often the diagnosis is correct, by case\n", _by_case(runs)]
     parts += ["\n## The repair EA on the intact robots\n", _gaits(robots, walks)]
     RESULTS.write_text("\n".join(parts), encoding="utf-8")
 
@@ -59,7 +59,7 @@ def write_results(walks: list[Facts], runs: list[Facts]) -> None:
 def _table_one(robot: str, runs: list[Facts]) -> str:
     rows = [
         (
-            "| case | truth | before | after | recovered | ÷ before | right | best hypothesis, "
+            "| case | truth | before | after | recovered | ÷ before | correct | best hypothesis, "
             "where wrong | distinct | seconds |"
         ),
         "|---|---|---:|---:|---:|---:|---|---|---:|---:|",
@@ -85,7 +85,7 @@ def _short(number: float) -> str:
 def _by_case(runs: list[Facts]) -> str:
     rows = [
         ("The quadruped, one run a seed; *÷ before* is recovered over before, over the seeds.\n"),
-        "| case | truth | right | median ÷ before | lowest | highest | diverged simulations |",
+        "| case | truth | correct | median ÷ before | lowest | highest | diverged simulations |",
         "|---|---|---:|---:|---:|---:|---:|",
     ]
     cases: dict[int, list[Facts]] = {}
