@@ -1,5 +1,6 @@
-"""Writes docs/results.md from the runs of ``benchmarks.table_one``."""
+"""Writes docs/results.md and its data, docs/results.jsonl, from the runs of ``table_one``."""
 
+import json
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -15,7 +16,8 @@ Made by `make results` (`python -m benchmarks.table_one`), which runs what has n
 writes this page. Forward-displacement comparator, the paper's budget (population 100, 30
 generations, 1,000 control steps, 3 trials after the failing one), no reality gap. One thread a
 run, as many runs at once as there are processors, and the seconds are those of such a run,
-without evolving the gait that the robot walks with before it fails (see the last table).
+without evolving the gait that the robot walks with before it fails (see the last table). The data,
+a line a gait and a line a run, is in [results.jsonl](results.jsonl).
 
 Of the ten hypotheses ranked, the best counts. A compound is found when the search happens upon it:
 with one number a trial, a half-right hypothesis is no closer than a wrong one. The silent neuron of
@@ -54,6 +56,9 @@ def write_results(walks: list[Facts], runs: list[Facts]) -> None:
     parts += ["\n## How often the diagnosis is correct, by case\n", _by_case(runs)]
     parts += ["\n## The repair EA on the intact robots\n", _gaits(robots, walks)]
     RESULTS.write_text("\n".join(parts), encoding="utf-8")
+    rows = [json.dumps({key: run[key] for key in run if key != "trials"}) for run in runs]
+    rows = [*map(json.dumps, walks), *rows]
+    RESULTS.with_suffix(".jsonl").write_text("\n".join(rows) + "\n", encoding="utf-8")
 
 
 def _table_one(robot: str, runs: list[Facts]) -> str:

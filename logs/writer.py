@@ -112,7 +112,7 @@ class TrialWriter:
         try:
             write_preamble(self._log, self._robot, self._plan, self._settings, self._hidden)
             self._channels = [self._log.channel(topic.name, topic.type) for topic in self._topics]
-        except BaseException:
+        except BaseException:  # whatever ends it, Ctrl-C too: `__exit__` is not called then
             self._log.close()
             raise
         self._sound = True

@@ -69,11 +69,13 @@ def recover(
         typer.echo(f"interrupted: the finished trials are in {experiment.folder}", err=True)
         raise typer.Exit(130) from None
     result = as_object(experiment, outcome)
-    if as_json:
-        typer.echo(result)
-    else:
-        print_report(experiment, outcome)
-    replace(experiment.folder / "result.json", f"{result}\n".encode())
+    try:
+        replace(experiment.folder / "result.json", f"{result}\n".encode())
+    finally:  # what was found is said even where the disk is full
+        if as_json:
+            typer.echo(result)
+        else:
+            print_report(experiment, outcome)
 
 
 def _new_folder(robot: str) -> Path:
