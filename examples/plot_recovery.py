@@ -26,7 +26,7 @@ def main(folder: Path, figure: Path) -> None:
         draw(axes, log, shade=0.4 + 0.6 * (number + 1) / len(logs))
     axes.set_xlabel("time, s")
     axes.set_ylabel("way forward, m")
-    axes.set_title(f"{logs[0].robot}: physical trials before and after a failure")
+    axes.set_title(f"{logs[0].trial.robot}: physical trials before and after a failure")
     axes.legend(frameon=False)
     axes.spines[["top", "right"]].set_visible(False)
     plt.savefig(figure, dpi=150)
@@ -36,7 +36,7 @@ def draw(axes: Axes, log: TrialLog, shade: float) -> None:
     """Draws one trial."""
     behaviour, plan = log.trial.behaviour, log.trial.plan
     x = behaviour["base_position"][:, 0]
-    label = f"{plan.name}: {log.displacement:.2f} m"
+    label = f"{plan.name}: {log.trial.displacement:.2f} m"
     axes.plot(behaviour.time, x - x[0], color=COLOURS[plan.stage], alpha=shade, label=label)
 
 

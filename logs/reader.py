@@ -45,23 +45,19 @@ class TrialLog:
 
     Attributes:
         trial: What was to be done and what was observed.
-        robot: The robot's name.
         mjcf: The robot's model with nothing wrong, as XML.
         control_timestep: Seconds between two commands.
         settings: The paper's numbers, as they were.
         software: Versions, by the name of what they are of.
         status: ``finished``.
-        displacement: How far the robot travelled forward, m.
     """
 
     trial: Trial
-    robot: str
     mjcf: str
     control_timestep: float
     settings: Settings
     software: Mapping[str, str]
     status: str
-    displacement: float
 
 
 def read_log(path: str | Path) -> TrialLog:
@@ -104,13 +100,11 @@ def read_log(path: str | Path) -> TrialLog:
         raise SchemaMismatchError(path, f"an attachment cannot be read: {error}") from error
     return TrialLog(
         trial=trial,
-        robot=record.robot,
         mjcf=text,
         control_timestep=record.control_timestep,
         settings=settings,
         software=MappingProxyType(dict(contents.metadata.get(SOFTWARE, {}))),
         status=result.status,
-        displacement=result.displacement,
     )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from selfmodel.comparator import Comparator
 from selfmodel.controller import Controller
-from selfmodel.database import Database, Journal
+from selfmodel.database import Journal
 from selfmodel.diagnose import Diagnose
 from selfmodel.diagnosis import Diagnosis
 from selfmodel.evolution import Generation
@@ -114,8 +114,9 @@ def recover(
         watch(SearchBegins("repair", hypothesis))
         return repair(hypothesis, journal.read().controllers, stream(), watch)
 
-    def explain(known: Database) -> Diagnosis:
+    def explain() -> Diagnosis:
         watch(SearchBegins("diagnostic"))
+        known = journal.read()
         diagnosis = diagnose(known.evidence, known.hypotheses, stream(), watch)
         journal.note(diagnosis)
         watch(diagnosis)
@@ -133,9 +134,9 @@ def recover(
     act(healthy, "before", INTACT, gait)
     act(damaged, "after", INTACT, gait)
     for _ in range(settings.trials):
-        believed = explain(journal.read()).best
+        believed = explain().best
         act(damaged, "recovery", believed, evolve_controller(believed))
-    diagnosis = explain(journal.read())
+    diagnosis = explain()
 
     return Recovery(
         trials=journal.read().trials,
