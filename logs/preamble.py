@@ -7,17 +7,21 @@ import mujoco
 import numpy as np
 
 import selfmodel
+from selfmodel.controller import Controller
 from selfmodel.logs.controllers import controller_bytes
 from selfmodel.logs.logfile import LogFile
 from selfmodel.logs.records import (
     CONTROLLER_FILE,
     FORMAT,
     HIDDEN,
+    IMPORT,
+    MAPPING_FILE,
     MODEL_FILE,
     SETTINGS_FILE,
     SOFTWARE,
     TRIAL,
     TRUTH,
+    Imported,
     TrialRecord,
     settings_json,
     sha256,
@@ -30,16 +34,30 @@ from selfmodel.trial import Plan
 
 
 def write_preamble(
-    log: LogFile, robot: Robot, plan: Plan, settings: Settings, hidden: str | None
+    log: LogFile,
+    robot: Robot,
+    plan: Plan,
+    *,
+    settings: Settings,
+    hidden: str | None,
+    imported: Imported | None,
 ) -> None:
     """Writes the records, attachments and description that precede the first step.
 
-    When this returns, the disk has them.
+    Args:
+        log: Where to.
+        robot: The robot as its model describes it.
+        plan: What is to be done.
+        settings: The paper's numbers.
+        hidden: What is wrong with a simulated robot, in notation.
+        imported: Where an imported trial comes from.
 
     Raises:
         LogWriteError: The disk is full, or failed.
     """
-    controller, model = controller_bytes(plan.controller), robot.mjcf.encode()
+    driver = plan.controller
+    controller = controller_bytes(driver) if isinstance(driver, Controller) else b""
+    model = robot.mjcf.encode()
     record = TrialRecord(
         format=FORMAT,
         name=plan.name,
@@ -49,18 +67,23 @@ def write_preamble(
         control_timestep=robot.control_timestep,
         steps=plan.steps,
         seed=plan.seed,
-        controller_sha256=sha256(controller),
+        controller_sha256=sha256(controller) if controller else "",
         model_sha256=sha256(model),
     )
     log.metadata(TRIAL, record.texts())
     log.metadata(SOFTWARE, _software())
     if hidden is not None:
         log.metadata(HIDDEN, {TRUTH: hidden})
-    log.attach(MODEL_FILE, "application/xml", model)
-    log.attach(CONTROLLER_FILE, "application/octet-stream", controller)
-    log.attach(SETTINGS_FILE, "application/json", settings_json(settings))
+    log.attach(MODEL_FILE, model)
+    for name, data in robot.assets.items():
+        log.attach(name, data)
+    if controller:
+        log.attach(CONTROLLER_FILE, controller)
+    log.attach(SETTINGS_FILE, settings_json(settings))
+    if imported is not None:
+        log.metadata(IMPORT, imported.facts)
+        log.attach(MAPPING_FILE, imported.mapping.encode())
     log.message(log.channel(DESCRIPTION, DESCRIPTION_TYPE), 0, description(urdf(robot)), 0)
-    log.sync()
 
 
 def _software() -> dict[str, str]:

@@ -13,6 +13,7 @@ from selfmodel.logs.cdr import Layout, Template
 WORLD = "world"
 
 DESCRIPTION = "/robot_description"
+TRANSFORMS = "/tf"
 DESCRIPTION_TYPE = "std_msgs/msg/String"
 
 Derived = Literal["child_linear_velocity", "transforms"]
@@ -120,7 +121,7 @@ def transforms(bodies: Sequence[str]) -> Topic:
         layout.string(body)
         layout.floats(7)
     parts: tuple[tuple[Part, int], ...] = (("transforms", 7 * len(bodies)),)
-    return Topic("/tf", "tf2_msgs/msg/TFMessage", layout.template(), parts)
+    return Topic(TRANSFORMS, "tf2_msgs/msg/TFMessage", layout.template(), parts)
 
 
 def description(text: str) -> bytes:

@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from selfmodel.behaviour import SIGNALS, Sample
+from selfmodel.behaviour import SIGNALS, Names, Sample
+from selfmodel.controller import Controller
+from selfmodel.driver import Driver
 from selfmodel.errors import InputError
-from selfmodel.logs.errors import IncompleteError
+from selfmodel.logs.errors import IncompleteError, salvage_it
 from selfmodel.logs.files import explained, part_of
 from selfmodel.logs.frames import Kinematics, body_names, into_child_frame
 from selfmodel.logs.logfile import LogFile
 from selfmodel.logs.preamble import write_preamble
-from selfmodel.logs.records import FINISHED, RESULT, Result, checked_name
+from selfmodel.logs.records import FINISHED, RESULT, Imported, Result, checked_name
 from selfmodel.logs.topics import topics, transforms
 from selfmodel.robot import Robot
 from selfmodel.settings import Settings
@@ -37,6 +39,7 @@ def write_trial(
     *,
     settings: Settings,
     hidden: str | None = None,
+    imported: Imported | None = None,
 ) -> Path:
     """Logs a trial while it runs; see ``TrialWriter``.
 
@@ -47,6 +50,7 @@ def write_trial(
         samples: What happens, as it happens; not more than the plan's steps are asked for.
         settings: The paper's numbers, for the record.
         hidden: What is wrong with a simulated robot, in notation; for ``read_truth`` only.
+        imported: Where an imported trial comes from.
 
     Returns:
         ``path``.
@@ -56,7 +60,8 @@ def write_trial(
         IncompleteError: There were fewer samples than planned; they are in the ``.part``.
         LogWriteError: The disk is full, or failed.
     """
-    with TrialWriter(path, robot, plan, settings=settings, hidden=hidden) as writer:
+    writer = TrialWriter(path, robot, plan, settings=settings, hidden=hidden, imported=imported)
+    with writer:
         for sample in itertools.islice(samples, plan.steps):
             writer.add(sample)
     return path
@@ -74,6 +79,7 @@ class TrialWriter:
         plan: What is to be done.
         settings: The paper's numbers.
         hidden: What is wrong with a simulated robot, in notation.
+        imported: Where an imported trial comes from.
 
     Raises:
         InputError: The plan does not fit the robot.
@@ -87,19 +93,17 @@ class TrialWriter:
         *,
         settings: Settings,
         hidden: str | None = None,
+        imported: Imported | None = None,
     ) -> None:
         checked_name(plan.name)
-        names, network = robot.anatomy.names, plan.controller.network
-        if (network.sensors, network.motors) != (names.sensors, names.motors):
-            raise InputError(
-                f"expected a controller for {robot.name}, with the sensors {names.sensors} and "
-                f"motors {names.motors}, got one for {network.sensors} and {network.motors}"
-            )
+        names = robot.anatomy.names
+        _check_ends(robot.name, names, plan.controller)
         if plan.steps < 1:
             raise InputError(f"a trial has at least 1 step, got {plan.steps}")
         self.path = path
         self.steps = 0
-        self._robot, self._plan, self._settings, self._hidden = robot, plan, settings, hidden
+        self._robot, self._plan, self._settings = robot, plan, settings
+        self._hidden, self._imported = hidden, imported
         self._topics = (*topics(names, robot.root), transforms(body_names(robot.model)))
         self._kinematics = Kinematics(robot)
         self._rows = {signal: np.empty((FLUSH_STEPS, names.width(signal))) for signal in SIGNALS}
@@ -110,8 +114,16 @@ class TrialWriter:
     def __enter__(self) -> Self:
         self._log = LogFile(self.path)
         try:
-            write_preamble(self._log, self._robot, self._plan, self._settings, self._hidden)
+            write_preamble(
+                self._log,
+                self._robot,
+                self._plan,
+                settings=self._settings,
+                hidden=self._hidden,
+                imported=self._imported,
+            )
             self._channels = [self._log.channel(topic.name, topic.type) for topic in self._topics]
+            self._log.sync()  # before the robot moves, the disk has all that steps are read by
         except BaseException:  # whatever ends it, Ctrl-C too: `__exit__` is not called then
             self._log.close()
             raise
@@ -169,6 +181,7 @@ class TrialWriter:
                 part_of(self.path),
                 f"the robot stopped after {self.steps} of {self._plan.steps} steps",
                 good=f"{self.steps} steps are in that file",
+                advice=salvage_it(part_of(self.path)),
             )
 
     def _flush(self) -> None:
@@ -202,3 +215,15 @@ class TrialWriter:
         result = Result(FINISHED, self.steps, self._end - self._start)
         self._log.metadata(RESULT, result.texts())
         self._log.finish()
+
+
+def _check_ends(robot: str, names: Names, driver: Driver) -> None:
+    if isinstance(driver, Controller):
+        sensors, motors = driver.network.sensors, driver.network.motors
+    else:
+        sensors, motors = names.sensors, driver.motors
+    if (sensors, motors) != (names.sensors, names.motors):
+        raise InputError(
+            f"expected a controller for {robot}, with the sensors {names.sensors} and motors "
+            f"{names.motors}, got one for {sensors} and {motors}"
+        )

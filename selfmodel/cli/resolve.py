@@ -82,6 +82,11 @@ def controller(path: Path, network: Network) -> Controller:
         )
     except LogError as error:
         raise InputError(str(error)) from error
+    if not isinstance(loaded, Controller):
+        raise InputError(
+            f"{path} has no controller, only the commands that were recorded: give the log of a "
+            f"robot that selfmodel drove, or a .npz"
+        )
     if loaded.network != network:
         raise InputError(
             f"{path} has a controller for {_described(loaded.network)}; this robot needs one for "
