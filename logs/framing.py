@@ -123,7 +123,8 @@ def parse(frame: Frame) -> McapRecord | None:
         if checksum and zlib.crc32(frame.body[:-4]) != checksum:
             raise ContradictionError("the checksum of an attachment is wrong")
     read = _READERS.get(frame.opcode)
-    return read(stream) if read else None
+    record: McapRecord | None = read(stream) if read else None
+    return record
 
 
 def unpack(chunk: Chunk) -> list[McapRecord]:

@@ -84,6 +84,21 @@ def salvage(path: Path, out: Path) -> Salvaged:
     )
 
 
+def salvageable_steps(path: Path) -> int:
+    """Returns how many steps ``salvage`` would save.
+
+    Raises:
+        InputError: There is no such file.
+    """
+    try:
+        contents = rescue(path)
+        record, _ = _with_what_is_left(path, contents)
+        every = topics(read_names(path, contents), record.root)
+        return _complete_steps(path, contents, record, every)
+    except LogError:
+        return 0
+
+
 def _refuse_sound(path: Path) -> None:
     try:
         status = read_log(path).status
