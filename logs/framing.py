@@ -117,14 +117,14 @@ def parse(frame: Frame) -> McapRecord | None:
     """
     stream = ReadDataStream(io.BytesIO(frame.body))
     if frame.opcode == Opcode.MESSAGE:
-        return Message.read(stream, len(frame.body))
+        message: McapRecord = Message.read(stream, len(frame.body))
+        return message
     if frame.opcode == Opcode.ATTACHMENT:
         checksum = int.from_bytes(frame.body[-4:], "little")
         if checksum and zlib.crc32(frame.body[:-4]) != checksum:
             raise ContradictionError("the checksum of an attachment is wrong")
     read = _READERS.get(frame.opcode)
-    record: McapRecord | None = read(stream) if read else None
-    return record
+    return read(stream) if read else None
 
 
 def unpack(chunk: Chunk) -> list[McapRecord]:

@@ -11,7 +11,7 @@ from selfmodel.logs.files import create_part, explained, part_of, publish, sync
 from selfmodel.logs.records import MEDIA_TYPES, with_digest
 from selfmodel.logs.schemas import schema_text
 
-CHUNK = 64 * 2**10
+CHUNK = 256 * 2**10
 """Bytes that are packed together: with the library's 1 MiB a kill would lose a whole trial."""
 
 

@@ -104,7 +104,9 @@ def _refuse_sound(path: Path) -> None:
         status = read_log(path).status
     except LogError:
         return
-    raise InputError(f"{path} is sound, and the trial in it {status}: there is nothing to salvage")
+    raise InputError(
+        f"{path} is sound, and the trial in it is {status}: there is nothing to salvage"
+    )
 
 
 def _with_what_is_left(path: Path, contents: Contents) -> tuple[TrialRecord, tuple[str, ...]]:

@@ -4,7 +4,7 @@ import itertools
 from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
 
@@ -12,20 +12,15 @@ from selfmodel.behaviour import SIGNALS, Names, Sample
 from selfmodel.controller import Controller
 from selfmodel.driver import Driver
 from selfmodel.errors import InputError
+from selfmodel.logs.encoder import Encoder
 from selfmodel.logs.errors import IncompleteError, salvage_it
 from selfmodel.logs.files import explained, part_of
-from selfmodel.logs.frames import Kinematics, body_names, into_child_frame
 from selfmodel.logs.logfile import LogFile
 from selfmodel.logs.preamble import write_preamble
 from selfmodel.logs.records import FINISHED, RESULT, Imported, Result, checked_name
-from selfmodel.logs.topics import topics, transforms
 from selfmodel.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trial import Plan
-
-if TYPE_CHECKING:
-    from selfmodel.arrays import FloatArray
-    from selfmodel.logs.topics import Part
 
 FLUSH_STEPS = 50
 """How many steps a kill can cost at most. It makes the file 1 % larger than never flushing."""
@@ -104,8 +99,7 @@ class TrialWriter:
         self.steps = 0
         self._robot, self._plan, self._settings = robot, plan, settings
         self._hidden, self._imported = hidden, imported
-        self._topics = (*topics(names, robot.root), transforms(body_names(robot.model)))
-        self._kinematics = Kinematics(robot)
+        self._encoder = Encoder(robot)
         self._rows = {signal: np.empty((FLUSH_STEPS, names.width(signal))) for signal in SIGNALS}
         self._written = 0
         self._start = self._end = 0.0
@@ -122,7 +116,9 @@ class TrialWriter:
                 hidden=self._hidden,
                 imported=self._imported,
             )
-            self._channels = [self._log.channel(topic.name, topic.type) for topic in self._topics]
+            self._channels = [
+                self._log.channel(topic.name, topic.type) for topic in self._encoder.topics
+            ]
             self._log.sync()  # before the robot moves, the disk has all that steps are read by
         except BaseException:  # whatever ends it, Ctrl-C too: `__exit__` is not called then
             self._log.close()
@@ -186,27 +182,14 @@ class TrialWriter:
 
     def _flush(self) -> None:
         """Writes the steps that wait, and hands them to the operating system."""
-        steps = np.arange(self._written, self.steps)
-        if not len(steps):
+        count = self.steps - self._written
+        if not count:
             return
         self._sound = False
-        rows: dict[Part, FloatArray] = {
-            signal: rows[: len(steps)] for signal, rows in self._rows.items()
-        }
-        rows["transforms"] = self._kinematics.transforms(
-            rows["joint_positions"], rows["base_position"], rows["base_orientation"]
-        )
-        rows["child_linear_velocity"] = into_child_frame(
-            rows["base_linear_velocity"], rows["base_orientation"]
-        )
-        stamps = np.rint(steps * self._robot.control_timestep * 1e9).astype(np.int64)
-        series = [topic.template.encode(stamps, topic.pack(rows)) for topic in self._topics]
+        rows = {signal: rows[:count] for signal, rows in self._rows.items()}
         with explained(part_of(self.path)):
-            for step, stamp, *payloads in zip(
-                steps.tolist(), stamps.tolist(), *series, strict=True
-            ):
-                for channel, payload in zip(self._channels, payloads, strict=True):
-                    self._log.message(channel, stamp, payload, step)
+            for step, topic, stamp, payload in self._encoder.encode(self._written, rows):
+                self._log.message(self._channels[topic], stamp, payload, step)
         self._log.flush()
         self._written = self.steps
         self._sound = True

@@ -6,7 +6,7 @@ from selfmodel.database import Database
 from selfmodel.diagnose import Diagnose
 from selfmodel.diagnosis import Diagnosis
 from selfmodel.errors import InputError
-from selfmodel.evolution import Generation
+from selfmodel.events import Event, SearchBegins
 from selfmodel.streams import diagnosis_stream
 from selfmodel.trial import Trial
 
@@ -15,7 +15,7 @@ def explain(
     trials: Sequence[Trial],
     diagnose: Diagnose,
     seed: int,
-    watch: Callable[[Generation | Diagnosis], None],
+    watch: Callable[[Event], None],
 ) -> Diagnosis:
     """Returns the hypotheses that explain all trials, ranked.
 
@@ -26,7 +26,7 @@ def explain(
         trials: Those since something is wrong, in the order in which they were run.
         diagnose: The diagnostic EA.
         seed: Every random choice comes from it.
-        watch: Is told of every generation and every diagnosis.
+        watch: Is told what happens.
 
     Raises:
         InputError: There are no trials, or the comparator cannot judge one.
@@ -35,6 +35,7 @@ def explain(
         raise InputError("expected at least one trial to explain, got none")
     known = Database()
     for number in range(1, len(trials) + 1):
+        watch(SearchBegins("diagnostic"))
         diagnosis = diagnose(
             trials[:number], known.hypotheses, diagnosis_stream(seed, number), watch
         )

@@ -8,7 +8,7 @@ from selfmodel.controller import Controller
 from selfmodel.database import Journal
 from selfmodel.diagnose import Diagnose
 from selfmodel.diagnosis import Diagnosis
-from selfmodel.evolution import Generation
+from selfmodel.events import Event, SearchBegins
 from selfmodel.hypothesis import INTACT, Hypothesis
 from selfmodel.physical import PhysicalRobot
 from selfmodel.repair import Repair
@@ -16,23 +16,6 @@ from selfmodel.settings import Settings
 from selfmodel.simulator import Simulator
 from selfmodel.streams import diagnosis_stream, repair_stream
 from selfmodel.trial import Plan, Stage, Trial
-
-
-@dataclass(frozen=True)
-class SearchBegins:
-    """A search begins.
-
-    Attributes:
-        kind: Which of the two EAs.
-        hypothesis: What a repair takes to be wrong; None for a diagnosis.
-    """
-
-    kind: str
-    hypothesis: Hypothesis | None = None
-
-
-Event = SearchBegins | Generation | Trial | Diagnosis
-"""What happens in a recovery, told as it happens."""
 
 
 @dataclass(frozen=True)
