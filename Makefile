@@ -36,7 +36,7 @@ wheel: $(READY) ## build the wheel and check what it holds
 	$(BIN)/python -m build --quiet --wheel
 	$(BIN)/python .ci/check_wheel.py dist/*.whl
 
-viewers: $(READY) $(VIEWERS)/rerun/.ready $(VIEWERS)/pymcap/.ready $(NODE_READY) ## prove that fresh logs open in other people's tools
+viewers: $(READY) $(VIEWERS)/rerun/.ready $(VIEWERS)/pymcap/.ready $(NODE_READY) ## prove that fresh logs open in other people's tools; needs Node.js
 	rm -rf $(VIEWERS)/logs
 	mkdir $(VIEWERS)/logs
 	$(BIN)/selfmodel trial quadruped --out $(VIEWERS)/logs/quadruped.mcap

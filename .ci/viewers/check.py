@@ -82,7 +82,7 @@ def rerun(log: Path) -> str:
     if [row["time"] for row in rows] != np.rint(behaviour.time * 1e9).astype(int).tolist():
         raise ProofError("the rows' times are not those of the log")
     shown = np.array([row["numbers"] for row in rows])
-    if not np.array_equal(shown, behaviour.signals["joint_positions"]):
+    if not np.array_equal(shown, behaviour.signals["joint_positions"], equal_nan=True):
         raise ProofError("the numbers at /joint_states/position are not those of the log")
     return f"{len(rows)} rows of {len(expected)} joint positions as Scalars, equal to the log's"
 
