@@ -42,6 +42,7 @@ viewers: $(READY) $(VIEWERS)/rerun/.ready $(VIEWERS)/pymcap/.ready $(NODE_READY)
 	$(BIN)/selfmodel trial quadruped --out $(VIEWERS)/logs/quadruped.mcap
 	$(BIN)/selfmodel trial hexapod --damage break:front_left_knee --out $(VIEWERS)/logs/hexapod.mcap
 	$(BIN)/python .ci/viewers/check.py $(VIEWERS)/logs/quadruped.mcap $(VIEWERS)/logs/hexapod.mcap
+	$(BIN)/python .ci/viewers/can_fail.py $(VIEWERS)/logs/quadruped.mcap
 	node .ci/viewers/layout.mjs docs/foxglove-layout.json $(VIEWERS)/logs/quadruped.mcap
 
 # The tools have environments of their own: some are heavy, one is GPL, none is a dependency.

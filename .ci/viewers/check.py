@@ -30,17 +30,16 @@ def main(logs: list[Path]) -> None:
     """Prints what each tool says of each log; exits with 1 where one of them complains."""
     if not logs:
         sys.exit("usage: python .ci/viewers/check.py LOG.mcap...")
-    proofs = {"foxglove": foxglove, "pymcap-cli": doctor, "rerun": rerun}
     failed = 0
     for log in logs:
-        for tool, proof in proofs.items():
+        for tool, proof in PROOFS.items():
             try:
                 sys.stdout.write(f"{log.name}: {tool}: {proof(log)}\n")
             except ProofError as error:
                 failed += 1
                 sys.stdout.write(f"{log.name}: {tool}: FAILED: {error}\n")
     if failed:
-        sys.exit(f"{failed} of {len(logs) * len(proofs)} proofs failed")
+        sys.exit(f"{failed} of {len(logs) * len(PROOFS)} proofs failed")
 
 
 def foxglove(log: Path) -> str:
@@ -111,6 +110,9 @@ def said(*command: str | Path, quiet: bool = False) -> str:
         words = " ".join(f"{done.stdout[-2000:]} {done.stderr[-2000:]}".split())
         raise ProofError(f"exit status {done.returncode}: {words}")
     return done.stdout
+
+
+PROOFS = {"foxglove": foxglove, "pymcap-cli": doctor, "rerun": rerun}
 
 
 if __name__ == "__main__":
