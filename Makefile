@@ -57,10 +57,13 @@ $(NODE_READY): .ci/viewers/package.json .ci/viewers/package-lock.json
 	npm ci --prefix .ci/viewers --ignore-scripts
 	touch $@
 
+fuzz: $(READY) ## damage 30,000 logs at random and check that nothing goes unnoticed; in minutes
+	$(BIN)/python -m tests.logs.fuzz --count 30000
+
 bench: $(READY) ## measure speed and memory; on a quiet machine
 	$(BIN)/python -m benchmarks.bench
 
 results: $(READY) ## run Table I on both robots and write docs/results.md; takes over an hour
 	$(BIN)/python -m benchmarks.table_one
 
-.PHONY: help setup demo test lint types wheel viewers bench results
+.PHONY: help setup demo test lint types wheel viewers fuzz bench results

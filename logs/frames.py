@@ -63,7 +63,7 @@ class Kinematics:
         parents = self._model.body_parentid[1:]
         with np.errstate(over="ignore", invalid="ignore"):  # a robot may be lost to sight
             relative = _relative(poses[:, parents], poses[:, 1:])[..., _POSITION_XYZW]
-        return to_micrometres(relative).reshape(len(position), -1)
+        return to_micrometres(relative).reshape(len(position), 7 * len(parents))
 
 
 def to_micrometres(values: FloatArray) -> FloatArray:

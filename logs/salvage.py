@@ -9,7 +9,7 @@ import numpy as np
 from selfmodel.behaviour import forward_displacement
 from selfmodel.errors import InputError
 from selfmodel.logs.contents import MESSAGE_LIMIT, Contents, Messages
-from selfmodel.logs.errors import CorruptError, LogError
+from selfmodel.logs.errors import CorruptError, LogError, SchemaMismatchError
 from selfmodel.logs.files import explained, part_of, refuse_existing
 from selfmodel.logs.logfile import LogFile
 from selfmodel.logs.reader import interpret, read_controller, read_log, read_record
@@ -69,8 +69,7 @@ def salvage(path: Path, out: Path) -> Salvaged:
     contents = rescue(path)
     record, lost = _with_what_is_left(path, contents)
     controller = read_controller(path, contents, record)
-    every = topics(read_names(path, contents), record.root)
-    steps = _complete_steps(path, contents, record, every)
+    every, steps = _complete(path, contents, record)
     missing = {topic.name: _fill(contents, topic, steps, record) for topic in every}
     _cut(contents, {topic.name for topic in every}, _time_of(steps, record))
     behaviour = read_behaviour(path, contents, record, steps, controller)
@@ -93,8 +92,7 @@ def salvageable_steps(path: Path) -> int:
     try:
         contents = rescue(path)
         record, _ = _with_what_is_left(path, contents)
-        every = topics(read_names(path, contents), record.root)
-        return _complete_steps(path, contents, record, every)
+        return _complete(path, contents, record)[1]
     except LogError:
         return 0
 
@@ -125,10 +123,12 @@ def _with_what_is_left(path: Path, contents: Contents) -> tuple[TrialRecord, tup
     return record, tuple(lost)
 
 
-def _complete_steps(
-    path: Path, contents: Contents, record: TrialRecord, every: tuple[Topic, ...]
-) -> int:
-    """How many steps there are up to the last that has a message on every topic."""
+def _complete(path: Path, contents: Contents, record: TrialRecord) -> tuple[tuple[Topic, ...], int]:
+    """The topics, and how many steps there are up to the last that all of them tell of."""
+    try:
+        every = topics(read_names(path, contents), record.root)
+    except SchemaMismatchError as error:
+        raise _nothing(path) from error
     if record.steps > MESSAGE_LIMIT // len(every):
         raise CorruptError(path, f"it claims {record.steps} steps, more than a log may have")
     whole = set(range(record.steps))
@@ -137,10 +137,12 @@ def _complete_steps(
         times = {log for log, _ in messages.times} if messages else set()
         whole = {k for k in whole if _time_of(k, record) in times}
     if not whole:
-        raise CorruptError(
-            path, "nothing can be salvaged: not one step of the trial is complete in it"
-        )
-    return max(whole) + 1
+        raise _nothing(path)
+    return every, max(whole) + 1
+
+
+def _nothing(path: Path) -> CorruptError:
+    return CorruptError(path, "nothing can be salvaged: not one step of the trial is complete")
 
 
 def _fill(contents: Contents, topic: Topic, steps: int, record: TrialRecord) -> int:

@@ -151,7 +151,8 @@ class TrialWriter:
         if self.steps == 0:
             self._start = self._end
         self.steps += 1
-        if self.steps - self._written == FLUSH_STEPS:
+        # The first step goes out at once: with it, what follows can always be salvaged.
+        if self.steps == 1 or self.steps - self._written == FLUSH_STEPS:
             self._flush()
 
     def __exit__(
