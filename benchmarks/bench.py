@@ -44,6 +44,7 @@ def main() -> None:
         ),
         **recovery.measure(),
         **trial_log.measure(quadruped),
+        "log_of_hexapod": trial_log.measure(robots[1]),
         "help_cpu_seconds": help_cpu_seconds(),
         "closed_loop": loops,
         "growth": simulation.growth(robots, threads),

@@ -1,0 +1,92 @@
+"""Promises of diagnosis from logged trials alone, and of what judges them."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from selfmodel.behaviour import Behaviour
+from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT
+from selfmodel.diagnose import Diagnose
+from selfmodel.diagnosis import Diagnosis
+from selfmodel.errors import InputError
+from selfmodel.events import Event, SearchBegins
+from selfmodel.explain import explain
+from selfmodel.logs import read_log
+from selfmodel.logs.writer import write_trial
+from selfmodel.notation import parse
+from selfmodel.physical import SimulatedRobot
+from selfmodel.playback import Playback
+from selfmodel.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.simulator import Simulator
+from selfmodel.trial import Plan, Trial
+from tests.conftest import random_controllers
+
+SMALL = dataclasses.replace(Settings().scaled(20), generations=4, steps=200)
+
+
+def trials(robot: Robot, folder: Path, truth: str, count: int) -> list[Trial]:
+    """Logged trials of a robot with something wrong, each with another controller."""
+    found = []
+    for number, controller in enumerate(random_controllers(robot, count, seed=2)):
+        plan = Plan(f"trial-{number}", "single", controller, SMALL.steps, 0)
+        samples = SimulatedRobot(robot, parse(truth, robot.anatomy)).run(controller, SMALL.steps)
+        path = write_trial(folder / f"{number}.mcap", robot, plan, samples, settings=SMALL)
+        found.append(read_log(path).trial)
+    return found
+
+
+def test_each_trial_is_added_in_turn_and_each_diagnosis_seeds_the_next(
+    quadruped: Robot, tmp_path: Path
+):
+    three = trials(quadruped, tmp_path, "break:back_left_shoulder", 3)
+    events: list[Event] = []
+    search = Diagnose(Simulator(quadruped, 2), FORWARD_DISPLACEMENT, SMALL)
+    last = explain(three, search, 4, events.append)
+    begins = [event for event in events if isinstance(event, SearchBegins)]
+    made = [event for event in events if isinstance(event, Diagnosis)]
+
+    assert [event.kind for event in begins] == ["diagnostic"] * 3
+    assert [diagnosis.trials for diagnosis in made] == [1, 2, 3]
+    assert made[-1] == last
+    fewer = explain(
+        three[:2],
+        Diagnose(Simulator(quadruped, 1), FORWARD_DISPLACEMENT, SMALL),
+        4,
+        lambda _: None,
+    )
+    assert fewer == made[1]
+
+
+def test_there_must_be_a_trial_to_explain(quadruped: Robot):
+    search = Diagnose(Simulator(quadruped, 1), FORWARD_DISPLACEMENT, SMALL)
+    with pytest.raises(InputError, match="at least one trial to explain, got none"):
+        explain([], search, 0, lambda _: None)
+
+
+def test_a_trial_that_other_software_drove_is_explained_by_its_commands(
+    quadruped: Robot, tmp_path: Path
+):
+    (trial,) = trials(quadruped, tmp_path, "break:back_left_shoulder", 1)
+    commands = trial.behaviour["commands"]
+    plan = dataclasses.replace(trial.plan, controller=Playback(quadruped.anatomy.motors, commands))
+    played = dataclasses.replace(trial, plan=plan)
+    search = Diagnose(Simulator(quadruped, 2), FORWARD_DISPLACEMENT, SMALL)
+    hypotheses = [parse(text, quadruped.anatomy) for text in ("break:back_left_shoulder", "intact")]
+    distances = search.distances(hypotheses, [played])
+
+    assert distances[0] == 0 < distances[1]
+
+
+@pytest.mark.parametrize("name", COMPARATORS)
+def test_a_comparator_says_what_a_trial_lacks(name: str, quadruped: Robot, tmp_path: Path):
+    (trial,) = trials(quadruped, tmp_path, "intact", 1)
+    behaviour = trial.behaviour
+    nothing = {signal: np.full_like(rows, np.nan) for signal, rows in behaviour.signals.items()}
+    blind = dataclasses.replace(
+        trial, behaviour=Behaviour(behaviour.names, behaviour.time, nothing)
+    )
+    with pytest.raises(InputError, match=r"0\.mcap: .* needs \w+"):
+        COMPARATORS[name].request(blind)
