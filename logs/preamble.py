@@ -7,17 +7,21 @@ import mujoco
 import numpy as np
 
 import selfmodel
+from selfmodel.controller import Controller
 from selfmodel.logs.controllers import controller_bytes
 from selfmodel.logs.logfile import LogFile
 from selfmodel.logs.records import (
     CONTROLLER_FILE,
     FORMAT,
     HIDDEN,
+    IMPORT,
+    MAPPING_FILE,
     MODEL_FILE,
     SETTINGS_FILE,
     SOFTWARE,
     TRIAL,
     TRUTH,
+    Imported,
     TrialRecord,
     settings_json,
     sha256,
@@ -30,7 +34,12 @@ from selfmodel.trial import Plan
 
 
 def write_preamble(
-    log: LogFile, robot: Robot, plan: Plan, settings: Settings, hidden: str | None
+    log: LogFile,
+    robot: Robot,
+    plan: Plan,
+    settings: Settings,
+    hidden: str | None,
+    imported: Imported | None,
 ) -> None:
     """Writes the records, attachments and description that precede the first step.
 
@@ -39,7 +48,9 @@ def write_preamble(
     Raises:
         LogWriteError: The disk is full, or failed.
     """
-    controller, model = controller_bytes(plan.controller), robot.mjcf.encode()
+    driver = plan.controller
+    controller = controller_bytes(driver) if isinstance(driver, Controller) else b""
+    model = robot.mjcf.encode()
     record = TrialRecord(
         format=FORMAT,
         name=plan.name,
@@ -49,7 +60,7 @@ def write_preamble(
         control_timestep=robot.control_timestep,
         steps=plan.steps,
         seed=plan.seed,
-        controller_sha256=sha256(controller),
+        controller_sha256=sha256(controller) if controller else "",
         model_sha256=sha256(model),
     )
     log.metadata(TRIAL, record.texts())
@@ -57,7 +68,11 @@ def write_preamble(
     if hidden is not None:
         log.metadata(HIDDEN, {TRUTH: hidden})
     log.attach(MODEL_FILE, "application/xml", model)
-    log.attach(CONTROLLER_FILE, "application/octet-stream", controller)
+    if controller:
+        log.attach(CONTROLLER_FILE, "application/octet-stream", controller)
+    if imported is not None:
+        log.metadata(IMPORT, imported.facts)
+        log.attach(MAPPING_FILE, "application/toml", imported.mapping.encode())
     log.attach(SETTINGS_FILE, "application/json", settings_json(settings))
     log.message(log.channel(DESCRIPTION, DESCRIPTION_TYPE), 0, description(urdf(robot)), 0)
     log.sync()

@@ -35,6 +35,7 @@ from selfmodel.logs.records import (
     trial_record,
 )
 from selfmodel.logs.signals import read_behaviour
+from selfmodel.playback import Playback
 from selfmodel.settings import Settings
 from selfmodel.trial import Plan, Trial
 
@@ -78,7 +79,8 @@ def read_log(path: str | Path) -> TrialLog:
     mjcf = _attachment(path, contents, MODEL_FILE, record.model_sha256)
     controller = _controller(path, contents, record)
     behaviour = read_behaviour(path, contents, record, controller)
-    plan = Plan(record.name, record.stage, controller, record.steps, record.seed)
+    driver = controller or Playback(behaviour.names.motors, behaviour["commands"])
+    plan = Plan(record.name, record.stage, driver, record.steps, record.seed)
     trial = Trial(plan, record.robot, behaviour, str(path))
     if (result.status, result.steps) != (FINISHED, record.steps):
         raise IncompleteError(
@@ -162,7 +164,9 @@ def _attachment(path: Path, contents: Contents, name: str, expected: str = "") -
     return data
 
 
-def _controller(path: Path, contents: Contents, record: TrialRecord) -> Controller:
+def _controller(path: Path, contents: Contents, record: TrialRecord) -> Controller | None:
+    if not record.controller_sha256:
+        return None
     data = _attachment(path, contents, CONTROLLER_FILE, record.controller_sha256)
     try:
         return parse_controller(data, CONTROLLER_FILE)

@@ -20,11 +20,14 @@ TRIAL = "selfmodel.trial"
 SOFTWARE = "selfmodel.software"
 HIDDEN = "selfmodel.hidden"
 """The record with what a simulated physical robot hides; diagnosis never reads it."""
+IMPORT = "selfmodel.import"
+"""Where an imported trial comes from, and how good what was recorded is."""
 RESULT = "selfmodel.result"
 
 MODEL_FILE = "model.xml"
 CONTROLLER_FILE = "controller.npz"
 SETTINGS_FILE = "settings.json"
+MAPPING_FILE = "mapping.toml"
 
 TRUTH = "truth"
 FINISHED = "finished"
@@ -89,6 +92,19 @@ class Result:
             "steps": str(self.steps),
             "displacement": repr(self.displacement),
         }
+
+
+@dataclass(frozen=True)
+class Imported:
+    """Where an imported trial comes from.
+
+    Attributes:
+        facts: Its source, and the quality of what was recorded, as texts by name.
+        mapping: The mapping by which it was imported, as TOML.
+    """
+
+    facts: Mapping[str, str]
+    mapping: str
 
 
 def trial_record(texts: Mapping[str, str]) -> TrialRecord:

@@ -15,7 +15,7 @@ from selfmodel.logs.topics import Part, Topic, topics
 
 
 def read_behaviour(
-    path: Path, contents: Contents, record: TrialRecord, controller: Controller
+    path: Path, contents: Contents, record: TrialRecord, controller: Controller | None
 ) -> Behaviour:
     """Returns what the messages of a log say.
 
@@ -33,8 +33,8 @@ def read_behaviour(
         motors=_names(path, contents, "/joint_commands"),
         hinges=_names(path, contents, "/joint_states"),
     )
-    network = controller.network
-    if (names.sensors, names.motors) != (network.sensors, network.motors):
+    network = controller.network if controller else None
+    if network and (names.sensors, names.motors) != (network.sensors, network.motors):
         raise SchemaMismatchError(
             path,
             f"its controller is for the sensors {network.sensors} and motors {network.motors}, "

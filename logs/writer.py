@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from selfmodel.behaviour import SIGNALS, Sample
+from selfmodel.controller import Controller
 from selfmodel.errors import InputError
 from selfmodel.logs.errors import IncompleteError
 from selfmodel.logs.files import explained, part_of
 from selfmodel.logs.frames import Kinematics, body_names, into_child_frame
 from selfmodel.logs.logfile import LogFile
 from selfmodel.logs.preamble import write_preamble
-from selfmodel.logs.records import FINISHED, RESULT, Result, checked_name
+from selfmodel.logs.records import FINISHED, RESULT, Imported, Result, checked_name
 from selfmodel.logs.topics import topics, transforms
 from selfmodel.robot import Robot
 from selfmodel.settings import Settings
@@ -37,6 +38,7 @@ def write_trial(
     *,
     settings: Settings,
     hidden: str | None = None,
+    imported: Imported | None = None,
 ) -> Path:
     """Logs a trial while it runs; see ``TrialWriter``.
 
@@ -47,6 +49,7 @@ def write_trial(
         samples: What happens, as it happens; not more than the plan's steps are asked for.
         settings: The paper's numbers, for the record.
         hidden: What is wrong with a simulated robot, in notation; for ``read_truth`` only.
+        imported: Where an imported trial comes from.
 
     Returns:
         ``path``.
@@ -56,7 +59,8 @@ def write_trial(
         IncompleteError: There were fewer samples than planned; they are in the ``.part``.
         LogWriteError: The disk is full, or failed.
     """
-    with TrialWriter(path, robot, plan, settings=settings, hidden=hidden) as writer:
+    writer = TrialWriter(path, robot, plan, settings=settings, hidden=hidden, imported=imported)
+    with writer:
         for sample in itertools.islice(samples, plan.steps):
             writer.add(sample)
     return path
@@ -74,6 +78,7 @@ class TrialWriter:
         plan: What is to be done.
         settings: The paper's numbers.
         hidden: What is wrong with a simulated robot, in notation.
+        imported: Where an imported trial comes from.
 
     Raises:
         InputError: The plan does not fit the robot.
@@ -87,9 +92,11 @@ class TrialWriter:
         *,
         settings: Settings,
         hidden: str | None = None,
+        imported: Imported | None = None,
     ) -> None:
         checked_name(plan.name)
-        names, network = robot.anatomy.names, plan.controller.network
+        names, driver = robot.anatomy.names, plan.controller
+        network = driver.network if isinstance(driver, Controller) else robot.network
         if (network.sensors, network.motors) != (names.sensors, names.motors):
             raise InputError(
                 f"expected a controller for {robot.name}, with the sensors {names.sensors} and "
@@ -100,6 +107,7 @@ class TrialWriter:
         self.path = path
         self.steps = 0
         self._robot, self._plan, self._settings, self._hidden = robot, plan, settings, hidden
+        self._imported = imported
         self._topics = (*topics(names, robot.root), transforms(body_names(robot.model)))
         self._kinematics = Kinematics(robot)
         self._rows = {signal: np.empty((FLUSH_STEPS, names.width(signal))) for signal in SIGNALS}
@@ -110,7 +118,9 @@ class TrialWriter:
     def __enter__(self) -> Self:
         self._log = LogFile(self.path)
         try:
-            write_preamble(self._log, self._robot, self._plan, self._settings, self._hidden)
+            write_preamble(
+                self._log, self._robot, self._plan, self._settings, self._hidden, self._imported
+            )
             self._channels = [self._log.channel(topic.name, topic.type) for topic in self._topics]
         except BaseException:  # whatever ends it, Ctrl-C too: `__exit__` is not called then
             self._log.close()

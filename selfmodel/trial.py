@@ -5,6 +5,7 @@ from typing import Literal
 
 from selfmodel.behaviour import Behaviour, forward_displacement
 from selfmodel.controller import Controller
+from selfmodel.playback import Playback
 
 Stage = Literal["before", "after", "recovery", "single"]
 """Where in a story a trial stands: the robot walks (``before``), no longer does as its model says
@@ -26,7 +27,7 @@ class Plan:
 
     name: str
     stage: Stage
-    controller: Controller
+    controller: Controller | Playback
     steps: int
     seed: int
 
