@@ -4,6 +4,7 @@ import sys
 
 import typer
 
+from selfmodel.cli.logs_import import import_
 from selfmodel.cli.recover import recover
 from selfmodel.cli.robots import robots
 from selfmodel.cli.trial import trial
@@ -20,6 +21,9 @@ app = typer.Typer(
 app.command()(robots)
 app.command()(recover)
 app.command()(trial)
+logs = typer.Typer(help="Import logs of trials.", no_args_is_help=True)
+logs.command("import")(import_)
+app.add_typer(logs, name="logs")
 
 
 def main() -> None:
