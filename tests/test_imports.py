@@ -56,7 +56,17 @@ def test_dependencies_point_one_way(module: str):
 LAYERS = (
     # Plain data and plain algorithms; then MuJoCo; then what takes a comparator; then the story.
     ("errors", "arrays", "behaviour", "anatomy", "controller", "settings", "memo", "evolution"),
-    ("faults", "hypothesis", "notation", "genome", "diagnosis", "playback", "trial", "comparator", "contract"),
+    (
+        "faults",
+        "hypothesis",
+        "notation",
+        "genome",
+        "diagnosis",
+        "playback",
+        "trial",
+        "comparator",
+        "contract",
+    ),
     ("embodiment", "robot", "places", "senses", "simulator", "physical", "judge"),
     ("database", "diagnose", "repair"),
     ("recover",),

@@ -10,6 +10,9 @@ from selfmodel.logs.rosbag.series import Column, IntArray, Series
 APART = 60.0
 """Seconds: stamps further than that from the log times are of another clock."""
 
+BEYOND = 1e12
+"""No measurement of a robot is larger than this, in any unit; and its square is still finite."""
+
 
 @dataclass(frozen=True, eq=False)
 class Clocked:
@@ -80,13 +83,15 @@ def clocked(series: Series, clock: str) -> Clocked:
 def track(clock: Clocked, column: Column, wanted: slice) -> Track:
     """Returns some of a column's numbers over time: sorted, each time once, all of them known.
 
+    What is NaN, infinite or ``BEYOND`` is not known.
+
     Args:
         clock: The times of the topic.
         column: What the topic says.
         wanted: Which of the numbers.
     """
     times, values = clock.times[column.index], column.values[:, wanted]
-    known = clock.usable[column.index] & np.isfinite(values).all(axis=1)
+    known = clock.usable[column.index] & (np.abs(values) <= BEYOND).all(axis=1)
     # unique() keeps the first of equal times, in the order of the recording.
     times, first = np.unique(times[known], return_index=True)
     return Track(times, values[known][first])

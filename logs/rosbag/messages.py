@@ -1,5 +1,6 @@
 """The messages that can play a role, each read into names and rows of numbers."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -116,7 +117,7 @@ def _number(message: "ros.std_msgs__msg__Float64") -> Rows:
 
 
 def _wrench(message: "ros.geometry_msgs__msg__WrenchStamped") -> Rows:
-    return ("",), np.array([[np.linalg.norm(_xyz(message.wrench.force))]])
+    return ("",), np.array([[math.hypot(*_xyz(message.wrench.force))]])
 
 
 def _odometry(message: "ros.nav_msgs__msg__Odometry") -> Rows:

@@ -30,7 +30,6 @@ _FAILURES = (
     RuntimeError,  # lz4
     struct.error,
     zstandard.ZstdError,
-    KeyError,  # a channel that was not announced
     MemoryError,
     OverflowError,
 )
@@ -68,11 +67,13 @@ def _items(file: IO[bytes]) -> Iterator[Announced | Stored]:
     for record in _records(file):
         if isinstance(record, Message):
             count += 1
+            if record.channel_id not in topics:
+                raise DamageError(f"a message is of channel {record.channel_id}, which is unknown")
             yield Stored(topics[record.channel_id], checked_time(record.log_time), record.data)
         elif isinstance(record, Schema):
             schemas[record.id] = record.name
         elif isinstance(record, Channel):
-            kind = schemas[record.schema_id] if record.schema_id else ""
+            kind = schemas.get(record.schema_id, "")  # 0: it has none
             topics[record.id] = record.topic
             yield Announced(record.topic, kind, record.message_encoding)
         elif isinstance(record, Statistics):

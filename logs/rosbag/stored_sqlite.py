@@ -27,13 +27,22 @@ def read_sqlite(path: Path, name: Path) -> Iterator[Announced | Stored]:
         for item in _items(path):
             count += isinstance(item, Stored)
             yield item
-    except (sqlite3.Error, DamageError, OverflowError, MemoryError) as failure:
+    except _FAILURES as failure:
         raise CorruptError(
             name,
             f"the file is damaged or no rosbag2 recording: {failure}",
             good=f"{count} messages before that can be read",
             advice="record it again, or recover what is whole with `sqlite3 FILE .recover`",
         ) from failure
+
+
+_FAILURES = (
+    sqlite3.Error,
+    ValueError,  # texts that are none, and what is found out here
+    OverflowError,
+    MemoryError,
+)
+"""Everything that comes of damaged bytes."""
 
 
 def _items(path: Path) -> Iterator[Announced | Stored]:
