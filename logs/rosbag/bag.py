@@ -22,6 +22,7 @@ from selfmodel.logs.rosbag.unpack import ZSTD_MAGIC, BombError, unzstd, unzstd_f
 
 METADATA = "metadata.yaml"
 EXPECTED = "give a bag's folder, or its .mcap or .db3"
+AGAIN = "record it again, or unpack it by its own tool to see what is whole"
 
 
 @dataclass(frozen=True)
@@ -171,7 +172,7 @@ def _ready(name: Path, place: Path) -> Path:
     try:
         unzstd_file(name, place)
     except (BombError, zstandard.ZstdError) as failure:
-        raise CorruptError(name, f"it cannot be unpacked: {failure}") from failure
+        raise CorruptError(name, f"it cannot be unpacked: {failure}", advice=AGAIN) from failure
     return place
 
 
@@ -222,7 +223,7 @@ def _unpacked(item: Stored, name: Path) -> bytes:
         return unzstd(item.payload)
     except (BombError, zstandard.ZstdError) as failure:
         raise CorruptError(
-            name, f"a message on {item.topic} cannot be unpacked: {failure}"
+            name, f"a message on {item.topic} cannot be unpacked: {failure}", advice=AGAIN
         ) from failure
 
 

@@ -1,6 +1,6 @@
-"""A mapping held against the bag: every complaint names its line, and what the bag has instead."""
+"""A mapping held against robot and bag: complaints name its line, and what there is instead."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 from selfmodel.logs.rosbag.bag import Bag
@@ -27,6 +27,40 @@ TYPES: Mapping[RoleKind, tuple[str, ...]] = MappingProxyType(
     }
 )
 """The types of message that can play each role."""
+
+
+def check_names(
+    mapping: BagMapping, hinges: Sequence[str], motors: Sequence[str], touches: Sequence[str]
+) -> None:
+    """Checks that a mapping names the parts of the robot, and none else.
+
+    Args:
+        mapping: What to check.
+        hinges: The robot's hinges: each must be mapped.
+        motors: Its motors: each must be mapped.
+        touches: Its touch sensors: each may be.
+
+    Raises:
+        InputError: It names a part that there is not, or leaves out one.
+    """
+    document = mapping.document
+    for angles, what, known in (
+        (mapping.joints, "hinge", hinges),
+        (mapping.commands, "motor", motors),
+    ):
+        path = (angles.role, "names")
+        for name in angles.links:
+            if name not in known:
+                raise document.unknown((*path, name), f"{what} of the robot", name, known)
+        if missing := [name for name in known if name not in angles.links]:
+            raise document.error(
+                path,
+                f"[{'.'.join(path)}] must list every {what} of the robot, and lacks "
+                f"{', '.join(missing)}: add a line for each",
+            )
+    for name in mapping.touch:
+        if name not in touches:
+            raise document.unknown(("touch", name), "touch sensor of the robot", name, touches)
 
 
 def fitting(bag: Bag, kind: RoleKind) -> list[str]:

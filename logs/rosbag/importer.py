@@ -12,9 +12,9 @@ from selfmodel.behaviour import SIGNALS, Behaviour, Sample, Signal
 from selfmodel.controller import Controller
 from selfmodel.logs.records import Imported
 from selfmodel.logs.rosbag.bag import Source, open_bag
-from selfmodel.logs.rosbag.checks import check_columns, check_topics
+from selfmodel.logs.rosbag.checks import check_columns, check_names, check_topics
 from selfmodel.logs.rosbag.clock import Clocked, ClocksApartError, clocked
-from selfmodel.logs.rosbag.mapping import BagMapping, check_names
+from selfmodel.logs.rosbag.mapping import BagMapping
 from selfmodel.logs.rosbag.notes import notes
 from selfmodel.logs.rosbag.quality import Quality, quality
 from selfmodel.logs.rosbag.series import Series, read_series

@@ -10,6 +10,9 @@ from selfmodel.logs.rosbag.clock import Clocked
 from selfmodel.logs.rosbag.resample import REACH
 from selfmodel.logs.rosbag.series import Series
 
+LISTED = 100
+"""So many gaps of a topic are recorded one by one."""
+
 
 @dataclass(frozen=True)
 class Gap:
@@ -61,8 +64,11 @@ class Quality:
     refused: Mapping[str, int]
 
     def facts(self) -> dict[str, Any]:
-        """Returns all that as plain values."""
-        return asdict(self)
+        """Returns all that as plain values, with the first ``LISTED`` gaps."""
+        longest = max((gap.length for gap in self.gaps), default=0.0)
+        where = [[gap.start, gap.length] for gap in self.gaps[:LISTED]]
+        gaps = {"count": len(self.gaps), "longest": longest, "where": where}
+        return asdict(self) | {"gaps": gaps}
 
 
 def quality(series: Series, clock: Clocked, origin: int, roles: tuple[str, ...]) -> Quality:

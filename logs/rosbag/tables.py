@@ -8,7 +8,7 @@ from typing import Any
 
 from selfmodel.errors import InputError, unknown_name
 
-Path = tuple[str, ...]
+Keys = tuple[str, ...]
 """The names of the tables, and of the key, that lead to an entry."""
 
 _KEY = r"""(?:[A-Za-z0-9_-]+|"(?:[^"\\]|\\.)*"|'[^']*')"""
@@ -29,9 +29,9 @@ class Document:
 
     name: str
     text: str
-    lines: Mapping[Path, int]
+    lines: Mapping[Keys, int]
 
-    def error(self, path: Path, sentence: str, item: str = "") -> InputError:
+    def error(self, path: Keys, sentence: str, item: str = "") -> InputError:
         """Returns an error that names the line of what it is about.
 
         Args:
@@ -48,7 +48,7 @@ class Document:
         return InputError(f"{self.name}:{line}: {sentence}")
 
     def unknown(
-        self, path: Path, what: str, name: str, known: Iterable[str], item: str = ""
+        self, path: Keys, what: str, name: str, known: Iterable[str], item: str = ""
     ) -> InputError:
         """Returns the error for a name that is none of ``known``; see ``error``."""
         return self.error(path, str(unknown_name(what, name, known)), item)
@@ -80,9 +80,9 @@ def _explained(reason: str, text: str, line: int) -> str:
     return f"expected TOML: {reason}"
 
 
-def _lines(text: str) -> dict[Path, int]:
-    found: dict[Path, int] = {}
-    table: Path = ()
+def _lines(text: str) -> dict[Keys, int]:
+    found: dict[Keys, int] = {}
+    table: Keys = ()
     for number, line in enumerate(text.splitlines(), start=1):
         if header := _TABLE.match(line):
             table = _names(header[1])
@@ -94,7 +94,7 @@ def _lines(text: str) -> dict[Path, int]:
     return found
 
 
-def _names(keys: str) -> Path:
+def _names(keys: str) -> Keys:
     return tuple(key.strip("\"'") for key in re.findall(_KEY, keys))
 
 
@@ -107,7 +107,7 @@ class Table:
         entries: What it holds.
     """
 
-    def __init__(self, document: Document, path: Path, entries: Mapping[str, Any]) -> None:
+    def __init__(self, document: Document, path: Keys, entries: Mapping[str, Any]) -> None:
         self.document = document
         self.path = path
         self._entries = dict(entries)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from selfmodel.robot import Robot
 
 TIMESTEP = 0.01
-"""Seconds between two commands that ``--suggest`` assumes of an MJCF file."""
+"""Seconds between two commands that ``--suggest`` assumes of an MJCF file, or nearly so."""
 
 
 def import_(
@@ -66,16 +66,29 @@ def _suggestion(bag: Path, name: str) -> str:
     from selfmodel.tasks import ROBOTS  # noqa: PLC0415
 
     own = name in ROBOTS
-    made = _robot(name, None if own else TIMESTEP)
+    made = _robot(name, None if own else _timestep(Path(name)))
     with open_bag(bag) as opened:
         return suggest(opened, made, name, with_timestep=not own)
+
+
+def _timestep(path: Path) -> float | None:
+    """The multiple of a model's physics time step that is nearest to ``TIMESTEP``."""
+    import mujoco  # noqa: PLC0415
+
+    if not path.is_file():
+        return None
+    try:
+        physics = float(mujoco.MjModel.from_xml_path(str(path)).opt.timestep)
+    except ValueError as error:
+        raise InputError(f"{path}: expected a robot's MJCF, got: {error}") from error
+    return max(1, round(TIMESTEP / physics)) * physics
 
 
 def _import(bag: Path, out: Path, path: Path, *, as_json: bool) -> None:
     # Whatever brings MuJoCo or ROS's messages waits until the command runs.
     from selfmodel.logs.files import part_of  # noqa: PLC0415
     from selfmodel.logs.rosbag.importer import import_bag, write_recording  # noqa: PLC0415
-    from selfmodel.logs.rosbag.mapping import read_mapping  # noqa: PLC0415
+    from selfmodel.logs.rosbag.mapping_file import read_mapping  # noqa: PLC0415
 
     for existing in (out, part_of(out)):
         if existing.exists():

@@ -10,7 +10,7 @@ from mcap.reader import make_reader
 from selfmodel.errors import InputError
 from selfmodel.logs import read_log
 from selfmodel.logs.rosbag.importer import import_bag, write_recording
-from selfmodel.logs.rosbag.mapping import parse_mapping
+from selfmodel.logs.rosbag.mapping_file import parse_mapping
 from selfmodel.playback import Playback
 from selfmodel.robot import Robot
 from tests.logs.rosbag.bags import (

@@ -1,11 +1,13 @@
 """Every mistake in a mapping is told with its line, and with what could have been meant."""
 
+from contextlib import suppress
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from selfmodel.errors import InputError
-from selfmodel.logs.rosbag.mapping import parse_mapping, read_mapping
+from selfmodel.logs.rosbag.mapping_file import parse_mapping, read_mapping
 from selfmodel.robot import Robot
 from tests.logs.rosbag.bags import T0, joint_state, write_bag
 from tests.logs.rosbag.conftest import JOINTS, MAPPING, imported, recorded
@@ -123,3 +125,13 @@ def test_a_file_that_is_no_mapping_is_told(tmp_path: Path):
     path.write_text("")
     with pytest.raises(InputError, match=r"map\.toml:1: the mapping needs robot"):
         read_mapping(path)
+
+
+def test_no_misprint_crashes(biped: Robot, bag: Path):
+    rng = np.random.default_rng(0)
+    for _ in range(150):
+        spoilt = list(MAPPING)
+        for _ in range(int(rng.integers(1, 4))):
+            spoilt[rng.integers(len(spoilt))] = chr(rng.integers(32, 127))
+        with suppress(InputError):
+            assert imported(bag, biped, "".join(spoilt)).behaviour.steps >= 2

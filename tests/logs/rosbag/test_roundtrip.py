@@ -16,7 +16,7 @@ from selfmodel.hypothesis import Hypothesis
 from selfmodel.logs import read_log, save_controller
 from selfmodel.logs.rosbag.bag import open_bag
 from selfmodel.logs.rosbag.importer import import_bag
-from selfmodel.logs.rosbag.mapping import parse_mapping
+from selfmodel.logs.rosbag.mapping_file import parse_mapping
 from selfmodel.logs.rosbag.suggest import suggest
 from selfmodel.notation import parse
 from selfmodel.physical import SimulatedRobot
@@ -184,3 +184,8 @@ def test_options_that_do_not_go_together_are_told(driven: Path):
         done = selfmodel("logs", "import", driven, *arguments)
         assert done.returncode == 2
         assert message in done.stderr
+
+
+def test_help_does_not_wait_for_ros_messages():
+    code = "import sys, selfmodel.cli; assert not {'rosbags', 'ruamel'} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)
