@@ -83,7 +83,9 @@ def matched(wanted: Sequence[str], offered: Sequence[str]) -> dict[str, Guess]:
 
 
 def likeness(ours: str, theirs: str) -> float:
-    """Returns how alike two names are: 0, nothing in common, to 1, the same words."""
+    """Returns how alike two names are: 0, nothing in common, to 1, the same words or initials."""
+    if "".join(word[0] for word in _parts(ours)) == theirs.lower():
+        return 1.0
     first, second = _words(ours), _words(theirs)
     if any((first & sides) and (second & sides) and not first & second & sides for sides in _SIDES):
         return 0.0
@@ -94,5 +96,9 @@ def likeness(ours: str, theirs: str) -> float:
 
 
 def _words(name: str) -> frozenset[str]:
-    parts = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", name)
-    return frozenset(word for part in parts for word in _WORDS.get(part.lower(), (part.lower(),)))
+    return frozenset(word for part in _parts(name) for word in _WORDS.get(part, (part,)))
+
+
+def _parts(name: str) -> list[str]:
+    """``FLKnee_2`` is ``fl``, ``knee`` and ``2``."""
+    return [part.lower() for part in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", name)]

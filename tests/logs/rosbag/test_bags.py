@@ -22,6 +22,7 @@ from selfmodel.logs.rosbag import unpack
 from selfmodel.logs.rosbag.bag import open_bag
 from selfmodel.logs.rosbag.checks import TYPES
 from selfmodel.logs.rosbag.series import read_series
+from selfmodel.logs.rosbag.suggest import suggest
 from selfmodel.robot import Robot
 from tests.logs.rosbag.bags import FORMS, ROS, T0, array, storage, write_bag
 from tests.logs.rosbag.conftest import imported, recorded
@@ -107,6 +108,8 @@ def test_other_writers_of_mcap_are_read(
 @pytest.mark.parametrize("path", GENUINE, ids=lambda path: path.stem)
 def test_genuine_recordings_are_read_or_refused(path: Path, biped: Robot):
     assert read_all(path)
+    with open_bag(path) as bag:
+        assert "CHANGE: the bag has none" in suggest(bag, biped, "b.xml", with_timestep=True)
     with pytest.raises(InputError, match=r"MAP\.toml:5: unknown topic of the bag"):
         imported(path, biped)
 
