@@ -188,7 +188,7 @@ def _steps(mapping: BagMapping, tracks: Tracks, timestep: float) -> Steps:
 
 def _behaviour(mapping: BagMapping, tracks: Tracks, robot: Robot, steps: Steps) -> Behaviour:
     anatomy = robot.anatomy
-    joints = joint_signals(tracks, anatomy, steps)
+    joints = joint_signals(tracks, robot, steps)
     from_start = mapping.base is None or mapping.base.frame == "start"
     try:
         base = base_signals(tracks, steps, from_start=from_start)

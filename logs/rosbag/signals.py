@@ -13,6 +13,7 @@ from selfmodel.logs.rosbag.resample import angles, hold, linear, reach, slerp
 from selfmodel.logs.rosbag.series import IntArray
 from selfmodel.logs.rosbag.tracks import Tracks
 from selfmodel.logs.rosbag.turning import rotated, turned, unyaw
+from selfmodel.robot import Robot
 
 Interpolation = Callable[[FloatArray, FloatArray, FloatArray, float], FloatArray]
 
@@ -30,10 +31,18 @@ class Steps:
     at: IntArray
 
 
-def joint_signals(tracks: Tracks, anatomy: Anatomy, steps: Steps) -> dict[Signal, FloatArray]:
-    """Returns what is known of the hinges."""
+def joint_signals(tracks: Tracks, robot: Robot, steps: Steps) -> dict[Signal, FloatArray]:
+    """Returns what is known of the hinges.
+
+    Only one without limits can go round: what jumps elsewhere did not turn a whole turn.
+    """
+    anatomy, model = robot.anatomy, robot.model
+    positions = [
+        _at(tracks.positions[name], steps, linear if model.joint(name).limited[0] else angles)
+        for name in anatomy.hinges
+    ]
     return {
-        "joint_positions": _columns(tracks.positions, anatomy.hinges, steps, angles),
+        "joint_positions": np.concatenate(positions, axis=1),
         "joint_velocities": _columns(tracks.velocities, anatomy.hinges, steps, linear),
         "joint_efforts": _columns(tracks.efforts, anatomy.hinges, steps, linear),
     }

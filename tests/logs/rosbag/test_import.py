@@ -13,6 +13,7 @@ from selfmodel.logs.rosbag.importer import import_bag, write_recording
 from selfmodel.logs.rosbag.mapping_file import parse_mapping
 from selfmodel.playback import Playback
 from selfmodel.robot import Robot
+from tests.logs.conftest import MJCF
 from tests.logs.rosbag.bags import (
     ROS,
     T0,
@@ -271,3 +272,22 @@ def test_a_command_stands_through_silence(biped: Robot, tmp_path: Path):
     items += [("/commands", T0, array([0.1] * 4)), ("/commands", T0 + 5 * 10**8, array([0.2] * 4))]
     behaviour = imported(write_bag(tmp_path / "bag", items), biped).behaviour
     assert np.array_equal(behaviour["commands"][:, 0], np.where(behaviour.time < 0.5, 0.1, 0.2))
+
+
+@pytest.mark.parametrize("limited", [True, False])
+def test_only_a_hinge_without_limits_goes_round(*, limited: bool, tmp_path: Path):
+    items = without("/joint_states", recorded())
+    for k in range(200):
+        stamp, turn = T0 + k * 5_000_000, (k / 40 + np.pi) % (2 * np.pi) - np.pi
+        items.append(("/joint_states", stamp, joint_state(stamp, JOINTS, [turn, 0, 0, 0])))
+    mjcf = (
+        MJCF
+        if limited
+        else MJCF.replace(
+            'name="left_hip_x" axis="1 0 0" range="-30 30"', ('name="left_hip_x" axis="1 0 0"')
+        )
+    )
+    robot = Robot("biped", mjcf, 0.01)
+    behaviour = imported(write_bag(tmp_path / "bag", items), robot).behaviour
+    angles = behaviour["joint_positions"][:, 0]
+    assert angles.max() < np.pi if limited else np.allclose(angles, behaviour.time * 5)

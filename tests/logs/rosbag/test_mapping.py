@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from selfmodel.errors import InputError
+from selfmodel.logs.rosbag.mapping import Link
 from selfmodel.logs.rosbag.mapping_file import parse_mapping, read_mapping
 from selfmodel.robot import Robot
 from tests.logs.rosbag.bags import T0, joint_state, write_bag
@@ -135,3 +136,11 @@ def test_no_misprint_crashes(biped: Robot, bag: Path):
             spoilt[rng.integers(len(spoilt))] = chr(rng.integers(32, 127))
         with suppress(InputError):
             assert imported(bag, biped, "".join(spoilt)).behaviour.steps >= 2
+
+
+def test_the_mapping_in_the_guide_is_one():
+    guide = (Path(__file__).parents[3] / "docs" / "real-robots.md").read_text(encoding="utf-8")
+    text = guide.partition("```toml\n")[2].partition("```")[0]
+    mapping = parse_mapping(text, "guide")
+    assert mapping.joints.links["front_left_knee"] == Link("FL_knee", -1, 0.1)
+    assert mapping.touch["front_left_touch"].threshold == 5
