@@ -2,6 +2,8 @@
 PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
+VIEWERS := .viewers
+NODE_READY := .ci/viewers/node_modules/.ready
 
 help: ## show this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -34,10 +36,34 @@ wheel: $(READY) ## build the wheel and check what it holds
 	$(BIN)/python -m build --quiet --wheel
 	$(BIN)/python .ci/check_wheel.py dist/*.whl
 
+viewers: $(READY) $(VIEWERS)/rerun/.ready $(VIEWERS)/pymcap/.ready $(NODE_READY) ## prove that fresh logs open in other people's tools; needs Node.js
+	rm -rf $(VIEWERS)/logs
+	mkdir $(VIEWERS)/logs
+	$(BIN)/selfmodel trial quadruped --out $(VIEWERS)/logs/quadruped.mcap
+	$(BIN)/selfmodel trial hexapod --damage break:front_left_knee --out $(VIEWERS)/logs/hexapod.mcap
+	$(BIN)/python .ci/viewers/check.py $(VIEWERS)/logs/quadruped.mcap $(VIEWERS)/logs/hexapod.mcap
+	$(BIN)/python .ci/viewers/can_fail.py $(VIEWERS)/logs/quadruped.mcap
+	node .ci/viewers/layout.mjs docs/foxglove-layout.json $(VIEWERS)/logs/quadruped.mcap
+
+# The tools have environments of their own: some are heavy, one is GPL, none is a dependency.
+$(VIEWERS)/%/.ready: .ci/viewers/requirements-%.txt
+	rm -rf $(@D)
+	$(PYTHON) -m venv $(@D)
+	$(@D)/bin/python -m pip install --quiet --disable-pip-version-check --requirement $<
+	touch $@
+
+$(NODE_READY): .ci/viewers/package.json .ci/viewers/package-lock.json
+	@command -v npm >/dev/null || { echo 'make viewers needs Node.js 20 or newer with npm, and found none' >&2; exit 1; }
+	npm ci --prefix .ci/viewers --ignore-scripts
+	touch $@
+
+fuzz: $(READY) ## damage 30,000 logs at random and check that nothing goes unnoticed; in minutes
+	$(BIN)/python -m tests.logs.fuzz --count 30000
+
 bench: $(READY) ## measure speed and memory; on a quiet machine
 	$(BIN)/python -m benchmarks.bench
 
 results: $(READY) ## run Table I on both robots and write docs/results.md; takes over an hour
 	$(BIN)/python -m benchmarks.table_one
 
-.PHONY: help setup demo test lint types wheel bench results
+.PHONY: help setup demo test lint types wheel viewers fuzz bench results

@@ -7,6 +7,7 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.behaviour import Behaviour, forward_displacement
 from selfmodel.comparator import ClosedLoop
+from selfmodel.errors import InputError
 from selfmodel.trial import Trial
 
 
@@ -25,8 +26,16 @@ class ForwardDisplacement:
     name: str = "forward-displacement"
 
     def request(self, trial: Trial) -> ClosedLoop:
-        """Returns that the path of the root body is all it looks at."""
-        del trial  # every trial is judged by the same signal
+        """Returns that the path of the root body is all it looks at.
+
+        Raises:
+            InputError: The trial does not say where the root body began or ended.
+        """
+        if not np.isfinite(trial.displacement):
+            raise InputError(
+                f"{trial.path}: {self.name} needs base_position at the first and the last step, "
+                f"and the log does not have it: choose a comparator that does without"
+            )
         return ClosedLoop(record=("base_position",))
 
     def distances(self, simulated: Behaviour, trial: Trial) -> FloatArray:

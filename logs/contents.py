@@ -11,14 +11,33 @@ from mcap.records import Attachment, Channel, Header, McapRecord, Message, Metad
 
 from selfmodel.errors import InputError
 from selfmodel.logs.errors import (
-    FROM_PART,
+    ANOTHER,
+    IMPORT,
     CorruptError,
     LogError,
     NotMcapError,
     TruncatedError,
     UnsupportedError,
+    salvage_it,
 )
-from selfmodel.logs.scan import FAILURES, ContradictionError, UnknownCompressionError, scan
+from selfmodel.logs.framing import (
+    FAILURES,
+    MAGIC,
+    ContradictionError,
+    UncheckedError,
+    UnknownCompressionError,
+)
+from selfmodel.logs.records import OWN, without_digest
+from selfmodel.logs.scan import scan
+
+FILE_LIMIT = 256 * 2**20
+"""Bytes that a log may have: ten seconds of a quadruped take 0.65 MB."""
+
+UNPACKED_LIMIT = 384 * 2**20
+"""Bytes that the messages of a log may have, unpacked."""
+
+MESSAGE_LIMIT = 1_500_000
+"""Messages that a log may have: six topics at 100 Hz for 40 minutes."""
 
 _Item = TypeVar("_Item")
 
@@ -48,7 +67,7 @@ class Contents:
 
     Attributes:
         profile: Which rules the file follows, such as ``ros2``.
-        metadata: Records by name.
+        metadata: Records by name; ours without the digest that was checked.
         attachments: Files by name.
         topics: Messages by topic.
     """
@@ -76,77 +95,98 @@ def read_contents(path: Path, unread: Collection[str] = ()) -> Contents:
         LogError: The file is damaged, not MCAP, or holds what is not supported.
         InputError: There is no such file, or it cannot be opened.
     """
-    contents, error = salvage_contents(path, unread)
-    if error is not None:
-        raise error
+    contents = Contents()
+    data = read_bytes(path)
+    try:
+        _gather(scan(data), contents, unread)
+    except FAILURES as failure:
+        raise _explain(path, data, failure, contents) from failure
     return contents
 
 
-def salvage_contents(path: Path, unread: Collection[str] = ()) -> tuple[Contents, LogError | None]:
-    """Returns what can be read of a file, and what is wrong with it, if anything.
-
-    Every message that is returned stood in the file whole and, in a log of ours, passed its
-    chunk's checksum.
+def read_bytes(path: Path) -> bytes:
+    """Returns all of a file.
 
     Raises:
+        LogError: It is too large for a log.
         InputError: There is no such file, or it cannot be opened.
     """
-    contents = Contents()
     try:
         with path.open("rb") as file:
-            try:
-                _gather(scan(file), contents, unread)
-            except FAILURES as failure:
-                return contents, _explain(path, failure, contents)
+            data = file.read(FILE_LIMIT + 1)
     except OSError as failure:
         raise InputError(
             f"{path}: expected a log file that can be read, got: {failure.strerror}"
         ) from failure
-    return contents, None
+    if len(data) > FILE_LIMIT:
+        raise UnsupportedError(
+            path, f"expected at most {FILE_LIMIT} bytes, got more", advice=ANOTHER
+        )
+    return data
 
 
-def _gather(records: Iterator[McapRecord], contents: Contents, unread: Collection[str]) -> None:
-    schemas: dict[int, Schema] = {}
-    channels: dict[int, Messages] = {}
-    for record in records:
-        if isinstance(record, Message):
-            channels[record.channel_id].payloads.append(record.data)
-            channels[record.channel_id].times.append((record.log_time, record.publish_time))
-        elif isinstance(record, Schema):
-            schemas[record.id] = record
-        elif isinstance(record, Channel) and record.id not in channels:
-            schema = schemas[record.schema_id] if record.schema_id else Schema(0, b"", "", "")
-            channels[record.id] = Messages(schema.name, schema.data, record.message_encoding)
-            _put(contents.topics, record.topic, channels[record.id])
-        elif isinstance(record, Metadata) and record.name not in unread:
-            _put(contents.metadata, record.name, record.metadata)
-        elif isinstance(record, Attachment):
-            _put(contents.attachments, record.name, record.data)
-        elif isinstance(record, Header):
-            contents.profile = record.profile
+def put(items: dict[str, _Item], name: str, item: _Item) -> None:
+    """Adds what must be there only once.
 
-
-def _put(items: dict[str, _Item], name: str, item: _Item) -> None:
+    Raises:
+        ContradictionError: It is there.
+    """
     if name in items:
         raise ContradictionError(f"it has {name!r} twice")
     items[name] = item
 
 
-def _explain(path: Path, failure: Exception, contents: Contents) -> LogError:
-    started = bool(contents.metadata or contents.topics or contents.profile)
+def _gather(records: Iterator[McapRecord], contents: Contents, unread: Collection[str]) -> None:
+    schemas: dict[int, Schema] = {}
+    channels: dict[int, Messages] = {}
+    count = size = 0
+    for record in records:
+        if isinstance(record, Message):
+            count, size = count + 1, size + len(record.data)
+            if count > MESSAGE_LIMIT or size > UNPACKED_LIMIT:
+                raise ContradictionError(
+                    f"it holds more than a log may: {MESSAGE_LIMIT} messages, "
+                    f"{UNPACKED_LIMIT} bytes"
+                )
+            channels[record.channel_id].payloads.append(record.data)
+            channels[record.channel_id].times.append((record.log_time, record.publish_time))
+        elif isinstance(record, Schema):
+            schemas[record.id] = record
+        elif isinstance(record, Channel) and record.id not in channels:
+            channels[record.id] = messages_of(record, schemas)
+            put(contents.topics, record.topic, channels[record.id])
+        elif isinstance(record, Metadata) and record.name not in unread:
+            ours = record.name.startswith(OWN)
+            texts = without_digest(record.name, record.metadata) if ours else record.metadata
+            put(contents.metadata, record.name, texts)
+        elif isinstance(record, Attachment):
+            put(contents.attachments, record.name, record.data)
+        elif isinstance(record, Header):
+            contents.profile = record.profile
+
+
+def messages_of(channel: Channel, schemas: Mapping[int, Schema]) -> Messages:
+    """Returns a channel without messages.
+
+    Raises:
+        KeyError: Its schema is not known.
+    """
+    schema = schemas[channel.schema_id] if channel.schema_id else Schema(0, b"", "", "")
+    return Messages(schema.name, schema.data, channel.message_encoding)
+
+
+def _explain(path: Path, data: bytes, failure: Exception, contents: Contents) -> LogError:
+    good = contents.good
     if isinstance(failure, InvalidMagic):
-        if started:
-            return CorruptError(path, "its last bytes are damaged", good=contents.good)
-        return NotMcapError(path, "this is not an MCAP file", advice="give a trial log, NAME.mcap")
-    if isinstance(failure, (EndOfFile, struct.error)):
-        if started:
-            return TruncatedError(
-                path, "the file ends too early", good=contents.good, advice=FROM_PART
-            )
-        return NotMcapError(
-            path, "the file is empty or too short", advice="give a trial log, NAME.mcap"
-        )
+        return NotMcapError(path, "this is not an MCAP file", advice=ANOTHER)
     if isinstance(failure, UnknownCompressionError):
-        return UnsupportedError(path, str(failure), advice="pack it again with zstd")
+        return UnsupportedError(path, str(failure), good=good, advice="pack it again with zstd")
+    if isinstance(failure, UncheckedError):
+        what = f"{failure}: it is no log that selfmodel wrote"
+        return UnsupportedError(path, what, good=good, advice=IMPORT)
+    if isinstance(failure, (EndOfFile, struct.error)) and not data.endswith(MAGIC):
+        if len(data) <= len(MAGIC):
+            return NotMcapError(path, "the file is empty or too short", advice=ANOTHER)
+        return TruncatedError(path, "the file ends too early", good=good, advice=salvage_it(path))
     what = f"the file is damaged: {failure or type(failure).__name__}"
-    return CorruptError(path, what, good=contents.good)
+    return CorruptError(path, what, good=good, advice=salvage_it(path))

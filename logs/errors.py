@@ -6,10 +6,14 @@ from os import PathLike
 from selfmodel.errors import WorkError
 
 AGAIN = "make the trial again"
-FROM_PART = (
-    "the steps that are complete stay in the file, which nothing here deletes or changes; "
-    "make the trial again under another name"
-)
+ANOTHER = "give a trial log, NAME.mcap"
+IMPORT = "a recording of a robot becomes a trial log with `selfmodel logs import`"
+OTHER_VERSION = "read it with the version of selfmodel that wrote it"
+
+
+def salvage_it(path: str | PathLike[str]) -> str:
+    """Returns the advice to save what is complete, as a command that can be pasted."""
+    return f"save what is complete with `selfmodel logs salvage {path} -o NEW.mcap`"
 
 
 class LogError(WorkError):
@@ -20,12 +24,18 @@ class LogError(WorkError):
         what: What is wrong with it.
         good: How much of it is good; left out where nothing is known.
         advice: What can be done.
+
+    Attributes:
+        path: The file.
+        what: What is wrong with it.
+        good: How much of it is good, or "".
+        advice: What can be done.
     """
 
     def __init__(
         self, path: str | PathLike[str], what: str, *, good: str = "", advice: str = AGAIN
     ) -> None:
-        self.path = str(path)
+        self.path, self.what, self.good, self.advice = str(path), what, good, advice
         super().__init__(f"{path}: " + "; ".join(part for part in (what, good, advice) if part))
 
 
@@ -42,11 +52,11 @@ class CorruptError(LogError):
 
 
 class UnsupportedError(LogError):
-    """The file is sound, but of a kind or version that is not known here."""
+    """The file is sound, but of a kind, version or size that is not known here."""
 
 
 class IncompleteError(LogError):
-    """The trial did not run to its end."""
+    """The trial did not run to its end, and nobody has said so in its log."""
 
 
 class SchemaMismatchError(LogError):

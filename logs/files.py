@@ -23,9 +23,7 @@ def create_part(path: Path) -> IO[bytes]:
         InputError: Either of them exists, or their folder does not.
         LogWriteError: It could not be made.
     """
-    for existing in (path, part_of(path)):
-        if os.path.lexists(existing):
-            raise InputError(f"{existing} exists, and is not overwritten: choose another name")
+    refuse_existing(path)
     try:
         return part_of(path).open("xb")
     except FileExistsError:
@@ -38,6 +36,17 @@ def create_part(path: Path) -> IO[bytes]:
         ) from None
     except OSError as error:
         raise LogWriteError(part_of(path), error) from error
+
+
+def refuse_existing(path: Path) -> None:
+    """Refuses a name that is taken, before any work is done for it.
+
+    Raises:
+        InputError: A file of that name exists, or one that is to become it.
+    """
+    for existing in (path, part_of(path)):
+        if os.path.lexists(existing):
+            raise InputError(f"{existing} exists, and is not overwritten: choose another name")
 
 
 def publish(file: IO[bytes], path: Path) -> None:

@@ -5,6 +5,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.behaviour import Signal
+from selfmodel.logs.topics import WORLD
 from selfmodel.places import places
 from selfmodel.robot import Robot
 
@@ -15,6 +16,12 @@ _POSITION_XYZW = [0, 1, 2, 4, 5, 6, 3]
 def body_names(model: mujoco.MjModel) -> tuple[str, ...]:
     """Returns the name of each body but the world; it names the body's frame."""
     return tuple(model.body(b).name or f"body_{b}" for b in range(1, model.nbody))
+
+
+def parent_names(model: mujoco.MjModel) -> tuple[str, ...]:
+    """Returns, for each body but the world, the name of the frame that it is told in."""
+    names = (WORLD, *body_names(model))
+    return tuple(names[parent] for parent in model.body_parentid[1:])
 
 
 class Kinematics:
@@ -33,7 +40,7 @@ class Kinematics:
     def transforms(
         self, joint_positions: FloatArray, position: FloatArray, orientation: FloatArray
     ) -> FloatArray:
-        """Returns the pose of each body in the world.
+        """Returns the pose of each body in the frame of its parent.
 
         Args:
             joint_positions: ``(steps, hinges)`` rad.
@@ -41,9 +48,8 @@ class Kinematics:
             orientation: ``(steps, 4)`` of the root body, w x y z.
 
         Returns:
-            ``(steps, 7 bodies)``: of each body x y z in metres and the quaternion x y z w, each
-            rounded to a multiple of 2**-20. They are derived, and for looking at; a micrometre
-            and a microradian are enough for that and take half the place in the file.
+            ``(steps, 7 bodies)``: of each body x y z in metres and the quaternion x y z w, rounded
+            like all that is derived.
         """
         data, (hinges, where, turn) = self._data, self._columns
         poses = np.empty((len(position), self._model.nbody, 7))
@@ -54,21 +60,52 @@ class Kinematics:
             mujoco.mj_kinematics(self._model, data)
             poses[k, :, :3] = data.xpos
             poses[k, :, 3:] = data.xquat
-        poses = poses[:, 1:, _POSITION_XYZW]
-        with np.errstate(over="ignore"):  # a robot that was lost to sight may be anywhere
-            rounded: FloatArray = np.rint(poses * 2.0**20) / 2.0**20
-        return rounded.reshape(len(position), -1)
+        parents = self._model.body_parentid[1:]
+        with np.errstate(over="ignore", invalid="ignore"):  # a robot may be lost to sight
+            relative = _relative(poses[:, parents], poses[:, 1:])[..., _POSITION_XYZW]
+        return to_micrometres(relative).reshape(len(position), 7 * len(parents))
+
+
+def to_micrometres(values: FloatArray) -> FloatArray:
+    """Returns derived numbers rounded to multiples of 2**-20.
+
+    They are for looking at: a micrometre and a microradian are enough for that, and what does not
+    move takes no place in the file.
+    """
+    with np.errstate(over="ignore"):  # a robot may be lost to sight
+        rounded: FloatArray = np.rint(values * 2.0**20) / 2.0**20
+    return rounded + 0.0  # 0 is 0, never -0
 
 
 def into_child_frame(velocity: FloatArray, orientation: FloatArray) -> FloatArray:
-    """Returns velocities in the frame of a body, as nav_msgs/Odometry wants them.
+    """Returns vectors of the world's frame in the frame of a body.
 
     Args:
-        velocity: ``(steps, 3)`` in the world's frame.
-        orientation: ``(steps, 4)`` of the body, w x y z.
+        velocity: ``(..., 3)`` in the world's frame: for nav_msgs/Odometry, which wants it so.
+        orientation: ``(..., 4)`` of the body, w x y z.
     """
     with np.errstate(over="ignore", invalid="ignore"):
-        scalar, axis = orientation[:, :1], -orientation[:, 1:]
+        scalar, axis = orientation[..., :1], -orientation[..., 1:]
         twice = 2 * np.cross(axis, velocity)
         rotated: FloatArray = velocity + scalar * twice + np.cross(axis, twice)
     return rotated
+
+
+def _relative(parents: FloatArray, children: FloatArray) -> FloatArray:
+    """The poses of children in the frames of their parents, each ``(..., 7)``, w x y z last."""
+    back = parents[..., 3:] * (1.0, -1.0, -1.0, -1.0)
+    moved = into_child_frame(children[..., :3] - parents[..., :3], parents[..., 3:])
+    return np.concatenate([moved, _product(back, children[..., 3:])], axis=-1)
+
+
+def _product(first: FloatArray, second: FloatArray) -> FloatArray:
+    """The product of quaternions, each ``(..., 4)``, w x y z."""
+    scalar, axis = first[..., :1], first[..., 1:]
+    other, turned = second[..., :1], second[..., 1:]
+    return np.concatenate(
+        [
+            scalar * other - np.sum(axis * turned, axis=-1, keepdims=True),
+            scalar * turned + other * axis + np.cross(axis, turned),
+        ],
+        axis=-1,
+    )

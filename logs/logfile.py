@@ -8,9 +8,10 @@ from mcap.writer import CompressionType, Writer
 
 import selfmodel
 from selfmodel.logs.files import create_part, explained, part_of, publish, sync
+from selfmodel.logs.records import MEDIA_TYPES, with_digest
 from selfmodel.logs.schemas import schema_text
 
-CHUNK = 64 * 2**10
+CHUNK = 256 * 2**10
 """Bytes that are packed together: with the library's 1 MiB a kill would lose a whole trial."""
 
 
@@ -42,12 +43,13 @@ class LogFile:
             self._mcap.start(profile="ros2", library=f"selfmodel/{selfmodel.__version__}")
 
     def metadata(self, name: str, texts: Mapping[str, str]) -> None:
-        """Writes a record of names and texts."""
+        """Writes a record of names and texts, with its digest."""
         with explained(part_of(self.path)):
-            self._mcap.add_metadata(name, dict(texts))
+            self._mcap.add_metadata(name, with_digest(name, texts))
 
-    def attach(self, name: str, media_type: str, data: bytes) -> None:
+    def attach(self, name: str, data: bytes) -> None:
         """Writes a file within the file."""
+        media_type = MEDIA_TYPES.get(name, "application/octet-stream")
         with explained(part_of(self.path)):
             # Times of 0: the same trial gives the same bytes, whenever it is run.
             self._mcap.add_attachment(0, 0, name, media_type, data)
@@ -84,6 +86,11 @@ class LogFile:
         with explained(part_of(self.path)):
             self._mcap.finish()
             publish(self._file, self.path)
+
+    def abandon(self) -> None:
+        """Closes the file and takes it away: what it holds is also elsewhere."""
+        self.close()
+        part_of(self.path).unlink(missing_ok=True)
 
     def close(self) -> None:
         """Closes the file as it is; harmless when it is closed."""

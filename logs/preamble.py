@@ -37,13 +37,20 @@ def write_preamble(
     log: LogFile,
     robot: Robot,
     plan: Plan,
+    *,
     settings: Settings,
     hidden: str | None,
     imported: Imported | None,
 ) -> None:
     """Writes the records, attachments and description that precede the first step.
 
-    When this returns, the disk has them.
+    Args:
+        log: Where to.
+        robot: The robot as its model describes it.
+        plan: What is to be done.
+        settings: The paper's numbers.
+        hidden: What is wrong with a simulated robot, in notation.
+        imported: Where an imported trial comes from.
 
     Raises:
         LogWriteError: The disk is full, or failed.
@@ -67,15 +74,16 @@ def write_preamble(
     log.metadata(SOFTWARE, _software())
     if hidden is not None:
         log.metadata(HIDDEN, {TRUTH: hidden})
-    log.attach(MODEL_FILE, "application/xml", model)
+    log.attach(MODEL_FILE, model)
+    for name, data in robot.assets.items():
+        log.attach(name, data)
     if controller:
-        log.attach(CONTROLLER_FILE, "application/octet-stream", controller)
+        log.attach(CONTROLLER_FILE, controller)
+    log.attach(SETTINGS_FILE, settings_json(settings))
     if imported is not None:
         log.metadata(IMPORT, imported.facts)
-        log.attach(MAPPING_FILE, "application/toml", imported.mapping.encode())
-    log.attach(SETTINGS_FILE, "application/json", settings_json(settings))
+        log.attach(MAPPING_FILE, imported.mapping.encode())
     log.message(log.channel(DESCRIPTION, DESCRIPTION_TYPE), 0, description(urdf(robot)), 0)
-    log.sync()
 
 
 def _software() -> dict[str, str]:

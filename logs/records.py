@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, get_args
 
 from selfmodel.errors import InputError
@@ -22,15 +23,34 @@ HIDDEN = "selfmodel.hidden"
 """The record with what a simulated physical robot hides; diagnosis never reads it."""
 IMPORT = "selfmodel.import"
 """Where an imported trial comes from, and how good what was recorded is."""
+SALVAGE = "selfmodel.salvage"
+"""Which damaged file a salvaged trial comes from."""
 RESULT = "selfmodel.result"
+
+OWN = "selfmodel."
+"""What the names of all our records begin with; each holds a digest of itself."""
+DIGEST = "sha256"
 
 MODEL_FILE = "model.xml"
 CONTROLLER_FILE = "controller.npz"
 SETTINGS_FILE = "settings.json"
 MAPPING_FILE = "mapping.toml"
 
+MEDIA_TYPES: Mapping[str, str] = MappingProxyType(
+    {
+        MODEL_FILE: "application/xml",
+        SETTINGS_FILE: "application/json",
+        MAPPING_FILE: "application/toml",
+    }
+)
+"""What the attachments are; all others are bytes."""
+
 TRUTH = "truth"
 FINISHED = "finished"
+INTERRUPTED = "interrupted"
+
+LARGEST_SETTING = 10**6
+"""A setting of a log that is larger would fill the memory, or take for ever."""
 
 _NAME = re.compile(r"[A-Za-z0-9-]{1,100}")
 
@@ -48,7 +68,8 @@ class TrialRecord:
         control_timestep: Seconds between two commands; step k is at k times this.
         steps: Control steps that it is to last.
         seed: From which everything random about it is drawn.
-        controller_sha256: Of the attached controller.
+        controller_sha256: Of the attached controller, or "" where there is none because what drove
+            the robot is not known; its commands are.
         model_sha256: Of the attached model.
     """
 
@@ -76,7 +97,7 @@ class Result:
     """The record ``selfmodel.result``, written last.
 
     Attributes:
-        status: ``finished``.
+        status: ``finished`` or ``interrupted``.
         steps: Control steps that were logged.
         displacement: How far the robot travelled forward, m.
     """
@@ -170,7 +191,30 @@ def parse_settings(data: bytes) -> Settings:
             raise ValueError(f"there is no setting {name!r}")
         if type(value) not in (int, type(defaults[name])):
             raise TypeError(f"{name} must be a number such as {defaults[name]}, got {value!r}")
+        if value > LARGEST_SETTING:
+            raise ValueError(f"{name} must be at most {LARGEST_SETTING}, got {value}")
     return Settings(**values)
+
+
+def with_digest(name: str, texts: Mapping[str, str]) -> dict[str, str]:
+    """Returns a record with a digest of itself: MCAP has no checksum for one record alone."""
+    return {**texts, DIGEST: _digest(name, texts)}
+
+
+def without_digest(name: str, texts: Mapping[str, str]) -> dict[str, str]:
+    """Returns a record of ours as it was before its digest was added.
+
+    Raises:
+        ValueError: The digest is missing, or is not that of the record.
+    """
+    bare = {key: text for key, text in texts.items() if key != DIGEST}
+    if texts.get(DIGEST) != _digest(name, bare):
+        raise ValueError(f"the record {name} does not have the digest that it says")
+    return bare
+
+
+def _digest(name: str, texts: Mapping[str, str]) -> str:
+    return sha256(json.dumps([name, sorted(texts.items())]).encode())
 
 
 def sha256(data: bytes) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray, frozen
 from selfmodel.behaviour import SIGNALS, Behaviour, Names, Signal
-from selfmodel.controller import Controller
+from selfmodel.controller import Controller, Network
 from selfmodel.logs.cdr import names_of
 from selfmodel.logs.contents import Contents, Messages
 from selfmodel.logs.errors import CorruptError, SchemaMismatchError
@@ -15,7 +15,7 @@ from selfmodel.logs.topics import Part, Topic, topics
 
 
 def read_behaviour(
-    path: Path, contents: Contents, record: TrialRecord, controller: Controller | None
+    path: Path, contents: Contents, record: TrialRecord, steps: int, controller: Controller | None
 ) -> Behaviour:
     """Returns what the messages of a log say.
 
@@ -23,38 +23,51 @@ def read_behaviour(
         path: The log, for errors.
         contents: What stands in it.
         record: What was to be done.
-        controller: What drove the robot; the messages must have the names that it has.
+        steps: How many steps the log says it has.
+        controller: What drove the robot, if that is known; the messages must have its names.
 
     Raises:
         LogError: The messages do not fit the record, the controller or their types.
     """
-    names = Names(
-        sensors=_names(path, contents, "/sensors"),
-        motors=_names(path, contents, "/joint_commands"),
-        hinges=_names(path, contents, "/joint_states"),
-    )
-    network = controller.network if controller else None
-    if network and (names.sensors, names.motors) != (network.sensors, network.motors):
+    names = read_names(path, contents)
+    network = controller.network if controller else Network(names.sensors, names.motors)
+    if (names.sensors, names.motors) != (network.sensors, network.motors):
         raise SchemaMismatchError(
             path,
             f"its controller is for the sensors {network.sensors} and motors {network.motors}, "
             f"its messages have {names.sensors} and {names.motors}",
+            good=contents.good,
         )
     held = len(_messages(path, contents, "/joint_states").payloads)
-    if held != record.steps:
-        raise CorruptError(path, f"{held} messages on /joint_states for {record.steps} steps")
-    time: FloatArray = np.arange(record.steps, dtype=np.float64) * record.control_timestep
+    if held != steps:
+        raise CorruptError(
+            path, f"{held} messages on /joint_states for {steps} steps", good=contents.good
+        )
+    time: FloatArray = np.arange(steps, dtype=np.float64) * record.control_timestep
     parts: dict[Part, FloatArray] = {}
     for topic in topics(names, record.root):
-        parts |= _rows(path, _messages(path, contents, topic.name), topic, time)
+        parts |= _rows(path, contents, topic, time)
     signals: dict[Signal, FloatArray] = {signal: frozen(parts[signal]) for signal in SIGNALS}
     return Behaviour(names, frozen(time), signals)
+
+
+def read_names(path: Path, contents: Contents) -> Names:
+    """Returns the names in the first message of each topic.
+
+    Raises:
+        LogError: There is no message, or it has no names.
+    """
+    return Names(
+        sensors=_names(path, contents, "/sensors"),
+        motors=_names(path, contents, "/joint_commands"),
+        hinges=_names(path, contents, "/joint_states"),
+    )
 
 
 def _messages(path: Path, contents: Contents, topic: str) -> Messages:
     messages = contents.topics.get(topic)
     if messages is None or not messages.payloads:
-        raise SchemaMismatchError(path, f"it has no messages on {topic}")
+        raise SchemaMismatchError(path, f"it has no messages on {topic}", good=contents.good)
     return messages
 
 
@@ -62,28 +75,34 @@ def _names(path: Path, contents: Contents, topic: str) -> tuple[str, ...]:
     try:
         return names_of(_messages(path, contents, topic).payloads[0])
     except ValueError as error:
-        raise SchemaMismatchError(path, f"on {topic}: {error}") from error
+        raise SchemaMismatchError(path, f"on {topic}: {error}", good=contents.good) from error
 
 
-def _rows(path: Path, messages: Messages, topic: Topic, time: FloatArray) -> dict[Part, FloatArray]:
+def _rows(path: Path, contents: Contents, topic: Topic, time: FloatArray) -> dict[Part, FloatArray]:
+    messages, good = _messages(path, contents, topic.name), contents.good
     if (messages.type, messages.encoding) != (topic.type, "cdr"):
         raise SchemaMismatchError(
             path,
             f"expected {topic.type} in cdr on {topic.name}, "
             f"got {messages.type!r} in {messages.encoding!r}",
+            good=good,
         )
     if len(messages.payloads) != len(time):
         raise CorruptError(
-            path, f"{len(messages.payloads)} messages on {topic.name} for {len(time)} steps"
+            path,
+            f"{len(messages.payloads)} messages on {topic.name} for {len(time)} steps",
+            good=good,
         )
     try:
         stamps, values = topic.template.decode(messages.payloads)
     except ValueError as error:
-        raise SchemaMismatchError(path, f"on {topic.name}: {error}") from error
+        raise SchemaMismatchError(path, f"on {topic.name}: {error}", good=good) from error
     expected = np.rint(time * 1e9)
     times = np.array(messages.times, dtype=np.float64)  # exact for the first hundred days
     if np.any(stamps != expected) or np.any(times != expected[:, np.newaxis]):
         raise SchemaMismatchError(
-            path, f"the times on {topic.name} are not the multiples of the control time step"
+            path,
+            f"the times on {topic.name} are not the multiples of the control time step",
+            good=good,
         )
     return topic.unpack(values)

@@ -13,11 +13,12 @@ from selfmodel.logs.cdr import Layout, Template
 WORLD = "world"
 
 DESCRIPTION = "/robot_description"
+TRANSFORMS = "/tf"
 DESCRIPTION_TYPE = "std_msgs/msg/String"
 
 Derived = Literal["child_linear_velocity", "transforms"]
 """What a log holds for other tools and the reader leaves alone: the base's velocity in its own
-frame, ``(steps, 3)`` m/s; each body's position and orientation (x y z w) in the world,
+frame, ``(steps, 3)`` m/s; each body's position and orientation (x y z w) in its parent's frame,
 ``(steps, 7 bodies)``."""
 
 Part = Signal | Derived
@@ -111,16 +112,21 @@ def topics(names: Names, root: str) -> tuple[Topic, ...]:
     )
 
 
-def transforms(bodies: Sequence[str]) -> Topic:
-    """Returns the topic that tells other tools where each body is."""
+def transforms(bodies: Sequence[str], parents: Sequence[str]) -> Topic:
+    """Returns the topic that tells other tools where each body is.
+
+    Args:
+        bodies: The name of each body's frame.
+        parents: The name of the frame that it is told in.
+    """
     layout = Layout()
     layout.length(len(bodies))
-    for body in bodies:
-        layout.header(WORLD)
+    for body, parent in zip(bodies, parents, strict=True):
+        layout.header(parent)
         layout.string(body)
         layout.floats(7)
     parts: tuple[tuple[Part, int], ...] = (("transforms", 7 * len(bodies)),)
-    return Topic("/tf", "tf2_msgs/msg/TFMessage", layout.template(), parts)
+    return Topic(TRANSFORMS, "tf2_msgs/msg/TFMessage", layout.template(), parts)
 
 
 def description(text: str) -> bytes:

@@ -4,27 +4,23 @@ import itertools
 from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
 
-from selfmodel.behaviour import SIGNALS, Sample
+from selfmodel.behaviour import SIGNALS, Names, Sample
 from selfmodel.controller import Controller
+from selfmodel.driver import Driver
 from selfmodel.errors import InputError
-from selfmodel.logs.errors import IncompleteError
+from selfmodel.logs.encoder import Encoder
+from selfmodel.logs.errors import IncompleteError, salvage_it
 from selfmodel.logs.files import explained, part_of
-from selfmodel.logs.frames import Kinematics, body_names, into_child_frame
 from selfmodel.logs.logfile import LogFile
 from selfmodel.logs.preamble import write_preamble
 from selfmodel.logs.records import FINISHED, RESULT, Imported, Result, checked_name
-from selfmodel.logs.topics import topics, transforms
 from selfmodel.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trial import Plan
-
-if TYPE_CHECKING:
-    from selfmodel.arrays import FloatArray
-    from selfmodel.logs.topics import Part
 
 FLUSH_STEPS = 50
 """How many steps a kill can cost at most. It makes the file 1 % larger than never flushing."""
@@ -95,21 +91,15 @@ class TrialWriter:
         imported: Imported | None = None,
     ) -> None:
         checked_name(plan.name)
-        names, driver = robot.anatomy.names, plan.controller
-        network = driver.network if isinstance(driver, Controller) else robot.network
-        if (network.sensors, network.motors) != (names.sensors, names.motors):
-            raise InputError(
-                f"expected a controller for {robot.name}, with the sensors {names.sensors} and "
-                f"motors {names.motors}, got one for {network.sensors} and {network.motors}"
-            )
+        names = robot.anatomy.names
+        _check_ends(robot.name, names, plan.controller)
         if plan.steps < 1:
             raise InputError(f"a trial has at least 1 step, got {plan.steps}")
         self.path = path
         self.steps = 0
-        self._robot, self._plan, self._settings, self._hidden = robot, plan, settings, hidden
-        self._imported = imported
-        self._topics = (*topics(names, robot.root), transforms(body_names(robot.model)))
-        self._kinematics = Kinematics(robot)
+        self._robot, self._plan, self._settings = robot, plan, settings
+        self._hidden, self._imported = hidden, imported
+        self._encoder = Encoder(robot)
         self._rows = {signal: np.empty((FLUSH_STEPS, names.width(signal))) for signal in SIGNALS}
         self._written = 0
         self._start = self._end = 0.0
@@ -119,9 +109,17 @@ class TrialWriter:
         self._log = LogFile(self.path)
         try:
             write_preamble(
-                self._log, self._robot, self._plan, self._settings, self._hidden, self._imported
+                self._log,
+                self._robot,
+                self._plan,
+                settings=self._settings,
+                hidden=self._hidden,
+                imported=self._imported,
             )
-            self._channels = [self._log.channel(topic.name, topic.type) for topic in self._topics]
+            self._channels = [
+                self._log.channel(topic.name, topic.type) for topic in self._encoder.topics
+            ]
+            self._log.sync()  # before the robot moves, the disk has all that steps are read by
         except BaseException:  # whatever ends it, Ctrl-C too: `__exit__` is not called then
             self._log.close()
             raise
@@ -153,7 +151,8 @@ class TrialWriter:
         if self.steps == 0:
             self._start = self._end
         self.steps += 1
-        if self.steps - self._written == FLUSH_STEPS:
+        # The first step goes out at once: with it, what follows can always be salvaged.
+        if self.steps == 1 or self.steps - self._written == FLUSH_STEPS:
             self._flush()
 
     def __exit__(
@@ -179,31 +178,19 @@ class TrialWriter:
                 part_of(self.path),
                 f"the robot stopped after {self.steps} of {self._plan.steps} steps",
                 good=f"{self.steps} steps are in that file",
+                advice=salvage_it(part_of(self.path)),
             )
 
     def _flush(self) -> None:
         """Writes the steps that wait, and hands them to the operating system."""
-        steps = np.arange(self._written, self.steps)
-        if not len(steps):
+        count = self.steps - self._written
+        if not count:
             return
         self._sound = False
-        rows: dict[Part, FloatArray] = {
-            signal: rows[: len(steps)] for signal, rows in self._rows.items()
-        }
-        rows["transforms"] = self._kinematics.transforms(
-            rows["joint_positions"], rows["base_position"], rows["base_orientation"]
-        )
-        rows["child_linear_velocity"] = into_child_frame(
-            rows["base_linear_velocity"], rows["base_orientation"]
-        )
-        stamps = np.rint(steps * self._robot.control_timestep * 1e9).astype(np.int64)
-        series = [topic.template.encode(stamps, topic.pack(rows)) for topic in self._topics]
+        rows = {signal: rows[:count] for signal, rows in self._rows.items()}
         with explained(part_of(self.path)):
-            for step, stamp, *payloads in zip(
-                steps.tolist(), stamps.tolist(), *series, strict=True
-            ):
-                for channel, payload in zip(self._channels, payloads, strict=True):
-                    self._log.message(channel, stamp, payload, step)
+            for step, topic, stamp, payload in self._encoder.encode(self._written, rows):
+                self._log.message(self._channels[topic], stamp, payload, step)
         self._log.flush()
         self._written = self.steps
         self._sound = True
@@ -212,3 +199,15 @@ class TrialWriter:
         result = Result(FINISHED, self.steps, self._end - self._start)
         self._log.metadata(RESULT, result.texts())
         self._log.finish()
+
+
+def _check_ends(robot: str, names: Names, driver: Driver) -> None:
+    if isinstance(driver, Controller):
+        sensors, motors = driver.network.sensors, driver.network.motors
+    else:
+        sensors, motors = names.sensors, driver.motors
+    if (sensors, motors) != (names.sensors, names.motors):
+        raise InputError(
+            f"expected a controller for {robot}, with the sensors {names.sensors} and motors "
+            f"{names.motors}, got one for {sensors} and {motors}"
+        )

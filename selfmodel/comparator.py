@@ -33,7 +33,11 @@ class Comparator(Protocol):
         ...
 
     def request(self, trial: Trial) -> ClosedLoop:
-        """Returns what must be simulated to judge a trial."""
+        """Returns what must be simulated to judge a trial.
+
+        Raises:
+            InputError: The trial lacks a signal that it needs; the sentence says which.
+        """
         ...
 
     def distances(self, simulated: Behaviour, trial: Trial) -> FloatArray:

@@ -27,7 +27,8 @@ class Database:
     @property
     def controllers(self) -> tuple[Controller, ...]:
         """Every controller that a physical robot has run, the newest first, each once."""
-        return tuple(dict.fromkeys(trial.plan.controller for trial in reversed(self.trials)))
+        drivers = dict.fromkeys(trial.plan.controller for trial in reversed(self.trials))
+        return tuple(driver for driver in drivers if isinstance(driver, Controller))
 
     @property
     def evidence(self) -> tuple[Trial, ...]:

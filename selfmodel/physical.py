@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.behaviour import SIGNALS, Sample
-from selfmodel.controller import Controller, Population
+from selfmodel.driver import Driver, drive
 from selfmodel.errors import TrialError
 from selfmodel.hypothesis import INTACT, Hypothesis
 from selfmodel.places import places
@@ -18,7 +18,7 @@ from selfmodel.senses import Senses
 class PhysicalRobot(Protocol):
     """The only way in which the algorithm reaches a robot: it runs a controller and looks on."""
 
-    def run(self, controller: Controller, steps: int) -> Iterator[Sample]:
+    def run(self, controller: Driver, steps: int) -> Iterator[Sample]:
         """Runs a controller from the start position, one sample a control step as it happens.
 
         A caller that stops iterating stops the robot.
@@ -47,7 +47,7 @@ class SimulatedRobot:
         self._robot = robot
         self._embodiment = robot.build(hidden)
 
-    def run(self, controller: Controller, steps: int) -> Iterator[Sample]:
+    def run(self, controller: Driver, steps: int) -> Iterator[Sample]:
         """Runs a controller; see ``PhysicalRobot``. The same bits as the ``Simulator``'s.
 
         Raises:
@@ -57,7 +57,7 @@ class SimulatedRobot:
         model, data = embodiment.model, mujoco.MjData(embodiment.model)
         mujoco.mj_forward(model, data)
         senses = Senses(model, robot.anatomy, [embodiment])
-        brain = Population([controller], embodiment.neurons[np.newaxis])
+        brain = drive([controller], embodiment.neurons[np.newaxis], len(robot.anatomy.sensors))
         where = places(robot)
         for k in range(steps):
             senses.read(data.sensordata[np.newaxis], data.qpos[np.newaxis], brain.readings)

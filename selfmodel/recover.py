@@ -3,37 +3,19 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-
 from selfmodel.comparator import Comparator
 from selfmodel.controller import Controller
 from selfmodel.database import Journal
 from selfmodel.diagnose import Diagnose
 from selfmodel.diagnosis import Diagnosis
-from selfmodel.evolution import Generation
+from selfmodel.events import Event, SearchBegins
 from selfmodel.hypothesis import INTACT, Hypothesis
 from selfmodel.physical import PhysicalRobot
 from selfmodel.repair import Repair
 from selfmodel.settings import Settings
 from selfmodel.simulator import Simulator
+from selfmodel.streams import diagnosis_stream, repair_stream
 from selfmodel.trial import Plan, Stage, Trial
-
-
-@dataclass(frozen=True)
-class SearchBegins:
-    """A search begins.
-
-    Attributes:
-        kind: Which of the two EAs.
-        hypothesis: What a repair takes to be wrong; None for a diagnosis.
-    """
-
-    kind: str
-    hypothesis: Hypothesis | None = None
-
-
-Event = SearchBegins | Generation | Trial | Diagnosis
-"""What happens in a recovery, told as it happens."""
 
 
 @dataclass(frozen=True)
@@ -101,23 +83,21 @@ def recover(
     Returns:
         What the journal says at the end.
     """
-    rng = np.random.default_rng(seed)
     repair = Repair(simulator, settings)
     diagnose = Diagnose(simulator, comparator, settings)
     tried: list[Hypothesis] = []
 
-    def stream() -> np.random.Generator:
-        """One for each search, so that what one draws does not move the others."""
-        return rng.spawn(1)[0]
-
     def evolve_controller(hypothesis: Hypothesis) -> Controller:
         watch(SearchBegins("repair", hypothesis))
-        return repair(hypothesis, journal.read().controllers, stream(), watch)
+        known = journal.read()
+        rng = repair_stream(seed, len(known.diagnoses))
+        return repair(hypothesis, known.controllers, rng, watch)
 
     def explain() -> Diagnosis:
         watch(SearchBegins("diagnostic"))
         known = journal.read()
-        diagnosis = diagnose(known.evidence, known.hypotheses, stream(), watch)
+        rng = diagnosis_stream(seed, len(known.diagnoses) + 1)
+        diagnosis = diagnose(known.evidence, known.hypotheses, rng, watch)
         journal.note(diagnosis)
         watch(diagnosis)
         return diagnosis
@@ -129,8 +109,6 @@ def recover(
 
     if gait is None:
         gait = evolve_controller(INTACT)
-    else:
-        stream()
     act(healthy, "before", INTACT, gait)
     act(damaged, "after", INTACT, gait)
     for _ in range(settings.trials):

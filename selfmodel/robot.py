@@ -1,5 +1,6 @@
 """A robot: an MJCF model, its parts by name, and its rhythm."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import mujoco
@@ -20,8 +21,9 @@ class Robot:
 
     Attributes:
         name: What it is called.
-        mjcf: The model, as one XML text that needs no other file.
+        mjcf: The model, as one XML text that needs no files but the assets.
         control_timestep: Seconds between two commands.
+        assets: The files that the model names, such as meshes.
         model: The compiled model.
         anatomy: Its joints, sensors and motors.
         root: Its root body, whose travel counts.
@@ -30,12 +32,13 @@ class Robot:
     name: str
     mjcf: str
     control_timestep: float
+    assets: Mapping[str, bytes] = field(default_factory=dict, repr=False)
     model: mujoco.MjModel = field(init=False, repr=False)
     anatomy: Anatomy = field(init=False, repr=False)
     root: str = field(init=False)
 
     def __post_init__(self) -> None:
-        model = mujoco.MjModel.from_xml_string(self.mjcf)
+        model = mujoco.MjModel.from_xml_string(self.mjcf, dict(self.assets))
         object.__setattr__(self, "model", model)
         object.__setattr__(self, "anatomy", read_anatomy(model))
         object.__setattr__(self, "root", _root(model))

@@ -1,4 +1,4 @@
-"""The self-model in motion: many robots, each with its hypothesis and controller, in one batch."""
+"""The self-model in motion: many robots, each with its hypothesis and driver, in one batch."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -12,15 +12,15 @@ from mujoco.batch import Batch, SimulationError
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.behaviour import Behaviour, Signal
-from selfmodel.controller import Controller, Population
+from selfmodel.driver import Driver, drive
 from selfmodel.embodiment import Embodiment
 from selfmodel.hypothesis import Hypothesis
 from selfmodel.places import places
 from selfmodel.robot import Robot
 from selfmodel.senses import Senses
 
-Run = tuple[Hypothesis, Controller]
-"""What one simulation runs: a robot with what the hypothesis says wrong, and its controller."""
+Run = tuple[Hypothesis, Driver]
+"""What one simulation runs: a robot with what the hypothesis says wrong, and what drives it."""
 
 REMEMBERED_EMBODIMENTS = 1024
 """Built models that are kept: a few tens of kB each."""
@@ -82,12 +82,13 @@ class Simulator:
         embodiments = [self._embodiment(hypothesis) for hypothesis, _ in runs]
         batch = _batch(robot.model, embodiments, self._threads)
         senses = Senses(robot.model, robot.anatomy, embodiments)
-        population = Population(
-            [controller for _, controller in runs],
+        brains = drive(
+            [driver for _, driver in runs],
             np.array([embodiment.neurons for embodiment in embodiments]),
+            len(robot.anatomy.sensors),
         )
         sensordata, qpos, ctrl = (batch.bind(field) for field in ("sensordata", "qpos", "ctrl"))
-        live = _live(robot, batch, population, record)
+        live = _live(robot, batch, brains.readings, record)
         # By step while it runs, so that a step is written in one piece.
         kept = {
             signal: np.empty((steps, n, robot.anatomy.names.width(signal))) for signal in record
@@ -97,8 +98,8 @@ class Simulator:
         alive = _Alive(batch)
         with _counted_not_printed():
             for k in range(steps):
-                senses.read(sensordata, qpos, population.readings)
-                population.step(ctrl)
+                senses.read(sensordata, qpos, brains.readings)
+                brains.step(ctrl)
                 for signal, rows in kept.items():
                     values, chosen = live[signal]
                     rows[k] = values[:, chosen]
@@ -161,12 +162,12 @@ def _batch(model: mujoco.MjModel, embodiments: Sequence[Embodiment], threads: in
 
 
 def _live(
-    robot: Robot, batch: Batch, population: Population, record: Sequence[Signal]
+    robot: Robot, batch: Batch, readings: FloatArray, record: Sequence[Signal]
 ) -> dict[Signal, tuple[FloatArray, slice | list[int]]]:
     """For each signal the array that always holds its present value, and its columns in it."""
     state = places(robot)
     return {
-        signal: (population.readings, slice(None))
+        signal: (readings, slice(None))
         if signal == "sensors"
         else (batch.bind(state[signal].field), state[signal].columns)
         for signal in record

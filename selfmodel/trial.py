@@ -4,8 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from selfmodel.behaviour import Behaviour, forward_displacement
-from selfmodel.controller import Controller
-from selfmodel.playback import Playback
+from selfmodel.driver import Driver
 
 Stage = Literal["before", "after", "recovery", "single"]
 """Where in a story a trial stands: the robot walks (``before``), no longer does as its model says
@@ -27,19 +26,20 @@ class Plan:
 
     name: str
     stage: Stage
-    controller: Controller | Playback
+    controller: Driver
     steps: int
     seed: int
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A finished trial.
+    """A trial that ran, to its end or until it was interrupted.
 
     Attributes:
         plan: What was to be done.
         robot: The name of the robot.
-        behaviour: What was observed, every signal of it.
+        behaviour: What was observed, every signal of it: ``plan.steps`` steps, or fewer where the
+            trial was interrupted. What is NaN was not observed.
         path: The log it was read from.
     """
 

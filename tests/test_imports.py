@@ -55,21 +55,24 @@ def test_dependencies_point_one_way(module: str):
 
 LAYERS = (
     # Plain data and plain algorithms; then MuJoCo; then what takes a comparator; then the story.
-    ("errors", "arrays", "behaviour", "anatomy", "controller", "settings", "memo", "evolution"),
+    (
+        *("errors", "arrays", "behaviour", "anatomy", "controller", "settings", "memo"),
+        *("evolution", "playback", "driver", "streams"),
+    ),
     (
         "faults",
         "hypothesis",
         "notation",
         "genome",
         "diagnosis",
-        "playback",
         "trial",
         "comparator",
         "contract",
+        "events",
     ),
-    ("embodiment", "robot", "places", "senses", "simulator", "physical", "judge"),
+    ("embodiment", "robot", "places", "senses", "simulator", "physical", "judge", "replay"),
     ("database", "diagnose", "repair"),
-    ("recover",),
+    ("recover", "explain"),
 )
 
 

@@ -14,6 +14,7 @@ from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.controller import Controller
 from selfmodel.database import Journal
 from selfmodel.diagnosis import Diagnosis
+from selfmodel.events import Event, SearchBegins
 from selfmodel.evolution import Draw, Evolution, Generation
 from selfmodel.genome import encode
 from selfmodel.hypothesis import INTACT, Hypothesis
@@ -21,7 +22,7 @@ from selfmodel.logs import read_truth
 from selfmodel.logs.journal import open_journal
 from selfmodel.notation import parse
 from selfmodel.physical import SimulatedRobot
-from selfmodel.recover import Event, Recovery, SearchBegins, recover
+from selfmodel.recover import Recovery, recover
 from selfmodel.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulator import Run, Simulated, Simulator

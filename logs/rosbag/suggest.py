@@ -3,7 +3,6 @@
 What is uncertain is marked: ``CHECK`` is a guess that may be right, ``CHANGE`` must be filled in.
 """
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 
 from selfmodel.logs.rosbag.bag import Bag, Topic
@@ -116,7 +115,7 @@ def _order(width: int, order: tuple[str, ...]) -> tuple[str, ...]:
 
 def _link(guess: Guess | None, offered: Sequence[str]) -> str:
     if guess is None:
-        known = ", ".join(offered) or "nothing"
+        known = ", ".join("".join(map(_escaped, name)) for name in offered) or "nothing"
         return f'"?"  # CHANGE: the bag has {known}'
     return _quoted(guess.name) + ("" if guess.sure else "  # CHECK: not sure")
 
@@ -124,7 +123,7 @@ def _link(guess: Guess | None, offered: Sequence[str]) -> str:
 def _topic(topics: Sequence[Topic]) -> str:
     if not topics:
         return 'topic = "?"  # CHANGE: the bag has none of a type that fits'
-    others = ", ".join(topic.name for topic in topics[1:])
+    others = ", ".join("".join(map(_escaped, topic.name)) for topic in topics[1:])
     return f"topic = {_quoted(topics[0].name)}" + (f"  # CHECK: or {others}" if others else "")
 
 
@@ -169,7 +168,12 @@ def _touches(bag: Bag, sensors: Sequence[str]) -> Iterator[str]:
 
 
 def _quoted(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False)
+    """A text as TOML has it: names in a bag may hold anything."""
+    return f'"{"".join(map(_escaped, text))}"'
+
+
+def _escaped(char: str) -> str:
+    return char if char.isprintable() and char not in '"\\' else f"\\U{ord(char):08X}"
 
 
 def _key(name: str) -> str:

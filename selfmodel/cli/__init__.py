@@ -4,8 +4,11 @@ import sys
 
 import typer
 
-from selfmodel.cli.logs_import import import_
+from selfmodel.cli import logs
+from selfmodel.cli.diagnose import diagnose
+from selfmodel.cli.plain import plain
 from selfmodel.cli.recover import recover
+from selfmodel.cli.replay import replay
 from selfmodel.cli.robots import robots
 from selfmodel.cli.trial import trial
 from selfmodel.errors import InputError, WorkError
@@ -21,9 +24,9 @@ app = typer.Typer(
 app.command()(robots)
 app.command()(recover)
 app.command()(trial)
-logs = typer.Typer(help="Import logs of trials.", no_args_is_help=True)
-logs.command("import")(import_)
-app.add_typer(logs, name="logs")
+app.command()(diagnose)
+app.command()(replay)
+app.add_typer(logs.app)
 
 
 def main() -> None:
@@ -42,5 +45,5 @@ def main() -> None:
 
 
 def _fail(message: str, status: int) -> None:
-    typer.echo(f"error: {message}", err=True)
+    typer.echo(f"error: {plain(message)}", err=True)
     sys.exit(status)

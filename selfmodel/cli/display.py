@@ -12,8 +12,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn
 
 from selfmodel.diagnosis import Diagnosis
+from selfmodel.events import Event, SearchBegins
 from selfmodel.evolution import Generation
-from selfmodel.recover import Event, SearchBegins
 from selfmodel.trial import Trial
 
 

@@ -7,11 +7,12 @@ from time import perf_counter
 
 from selfmodel.comparator import Comparator
 from selfmodel.controller import Controller
+from selfmodel.events import Event
 from selfmodel.hypothesis import INTACT, Hypothesis
 from selfmodel.judge import is_correct
 from selfmodel.logs.journal import open_journal
 from selfmodel.physical import SimulatedRobot
-from selfmodel.recover import Event, Recovery, recover
+from selfmodel.recover import Recovery, recover
 from selfmodel.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulator import Simulator, Tally

@@ -1,8 +1,11 @@
 """The options that several commands share, so that they read the same everywhere."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from selfmodel.errors import InputError
 
 RobotName = Annotated[
     str, typer.Argument(metavar="ROBOT", help="One of those that `selfmodel robots` lists.")
@@ -20,4 +23,30 @@ Threads = Annotated[
     int,
     typer.Option(min=0, max=1024, help="Threads for the physics; 0 means one for each processor."),
 ]
+RobotOrModel = Annotated[
+    str | None,
+    typer.Option(
+        "--robot",
+        metavar="NAME|MODEL.xml",
+        help="The self-model to use in the place of the one in the logs.",
+    ),
+]
+ComparatorName = Annotated[
+    str,
+    typer.Option(
+        metavar="NAME|package.module:object",
+        help="How a simulation is compared with a logged trial.",
+    ),
+]
+LogFiles = Annotated[list[Path], typer.Argument(metavar="FILE...", help="Trial logs, NAME.mcap.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+
+
+def check_log_name(path: Path) -> None:
+    """Checks the name of a log that is to be written.
+
+    Raises:
+        InputError: It does not end in ``.mcap``.
+    """
+    if path.suffix != ".mcap":
+        raise InputError(f"--out needs a name that ends in .mcap, got {str(path)!r}")

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from selfmodel.cli.options import Damage, Json, RobotName, Seed, Threads
+from selfmodel.cli.options import ComparatorName, Damage, Json, RobotName, Seed, Threads
 from selfmodel.comparators import DEFAULT
 
 
@@ -16,13 +16,7 @@ def recover(
         int | None, typer.Option(metavar="N", help="A failure of the paper's Table I, 1 to 10.")
     ] = None,
     damage: Damage = None,
-    comparator: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME|package.module:object",
-            help="How a simulation is compared with a logged trial.",
-        ),
-    ] = DEFAULT,
+    comparator: ComparatorName = DEFAULT,
     seed: Seed = 0,
     trials: Annotated[
         int, typer.Option(min=1, max=99, help="Physical trials after the failing one.")

@@ -1,7 +1,6 @@
 """What ``selfmodel recover`` says at the end, for people and for programs."""
 
 import json
-import math
 from typing import Any
 
 import typer
@@ -9,6 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from selfmodel.cli.experiment import Experiment, Outcome
+from selfmodel.cli.ranking import as_values, ranking_table
 
 
 def as_object(experiment: Experiment, outcome: Outcome) -> str:
@@ -25,18 +25,7 @@ def print_report(experiment: Experiment, outcome: Outcome) -> None:
     trials.columns[2].justify = "right"
     for trial in found["trials"]:
         trials.add_row(trial["stage"], trial["hypothesis"], f"{trial['displacement']:.3f}")
-    diagnosis = Table("", "hypothesis", "distance", title="diagnosis")
-    diagnosis.columns[1].overflow = "fold"
-    diagnosis.columns[2].justify = "right"
-    for rank, candidate in enumerate(found["diagnosis"], start=1):
-        mark = " (the truth)" if candidate["hypothesis"] == found["truth"] else ""
-        distance = candidate["distance"]
-        diagnosis.add_row(
-            str(rank),
-            candidate["hypothesis"] + mark,
-            "diverged" if distance is None else f"{distance:.4f}",
-        )
-    console.print(trials, diagnosis)
+    console.print(trials, ranking_table(found["diagnosis"], found["truth"]))
     evaluations, trials_since = found["evaluations"], found["physical_trials"]
     verdict = "right" if found["correct"] else "wrong"
     # Not through rich: a folder's name may look like markup, and must not be folded.
@@ -71,13 +60,7 @@ def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
             }
             for trial, tried in zip(recovery.trials, recovery.tried, strict=True)
         ],
-        "diagnosis": [
-            {
-                "hypothesis": str(candidate.hypothesis),
-                "distance": candidate.distance if math.isfinite(candidate.distance) else None,
-            }
-            for candidate in recovery.diagnosis.ranked
-        ],
+        "diagnosis": as_values(recovery.diagnosis.ranked),
         "correct": outcome.correct,
         "displacement": {
             "before": recovery.before,

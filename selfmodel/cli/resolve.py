@@ -2,13 +2,17 @@
 
 import importlib
 import os
+from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 
 from selfmodel.comparator import Comparator
 from selfmodel.comparators import COMPARATORS
 from selfmodel.controller import Controller, Network
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.logs import LogError, load_controller, read_log
+from selfmodel.logs import LogError, TrialLog, load_controller, read_log
+from selfmodel.logs.robots import the_robot_of
+from selfmodel.robot import Robot
 from selfmodel.tasks import ROBOTS, Entry
 
 
@@ -82,6 +86,11 @@ def controller(path: Path, network: Network) -> Controller:
         )
     except LogError as error:
         raise InputError(str(error)) from error
+    if not isinstance(loaded, Controller):
+        raise InputError(
+            f"{path} has no controller, only the commands that were recorded: give the log of a "
+            f"robot that selfmodel drove, or a .npz"
+        )
     if loaded.network != network:
         raise InputError(
             f"{path} has a controller for {_described(loaded.network)}; this robot needs one for "
@@ -93,6 +102,71 @@ def controller(path: Path, network: Network) -> Controller:
 def _described(network: Network) -> str:
     sensors, motors = ", ".join(network.sensors), ", ".join(network.motors)
     return f"the sensors {sensors}, the motors {motors}, with {network.hidden} hidden neurons"
+
+
+def logs(paths: Sequence[Path]) -> list[TrialLog]:
+    """Returns the trials in some logs.
+
+    Raises:
+        InputError: One cannot be used, or is given twice.
+    """
+    twice = [path for path, count in Counter(path.resolve() for path in paths).items() if count > 1]
+    if twice:
+        raise InputError(f"{twice[0]} is given more than once: give each log once")
+    try:
+        return [read_log(path) for path in paths]
+    except LogError as error:
+        raise InputError(str(error)) from error
+
+
+def robot_of_logs(found: Sequence[TrialLog], override: str | None) -> Robot:
+    """Returns the robot that logs are of.
+
+    Args:
+        found: At least one log.
+        override: The name of a robot, or an MJCF file, to take in the place of the logs' model.
+
+    Raises:
+        InputError: The logs are of different robots, their model cannot be used, or the other does
+            not have their sensors, motors and hinges.
+    """
+    try:
+        own = the_robot_of(found)
+    except LogError as error:
+        raise InputError(str(error)) from error
+    if override is None:
+        return own
+    chosen = robot(override, own.control_timestep)
+    if chosen.anatomy.names != own.anatomy.names:
+        raise InputError(
+            f"{override} is another robot than that of {found[0].trial.path}: it has "
+            f"{chosen.anatomy.names}, the log has {own.anatomy.names}"
+        )
+    return chosen
+
+
+def robot(name: str, control_timestep: float) -> Robot:
+    """Returns the robot of that name, or the one that an MJCF file describes.
+
+    Args:
+        name: One that ``selfmodel robots`` lists, or a path that ends in ``.xml``.
+        control_timestep: Seconds between two commands, for the MJCF file.
+
+    Raises:
+        InputError: There is none, or the model cannot be used.
+    """
+    path = Path(name)
+    if path.suffix.lower() != ".xml":
+        return robot_entry(name).robot()
+    try:
+        return Robot(path.stem, path.read_text(encoding="utf-8"), control_timestep)
+    except OSError as error:
+        raise InputError(f"{path}: expected an MJCF file that can be read: {error}") from error
+    except (ValueError, KeyError) as error:
+        what = " ".join(str(error).split())
+        raise InputError(
+            f"{path}: expected an MJCF file of a robot that needs no other file: {what}"
+        ) from error
 
 
 def threads(requested: int) -> int:

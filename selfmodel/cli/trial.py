@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from selfmodel.cli.options import Damage, Json, RobotName, Seed
+from selfmodel.cli.options import Damage, Json, RobotName, Seed, check_log_name
 
 
 def trial(
@@ -32,7 +32,6 @@ def trial(
 
     from selfmodel.cli import resolve  # noqa: PLC0415
     from selfmodel.controller import Controller, draw_weights  # noqa: PLC0415
-    from selfmodel.errors import InputError  # noqa: PLC0415
     from selfmodel.logs import read_log  # noqa: PLC0415
     from selfmodel.logs.writer import write_trial  # noqa: PLC0415
     from selfmodel.notation import parse  # noqa: PLC0415
@@ -41,8 +40,7 @@ def trial(
     from selfmodel.trial import Plan  # noqa: PLC0415
 
     made = resolve.robot_entry(robot).robot()
-    if out.suffix != ".mcap":
-        raise InputError(f"--out needs a name that ends in .mcap, got {str(out)!r}")
+    check_log_name(out)
     hidden = parse("intact" if damage is None else damage, made.anatomy)
     if controller:
         driver = resolve.controller(controller, made.network)

@@ -1,6 +1,4 @@
-import hashlib
 import io
-import json
 from collections.abc import Callable, Collection
 from pathlib import Path
 
@@ -8,7 +6,7 @@ import numpy as np
 import pytest
 from mcap.data_stream import RecordBuilder
 from mcap.records import Attachment, Chunk, McapRecord, Message, Metadata, Statistics
-from mcap.writer import CompressionType, IndexType, Writer
+from mcap.writer import Writer
 
 from selfmodel.errors import InputError
 from selfmodel.logs import (
@@ -24,7 +22,7 @@ from selfmodel.logs import (
 )
 from selfmodel.logs import reader as reader_module
 from selfmodel.logs.contents import Contents, read_contents
-from selfmodel.logs.records import HIDDEN, RESULT, TRIAL
+from selfmodel.logs.records import HIDDEN, RESULT, TRIAL, with_digest, without_digest
 from selfmodel.logs.scan import scan
 
 CASES = Path(__file__).parents[3] / "shared" / "samples" / "mcap-conformance"
@@ -80,7 +78,7 @@ def test_no_damage_passes(log: Path, damage: Callable[[bytes, np.random.Generato
         (lambda d: d[:5], NotMcapError, "empty or too short"),
         (lambda _: b"no log at all", NotMcapError, "not an MCAP file"),
         (lambda d: d[:9000], TruncatedError, "ends too early; .* messages .* complete"),
-        (lambda d: d[:-1], TruncatedError, "721 messages on 7 topics"),
+        (lambda d: d[:-1], TruncatedError, "625 messages on 7 topics"),
         (lambda d: d + b"x", CorruptError, "something follows its end"),
         (lambda d: d[:-8] + bytes(8), CorruptError, "last bytes are damaged"),
     ],
@@ -102,8 +100,7 @@ def test_a_file_that_is_not_there_is_said_so(tmp_path: Path):
 
 def rewritten(path: Path, change: Change) -> None:
     """Writes a sound file of what ``change`` makes of each record, None for nothing."""
-    with path.open("rb") as file:
-        records = list(scan(file))
+    records = list(scan(path.read_bytes()))
     output = io.BytesIO()
     writer = Writer(output, enable_data_crcs=True)
     writer.start("ros2")
@@ -134,7 +131,8 @@ def rewritten(path: Path, change: Change) -> None:
 def metadata(name: str, **texts: str):
     def change(record: McapRecord) -> McapRecord:
         if isinstance(record, Metadata) and record.name == name:
-            return Metadata(name, {**record.metadata, **texts})
+            bare = without_digest(name, record.metadata)
+            return Metadata(name, with_digest(name, {**bare, **texts}))
         return record
 
     return change
@@ -157,6 +155,12 @@ def without(kind: type[McapRecord], name: str):
 def later(record: McapRecord) -> McapRecord:
     if isinstance(record, Message) and record.log_time == 50 * 10**7:
         record.log_time += 1
+    return record
+
+
+def forged(record: McapRecord) -> McapRecord:
+    if isinstance(record, Metadata) and record.name == TRIAL:
+        return Metadata(TRIAL, {**record.metadata, "seed": "8"})
     return record
 
 
@@ -192,15 +196,20 @@ def retyped(record: McapRecord) -> McapRecord:
     ("change", "error", "match"),
     [
         (without(Metadata, TRIAL), SchemaMismatchError, r"no record selfmodel\.trial"),
-        (without(Metadata, RESULT), IncompleteError, "did not finish; 721 messages"),
+        (without(Metadata, RESULT), IncompleteError, "did not finish; 625 messages"),
         (metadata(TRIAL, format="2"), UnsupportedError, "expected format 1, got '2'"),
         (metadata(TRIAL, stage="later"), SchemaMismatchError, "stage must be one of before"),
         (metadata(TRIAL, steps="many"), SchemaMismatchError, "invalid literal"),
-        (metadata(TRIAL, steps=str(10**15)), CorruptError, "120 messages on /joint_states for"),
+        (metadata(TRIAL, steps=str(10**15)), IncompleteError, "after 120 of 1000000000000000"),
         (metadata(TRIAL, control_timestep="0.02"), SchemaMismatchError, "times on /joint_states"),
         (metadata(TRIAL, control_timestep="nan"), SchemaMismatchError, "must be above 0 s"),
         (metadata(TRIAL, root="hip"), SchemaMismatchError, "on /odom: message 0 has"),
-        (metadata(RESULT, status="interrupted"), IncompleteError, "'interrupted' after 120"),
+        (metadata(RESULT, status="lost"), UnsupportedError, "the trial is 'lost'"),
+        (
+            metadata(RESULT, status="interrupted", steps="119"),
+            CorruptError,
+            "120 messages on /joint_states for 119 steps",
+        ),
         (metadata(RESULT, steps="119"), IncompleteError, "after 119 of 120 steps"),
         (metadata(RESULT, displacement="1.5"), CorruptError, r"says 1\.5 m of displacement"),
         (without(Attachment, "model.xml"), SchemaMismatchError, r"no attachment model\.xml"),
@@ -214,6 +223,7 @@ def retyped(record: McapRecord) -> McapRecord:
         (attachment("settings.json", b"1000", b"true"), SchemaMismatchError, "must be a number"),
         (attachment("settings.json", b"{", b"["), SchemaMismatchError, "cannot be read"),
         (later, SchemaMismatchError, "times on /joint_states are not the multiples"),
+        (forged, CorruptError, r"selfmodel\.trial does not have the digest"),
         (stamped, SchemaMismatchError, "times on /joint_states are not the multiples"),
         (missing, CorruptError, "119 messages on /joint_states for 120 steps"),
         (renamed, SchemaMismatchError, "its controller is for the sensors"),
@@ -261,14 +271,14 @@ def test_a_file_without_checksums_is_refused(log: Path):
     writer.start("ros2")
     writer.finish()
     log.write_bytes(output.getvalue())
-    with pytest.raises(CorruptError, match="no checksum over its data"):
+    with pytest.raises(UnsupportedError, match=r"no checksum over its data: .* logs import"):
         read_log(log)
 
 
 @pytest.mark.parametrize(
     ("count", "match"),
     [
-        ("message_count", "720 messages, it holds 721"),
+        ("message_count", "624 messages, it holds 625"),
         ("attachment_count", "2 attachments, it holds 3"),
         ("metadata_count", "3 metadata records, it holds 4"),
         ("schema_count", "5 schemas, it holds 6"),
@@ -301,81 +311,3 @@ def test_a_chunk_that_would_fill_the_memory_is_refused(log: Path, monkeypatch: p
     rewritten(log, lambda record: record)
     with pytest.raises(CorruptError, match="a chunk claims 1099511627776 bytes"):
         read_log(log)
-
-
-@pytest.mark.parametrize("case", sorted(CASES.glob("*/*.json")), ids=lambda path: path.stem)
-def test_the_strict_pass_reads_the_conformance_suite(case: Path):
-    described = json.loads(case.read_text())
-    data = built(described)
-    expected = (CASES / "sha256.txt").read_text()
-    assert hashlib.sha256(data).hexdigest() in expected
-    found = [record for record in scan(io.BytesIO(data)) if isinstance(record, COUNTED)]
-    told = [record for record in described["records"] if record["type"] in NAMES]
-    assert [type(record).__name__ for record in found] == [record["type"] for record in told]
-    for record, other in zip(found, told, strict=True):
-        for field, text in other["fields"]:
-            value = getattr(record, field)
-            assert ([str(b) for b in value] if isinstance(value, bytes) else value) == (
-                int(text) if isinstance(value, int) else text
-            )
-
-
-NAMES = {kind.__name__ for kind in COUNTED}
-
-
-def built(described: dict) -> bytes:
-    """Rebuilds a case of the suite from its description."""
-    features = set(described["meta"]["variant"]["features"])
-    kinds = {"chx": "CHUNK", "mx": "MESSAGE", "ax": "ATTACHMENT", "mdx": "METADATA"}
-    indexes = IndexType.NONE
-    for feature in features & set(kinds):
-        indexes |= IndexType[kinds[feature]]
-    output = io.BytesIO()
-    writer = Writer(
-        output,
-        compression=CompressionType.NONE,
-        index_types=indexes,
-        repeat_channels="rch" in features,
-        repeat_schemas="rsh" in features,
-        use_chunking="ch" in features,
-        use_statistics="st" in features,
-        use_summary_offsets="sum" in features,
-        enable_data_crcs=True,
-    )
-    for record in described["records"]:
-        fields = dict(record["fields"])
-        data = bytes(int(b) for b in fields.get("data", []))
-        match record["type"]:
-            case "Header":
-                writer.start(fields["profile"], fields["library"])
-            case "Schema":
-                writer.register_schema(fields["name"], fields["encoding"], data)
-            case "Channel":
-                writer.register_channel(
-                    fields["topic"],
-                    fields["message_encoding"],
-                    int(fields["schema_id"]),
-                    fields["metadata"],
-                )
-            case "Message":
-                writer.add_message(
-                    int(fields["channel_id"]),
-                    int(fields["log_time"]),
-                    data,
-                    int(fields["publish_time"]),
-                    int(fields["sequence"]),
-                )
-            case "Attachment":
-                writer.add_attachment(
-                    int(fields["create_time"]),
-                    int(fields["log_time"]),
-                    fields["name"],
-                    fields["media_type"],
-                    data,
-                )
-            case "Metadata":
-                writer.add_metadata(fields["name"], fields["metadata"])
-            case "DataEnd":
-                break
-    writer.finish()
-    return output.getvalue()

@@ -13,7 +13,7 @@ import pytest
 from selfmodel.behaviour import Sample
 from selfmodel.errors import InputError
 from selfmodel.logs import IncompleteError, LogWriteError, TruncatedError, files, logfile, read_log
-from selfmodel.logs.contents import salvage_contents
+from selfmodel.logs.rescue import rescue
 from selfmodel.logs.signals import topics
 from selfmodel.logs.writer import FLUSH_STEPS, write_trial
 from selfmodel.robot import Robot
@@ -44,8 +44,9 @@ write_trial(Path(sys.argv[1]), robot, plan_of(robot, 1000), samples(), settings=
 
 def steps_kept(part: Path, robot: Robot) -> int:
     """How many steps an unfinished file holds whole, having checked that they are the true ones."""
-    contents, error = salvage_contents(part)
-    assert isinstance(error, TruncatedError)
+    with pytest.raises(TruncatedError, match="selfmodel logs salvage"):
+        read_log(part)
+    contents = rescue(part)
     assert set(contents.attachments) == {"model.xml", "controller.npz", "settings.json"}
     for topic in topics(robot.anatomy.names, robot.root):
         messages = contents.topics[topic.name]
@@ -89,8 +90,7 @@ def test_a_trial_that_ends_before_its_first_step_leaves_what_was_planned(
             stopping(biped, 0, RuntimeError("gone")),
             settings=Settings(),
         )
-    contents, error = salvage_contents(tmp_path / "a.mcap.part")
-    assert isinstance(error, TruncatedError)
+    contents = rescue(tmp_path / "a.mcap.part")
     assert contents.metadata["selfmodel.trial"]["name"] == "00-before"
 
 
@@ -119,7 +119,7 @@ def test_a_robot_that_stops_early_has_not_finished(biped: Robot, tmp_path: Path)
         write_trial(path, biped, plan_of(biped, STEPS), samples, settings=Settings())
     assert not path.exists()
     assert steps_kept(tmp_path / "a.mcap.part", biped) == 70
-    with pytest.raises(TruncatedError, match="stay in the file"):
+    with pytest.raises(TruncatedError, match="selfmodel logs salvage"):
         read_log(tmp_path / "a.mcap.part")
 
 

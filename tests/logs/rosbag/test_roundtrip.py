@@ -150,13 +150,16 @@ def test_the_command_suggests_imports_and_reports(driven: Path, tmp_path: Path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ('robot = "quadrupet"', "map.toml:1: unknown robot or MJCF file 'quadrupet': did you mean"),
+        ('robot = "quadrupet"', "map.toml:1: unknown robot 'quadrupet': did you mean"),
         (
             'robot = "quadruped"\ncontrol_timestep = 0.01',
             "map.toml:2: quadruped has a control time step of its own",
         ),
         ('robot = "r.xml"', "map.toml:1: r.xml does not say how often it is controlled"),
-        ('robot = "r.xml"\ncontrol_timestep = 0.01', "expected a robot's MJCF, got"),
+        (
+            'robot = "r.xml"\ncontrol_timestep = 0.01',
+            "expected an MJCF file of a robot that needs no other file",
+        ),
         ('robot = "quadruped"\ncontroller = "g.npz"', "map.toml:2: .*g.npz: expected a controller"),
     ],
 )

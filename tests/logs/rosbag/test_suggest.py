@@ -71,3 +71,16 @@ def test_states_and_commands_of_one_type_are_told_apart_by_name(biped: Robot, tm
     with open_bag(write_bag(tmp_path / "bag", items)) as opened:
         mapping = parse_mapping(suggest(opened, biped, "b.xml", with_timestep=True), "m")
     assert (mapping.joints.topic, mapping.commands.topic) == ("/joint_states", "/joint_cmd")
+
+
+def test_names_that_hold_anything_stay_names(biped: Robot, tmp_path: Path):
+    names = ['LHX\n"', "left\x1b[31m_hip_y\\", "right hip é x", "RHY"]
+    items = [("/joints", T0, joint_state(T0, names, [0.0] * 4))]
+    items.append(("/x\n\x7f", T0, joint_state(T0, names[:1], [0.0])))
+    with open_bag(write_bag(tmp_path / "bag", items)) as opened:
+        text = suggest(opened, biped, "b.xml", with_timestep=True)
+    assert all(char.isprintable() or char == "\n" for char in text)
+    for number in range(text.count('"?"')):
+        text = text.replace('"?"', f'"{number}"', 1)
+    told = {link.name for link in parse_mapping(text, "m").joints.links.values()}
+    assert {names[1], names[2], names[3]} <= told

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from selfmodel.cli.options import Json
+from selfmodel.cli.options import Json, check_log_name
+from selfmodel.cli.plain import plain
 from selfmodel.errors import InputError
 
 if TYPE_CHECKING:
@@ -54,33 +55,35 @@ def import_(
             "an import needs --out TRIAL.mcap and --mapping MAP.toml; "
             "--suggest --robot NAME|MJCF prints a mapping to start from"
         )
-    if out.suffix != ".mcap":
-        raise InputError(f"--out needs a name that ends in .mcap, got {str(out)!r}")
+    check_log_name(out)
     _import(bag, out, mapping, as_json=as_json)
 
 
 def _suggestion(bag: Path, name: str) -> str:
     # Whatever brings MuJoCo or ROS's messages waits until the command runs.
+    from selfmodel.cli import resolve  # noqa: PLC0415
     from selfmodel.logs.rosbag.bag import open_bag  # noqa: PLC0415
     from selfmodel.logs.rosbag.suggest import suggest  # noqa: PLC0415
-    from selfmodel.tasks import ROBOTS  # noqa: PLC0415
 
-    own = name in ROBOTS
-    made = _robot(name, None if own else _timestep(Path(name)))
+    own = not _is_model(name)
+    made = resolve.robot(name, TIMESTEP if own else _timestep(Path(name)))
     with open_bag(bag) as opened:
         return suggest(opened, made, name, with_timestep=not own)
 
 
-def _timestep(path: Path) -> float | None:
-    """The multiple of a model's physics time step that is nearest to ``TIMESTEP``."""
-    import mujoco  # noqa: PLC0415
+def _is_model(name: str) -> bool:
+    return Path(name).suffix.lower() == ".xml"
 
-    if not path.is_file():
-        return None
+
+def _timestep(path: Path) -> float:
+    """The multiple of a model's physics time step that is nearest to ``TIMESTEP``."""
+    import mujoco  # noqa: PLC0415  # with the other work
+
     try:
         physics = float(mujoco.MjModel.from_xml_path(str(path)).opt.timestep)
     except ValueError as error:
-        raise InputError(f"{path}: expected a robot's MJCF, got: {error}") from error
+        what = " ".join(str(error).split())
+        raise InputError(f"{path}: expected an MJCF file of a robot: {what}") from error
     return max(1, round(TIMESTEP / physics)) * physics
 
 
@@ -106,37 +109,22 @@ def _import(bag: Path, out: Path, path: Path, *, as_json: bool) -> None:
 
 def _mapped_robot(mapping: "BagMapping", folder: Path) -> "Robot":
     """The robot that a mapping names: one that comes with selfmodel, or a file beside it."""
-    from selfmodel.tasks import ROBOTS  # noqa: PLC0415
+    from selfmodel.cli import resolve  # noqa: PLC0415
 
     name, timestep = mapping.robot, mapping.control_timestep
-    own = name in ROBOTS
+    own = not _is_model(name)
     if own and timestep is not None:
         raise mapping.document.error(
             ("control_timestep",), f"{name} has a control time step of its own: remove this one"
         )
-    if not own and not (folder / name).is_file():
-        raise mapping.document.unknown(("robot",), "robot or MJCF file", name, ROBOTS)
     if not own and timestep is None:
         raise mapping.document.error(
             ("robot",), f"{name} does not say how often it is controlled: add control_timestep, s"
         )
     try:
-        return _robot(name if own else str(folder / name), timestep)
+        return resolve.robot(name if own else str(folder / name), timestep or TIMESTEP)
     except InputError as error:
         raise mapping.document.error(("robot",), str(error)) from error
-
-
-def _robot(name: str, timestep: float | None) -> "Robot":
-    """A robot that comes with selfmodel, or the one in an MJCF file."""
-    from selfmodel.cli.resolve import robot_entry  # noqa: PLC0415
-    from selfmodel.robot import Robot  # noqa: PLC0415
-
-    if timestep is None or not Path(name).is_file():
-        return robot_entry(name).robot()
-    try:
-        return Robot(Path(name).stem, Path(name).read_text(encoding="utf-8"), timestep)
-    except (OSError, ValueError) as error:
-        raise InputError(f"{name}: expected a robot's MJCF, got: {error}") from error
 
 
 def _controller(mapping: "BagMapping", folder: Path, robot: "Robot") -> "Controller | None":
@@ -172,7 +160,7 @@ def _print(out: Path, recording: "Recording") -> None:
         column.justify = "right"
     for topic, found in recording.qualities.items():
         table.add_row(
-            topic,
+            plain(topic),
             str(found.messages),
             _number(found.rate),
             _number(found.jitter, 1e3),
@@ -180,11 +168,11 @@ def _print(out: Path, recording: "Recording") -> None:
             _number(found.longest, 1e3),
             _number(found.latency, 1e3),
         )
-    Console().print(table)
+    Console(markup=False).print(table)
     valid = ", ".join(f"{signal} {share:.0%}" for signal, share in recording.valid.items())
-    # Not through rich: a topic's or a folder's name may look like markup.
+    # Not through rich: a folder's name may look like markup.
     for note in recording.notes:
-        typer.echo(f"note: {note}")
+        typer.echo(f"note: {plain(note)}")
     typer.echo(f"observed: {valid}\n{recording.behaviour.steps} steps: {out}")
 
 

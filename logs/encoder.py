@@ -1,0 +1,76 @@
+"""From the rows of some steps to the messages that a log gets for them."""
+
+from collections.abc import Mapping
+from itertools import repeat
+from operator import itemgetter
+
+import numpy as np
+
+from selfmodel.arrays import FloatArray
+from selfmodel.behaviour import Signal
+from selfmodel.logs.frames import (
+    Kinematics,
+    body_names,
+    into_child_frame,
+    parent_names,
+    to_micrometres,
+)
+from selfmodel.logs.topics import Part, topics, transforms
+from selfmodel.robot import Robot
+
+FRAMES_PERIOD = 0.05
+"""Seconds between two messages on ``/tf``: it is for eyes, and would be a fifth of a log."""
+
+
+class Encoder:
+    """Makes the messages of one trial.
+
+    Args:
+        robot: As its model describes it.
+
+    Attributes:
+        topics: What there are messages of, in the order in which a step has them.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        frames = transforms(body_names(robot.model), parent_names(robot.model))
+        self.topics = (*topics(robot.anatomy.names, robot.root), frames)
+        self._timestep = robot.control_timestep
+        self._kinematics = Kinematics(robot)
+        self._stride = max(1, round(FRAMES_PERIOD / robot.control_timestep))
+
+    def encode(
+        self, first: int, rows: Mapping[Signal, FloatArray]
+    ) -> list[tuple[int, int, int, bytes]]:
+        """Returns the messages of some steps, in order.
+
+        Args:
+            first: The number of the first step.
+            rows: Each signal, ``(steps, width)``.
+
+        Returns:
+            Step, index into ``topics``, time in ns, and payload of each.
+        """
+        count = len(rows["sensors"])
+        steps = np.arange(first, first + count)
+        stamps = np.rint(steps * self._timestep * 1e9).astype(np.int64)
+        seen = slice(-first % self._stride, None, self._stride)
+        every = slice(None)
+        parts: dict[Part, FloatArray] = {
+            "child_linear_velocity": to_micrometres(
+                into_child_frame(rows["base_linear_velocity"], rows["base_orientation"])
+            ),
+            "transforms": self._kinematics.transforms(
+                rows["joint_positions"][seen],
+                rows["base_position"][seen],
+                rows["base_orientation"][seen],
+            ),
+        }
+        parts.update((signal, values) for signal, values in rows.items())
+        told: list[tuple[int, int, int, bytes]] = []
+        for number, topic in enumerate(self.topics):
+            chosen = seen if number == len(self.topics) - 1 else every
+            payloads = topic.template.encode(stamps[chosen], topic.pack(parts))
+            told += zip(steps[chosen].tolist(), repeat(number), stamps[chosen].tolist(), payloads)
+        told.sort(key=itemgetter(0, 1))
+        return told

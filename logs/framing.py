@@ -1,0 +1,185 @@
+"""How records lie in an MCAP file, and what a record or a chunk holds; every size is bounded.
+
+The library reads a damaged length before it looks whether so many bytes are there, and unpacks lz4
+without a bound. So the bytes are cut into records here, and each is given to the library alone.
+"""
+
+import io
+import struct
+import zlib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import zstandard
+from lz4.frame import LZ4FrameDecompressor
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import EndOfFile, McapError
+from mcap.opcode import Opcode
+from mcap.records import (
+    Attachment,
+    AttachmentIndex,
+    Channel,
+    Chunk,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    McapRecord,
+    Message,
+    MessageIndex,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+    SummaryOffset,
+)
+from mcap.stream_reader import breakup_chunk
+
+MAGIC = b"\x89MCAP0\r\n"
+
+FRAME = 1 + 8
+"""Bytes before a record's own: what it is, and its length."""
+
+CHUNK_LIMIT = 16 * 2**20
+"""Bytes that a chunk may unpack to: ours have 64 KiB, and the smallest messages take 30 bytes."""
+
+
+class ContradictionError(ValueError):
+    """Every record can be read, but two of them do not agree."""
+
+
+class UncheckedError(ValueError):
+    """There is no checksum, so nobody can say whether these are the bytes that were written."""
+
+
+class UnknownCompressionError(ValueError):
+    """A chunk is packed in a way that is not known here."""
+
+
+FAILURES = (
+    McapError,
+    ValueError,  # a wrong checksum, text that is not UTF-8, and the three above
+    RuntimeError,  # lz4
+    struct.error,
+    zstandard.ZstdError,
+    KeyError,
+    EOFError,
+    MemoryError,
+    OverflowError,
+)
+"""Everything that the library and its decompressors raise over damaged bytes."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One record as it lies in a file.
+
+    Attributes:
+        offset: Where it begins.
+        opcode: What it is.
+        body: Its bytes, after its length.
+    """
+
+    offset: int
+    opcode: int
+    body: bytes
+
+    @property
+    def end(self) -> int:
+        """Where the next record begins."""
+        return self.offset + FRAME + len(self.body)
+
+
+def frames(data: bytes, offset: int = len(MAGIC)) -> Iterator[Frame]:
+    """Yields the records from an offset on, up to the footer.
+
+    Raises:
+        EndOfFile: The data end before the footer does.
+    """
+    opcode = 0
+    while opcode != Opcode.FOOTER:
+        if offset + FRAME > len(data):
+            raise EndOfFile
+        opcode, length = struct.unpack_from("<BQ", data, offset)
+        start = offset + FRAME
+        if length > len(data) - start:
+            raise EndOfFile
+        yield Frame(offset, opcode, data[start : start + length])
+        offset = start + length
+
+
+def parse(frame: Frame) -> McapRecord | None:
+    """Returns what a record says; None for one of a kind that the format does not know yet.
+
+    Raises:
+        Exception: One of ``FAILURES``: its bytes do not fit its kind.
+    """
+    stream = ReadDataStream(io.BytesIO(frame.body))
+    if frame.opcode == Opcode.MESSAGE:
+        message: McapRecord = Message.read(stream, len(frame.body))
+        return message
+    if frame.opcode == Opcode.ATTACHMENT:
+        checksum = int.from_bytes(frame.body[-4:], "little")
+        if checksum and zlib.crc32(frame.body[:-4]) != checksum:
+            raise ContradictionError("the checksum of an attachment is wrong")
+    read = _READERS.get(frame.opcode)
+    return read(stream) if read else None
+
+
+def unpack(chunk: Chunk) -> list[McapRecord]:
+    """Returns the records in a chunk.
+
+    Raises:
+        Exception: One of ``FAILURES``: it is damaged, unpacks to more than ``CHUNK_LIMIT`` bytes,
+            or has no checksum.
+    """
+    if chunk.uncompressed_size > CHUNK_LIMIT:
+        raise ContradictionError(
+            f"a chunk claims {chunk.uncompressed_size} bytes, more than {CHUNK_LIMIT}"
+        )
+    if chunk.uncompressed_crc == 0 and chunk.uncompressed_size:
+        raise UncheckedError("a chunk has no checksum")
+    chunk.data = _unpacked(chunk)
+    chunk.compression = ""
+    if len(chunk.data) != chunk.uncompressed_size:
+        raise ContradictionError(
+            f"a chunk claims {chunk.uncompressed_size} bytes, and has {len(chunk.data)}"
+        )
+    return breakup_chunk(chunk, validate_crc=True)
+
+
+def _unpacked(chunk: Chunk) -> bytes:
+    if chunk.compression == "":
+        return chunk.data
+    if chunk.compression == "zstd":
+        if zstandard.frame_content_size(chunk.data) > chunk.uncompressed_size:
+            raise ContradictionError("a chunk would unpack to more than it claims")
+        return zstandard.ZstdDecompressor().decompress(chunk.data, chunk.uncompressed_size)
+    if chunk.compression == "lz4":
+        # One byte more than claimed shows that there is more.
+        unpacked: bytes = LZ4FrameDecompressor().decompress(
+            chunk.data, max_length=chunk.uncompressed_size + 1
+        )
+        return unpacked
+    raise UnknownCompressionError(f"a chunk is packed with {chunk.compression!r}")
+
+
+_READERS: Mapping[int, Callable[[ReadDataStream], McapRecord]] = MappingProxyType(
+    {
+        Opcode.ATTACHMENT: Attachment.read,
+        Opcode.ATTACHMENT_INDEX: AttachmentIndex.read,
+        Opcode.CHANNEL: Channel.read,
+        Opcode.CHUNK: Chunk.read,
+        Opcode.CHUNK_INDEX: ChunkIndex.read,
+        Opcode.DATA_END: DataEnd.read,
+        Opcode.FOOTER: Footer.read,
+        Opcode.HEADER: Header.read,
+        Opcode.MESSAGE_INDEX: MessageIndex.read,
+        Opcode.METADATA: Metadata.read,
+        Opcode.METADATA_INDEX: MetadataIndex.read,
+        Opcode.SCHEMA: Schema.read,
+        Opcode.STATISTICS: Statistics.read,
+        Opcode.SUMMARY_OFFSET: SummaryOffset.read,
+    }
+)

@@ -1,0 +1,89 @@
+"""The robot of a log, made from the log alone, whoever wrote it."""
+
+from collections.abc import Sequence
+
+import mujoco
+
+from selfmodel.errors import InputError
+from selfmodel.logs.errors import SchemaMismatchError
+from selfmodel.logs.reader import TrialLog
+from selfmodel.logs.untrusted import checked_mjcf
+from selfmodel.robot import Robot
+
+MOST_SUBSTEPS = 1000
+"""Physics steps in a control step: more would take for ever."""
+
+GOOD = "what was observed reads well"
+
+
+def robot_of(log: TrialLog) -> Robot:
+    """Returns the robot whose model stands in a log.
+
+    MuJoCo gets no file but those attached to the log.
+
+    Raises:
+        LogError: The model asks for files or for too much, is none, or is of another robot than the
+            messages.
+    """
+    path = log.trial.path
+    try:
+        mjcf = checked_mjcf(log.mjcf, log.assets)
+        robot = Robot(log.trial.robot, mjcf, log.control_timestep, log.assets)
+    except (ValueError, KeyError, mujoco.FatalError) as error:
+        raise SchemaMismatchError(
+            path, f"its model cannot be loaded: {_line(error)}", good=GOOD
+        ) from error
+    if robot.substeps > MOST_SUBSTEPS:
+        raise SchemaMismatchError(
+            path,
+            f"its model takes {robot.substeps} physics steps for each of {log.control_timestep} s, "
+            f"expected at most {MOST_SUBSTEPS}",
+            good=GOOD,
+        )
+    names = log.trial.behaviour.names
+    if (robot.anatomy.names, robot.root) != (names, log.root):
+        raise SchemaMismatchError(
+            path,
+            f"its model is of a robot with {robot.anatomy.names} and the base {robot.root!r}, its "
+            f"messages are of one with {names} and {log.root!r}",
+            good=GOOD,
+        )
+    return robot
+
+
+def the_robot_of(logs: Sequence[TrialLog]) -> Robot:
+    """Returns the robot that all logs are of.
+
+    Raises:
+        InputError: There is no log, or they are of different robots; both are named.
+        LogError: The model of the first cannot be loaded.
+    """
+    if not logs:
+        raise InputError("expected at least one log, got none")
+    first = logs[0]
+    for other in logs[1:]:
+        if _identity(other) != _identity(first):
+            what = (
+                "of different robots"
+                if other.trial.robot != first.trial.robot
+                else "of different models, though they are called alike"
+            )
+            raise InputError(
+                f"the logs are {what}: {first.trial.path} is of {first.trial.robot!r}, "
+                f"{other.trial.path} of {other.trial.robot!r}; give logs of one robot"
+            )
+    return robot_of(first)
+
+
+def _identity(log: TrialLog) -> tuple[object, ...]:
+    return (
+        log.trial.robot,
+        log.mjcf,
+        dict(log.assets),
+        log.control_timestep,
+        log.trial.behaviour.names,
+    )
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())

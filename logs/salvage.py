@@ -1,0 +1,205 @@
+"""Saves what is complete of a damaged or unfinished log in a new one."""
+
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from selfmodel.behaviour import forward_displacement
+from selfmodel.errors import InputError
+from selfmodel.logs.contents import MESSAGE_LIMIT, Contents, Messages
+from selfmodel.logs.errors import CorruptError, LogError, SchemaMismatchError
+from selfmodel.logs.files import explained, part_of, refuse_existing
+from selfmodel.logs.logfile import LogFile
+from selfmodel.logs.reader import interpret, read_controller, read_log, read_record
+from selfmodel.logs.records import (
+    CONTROLLER_FILE,
+    INTERRUPTED,
+    RESULT,
+    SALVAGE,
+    SETTINGS_FILE,
+    TRIAL,
+    Result,
+    TrialRecord,
+    settings_json,
+    sha256,
+)
+from selfmodel.logs.rescue import rescue
+from selfmodel.logs.signals import read_behaviour, read_names
+from selfmodel.logs.topics import DESCRIPTION, TRANSFORMS, Topic, topics
+from selfmodel.settings import Settings
+
+
+@dataclass(frozen=True)
+class Salvaged:
+    """What was saved.
+
+    Attributes:
+        log: The new file.
+        steps: How many steps it has, from the first to the last of which everything is known.
+        planned: How many the trial was to last.
+        missing: For each topic, how many messages of those steps are lost; they are NaN, which
+            means not observed.
+        lost: Attachments that are lost. Without the controller, the commands are played back;
+            without the settings, those of the paper stand in their place.
+    """
+
+    log: str
+    steps: int
+    planned: int
+    missing: dict[str, int]
+    lost: tuple[str, ...]
+
+
+def salvage(path: Path, out: Path) -> Salvaged:
+    """Writes all complete data of a damaged or unfinished log into a new, valid one.
+
+    Args:
+        path: The log; it is only read.
+        out: The new log, whose status is ``interrupted``.
+
+    Raises:
+        LogError: Too little is left for a log: its first records, its model, or every step is lost.
+        InputError: The log is sound, ``out`` exists, or there is no such file.
+        LogWriteError: The disk is full, or failed.
+    """
+    refuse_existing(out)
+    _refuse_sound(path)
+    contents = rescue(path)
+    record, lost = _with_what_is_left(path, contents)
+    controller = read_controller(path, contents, record)
+    every, steps = _complete(path, contents, record)
+    missing = {topic.name: _fill(contents, topic, steps, record) for topic in every}
+    _cut(contents, {topic.name for topic in every}, _time_of(steps, record))
+    behaviour = read_behaviour(path, contents, record, steps, controller)
+    result = Result(INTERRUPTED, steps, float(forward_displacement(behaviour)))
+    contents.metadata[RESULT] = result.texts()
+    contents.metadata[SALVAGE] = {"source": path.name, "steps": str(steps)}
+    interpret(path, contents)  # nothing is written that could not be read
+    _write(out, contents)
+    return Salvaged(
+        str(out), steps, record.steps, {name: n for name, n in missing.items() if n}, lost
+    )
+
+
+def salvageable_steps(path: Path) -> int:
+    """Returns how many steps ``salvage`` would save.
+
+    Raises:
+        InputError: There is no such file.
+    """
+    try:
+        contents = rescue(path)
+        record, _ = _with_what_is_left(path, contents)
+        return _complete(path, contents, record)[1]
+    except LogError:
+        return 0
+
+
+def _refuse_sound(path: Path) -> None:
+    try:
+        status = read_log(path).status
+    except LogError:
+        return
+    raise InputError(
+        f"{path} is sound, and the trial in it is {status}: there is nothing to salvage"
+    )
+
+
+def _with_what_is_left(path: Path, contents: Contents) -> tuple[TrialRecord, tuple[str, ...]]:
+    """The record of the trial, changed for attachments that are lost, and the names of these."""
+    record = read_record(path, contents)
+    lost = []
+    attached = contents.attachments.get(CONTROLLER_FILE, b"")
+    if record.controller_sha256 not in ("", sha256(attached)):
+        record = dataclasses.replace(record, controller_sha256="")
+        contents.attachments.pop(CONTROLLER_FILE, None)
+        contents.metadata[TRIAL] = record.texts()
+        lost.append(CONTROLLER_FILE)
+    if SETTINGS_FILE not in contents.attachments:
+        contents.attachments[SETTINGS_FILE] = settings_json(Settings())
+        lost.append(SETTINGS_FILE)
+    return record, tuple(lost)
+
+
+def _complete(path: Path, contents: Contents, record: TrialRecord) -> tuple[tuple[Topic, ...], int]:
+    """The topics, and how many steps there are up to the last that all of them tell of."""
+    try:
+        every = topics(read_names(path, contents), record.root)
+    except SchemaMismatchError as error:
+        raise _nothing(path) from error
+    if record.steps > MESSAGE_LIMIT // len(every):
+        raise CorruptError(path, f"it claims {record.steps} steps, more than a log may have")
+    whole = set(range(record.steps))
+    for topic in every:
+        messages = contents.topics.get(topic.name)
+        times = {log for log, _ in messages.times} if messages else set()
+        whole = {k for k in whole if _time_of(k, record) in times}
+    if not whole:
+        raise _nothing(path)
+    return every, max(whole) + 1
+
+
+def _nothing(path: Path) -> CorruptError:
+    return CorruptError(path, "nothing can be salvaged: not one step of the trial is complete")
+
+
+def _fill(contents: Contents, topic: Topic, steps: int, record: TrialRecord) -> int:
+    """Puts NaN where a topic lacks the message of a step; returns how many it lacked."""
+    messages = contents.topics[topic.name]
+    known = {
+        log: (payload, publish)
+        for payload, (log, publish) in zip(messages.payloads, messages.times, strict=True)
+    }
+    times = [_time_of(k, record) for k in range(steps)]
+    stamps = np.array(times, dtype=np.int64)
+    empty = topic.template.encode(stamps, np.full((steps, topic.template.width), np.nan))
+    rows = [known.get(time, (nothing, time)) for time, nothing in zip(times, empty, strict=True)]
+    messages.payloads = [payload for payload, _ in rows]
+    messages.times = [(time, publish) for time, (_, publish) in zip(times, rows, strict=True)]
+    return len(set(times) - set(known))
+
+
+def _cut(contents: Contents, names: set[str], end: int) -> None:
+    """Leaves out what came after the last step that is complete, and what is no topic of ours."""
+    for name in set(contents.topics) - names - {TRANSFORMS, DESCRIPTION}:
+        del contents.topics[name]
+    for messages in contents.topics.values():
+        kept = [k for k, (log, _) in enumerate(messages.times) if log < end]
+        messages.payloads = [messages.payloads[k] for k in kept]
+        messages.times = [messages.times[k] for k in kept]
+
+
+def _time_of(step: int, record: TrialRecord) -> int:
+    return round(step * record.control_timestep * 1e9)
+
+
+def _write(out: Path, contents: Contents) -> None:
+    log = LogFile(out)
+    try:
+        for name, texts in contents.metadata.items():
+            if name != RESULT:
+                log.metadata(name, texts)
+        for name, data in contents.attachments.items():
+            log.attach(name, data)
+        _write_messages(log, contents.topics)
+        log.metadata(RESULT, contents.metadata[RESULT])
+        log.finish()
+    except BaseException:  # whatever ends it: the damaged file still has everything
+        log.abandon()
+        raise
+
+
+def _write_messages(log: LogFile, every: dict[str, Messages]) -> None:
+    rows = []
+    for topic, messages in every.items():
+        channel = log.channel(topic, messages.type)
+        rows += [
+            (time, channel, payload)
+            for payload, (time, _) in zip(messages.payloads, messages.times, strict=True)
+        ]
+    rows.sort(key=lambda row: row[:2])
+    with explained(part_of(log.path)):
+        for time, channel, payload in rows:
+            log.message(channel, time, payload, 0)

@@ -1,0 +1,89 @@
+"""``selfmodel diagnose``: what is wrong, from logs alone."""
+
+import json
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from selfmodel.cli.options import ComparatorName, Json, LogFiles, RobotOrModel, Threads
+from selfmodel.comparators import DEFAULT
+
+if TYPE_CHECKING:
+    from selfmodel.logs import TrialLog
+
+
+def diagnose(
+    files: LogFiles,
+    *,
+    robot: RobotOrModel = None,
+    comparator: ComparatorName = DEFAULT,
+    seed: Annotated[
+        int | None,
+        typer.Option(
+            min=0, help="Every random choice comes from it.", show_default="that of the logs"
+        ),
+    ] = None,
+    threads: Threads = 0,
+    as_json: Json = False,
+) -> None:
+    """Rank what may be wrong with a robot by how well it explains logs, with no robot at hand.
+
+    Give the logs in the order in which the trials were run. Trials from before the failure explain
+    nothing and are passed over, unless all are.
+    """
+    # Whatever brings MuJoCo waits until the command runs.
+    from selfmodel.cli import resolve  # noqa: PLC0415
+    from selfmodel.cli.display import display  # noqa: PLC0415
+    from selfmodel.cli.ranking import as_values  # noqa: PLC0415
+    from selfmodel.diagnose import Diagnose  # noqa: PLC0415
+    from selfmodel.explain import explain  # noqa: PLC0415
+    from selfmodel.simulator import Simulator  # noqa: PLC0415
+
+    start = perf_counter()
+    judge = resolve.comparator(comparator)
+    logs = resolve.logs(files)
+    model = resolve.robot_of_logs(logs, robot)
+    used = _since_the_failure(logs)
+    first = used[0]
+    chosen = first.trial.plan.seed if seed is None else seed
+    search = Diagnose(Simulator(model, resolve.threads(threads)), judge, first.settings)
+    with display() as watch:
+        diagnosis = explain([log.trial for log in used], search, chosen, watch)
+    result = {
+        "robot": model.name,
+        "comparator": judge.name,
+        "seed": chosen,
+        "logs": [log.trial.path for log in used],
+        "passed_over": [log.trial.path for log in logs if log not in used],
+        "diagnosis": as_values(diagnosis.ranked),
+        "evaluations": search.evaluations,
+        "distinct_hypotheses": search.distinct_hypotheses,
+        "seconds": perf_counter() - start,
+    }
+    if as_json:
+        typer.echo(json.dumps(result, indent=2, allow_nan=False))
+    else:
+        _print(result)
+
+
+def _since_the_failure(logs: "list[TrialLog]") -> "list[TrialLog]":
+    return [log for log in logs if log.trial.plan.stage != "before"] or logs
+
+
+def _print(result: dict[str, Any]) -> None:
+    from rich.console import Console  # noqa: PLC0415  # only where a table is drawn
+
+    from selfmodel.cli.plain import plain  # noqa: PLC0415  # the same
+    from selfmodel.cli.ranking import ranking_table  # noqa: PLC0415  # the same
+
+    Console(markup=False).print(ranking_table(result["diagnosis"]))
+    count = len(result["logs"])
+    typer.echo(
+        f"{plain(result['robot'])}, {count} {'log' if count == 1 else 'logs'}, "
+        f"{result['comparator']}: {result['evaluations']} evaluations of "
+        f"{result['distinct_hypotheses']} distinct hypotheses in {result['seconds']:.1f} s."
+    )
+    for path in result["passed_over"]:
+        typer.echo(f"passed over, from before the failure: {Path(path)}")

@@ -1,0 +1,128 @@
+"""``selfmodel logs info``: what is in a log, at a glance."""
+
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from selfmodel.cli.options import Json, LogFiles
+from selfmodel.cli.plain import plain
+
+if TYPE_CHECKING:
+    from selfmodel.logs.info import Info
+
+
+def info(files: LogFiles, *, as_json: Json = False) -> None:
+    """Show what is in logs, and how to open them in a viewer. Exits with 1 if one is damaged."""
+    found = [_facts(path) for path in files]
+    if as_json:
+        typer.echo(json.dumps({"files": found}, indent=2, allow_nan=False))
+    else:
+        for one in found:
+            _print(one)
+        if any("error" not in one for one in found):
+            typer.echo(_OPENING)
+    raise typer.Exit(1 if any("error" in one for one in found) else 0)
+
+
+_OPENING = """\
+To look at one:
+  Foxglove  Open local file; import docs/foxglove-layout.json as layout
+  Rerun     rerun FILE.mcap   (pip install rerun-sdk)"""
+
+
+def _facts(path: Path) -> dict[str, Any]:
+    from selfmodel.logs.errors import LogError  # noqa: PLC0415  # with the other work
+    from selfmodel.logs.info import read_info  # noqa: PLC0415  # the same
+    from selfmodel.logs.salvage import salvageable_steps  # noqa: PLC0415  # the same
+
+    try:
+        return _as_object(path, read_info(path))
+    except LogError as error:
+        return {
+            "file": str(path),
+            "error": str(error),
+            "kind": type(error).__name__,
+            "salvageable_steps": salvageable_steps(path),
+        }
+
+
+def _as_object(path: Path, found: "Info") -> dict[str, Any]:
+    from selfmodel.logs.info import hides_truth  # noqa: PLC0415  # with the other work
+
+    trial = found.log.trial
+    displacement = trial.displacement
+    return {
+        "file": str(path),
+        "bytes": found.bytes,
+        "robot": trial.robot,
+        "trial": trial.plan.name,
+        "stage": trial.plan.stage,
+        "status": found.log.status,
+        "steps": trial.behaviour.steps,
+        "planned_steps": trial.plan.steps,
+        "control_timestep": found.log.control_timestep,
+        "seed": trial.plan.seed,
+        "displacement": displacement if math.isfinite(displacement) else None,
+        "driver": found.driver,
+        "software": dict(found.log.software),
+        "topics": {
+            name: {"type": topic.type, "messages": topic.messages, "rate": round(topic.rate, 3)}
+            for name, topic in found.topics.items()
+        },
+        "attachments": dict(found.attachments),
+        "records": list(found.records),
+        "observed": {signal: round(share, 6) for signal, share in found.observed.items()},
+        "truth": "hidden" if hides_truth(found) else "unknown",
+        "source": dict(found.source),
+    }
+
+
+def _print(one: dict[str, Any]) -> None:
+    from rich.console import Console  # noqa: PLC0415  # only where a table is drawn
+    from rich.table import Table  # noqa: PLC0415  # the same
+
+    if "error" in one:
+        typer.echo(plain(f"error: {one['error']}"))
+        typer.echo(f"complete steps that can be salvaged: {one['salvageable_steps']}\n")
+        return
+    seconds = one["steps"] * one["control_timestep"]
+    way = one["displacement"]
+    told = (
+        f"{one['file']} ({one['bytes'] / 1000:.0f} kB)\n"
+        f"trial {one['trial']} ({one['stage']}) of {one['robot']}, {one['status']}\n"
+        f"{one['steps']} of {one['planned_steps']} steps of {one['control_timestep']:g} s = "
+        f"{seconds:.2f} s; {'displacement unknown' if way is None else f'{way:.3f} m forward'}; "
+        f"seed {one['seed']}\n"
+        f"driven by {one['driver']}\n"
+        f"written with {', '.join(f'{name} {text}' for name, text in one['software'].items())}\n"
+        f"what was wrong: {_TRUTH[one['truth']]}"
+    )
+    typer.echo(plain(told))
+    for name, text in one["source"].items():
+        typer.echo(plain(f"{name}: {text if len(text) <= 100 else text[:97] + '...'}"))
+    table = Table("topic", "type", "messages", "Hz")
+    for column in table.columns[2:]:
+        column.justify = "right"
+    for name, topic in one["topics"].items():
+        table.add_row(
+            plain(name), plain(topic["type"]), str(topic["messages"]), f"{topic['rate']:.1f}"
+        )
+    Console(markup=False).print(table)
+    partly = {signal: share for signal, share in one["observed"].items() if share < 1}
+    typer.echo(
+        "observed: everything"
+        if not partly
+        else "not all was observed: "
+        + ", ".join(f"{signal} {share:.1%}" for signal, share in partly.items())
+    )
+    sizes = ", ".join(f"{name} {size / 1000:.1f} kB" for name, size in one["attachments"].items())
+    typer.echo(plain(f"attachments: {sizes}\n"))
+
+
+_TRUTH = {
+    "hidden": "a simulated robot; its log says it, where no diagnosis looks",
+    "unknown": "nobody knows",
+}

@@ -1,0 +1,138 @@
+"""``selfmodel replay``: a log simulated again, and compared."""
+
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from selfmodel.cli.options import Json, Threads
+
+if TYPE_CHECKING:
+    from selfmodel.behaviour import Signal
+    from selfmodel.logs import TrialLog
+    from selfmodel.replay import Replay
+
+TOLERANCE = 1e-6
+"""By how much numbers may differ and count as the same between versions of MuJoCo, in their SI
+unit: some thousand roundings, before contact makes more of them."""
+
+WINDOWS = 10
+"""Rows of the table of errors over time."""
+
+COLUMNS: "tuple[tuple[Signal, str], ...]" = (
+    ("base_position", "base, m"),
+    ("joint_positions", "joints, rad"),
+    ("joint_velocities", "joints, rad/s"),
+    ("commands", "commands, rad"),
+    ("sensors", "sensors"),
+)
+
+
+def replay(
+    file: Annotated[Path, typer.Argument(metavar="LOG", help="A trial log, NAME.mcap.")],
+    *,
+    hypothesis: Annotated[
+        str,
+        typer.Option(
+            metavar="NOTATION", help="What is taken to be wrong, such as break:front_left_knee."
+        ),
+    ] = "intact",
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", metavar="FIGURE.png|svg|pdf", help="Draw the error over time."),
+    ] = None,
+    threads: Threads = 0,
+    as_json: Json = False,
+) -> None:
+    """Simulate a logged trial again, from its log alone, and compare what it does to the bit."""
+    # Whatever brings MuJoCo waits until the command runs.
+    import mujoco  # noqa: PLC0415
+
+    from selfmodel.behaviour import SIGNALS  # noqa: PLC0415
+    from selfmodel.cli import resolve  # noqa: PLC0415
+    from selfmodel.cli.replay_figure import check_figure, draw  # noqa: PLC0415
+    from selfmodel.notation import parse  # noqa: PLC0415
+    from selfmodel.replay import replay as simulate  # noqa: PLC0415
+    from selfmodel.simulator import Simulator  # noqa: PLC0415
+
+    if out is not None:
+        check_figure(out)
+    (log,) = resolve.logs([file])
+    robot = resolve.robot_of_logs([log], None)
+    assumed = parse(hypothesis, robot.anatomy)
+    logged = log.software.get("mujoco", "unknown")
+    tolerance = 0.0 if logged == mujoco.__version__ else TOLERANCE
+    simulator = Simulator(robot, resolve.threads(threads))
+    found = simulate(log.trial, assumed, simulator, tolerance)
+    result = {
+        "log": str(file),
+        "robot": robot.name,
+        "hypothesis": str(assumed),
+        "steps": log.trial.behaviour.steps,
+        "identical": found.identical,
+        "first_divergence_step": found.first_divergence_step,
+        "rms": {signal: _finite(found.rms(signal)) for signal in SIGNALS},
+        "tolerance": tolerance,
+        "diverged": found.broke_down,
+        "mujoco": {"logged": logged, "running": mujoco.__version__},
+    }
+    if out is not None:
+        draw(out, log, found, str(assumed))
+        result["figure"] = str(out)
+    if as_json:
+        typer.echo(json.dumps(result, indent=2, allow_nan=False))
+    else:
+        _print(result, log, found)
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _print(result: dict[str, Any], log: "TrialLog", found: "Replay") -> None:
+    from rich.console import Console  # noqa: PLC0415  # only where a table is drawn
+
+    from selfmodel.cli.plain import plain  # noqa: PLC0415  # the same
+
+    typer.echo(
+        plain(f"{result['log']}: {result['steps']} steps of {result['robot']}, replayed as ")
+        + result["hypothesis"]
+    )
+    versions = result["mujoco"]
+    if versions["logged"] != versions["running"]:
+        typer.echo(
+            f"The log was made with MuJoCo {plain(versions['logged'])}, this is "
+            f"{versions['running']}: what differs by less than {TOLERANCE:g} counts as the same."
+        )
+    if found.broke_down:
+        typer.echo("The simulation broke down: with this hypothesis the model is unstable.")
+    if found.identical:
+        typer.echo("identical: every number that was observed is the simulated one, to the bit.")
+        return
+    step = found.first_divergence_step
+    if step is None:
+        typer.echo("the same within the tolerance, all the way.")
+    else:
+        time = step * log.control_timestep
+        typer.echo(f"They part at step {step} ({time:g} s). Root mean square of the difference:")
+    Console(markup=False).print(_table(log, found))
+
+
+def _table(log: "TrialLog", found: "Replay") -> Any:  # noqa: ANN401  # rich comes when it is drawn
+    from rich.table import Table  # noqa: PLC0415  # only where a table is drawn
+
+    steps = log.trial.behaviour.steps
+    table = Table("time, s", *(title for _, title in COLUMNS))
+    for column in table.columns:
+        column.justify = "right"
+    windows = min(WINDOWS, steps)
+    for k in range(windows):
+        first, last = steps * k // windows, steps * (k + 1) // windows
+        errors = [found.rms(signal, slice(first, last)) for signal, _ in COLUMNS]
+        table.add_row(
+            f"{first * log.control_timestep:.2f}-{(last - 1) * log.control_timestep:.2f}",
+            *("-" if math.isnan(error) else f"{error:.3g}" for error in errors),
+        )
+    return table

@@ -1,0 +1,44 @@
+"""Diagnosis from logged trials alone, as a recovery makes it trial by trial."""
+
+from collections.abc import Callable, Sequence
+
+from selfmodel.database import Database
+from selfmodel.diagnose import Diagnose
+from selfmodel.diagnosis import Diagnosis
+from selfmodel.errors import InputError
+from selfmodel.events import Event, SearchBegins
+from selfmodel.streams import diagnosis_stream
+from selfmodel.trial import Trial
+
+
+def explain(
+    trials: Sequence[Trial],
+    diagnose: Diagnose,
+    seed: int,
+    watch: Callable[[Event], None],
+) -> Diagnosis:
+    """Returns the hypotheses that explain all trials, ranked.
+
+    The trials are taken one by one, and each diagnosis seeds the next with its best hypotheses. So
+    the trials and the seed of a recovery give the rankings that the recovery found.
+
+    Args:
+        trials: Those since something is wrong, in the order in which they were run.
+        diagnose: The diagnostic EA.
+        seed: Every random choice comes from it.
+        watch: Is told what happens.
+
+    Raises:
+        InputError: There are no trials, or the comparator cannot judge one.
+    """
+    if not trials:
+        raise InputError("expected at least one trial to explain, got none")
+    known = Database()
+    for number in range(1, len(trials) + 1):
+        watch(SearchBegins("diagnostic"))
+        diagnosis = diagnose(
+            trials[:number], known.hypotheses, diagnosis_stream(seed, number), watch
+        )
+        known = Database(diagnoses=(diagnosis,))
+        watch(diagnosis)
+    return diagnosis

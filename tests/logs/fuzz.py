@@ -1,0 +1,215 @@
+"""Damages logs at random and checks that nothing of it goes unnoticed: ``make fuzz``.
+
+Each damaged log must be refused with a ``LogError``, or read exactly as it did before; what is
+salvaged of it must be what was written, or marked as not observed. Run as a process of its own, so
+that its memory can be measured.
+"""
+
+import argparse
+import io
+import json
+import resource
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, Message, Metadata, Schema
+from mcap.writer import CompressionType, Writer
+
+from selfmodel.behaviour import SIGNALS
+from selfmodel.errors import InputError
+from selfmodel.logs import LogError, TrialLog, read_log
+from selfmodel.logs.framing import Frame, frames
+from selfmodel.logs.salvage import salvage
+from selfmodel.logs.scan import scan
+from selfmodel.logs.writer import write_trial
+from selfmodel.robot import Robot
+from selfmodel.settings import Settings
+from tests.logs.conftest import MJCF, made_up, plan_of
+
+STEPS = 120
+SALVAGED = 5
+"""One damaged log in so many is also salvaged, which writes a file and waits for the disk."""
+
+Damage = Callable[[bytes, np.random.Generator], bytes]
+
+
+def flipped(data: bytes, rng: np.random.Generator) -> bytes:
+    damaged = bytearray(data)
+    damaged[rng.integers(len(data))] ^= 1 << int(rng.integers(8))
+    return bytes(damaged)
+
+
+def cut(data: bytes, rng: np.random.Generator) -> bytes:
+    return data[: rng.integers(len(data))]
+
+
+def garbage(data: bytes, rng: np.random.Generator) -> bytes:
+    size = int(rng.integers(1, 513))
+    start = int(rng.integers(len(data) - size))
+    return data[:start] + rng.bytes(size) + data[start + size :]
+
+
+def record_dropped(data: bytes, rng: np.random.Generator) -> bytes:
+    frame = _some_record(data, rng)
+    return data[: frame.offset] + data[frame.end :]
+
+
+def record_doubled(data: bytes, rng: np.random.Generator) -> bytes:
+    frame = _some_record(data, rng)
+    return data[: frame.end] + data[frame.offset :]
+
+
+def _some_record(data: bytes, rng: np.random.Generator) -> Frame:
+    """A chunk; in a file without any, a message."""
+    every = list(frames(data))
+    chunks = [frame for frame in every if frame.opcode == Opcode.CHUNK]
+    found = chunks or [frame for frame in every if frame.opcode == Opcode.MESSAGE]
+    return found[rng.integers(len(found))]
+
+
+DAMAGES: tuple[Damage, ...] = (flipped, cut, garbage, record_dropped, record_doubled)
+
+
+def packed(data: bytes, compression: CompressionType, chunk_size: int | None) -> bytes:
+    """Writes a log anew in other packing; without a chunk size, without chunks."""
+    output = io.BytesIO()
+    writer = Writer(
+        output,
+        chunk_size=chunk_size or 1,
+        compression=compression,
+        use_chunking=chunk_size is not None,
+        enable_data_crcs=True,
+    )
+    writer.start("ros2")
+    schemas: dict[int, int] = {}
+    channels: dict[int, int] = {}
+    for record in scan(data):
+        match record:
+            case Schema(id=number) if number not in schemas:
+                schemas[number] = writer.register_schema(record.name, record.encoding, record.data)
+            case Channel(id=number) if number not in channels:
+                channels[number] = writer.register_channel(
+                    record.topic, record.message_encoding, schemas[record.schema_id]
+                )
+            case Message():
+                writer.add_message(
+                    channels[record.channel_id], record.log_time, record.data, record.publish_time
+                )
+            case Metadata():
+                writer.add_metadata(record.name, record.metadata)
+            case Attachment():
+                writer.add_attachment(0, 0, record.name, record.media_type, record.data)
+    writer.finish()
+    return output.getvalue()
+
+
+def check(path: Path, damaged: bytes, whole: TrialLog) -> str:
+    """Returns how a damaged log was refused, or "same"; raises where it read as something else."""
+    path.write_bytes(damaged)
+    try:
+        read = read_log(path)
+    except LogError as error:
+        if path.name not in str(error):
+            raise AssertionError(f"the file is not named: {error}") from error
+        return type(error).__name__
+    _same(read, whole, allow_unobserved=False)
+    return "same"
+
+
+def check_salvage(path: Path, whole: TrialLog) -> str:
+    """Returns how salvage ended; raises where it saved what was not written."""
+    out = path.with_name("saved.mcap")
+    try:
+        salvage(path, out)
+    except LogError as error:
+        return type(error).__name__
+    except InputError:
+        return "sound"
+    saved = read_log(out)
+    out.unlink()
+    if saved.status != "interrupted":
+        raise AssertionError(f"a salvaged log says that it is {saved.status}")
+    _same(saved, whole, allow_unobserved=True)
+    return "saved"
+
+
+def _same(read: TrialLog, whole: TrialLog, *, allow_unobserved: bool) -> None:
+    told = (read.mjcf, read.control_timestep, read.settings, read.trial.robot, read.root)
+    expected = (whole.mjcf, whole.control_timestep, whole.settings, whole.trial.robot, whole.root)
+    if told != expected or read.trial.plan.seed != whole.trial.plan.seed:
+        raise AssertionError("what the log says of its trial has changed")
+    if not allow_unobserved and read.trial.plan != whole.trial.plan:
+        raise AssertionError("the plan has changed")
+    steps = read.trial.behaviour.steps
+    for signal in SIGNALS:
+        row, true = read.trial.behaviour[signal], whole.trial.behaviour[signal][:steps]
+        equal = row.view(np.int64) == true.view(np.int64)
+        if allow_unobserved:
+            equal |= np.isnan(row)
+        if not np.all(equal):
+            raise AssertionError(f"{signal} has changed")
+
+
+def main() -> None:
+    """Damages so many logs, and prints what became of them as JSON."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=30_000)
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+    robot = Robot("biped", MJCF, 0.01)
+    outcomes: Counter[str] = Counter()
+    salvages: Counter[str] = Counter()
+    slowest = 0.0
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "damaged.mcap"
+        written = write_trial(
+            Path(folder) / "whole.mcap",
+            robot,
+            plan_of(robot, STEPS),
+            made_up(robot, STEPS),
+            settings=Settings(),
+            hidden="intact",
+        )
+        whole, data = read_log(written), written.read_bytes()
+        forms = (
+            data,
+            packed(data, CompressionType.ZSTD, 8 * 2**10),
+            packed(data, CompressionType.LZ4, 64 * 2**10),
+            packed(data, CompressionType.NONE, 64 * 2**10),
+            packed(data, CompressionType.NONE, None),
+        )
+        for number in range(options.count):
+            rng = np.random.default_rng([options.seed, number])
+            damage = DAMAGES[number % len(DAMAGES)]
+            damaged = damage(forms[number // len(DAMAGES) % len(forms)], rng)
+            start = perf_counter()
+            try:
+                outcomes[check(path, damaged, whole)] += 1
+                if number // (len(DAMAGES) * len(forms)) % SALVAGED == 0:
+                    salvages[check_salvage(path, whole)] += 1
+            except Exception:
+                print(f"case {number} of seed {options.seed}: {damage.__name__}", file=sys.stderr)
+                raise
+            slowest = max(slowest, perf_counter() - start)
+    kilobytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    print(
+        json.dumps(
+            {
+                "cases": options.count,
+                "outcomes": outcomes,
+                "salvages": salvages,
+                "slowest_seconds": slowest,
+                "memory_megabytes": kilobytes / 1000,
+            }
+        )
+    )
+
+
+if __name__ == "__main__":
+    main()
