@@ -28,12 +28,13 @@ def suggest(bag: Bag, robot: Robot, name: str, *, with_timestep: bool) -> str:
     Raises:
         LogError: A message of the bag is damaged.
     """
-    joints = [topic for topic in _able(bag, "joints") if not _is_command(topic)]
-    commands = sorted(_able(bag, "commands"), key=lambda topic: not _is_command(topic))
-    commands = [topic for topic in commands if topic not in joints[:1]]
-    named = [topic.name for topic in (*joints, *commands)]
-    series = read_series(bag, named)
     hinges, motors = robot.anatomy.hinges, robot.anatomy.motors
+    joints, commands = _able(bag, "joints"), _able(bag, "commands")
+    series = read_series(bag, {topic.name for topic in (*joints, *commands)})
+    joints = [topic for topic in joints if not _is_command(topic)]
+    joints.sort(key=lambda topic: -_fit(series[topic.name], hinges))
+    commands = [topic for topic in commands if topic not in joints[:1]]
+    commands.sort(key=lambda topic: (not _is_command(topic), -_fit(series[topic.name], motors)))
     lines = [
         "# A suggestion. CHECK marks a guess; CHANGE must be filled in before it can be used.",
         f"robot = {_quoted(name)}",
@@ -72,6 +73,13 @@ def _able(bag: Bag, kind: RoleKind) -> list[Topic]:
 
 def _is_command(topic: Topic) -> bool:
     return topic.type != JOINT_STATE or any(word in topic.name.lower() for word in _COMMANDED)
+
+
+def _fit(series: Series, parts: Sequence[str]) -> int:
+    """How many parts of the robot a topic seems to tell of."""
+    if series.topic.type == ARRAY:
+        return len(parts) if len(series.columns) == len(parts) else 0
+    return len(matched(parts, list(series.columns)))
 
 
 def _names(series: Mapping[str, Series], topics: Sequence[Topic]) -> tuple[str, ...]:

@@ -43,7 +43,7 @@ class Document:
         known = next((path[:n] for n in range(len(path), 0, -1) if path[:n] in self.lines), ())
         line = self.lines.get(known, 1)
         if item:
-            below = self.text.splitlines()[line - 1 :]
+            below = self.text.split("\n")[line - 1 :]
             line += next((n for n, text in enumerate(below) if f'"{item}"' in text), 0)
         return InputError(f"{self.name}:{line}: {sentence}")
 
@@ -72,7 +72,7 @@ def parse_document(text: str, name: str) -> tuple[Document, dict[str, Any]]:
 
 
 def _explained(reason: str, text: str, line: int) -> str:
-    entry = _ENTRY.match(text.splitlines()[line - 1]) if text else None
+    entry = _ENTRY.match(text.split("\n")[line - 1])  # not splitlines: TOML knows this end only
     if reason == "Cannot overwrite a value" and entry:
         return f"{entry[1]} is listed twice: expected each name once, remove one of the two"
     if reason.startswith(("Cannot declare", "Cannot mutate")):
@@ -83,7 +83,7 @@ def _explained(reason: str, text: str, line: int) -> str:
 def _lines(text: str) -> dict[Keys, int]:
     found: dict[Keys, int] = {}
     table: Keys = ()
-    for number, line in enumerate(text.splitlines(), start=1):
+    for number, line in enumerate(text.split("\n"), start=1):
         if header := _TABLE.match(line):
             table = _names(header[1])
             found.setdefault(table, number)

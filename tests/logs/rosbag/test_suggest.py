@@ -68,6 +68,7 @@ def test_what_the_bag_lacks_must_be_filled_in(biped: Robot, tmp_path: Path):
 def test_states_and_commands_of_one_type_are_told_apart_by_name(biped: Robot, tmp_path: Path):
     items = [item for item in recorded() if item[0] == "/joint_states"]
     items += [("/joint_cmd", time, message) for _, time, message in items]
+    items += [("/arm/joints", T0, joint_state(T0, ["elbow"], [0.0])), ("/lamp_cmd", T0, array([0]))]
     with open_bag(write_bag(tmp_path / "bag", items)) as opened:
         mapping = parse_mapping(suggest(opened, biped, "b.xml", with_timestep=True), "m")
     assert (mapping.joints.topic, mapping.commands.topic) == ("/joint_states", "/joint_cmd")
