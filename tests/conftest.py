@@ -1,6 +1,8 @@
 """What the tests share: the robots, seeded controllers, and a journal that needs no files."""
 
+import json
 import os
+from pathlib import Path
 
 # dm_control looks for a display as it is imported; nothing here is drawn.
 os.environ["MUJOCO_GL"] = "disable"
@@ -14,6 +16,7 @@ from selfmodel.notation import parse
 from selfmodel.robot import Robot
 from selfmodel.simulator import Simulator
 from selfmodel.tasks import ROBOTS
+from tests.command import SMALL, selfmodel
 
 
 @pytest.fixture(scope="session", params=sorted(ROBOTS))
@@ -25,6 +28,17 @@ def robot(request: pytest.FixtureRequest) -> Robot:
 @pytest.fixture(scope="session")
 def quadruped() -> Robot:
     return ROBOTS["quadruped"].robot()
+
+
+@pytest.fixture(scope="session")
+def recovered(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
+    """A folder in which a small recovery ran, and what it printed."""
+    folder = tmp_path_factory.mktemp("recovered")
+    done = selfmodel(
+        "recover", "quadruped", "--case", "4", *SMALL, "--out", "run", "--json", cwd=folder
+    )
+    assert done.returncode == 0, done.stderr
+    return folder, json.loads(done.stdout)
 
 
 def random_controllers(robot: Robot, count: int, seed: int = 0) -> list[Controller]:

@@ -1,7 +1,6 @@
 """Promises of the command line, kept by running it as its users do."""
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -14,34 +13,10 @@ import pytest
 from selfmodel.logs import read_log, save_controller
 from selfmodel.logs.journal import read_database
 from selfmodel.robot import Robot
+from tests.command import SMALL, selfmodel
 from tests.conftest import random_controllers
 
 ROOT = Path(__file__).parents[1]
-SMALL = ("--population", "8", "--generations", "2")
-
-
-def selfmodel(*arguments: str, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:
-    """Runs the command in a folder, with its output piped."""
-    return subprocess.run(
-        [sys.executable, "-m", "selfmodel", *arguments],
-        cwd=cwd,
-        env={**os.environ, **environment},
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=300,
-    )
-
-
-@pytest.fixture(scope="module")
-def recovered(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
-    """A folder in which a small recovery ran, and what it printed."""
-    folder = tmp_path_factory.mktemp("recovered")
-    done = selfmodel(
-        "recover", "quadruped", "--case", "4", *SMALL, "--out", "run", "--json", cwd=folder
-    )
-    assert done.returncode == 0, done.stderr
-    return folder, json.loads(done.stdout)
 
 
 def test_recover_prints_one_json_object_with_everything_promised(recovered: tuple[Path, dict]):
