@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import zstandard
 from mcap.writer import CompressionType, Writer
+from rosbags.typesys import Stores, get_typestore
 
 from selfmodel.errors import InputError
 from selfmodel.logs.errors import (
@@ -21,6 +22,7 @@ from selfmodel.logs.errors import (
 from selfmodel.logs.rosbag import unpack
 from selfmodel.logs.rosbag.bag import open_bag
 from selfmodel.logs.rosbag.checks import TYPES
+from selfmodel.logs.rosbag.messages import KINDS
 from selfmodel.logs.rosbag.series import read_series
 from selfmodel.logs.rosbag.suggest import suggest
 from selfmodel.robot import Robot
@@ -202,3 +204,12 @@ def test_the_digest_of_each_file_is_that_of_the_file_as_found(bag: Path):
     with open_bag(bag) as opened:
         (source,) = opened.sources
     assert source.sha256 == hashlib.sha256(storage(bag).read_bytes()).hexdigest()
+
+
+@pytest.mark.parametrize("store", [store for store in Stores if store.name.startswith("ROS2")])
+def test_the_types_that_are_read_are_alike_in_every_ros_2(store: Stores):
+    other = get_typestore(store)
+    for kind in KINDS:
+        assert other.generate_msgdef(kind, ros_version=2) == ROS.generate_msgdef(
+            kind, ros_version=2
+        )
