@@ -2,6 +2,7 @@
 
 import typer
 
+from selfmodel.cli.logs.import_ import import_
 from selfmodel.cli.logs.info import info
 from selfmodel.cli.logs.salvage import salvage
 from selfmodel.cli.logs.verify import verify
@@ -14,3 +15,4 @@ app = typer.Typer(
 app.command()(info)
 app.command()(verify)
 app.command()(salvage)
+app.command("import")(import_)

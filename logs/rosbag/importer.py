@@ -1,0 +1,225 @@
+"""The import of a recording: a bag, a mapping and a robot make a behaviour, and its quality."""
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from selfmodel.arrays import FloatArray, frozen
+from selfmodel.behaviour import SIGNALS, Behaviour, Sample, Signal
+from selfmodel.controller import Controller
+from selfmodel.logs.records import Imported
+from selfmodel.logs.rosbag.bag import Source, open_bag
+from selfmodel.logs.rosbag.checks import check_columns, check_names, check_topics
+from selfmodel.logs.rosbag.clock import Clocked, ClocksApartError, clocked
+from selfmodel.logs.rosbag.mapping import BagMapping
+from selfmodel.logs.rosbag.notes import notes
+from selfmodel.logs.rosbag.quality import Quality, quality
+from selfmodel.logs.rosbag.series import Series, read_series
+from selfmodel.logs.rosbag.signals import (
+    Steps,
+    base_signals,
+    command_signals,
+    joint_signals,
+    sensor_signals,
+)
+from selfmodel.logs.rosbag.tracks import Tracks, read_tracks, required
+from selfmodel.logs.writer import write_trial
+from selfmodel.playback import Playback
+from selfmodel.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.trial import Plan
+
+LONGEST = 1_000_000
+"""Control steps that an import may have: one wrong stamp must not fill the memory."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """What a bag says of one trial.
+
+    Attributes:
+        behaviour: At the control steps; NaN is what was not observed.
+        qualities: By topic.
+        sources: The files it is from.
+        clock: What the times go by.
+        origin: When the trial starts, ns since 1970.
+        notes: What a user should know, a sentence each.
+    """
+
+    behaviour: Behaviour
+    qualities: Mapping[str, Quality]
+    sources: tuple[Source, ...]
+    clock: str
+    origin: int
+    notes: tuple[str, ...]
+
+    @property
+    def valid(self) -> dict[str, float]:
+        """The share of each signal that was observed."""
+        return {
+            signal: float(np.mean(np.isfinite(values)))
+            for signal, values in self.behaviour.signals.items()
+        }
+
+    def facts(self) -> dict[str, str]:
+        """Returns what the log says of its origin; lists and records are JSON."""
+        topics = {topic: found.facts() for topic, found in self.qualities.items()}
+        sources = {source.name: source.sha256 for source in self.sources}
+        return {
+            "sources_sha256": json.dumps(sources),
+            "clock": self.clock,
+            "start": str(self.origin),
+            "valid": json.dumps(self.valid),
+            "topics": json.dumps(topics, allow_nan=False),
+            "notes": json.dumps(self.notes, ensure_ascii=False),
+        }
+
+
+def import_bag(path: Path, mapping: BagMapping, robot: Robot) -> Recording:
+    """Returns what a bag says of one trial of a robot.
+
+    Args:
+        path: The bag: a folder or a file.
+        mapping: Which topic plays which role.
+        robot: The one that the mapping names.
+
+    Raises:
+        LogError: The bag is damaged.
+        InputError: The bag cannot be read, or the mapping fits it or the robot not.
+    """
+    anatomy = robot.anatomy
+    touches = [sensor.name for sensor in anatomy.sensors if sensor.kind == "touch"]
+    check_names(mapping, anatomy.hinges, anatomy.motors, touches)
+    with open_bag(path) as bag:
+        check_topics(mapping, bag)
+        series = read_series(bag, {role.topic for role in mapping.roles})
+    check_columns(mapping, series)
+    clocks = _clocks(mapping, series)
+    tracks = read_tracks(mapping, series, clocks)
+    steps = _steps(mapping, tracks, robot.control_timestep)
+    behaviour = _behaviour(mapping, tracks, robot, steps)
+    qualities = _qualities(mapping, series, clocks, steps.origin)
+    return Recording(
+        behaviour=behaviour,
+        qualities=qualities,
+        sources=bag.sources,
+        clock=mapping.clock,
+        origin=steps.origin,
+        notes=notes(mapping, behaviour, qualities, robot),
+    )
+
+
+def write_recording(
+    path: Path,
+    robot: Robot,
+    recording: Recording,
+    mapping: BagMapping,
+    controller: Controller | None,
+) -> Path:
+    """Writes a recording as a trial's log.
+
+    Args:
+        path: The log's name; it must not exist.
+        robot: The robot as its model describes it.
+        recording: What the bag says.
+        mapping: How it was read; the log keeps its text.
+        controller: What drove the robot; without it, the recorded commands are what drives.
+
+    Raises:
+        InputError: The file exists, or the controller does not fit the robot.
+        LogWriteError: The disk is full, or failed.
+    """
+    behaviour = recording.behaviour
+    driver = controller or Playback(robot.anatomy.motors, behaviour["commands"])
+    return write_trial(
+        path,
+        robot,
+        Plan("imported", "single", driver, behaviour.steps, seed=0),
+        _samples(behaviour),
+        settings=Settings(),
+        imported=Imported(recording.facts(), mapping.document.text),
+    )
+
+
+def _clocks(mapping: BagMapping, series: Mapping[str, Series]) -> dict[str, Clocked]:
+    found = {}
+    for role in mapping.roles:
+        try:
+            found[role.topic] = clocked(series[role.topic], mapping.clock)
+        except ClocksApartError as error:
+            raise mapping.document.error(
+                (*role.path, "topic"), f'{error}: set clock = "log" to go by the log times alone'
+            ) from error
+    return found
+
+
+def _steps(mapping: BagMapping, tracks: Tracks, timestep: float) -> Steps:
+    """The control steps at which every role has data."""
+    needed = required(mapping, tracks)
+    for role, part, track in needed:
+        if not len(track.times):
+            raise mapping.document.error(
+                (*role.path, "topic"),
+                f"{role.topic} says nothing that is a number about {part}: name another topic",
+            )
+    first = max(int(track.times[0]) for _, _, track in needed)
+    # The last command stands, so commands end no trial.
+    last = min(int(track.times[-1]) for role, _, track in needed if role.kind != "commands")
+    origin = first + round(mapping.start * 1e9)
+    period = timestep * 1e9
+    there = int((last - origin + 0.5) // period) + 1
+    asked = there if mapping.duration is None else round(mapping.duration / timestep)
+    if there < 2 or asked > there:
+        raise mapping.document.error(
+            ("duration" if mapping.duration is not None else "start",),
+            f"every role has data for {max(0, last - first) / 1e9:.3f} s in all, got a start "
+            f"{mapping.start:g} s after that begins and {max(asked, 2)} steps of {timestep:g} s: "
+            f"ask for less, or leave out the role that has the least data",
+        )
+    if not 2 <= asked <= LONGEST:
+        raise mapping.document.error(
+            ("duration",), f"a trial has 2 to {LONGEST} steps, got {asked}: set another duration"
+        )
+    return Steps(origin, np.rint(np.arange(asked) * period).astype(np.int64))
+
+
+def _behaviour(mapping: BagMapping, tracks: Tracks, robot: Robot, steps: Steps) -> Behaviour:
+    anatomy = robot.anatomy
+    joints = joint_signals(tracks, robot, steps)
+    from_start = mapping.base is None or mapping.base.frame == "start"
+    try:
+        base = base_signals(tracks, steps, from_start=from_start)
+    except ValueError as error:
+        raise mapping.document.error(
+            ("start",), f"{error}, because of a gap in its topic: set another start"
+        ) from error
+    found: dict[Signal, FloatArray] = {
+        **joints,
+        **command_signals(tracks, anatomy, steps),
+        **sensor_signals(tracks, anatomy, steps, joints["joint_positions"]),
+        **base,
+    }
+    time = np.arange(len(steps.at), dtype=np.float64) * robot.control_timestep
+    return Behaviour(
+        anatomy.names, frozen(time), {signal: frozen(found[signal]) for signal in SIGNALS}
+    )
+
+
+def _qualities(
+    mapping: BagMapping, series: Mapping[str, Series], clocks: Mapping[str, Clocked], origin: int
+) -> dict[str, Quality]:
+    roles: dict[str, tuple[str, ...]] = {}
+    for role in mapping.roles:
+        roles[role.topic] = (*roles.get(role.topic, ()), role.name)
+    return {
+        topic: quality(series[topic], clocks[topic], origin, played)
+        for topic, played in roles.items()
+    }
+
+
+def _samples(behaviour: Behaviour) -> Iterator[Sample]:
+    for k, time in enumerate(behaviour.time.tolist()):
+        yield Sample(time, {signal: values[k] for signal, values in behaviour.signals.items()})

@@ -1,0 +1,174 @@
+"""The messages that can play a role, each read into names and rows of numbers."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from selfmodel.arrays import FloatArray
+
+if TYPE_CHECKING:
+    from rosbags.typesys.store import Typestore
+    from rosbags.typesys.stores import ros2_humble as ros
+
+JOINT_STATE = "sensor_msgs/msg/JointState"
+TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
+ARRAY = "std_msgs/msg/Float64MultiArray"
+ODOMETRY = "nav_msgs/msg/Odometry"
+POSE = "geometry_msgs/msg/PoseStamped"
+IMU = "sensor_msgs/msg/Imu"
+WRENCH = "geometry_msgs/msg/WrenchStamped"
+NUMBERS = ("std_msgs/msg/Float64", "std_msgs/msg/Float32", "std_msgs/msg/Bool")
+
+Rows = tuple[tuple[str, ...], FloatArray]
+"""The names that a message tells of, and a row of numbers for each, ``(names, width)``."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A type of message that can be read.
+
+    Attributes:
+        stamped: Whether it has a header, and so says when it was measured.
+        rows: Reads a decoded one.
+    """
+
+    stamped: bool
+    rows: Callable[[Any], Rows]
+
+
+class RefusedError(ValueError):
+    """A message contradicts itself; it is counted and left out, and the rest is good."""
+
+
+class UndecodableError(ValueError):
+    """The bytes of a message are not what its type says."""
+
+
+def read_message(payload: bytes, kind: str) -> tuple[int, Rows]:
+    """Returns the time stamp of a message, ns (0 if it has none), and its rows.
+
+    Args:
+        payload: CDR.
+        kind: Its type, one of ``KINDS``.
+
+    Raises:
+        RefusedError: It contradicts itself.
+        UndecodableError: It is damaged.
+    """
+    from rosbags.serde import SerdeError  # noqa: PLC0415 - takes a while
+
+    try:
+        message: Any = _types().deserialize_cdr(payload, kind)
+    except (SerdeError, IndexError, OverflowError, MemoryError) as failure:
+        raise UndecodableError(str(failure)) from failure
+    stamp = 0
+    if KINDS[kind].stamped:
+        stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+    if stamp < 0:
+        raise RefusedError("with a stamp before 1970")
+    return stamp, KINDS[kind].rows(message)
+
+
+@cache
+def _types() -> "Typestore":
+    """The standard types. Those in KINDS are alike in every ROS 2, so the bag's are not needed."""
+    from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415 - takes a while
+
+    return get_typestore(Stores.ROS2_HUMBLE)
+
+
+def _joint_state(message: "ros.sensor_msgs__msg__JointState") -> Rows:
+    names = tuple(message.name)
+    if len(set(names)) != len(names):
+        raise RefusedError("with a name twice")
+    rows = np.full((len(names), 3), np.nan)
+    for column, values in enumerate((message.position, message.velocity, message.effort)):
+        if len(values) == len(names):
+            rows[:, column] = values
+        elif len(values):
+            raise RefusedError("with more or fewer numbers than names")
+    return names, rows
+
+
+def _trajectory(message: "ros.trajectory_msgs__msg__JointTrajectory") -> Rows:
+    names = tuple(message.joint_names)
+    if len(set(names)) != len(names):
+        raise RefusedError("with a name twice")
+    if not message.points:
+        raise RefusedError("without a point")
+    positions = message.points[0].positions
+    if len(positions) != len(names):
+        raise RefusedError("with more or fewer numbers than names")
+    return names, np.array(positions, dtype=np.float64).reshape(-1, 1)
+
+
+def _array(message: "ros.std_msgs__msg__Float64MultiArray") -> Rows:
+    values = np.array(message.data, dtype=np.float64).reshape(-1, 1)
+    return tuple(str(column) for column in range(len(values))), values
+
+
+def _number(message: "ros.std_msgs__msg__Float64") -> Rows:
+    return ("",), np.array([[message.data]], dtype=np.float64)
+
+
+def _wrench(message: "ros.geometry_msgs__msg__WrenchStamped") -> Rows:
+    return ("",), np.array([[math.hypot(*_xyz(message.wrench.force))]])
+
+
+def _odometry(message: "ros.nav_msgs__msg__Odometry") -> Rows:
+    twist = message.twist.twist
+    row = [*_pose(message.pose.pose), *_xyz(twist.linear), *_xyz(twist.angular)]
+    return ("",), np.array([row])
+
+
+def _pose_stamped(message: "ros.geometry_msgs__msg__PoseStamped") -> Rows:
+    return ("",), np.array([[*_pose(message.pose), *[np.nan] * 6]])
+
+
+def _imu(message: "ros.sensor_msgs__msg__Imu") -> Rows:
+    # REP 145: a first covariance of -1 says that there is no such measurement.
+    known = message.orientation_covariance[0] != -1
+    turning = message.angular_velocity_covariance[0] != -1
+    row = [
+        *(_wxyz(message.orientation) if known else [np.nan] * 4),
+        *(_xyz(message.angular_velocity) if turning else [np.nan] * 3),
+    ]
+    return ("",), np.array([row])
+
+
+def _pose(pose: "ros.geometry_msgs__msg__Pose") -> list[float]:
+    return [*_xyz(pose.position), *_wxyz(pose.orientation)]
+
+
+def _xyz(vector: "ros.geometry_msgs__msg__Point | ros.geometry_msgs__msg__Vector3") -> list[float]:
+    return [vector.x, vector.y, vector.z]
+
+
+def _wxyz(quaternion: "ros.geometry_msgs__msg__Quaternion") -> list[float]:
+    return [quaternion.w, quaternion.x, quaternion.y, quaternion.z]
+
+
+KINDS: Mapping[str, Kind] = MappingProxyType(
+    {
+        JOINT_STATE: Kind(stamped=True, rows=_joint_state),
+        TRAJECTORY: Kind(stamped=True, rows=_trajectory),
+        ARRAY: Kind(stamped=False, rows=_array),
+        ODOMETRY: Kind(stamped=True, rows=_odometry),
+        POSE: Kind(stamped=True, rows=_pose_stamped),
+        IMU: Kind(stamped=True, rows=_imu),
+        WRENCH: Kind(stamped=True, rows=_wrench),
+        **dict.fromkeys(NUMBERS, Kind(stamped=False, rows=_number)),
+    }
+)
+"""Every type that can be read.
+
+Widths: JointState 3 (position, velocity, effort), those of commands 1, Odometry and PoseStamped 13
+(position, orientation w x y z, linear and angular velocity in the child's frame), Imu 7
+(orientation w x y z, angular velocity), touch 1. What a message does not tell is NaN. The columns
+of a Float64MultiArray are called by their numbers.
+"""

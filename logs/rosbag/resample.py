@@ -1,0 +1,127 @@
+"""From irregular samples to the control steps, without inventing any.
+
+Times are in one unit, whichever. A result is NaN wherever the samples do not bear it out.
+"""
+
+import numpy as np
+
+from selfmodel.arrays import BoolArray, FloatArray, IndexArray
+
+REACH = 1.5
+"""Samples further apart than so many usual periods have a gap between them."""
+
+
+def reach(times: FloatArray) -> float:
+    """Returns how far apart two samples of a series may be, and still bear out what is between.
+
+    Args:
+        times: ``(m,)``, increasing.
+    """
+    return REACH * float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+
+
+def linear(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -> FloatArray:
+    """Returns values interpolated between the samples before and after.
+
+    Args:
+        times: ``(m,)``, strictly increasing.
+        values: ``(m, width)``.
+        at: ``(steps,)``.
+        limit: See ``reach``.
+
+    Returns:
+        ``(steps, width)``; a sample's own value at its own time.
+    """
+    before, after, share, valid = _bracket(times, at, limit)
+    result = np.full((len(at), values.shape[1]), np.nan)
+    low, high = values[before[valid]], values[after[valid]]
+    result[valid] = low + share[valid, np.newaxis] * (high - low)
+    return result
+
+
+def angles(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -> FloatArray:
+    """Returns angles interpolated the short way round; see ``linear``.
+
+    Args:
+        times: ``(m,)``, strictly increasing.
+        values: ``(m, width)`` rad, of which a jump by more than pi is a turn counted anew.
+        at: ``(steps,)``.
+        limit: See ``reach``.
+    """
+    return linear(times, np.unwrap(values, axis=0), at, limit)
+
+
+def slerp(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -> FloatArray:
+    """Returns orientations interpolated along the shortest arc.
+
+    Args:
+        times: ``(m,)``, strictly increasing.
+        values: ``(m, 4)`` unit quaternions, of which each means the same as its negative.
+        at: ``(steps,)``.
+        limit: See ``reach``.
+
+    Returns:
+        ``(steps, 4)`` unit quaternions.
+    """
+    before, after, share, valid = _bracket(times, at, limit)
+    result = np.full((len(at), 4), np.nan)
+    low, high = values[before[valid]], values[after[valid]]
+    cosine = np.sum(low * high, axis=1, keepdims=True)
+    high = np.where(cosine < 0, -high, high)
+    # The angle from both chords: exact for small angles, where that of a cosine is not.
+    half = np.arctan2(
+        np.linalg.norm(high - low, axis=1, keepdims=True),
+        np.linalg.norm(high + low, axis=1, keepdims=True),
+    )
+    part = share[valid, np.newaxis]
+    # sin(x)/sin(a) as sinc, which has its limit at 0.
+    sine = np.sinc(2 * half / np.pi)
+    turned = (
+        (1 - part) * np.sinc((1 - part) * 2 * half / np.pi) * low
+        + part * np.sinc(part * 2 * half / np.pi) * high
+    ) / sine
+    result[valid] = turned / np.linalg.norm(turned, axis=1, keepdims=True)
+    return result
+
+
+def hold(
+    times: FloatArray, values: FloatArray, at: FloatArray, limit: float = np.inf
+) -> FloatArray:
+    """Returns the last value that was given.
+
+    Args:
+        times: ``(m,)``, strictly increasing.
+        values: ``(m, width)``.
+        at: ``(steps,)``.
+        limit: How old it may be; a command stands until the next one, a measurement does not.
+
+    Returns:
+        ``(steps, width)``.
+    """
+    before = np.searchsorted(times, at, side="right") - 1
+    result = np.full((len(at), values.shape[1]), np.nan)
+    held = before >= 0
+    held[held] = at[held] - times[before[held]] <= limit
+    result[held] = values[before[held]]
+    return result
+
+
+def _bracket(
+    times: FloatArray, at: FloatArray, limit: float
+) -> tuple[IndexArray, IndexArray, FloatArray, BoolArray]:
+    """The samples before and after each time, how far it is between them, and if that is valid."""
+    if not len(times):
+        nowhere = np.zeros(len(at), dtype=np.intp)
+        return nowhere, nowhere, np.zeros(len(at)), np.zeros(len(at), dtype=bool)
+    last = len(times) - 1
+    before = np.searchsorted(times, at, side="right") - 1
+    inside = before >= 0
+    before = np.clip(before, 0, last)
+    after = np.minimum(before + 1, last)
+    period = times[after] - times[before]
+    exact = inside & (times[before] == at)
+    valid = exact | (inside & (after > before) & (period <= limit))
+    share = np.zeros(len(at))
+    between = valid & ~exact
+    share[between] = (at[between] - times[before[between]]) / period[between]
+    return before, after, share, valid

@@ -1,0 +1,126 @@
+"""The MCAP file of a bag, read in one pass from its start.
+
+Recorders write neither checksums nor, with some presets, an index, and the file may be one of a
+split recording. So nothing is required that a log of ours must have; what checks there are, are
+made: the checksums that are not 0, and the count of messages.
+"""
+
+import struct
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import IO
+
+import zstandard
+from mcap.exceptions import EndOfFile, InvalidMagic, McapError
+from mcap.records import Channel, Chunk, Footer, McapRecord, Message, Schema, Statistics
+from mcap.stream_reader import StreamReader, breakup_chunk
+
+from selfmodel.logs.errors import CorruptError, LogError, NotMcapError, TruncatedError
+from selfmodel.logs.rosbag.stored import Announced, DamageError, Stored, checked_time
+from selfmodel.logs.rosbag.unpack import LARGEST, unlz4, unzstd
+
+MCAP_MAGIC = b"\x89MCAP0\r\n"
+
+ADVICE = "record it again, or recover what is whole with `mcap recover`"
+
+_FAILURES = (
+    McapError,
+    ValueError,  # checksums, texts that are none, and what is found out here
+    RuntimeError,  # lz4
+    struct.error,
+    zstandard.ZstdError,
+    MemoryError,
+    OverflowError,
+)
+"""Everything that the library and its decompressors raise over damaged bytes."""
+
+
+def read_mcap(path: Path, name: Path) -> Iterator[Announced | Stored]:
+    """Yields what a file holds, in its order.
+
+    A caller knows that the file is whole when the iteration ends without an exception.
+
+    Args:
+        path: The file.
+        name: What errors call it: its name before it was unpacked.
+
+    Raises:
+        LogError: The file is damaged or ends too early.
+        OSError: It cannot be read.
+    """
+    count = 0
+    try:
+        with path.open("rb") as file:
+            for item in _items(file):
+                count += isinstance(item, Stored)
+                yield item
+    except _FAILURES as failure:
+        raise _explained(name, failure, f"{count} messages before that can be read") from failure
+
+
+def _items(file: IO[bytes]) -> Iterator[Announced | Stored]:
+    schemas: dict[int, str] = {}
+    topics: dict[int, str] = {}
+    count = 0
+    claimed: int | None = None
+    for record in _records(file):
+        if isinstance(record, Message):
+            count += 1
+            if record.channel_id not in topics:
+                raise DamageError(f"a message is of channel {record.channel_id}, which is unknown")
+            yield Stored(topics[record.channel_id], checked_time(record.log_time), record.data)
+        elif isinstance(record, Schema):
+            schemas[record.id] = record.name
+        elif isinstance(record, Channel):
+            kind = schemas.get(record.schema_id, "")  # 0: it has none
+            topics[record.id] = record.topic
+            yield Announced(record.topic, kind, record.message_encoding)
+        elif isinstance(record, Statistics):
+            claimed = record.message_count
+    if claimed is not None and claimed != count:
+        raise DamageError(f"its statistics say {claimed} messages, it holds {count}")
+    if file.read(1):
+        raise DamageError("something follows its end")
+
+
+def _records(file: IO[bytes]) -> Iterator[McapRecord]:
+    reader = StreamReader(file, emit_chunks=True, validate_crcs=True, record_size_limit=LARGEST)
+    ended = False
+    for record in reader.records:
+        if isinstance(record, Chunk):
+            yield from breakup_chunk(_unpacked(record), validate_crc=True)
+        else:
+            ended |= isinstance(record, Footer)
+            yield record
+    if not ended:
+        raise EndOfFile
+
+
+def _unpacked(chunk: Chunk) -> Chunk:
+    size = chunk.uncompressed_size
+    if size > LARGEST:
+        raise DamageError(f"a chunk claims {size} bytes, more than {LARGEST}")
+    match chunk.compression:
+        case "":
+            data = chunk.data
+        case "zstd":
+            data = unzstd(chunk.data, size)
+        case "lz4":
+            data = unlz4(chunk.data, size)
+        case other:
+            raise DamageError(f"a chunk is packed with {other!r}; zstd and lz4 are known")
+    if len(data) != size:
+        raise DamageError(f"a chunk of {size} bytes unpacks to {len(data)}")
+    return replace(chunk, compression="", data=data)
+
+
+def _explained(name: Path, failure: Exception, good: str) -> LogError:
+    if isinstance(failure, InvalidMagic):
+        return NotMcapError(
+            name, "its first or last bytes are not those of MCAP", good=good, advice=ADVICE
+        )
+    if isinstance(failure, (EndOfFile, struct.error)):
+        return TruncatedError(name, "the file ends too early", good=good, advice=ADVICE)
+    what = f"the file is damaged: {failure or type(failure).__name__}"
+    return CorruptError(name, what, good=good, advice=ADVICE)

@@ -1,0 +1,82 @@
+"""The SQLite file of a bag (``.db3``), as ROS 2 wrote them by default up to Humble."""
+
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+from selfmodel.logs.errors import CorruptError
+from selfmodel.logs.rosbag.stored import Announced, DamageError, Stored, checked_time
+from selfmodel.logs.rosbag.unpack import LARGEST
+
+SQLITE_MAGIC = b"SQLite format 3\x00"
+
+
+def read_sqlite(path: Path, name: Path) -> Iterator[Announced | Stored]:
+    """Yields what a file holds: the topics, then the messages in the order of their recording.
+
+    Args:
+        path: The file; it is not written to.
+        name: What errors call it: its name before it was unpacked.
+
+    Raises:
+        CorruptError: The file is damaged, or no rosbag2 recording.
+    """
+    count = 0
+    try:
+        for item in _items(path):
+            count += isinstance(item, Stored)
+            yield item
+    except _FAILURES as failure:
+        raise CorruptError(
+            name,
+            f"the file is damaged or no rosbag2 recording: {failure}",
+            good=f"{count} messages before that can be read",
+            advice="record it again, or recover what is whole with `sqlite3 FILE .recover`",
+        ) from failure
+
+
+_FAILURES = (
+    sqlite3.Error,
+    ValueError,  # texts that are none, and what is found out here
+    OverflowError,
+    MemoryError,
+)
+"""Everything that comes of damaged bytes."""
+
+
+def _items(path: Path) -> Iterator[Announced | Stored]:
+    # Immutable: a bag on a read-only disk has no place for SQLite's lock files.
+    address = f"{path.resolve().as_uri()}?mode=ro&immutable=1"
+    with closing(sqlite3.connect(address, uri=True)) as database:
+        database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST)
+        database.execute("PRAGMA trusted_schema=OFF")
+        _check(database)
+        topics: dict[int, str] = {}
+        for number, topic, kind, encoding in database.execute(
+            "SELECT id, name, type, serialization_format FROM topics ORDER BY id"
+        ):
+            if not all(isinstance(text, str) for text in (topic, kind, encoding)):
+                raise DamageError(f"topic {number!r} is described by what is no text")
+            topics[number] = topic
+            yield Announced(topic, kind, encoding)
+        for number, time, payload in database.execute(
+            "SELECT topic_id, timestamp, data FROM messages ORDER BY id"
+        ):
+            if number not in topics or not isinstance(payload, bytes):
+                raise DamageError(f"a message of topic {number!r} with {type(payload).__name__}")
+            yield Stored(topics[number], checked_time(time), payload)
+
+
+def _check(database: sqlite3.Connection) -> None:
+    """Refuses what is no recording; a view under a table's name could compute for ever."""
+    tables = {
+        name
+        for name, sql in database.execute("SELECT name, sql FROM sqlite_master WHERE type='table'")
+        if "virtual" not in str(sql).lower()
+    }
+    if missing := {"topics", "messages"} - tables:
+        raise DamageError(f"it has no table {' and no table '.join(sorted(missing))}")
+    (verdict,) = database.execute("PRAGMA quick_check(1)").fetchone()
+    if verdict != "ok":
+        raise DamageError(str(verdict))

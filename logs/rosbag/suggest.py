@@ -1,0 +1,192 @@
+"""A mapping to start from, drawn from a bag and a robot.
+
+What is uncertain is marked: ``CHECK`` is a guess that may be right, ``CHANGE`` must be filled in.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from selfmodel.logs.rosbag.bag import Bag, Topic
+from selfmodel.logs.rosbag.checks import TYPES
+from selfmodel.logs.rosbag.likeness import Guess, matched
+from selfmodel.logs.rosbag.mapping import RoleKind
+from selfmodel.logs.rosbag.messages import ARRAY, JOINT_STATE, NUMBERS, ODOMETRY, WRENCH
+from selfmodel.logs.rosbag.series import Series, read_series
+from selfmodel.robot import Robot
+
+_COMMANDED = ("command", "cmd", "target", "desired", "setpoint", "goal", "reference")
+
+
+def suggest(bag: Bag, robot: Robot, name: str, *, with_timestep: bool) -> str:
+    """Returns a mapping as TOML.
+
+    Args:
+        bag: The recording.
+        robot: Whose trial it is.
+        name: What the mapping is to call the robot: its name, or its MJCF file.
+        with_timestep: Whether the mapping must say the control time step.
+
+    Raises:
+        LogError: A message of the bag is damaged.
+    """
+    hinges, motors = robot.anatomy.hinges, robot.anatomy.motors
+    joints, commands = _able(bag, "joints"), _able(bag, "commands")
+    series = read_series(bag, {topic.name for topic in (*joints, *commands)})
+    joints = [topic for topic in joints if not _is_command(topic)]
+    joints.sort(key=lambda topic: -_fit(series[topic.name], hinges))
+    commands = [topic for topic in commands if topic not in joints[:1]]
+    commands.sort(key=lambda topic: (not _is_command(topic), -_fit(series[topic.name], motors)))
+    lines = [
+        "# A suggestion. CHECK marks a guess; CHANGE must be filled in before it can be used.",
+        f"robot = {_quoted(name)}",
+    ]
+    if with_timestep:
+        lines.append(
+            f"control_timestep = {robot.control_timestep!r}  "
+            f"# s; CHECK: how often the robot is commanded"
+        )
+    lines += [
+        '# controller = "gait.npz"  # what drove the robot, if it is known',
+        'clock = "header"  # or "log", where the time stamps are of another clock',
+        "# start = 0.0      # s after the first moment at which every role has data",
+        "# duration = 10.0  # s",
+        "",
+        *_angles("joints", joints, series, hinges, ()),
+        "",
+        *_angles("commands", commands, series, motors, _names(series, joints[:1])),
+        "",
+        *_base(bag),
+        *_imu(bag),
+        *_touches(bag, [s.name for s in robot.anatomy.sensors if s.kind == "touch"]),
+    ]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _able(bag: Bag, kind: RoleKind) -> list[Topic]:
+    """The topics that can play a role, those of its first type first."""
+    able = [
+        topic
+        for topic in bag.topics.values()
+        if topic.type in TYPES[kind] and topic.encoding == "cdr" and topic.count
+    ]
+    return sorted(able, key=lambda topic: TYPES[kind].index(topic.type))
+
+
+def _is_command(topic: Topic) -> bool:
+    return topic.type != JOINT_STATE or any(word in topic.name.lower() for word in _COMMANDED)
+
+
+def _fit(series: Series, parts: Sequence[str]) -> int:
+    """How many parts of the robot a topic seems to tell of."""
+    if series.topic.type == ARRAY:
+        return len(parts) if len(series.columns) == len(parts) else 0
+    return len(matched(parts, list(series.columns)))
+
+
+def _names(series: Mapping[str, Series], topics: Sequence[Topic]) -> tuple[str, ...]:
+    return tuple(name for topic in topics for name in series[topic.name].columns)
+
+
+def _angles(
+    table: str,
+    topics: Sequence[Topic],
+    series: Mapping[str, Series],
+    parts: Sequence[str],
+    order: tuple[str, ...],
+) -> Iterator[str]:
+    """The table of the joints or of the commands.
+
+    Args:
+        table: Its name.
+        topics: Those that can play the role, the likeliest first.
+        series: What they say.
+        parts: The hinges or motors of the robot.
+        order: What the columns of a Float64MultiArray may be, in order.
+    """
+    yield f"[{table}]"
+    yield _topic(topics)
+    yield 'unit = "rad"  # CHECK: rad or deg'
+    offered: tuple[str, ...] = ()
+    if topics:
+        offered = _names(series, topics[:1])
+        if topics[0].type == ARRAY:
+            offered = _order(len(offered), order)
+            yield f"order = [{', '.join(map(_quoted, offered))}]  # CHECK: the bag does not say it"
+    yield f"[{table}.names]  # each may also be {{ name = ..., sign = -1, offset = 0.1 }}"
+    found = matched(parts, offered)
+    for part in parts:
+        yield f"{_key(part)} = {_link(found.get(part), offered)}"
+
+
+def _order(width: int, order: tuple[str, ...]) -> tuple[str, ...]:
+    return order if len(order) == width else tuple(f"column_{k}" for k in range(width))
+
+
+def _link(guess: Guess | None, offered: Sequence[str]) -> str:
+    if guess is None:
+        known = ", ".join("".join(map(_escaped, name)) for name in offered) or "nothing"
+        return f'"?"  # CHANGE: the bag has {known}'
+    return _quoted(guess.name) + ("" if guess.sure else "  # CHECK: not sure")
+
+
+def _topic(topics: Sequence[Topic]) -> str:
+    if not topics:
+        return 'topic = "?"  # CHANGE: the bag has none of a type that fits'
+    others = ", ".join("".join(map(_escaped, topic.name)) for topic in topics[1:])
+    return f"topic = {_quoted(topics[0].name)}" + (f"  # CHECK: or {others}" if others else "")
+
+
+def _base(bag: Bag) -> Iterator[str]:
+    topics = _able(bag, "base")
+    if not topics:
+        yield "# No topic tells where the robot is: no displacement can be known."
+        yield ""
+        return
+    yield "[base]"
+    yield _topic(topics)
+    yield 'frame = "start"'
+    yield 'unit = "m"'
+    if topics[0].type != ODOMETRY:
+        yield "# It tells no velocities, and none are derived."
+    yield ""
+
+
+def _imu(bag: Bag) -> Iterator[str]:
+    if topics := _able(bag, "imu"):
+        yield "[imu]  # CHECK: its axes must be those of the root body"
+        yield _topic(topics)
+        yield ""
+
+
+def _touches(bag: Bag, sensors: Sequence[str]) -> Iterator[str]:
+    topics = {
+        topic.name: topic for topic in _able(bag, "touch") if topic.type in (WRENCH, *NUMBERS)
+    }
+    found = matched(sensors, list(topics))
+    for sensor in sensors:
+        if sensor not in found:
+            yield f"# No topic is like {sensor}: it counts as not observed."
+            continue
+        topic = topics[found[sensor].name]
+        unsure = "" if found[sensor].sure else "  # CHECK: not sure"
+        yield f"[touch.{_key(sensor)}]"
+        yield f"topic = {_quoted(topic.name)}{unsure}"
+        if not topic.type.endswith("Bool"):
+            yield "threshold = 5.0  # CHECK: it reads 1 above this"
+        yield ""
+
+
+def _quoted(text: str) -> str:
+    """A text as TOML has it: names in a bag may hold anything."""
+    return f'"{"".join(map(_escaped, text))}"'
+
+
+def _escaped(char: str) -> str:
+    return char if char.isprintable() and char not in '"\\' else f"\\U{ord(char):08X}"
+
+
+def _key(name: str) -> str:
+    return (
+        name
+        if name.replace("_", "").replace("-", "").isalnum() and name.isascii()
+        else _quoted(name)
+    )

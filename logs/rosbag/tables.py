@@ -1,0 +1,198 @@
+"""TOML read strictly, where every complaint names the line that it is about."""
+
+import re
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from selfmodel.errors import InputError, unknown_name
+
+Keys = tuple[str, ...]
+"""The names of the tables, and of the key, that lead to an entry."""
+
+_KEY = r"""(?:[A-Za-z0-9_-]+|"(?:[^"\\]|\\.)*"|'[^']*')"""
+_KEYS = rf"{_KEY}(?:\s*\.\s*{_KEY})*"
+_TABLE = re.compile(rf"\s*\[\s*({_KEYS})\s*\]")
+_ENTRY = re.compile(rf"\s*({_KEYS})\s*=")
+
+
+@dataclass(frozen=True)
+class Document:
+    """A TOML text, and where in it things stand.
+
+    Attributes:
+        name: What errors call it.
+        text: All of it.
+        lines: The line of each key and table, from 1; keys of inline tables are left out.
+    """
+
+    name: str
+    text: str
+    lines: Mapping[Keys, int]
+
+    def error(self, path: Keys, sentence: str, item: str = "") -> InputError:
+        """Returns an error that names the line of what it is about.
+
+        Args:
+            path: The table's and the key's names; of one that has no line of its own, the line
+                of what contains it is named.
+            sentence: What was expected, what came, and how to mend it.
+            item: A text in a list under that key, which may stand some lines below.
+        """
+        known = next((path[:n] for n in range(len(path), 0, -1) if path[:n] in self.lines), ())
+        line = self.lines.get(known, 1)
+        if item:
+            below = self.text.split("\n")[line - 1 :]
+            line += next((n for n, text in enumerate(below) if f'"{item}"' in text), 0)
+        return InputError(f"{self.name}:{line}: {sentence}")
+
+    def unknown(
+        self, path: Keys, what: str, name: str, known: Iterable[str], item: str = ""
+    ) -> InputError:
+        """Returns the error for a name that is none of ``known``; see ``error``."""
+        return self.error(path, str(unknown_name(what, name, known)), item)
+
+
+def parse_document(text: str, name: str) -> tuple[Document, dict[str, Any]]:
+    """Returns a TOML text as a document and as its tables.
+
+    Raises:
+        InputError: It is no TOML, or says something twice.
+    """
+    document = Document(name, text, _lines(text))
+    try:
+        return document, tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as failure:
+        reason = str(failure)
+        found = re.search(r" \(at line (\d+), column \d+\)", reason)
+        line = int(found[1]) if found else max(1, text.count("\n"))
+        reason = reason.replace(found[0] if found else "", "")
+        raise InputError(f"{name}:{line}: {_explained(reason, text, line)}") from failure
+
+
+def _explained(reason: str, text: str, line: int) -> str:
+    entry = _ENTRY.match(text.split("\n")[line - 1])  # not splitlines: TOML knows this end only
+    if reason == "Cannot overwrite a value" and entry:
+        return f"{entry[1]} is listed twice: expected each name once, remove one of the two"
+    if reason.startswith(("Cannot declare", "Cannot mutate")):
+        return f"this table is there twice ({reason}): put its entries together"
+    return f"expected TOML: {reason}"
+
+
+def _lines(text: str) -> dict[Keys, int]:
+    found: dict[Keys, int] = {}
+    table: Keys = ()
+    for number, line in enumerate(text.split("\n"), start=1):
+        if header := _TABLE.match(line):
+            table = _names(header[1])
+            found.setdefault(table, number)
+        elif entry := _ENTRY.match(line):
+            names = (*table, *_names(entry[1]))
+            for end in range(len(table) + 1, len(names) + 1):
+                found.setdefault(names[:end], number)
+    return found
+
+
+def _names(keys: str) -> Keys:
+    return tuple(key.strip("\"'") for key in re.findall(_KEY, keys))
+
+
+class Table:
+    """A table whose entries are taken one by one; what nobody takes is an error.
+
+    Args:
+        document: Where it stands.
+        path: Its name there.
+        entries: What it holds.
+    """
+
+    def __init__(self, document: Document, path: Keys, entries: Mapping[str, Any]) -> None:
+        self.document = document
+        self.path = path
+        self._entries = dict(entries)
+        self._known: list[str] = []
+
+    def text(self, key: str, default: str | None = None) -> str:
+        """Takes a text.
+
+        Raises:
+            InputError: This, and the other methods: it is missing, or no text.
+        """
+        value = self._take(key, default)
+        if not isinstance(value, str):
+            raise self._wrong(key, "a text in quotes", value)
+        return value
+
+    def choice(self, key: str, known: Iterable[str], default: str | None = None) -> str:
+        """Takes a text that is one of ``known``."""
+        value = self.text(key, default)
+        names = list(known)
+        if value not in names:
+            raise self.document.unknown((*self.path, key), key, value, names)
+        return value
+
+    def number(self, key: str, default: float | None = None) -> float:
+        """Takes a finite number."""
+        value = self._take(key, default)
+        # A bool is an int to Python; infinity and nan are floats to TOML.
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < 1e15:
+            raise self._wrong(key, "a number", value)
+        return float(value)
+
+    def texts(self, key: str) -> tuple[str, ...]:
+        """Takes a list of texts, of which none comes twice."""
+        value = self._take(key, None)
+        if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
+            raise self._wrong(key, "a list of texts", value)
+        for item in value:
+            if value.count(item) > 1:
+                sentence = f"{item} is listed twice in {key}: expected each name once"
+                raise self.document.error((*self.path, key), sentence, item)
+        return tuple(value)
+
+    def table(self, key: str) -> "Table":
+        """Takes a table."""
+        value = self._take(key, None)
+        if not isinstance(value, dict):
+            raise self._wrong(key, "a table", value)
+        return Table(self.document, (*self.path, key), value)
+
+    def value(self, key: str) -> object:
+        """Takes whatever it is."""
+        return self._take(key, None)
+
+    def has(self, key: str) -> bool:
+        """Says whether there is an entry that has not been taken."""
+        if key not in self._known:
+            self._known.append(key)
+        return key in self._entries
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """The names of the entries that have not been taken."""
+        return tuple(self._entries)
+
+    def done(self) -> None:
+        """Ends the taking.
+
+        Raises:
+            InputError: There is an entry that nobody took.
+        """
+        for key in self._entries:
+            where = f"[{'.'.join(self.path)}]" if self.path else "the mapping"
+            raise self.document.unknown((*self.path, key), f"key of {where}", key, self._known)
+
+    def _take(self, key: str, default: object) -> object:
+        self.has(key)
+        if key in self._entries:
+            return self._entries.pop(key)
+        if default is None:
+            where = f"[{'.'.join(self.path)}]" if self.path else "the mapping"
+            raise self.document.error(self.path, f"{where} needs {key}, and has none: add it")
+        return default
+
+    def _wrong(self, key: str, expected: str, value: object) -> InputError:
+        return self.document.error(
+            (*self.path, key), f"{key} must be {expected}, got {value!r}: change it"
+        )

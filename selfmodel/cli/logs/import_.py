@@ -1,0 +1,180 @@
+"""``selfmodel logs import``: a rosbag2 recording of a real robot becomes a trial's log."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from selfmodel.cli.options import Json, check_log_name
+from selfmodel.cli.plain import plain
+from selfmodel.errors import InputError
+
+if TYPE_CHECKING:
+    from selfmodel.controller import Controller
+    from selfmodel.logs.rosbag.importer import Recording
+    from selfmodel.logs.rosbag.mapping import BagMapping
+    from selfmodel.robot import Robot
+
+TIMESTEP = 0.01
+"""Seconds between two commands that ``--suggest`` assumes of an MJCF file, or nearly so."""
+
+
+def import_(
+    bag: Annotated[Path, typer.Argument(metavar="BAG", help="A bag's folder, .mcap or .db3.")],
+    *,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", "-o", metavar="TRIAL.mcap", help="The log to write; it must not exist."
+        ),
+    ] = None,
+    mapping: Annotated[
+        Path | None,
+        typer.Option(metavar="MAP.toml", help="Which topic plays which role for which joint."),
+    ] = None,
+    suggest: Annotated[
+        bool, typer.Option("--suggest", help="Print a mapping to start from, and import nothing.")
+    ] = False,
+    robot: Annotated[
+        str | None,
+        typer.Option(metavar="NAME|MJCF", help="Whose mapping to suggest; for --suggest only."),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Import a rosbag2 recording of a real robot as a trial's log, without ROS."""
+    if suggest:
+        if robot is None or out or mapping or as_json:
+            raise InputError("--suggest needs --robot NAME|MJCF, and goes with no other option")
+        typer.echo(_suggestion(bag, robot), nl=False)
+        return
+    if robot is not None:
+        raise InputError("--robot goes with --suggest; an import's robot stands in its mapping")
+    if out is None or mapping is None:
+        raise InputError(
+            "an import needs --out TRIAL.mcap and --mapping MAP.toml; "
+            "--suggest --robot NAME|MJCF prints a mapping to start from"
+        )
+    check_log_name(out)
+    _import(bag, out, mapping, as_json=as_json)
+
+
+def _suggestion(bag: Path, name: str) -> str:
+    # Whatever brings MuJoCo or ROS's messages waits until the command runs.
+    from selfmodel.cli import resolve  # noqa: PLC0415
+    from selfmodel.logs.rosbag.bag import open_bag  # noqa: PLC0415
+    from selfmodel.logs.rosbag.suggest import suggest  # noqa: PLC0415
+
+    own = not _is_model(name)
+    made = resolve.robot(name, TIMESTEP if own else _timestep(Path(name)))
+    with open_bag(bag) as opened:
+        return suggest(opened, made, name, with_timestep=not own)
+
+
+def _is_model(name: str) -> bool:
+    return Path(name).suffix.lower() == ".xml"
+
+
+def _timestep(path: Path) -> float:
+    """The multiple of a model's physics time step that is nearest to ``TIMESTEP``."""
+    import mujoco  # noqa: PLC0415  # with the other work
+
+    try:
+        physics = float(mujoco.MjModel.from_xml_path(str(path)).opt.timestep)
+    except ValueError as error:
+        what = " ".join(str(error).split())
+        raise InputError(f"{path}: expected an MJCF file of a robot: {what}") from error
+    return max(1, round(TIMESTEP / physics)) * physics
+
+
+def _import(bag: Path, out: Path, path: Path, *, as_json: bool) -> None:
+    # Whatever brings MuJoCo or ROS's messages waits until the command runs.
+    from selfmodel.logs.files import part_of  # noqa: PLC0415
+    from selfmodel.logs.rosbag.importer import import_bag, write_recording  # noqa: PLC0415
+    from selfmodel.logs.rosbag.mapping_file import read_mapping  # noqa: PLC0415
+
+    for existing in (out, part_of(out)):
+        if existing.exists():
+            raise InputError(f"{existing} exists, and is not overwritten: choose another name")
+    mapping = read_mapping(path)
+    made = _mapped_robot(mapping, path.parent)
+    controller = _controller(mapping, path.parent, made)
+    recording = import_bag(bag, mapping, made)
+    write_recording(out, made, recording, mapping, controller)
+    if as_json:
+        typer.echo(json.dumps(_facts(out, mapping, recording), indent=2, allow_nan=False))
+    else:
+        _print(out, recording)
+
+
+def _mapped_robot(mapping: "BagMapping", folder: Path) -> "Robot":
+    """The robot that a mapping names: one that comes with selfmodel, or a file beside it."""
+    from selfmodel.cli import resolve  # noqa: PLC0415
+
+    name, timestep = mapping.robot, mapping.control_timestep
+    own = not _is_model(name)
+    if own and timestep is not None:
+        raise mapping.document.error(
+            ("control_timestep",), f"{name} has a control time step of its own: remove this one"
+        )
+    if not own and timestep is None:
+        raise mapping.document.error(
+            ("robot",), f"{name} does not say how often it is controlled: add control_timestep, s"
+        )
+    try:
+        return resolve.robot(name if own else str(folder / name), timestep or TIMESTEP)
+    except InputError as error:
+        raise mapping.document.error(("robot",), str(error)) from error
+
+
+def _controller(mapping: "BagMapping", folder: Path, robot: "Robot") -> "Controller | None":
+    from selfmodel.cli import resolve  # noqa: PLC0415
+
+    if mapping.controller is None:
+        return None
+    try:
+        return resolve.controller(folder / mapping.controller, robot.network)
+    except InputError as error:
+        raise mapping.document.error(("controller",), str(error)) from error
+
+
+def _facts(out: Path, mapping: "BagMapping", recording: "Recording") -> dict[str, Any]:
+    return {
+        "log": str(out),
+        "robot": mapping.robot,
+        "steps": recording.behaviour.steps,
+        "valid": recording.valid,
+        "topics": {topic: found.facts() for topic, found in recording.qualities.items()},
+        "clock": recording.clock,
+        "notes": list(recording.notes),
+    }
+
+
+def _print(out: Path, recording: "Recording") -> None:
+    from rich.console import Console  # noqa: PLC0415  # only where a table is drawn
+    from rich.table import Table  # noqa: PLC0415
+
+    table = Table("topic", "msgs", "Hz", "jitter, ms", "gaps", "longest, ms", "late, ms")
+    table.columns[0].overflow = "fold"
+    for column in table.columns[1:]:
+        column.justify = "right"
+    for topic, found in recording.qualities.items():
+        table.add_row(
+            plain(topic),
+            str(found.messages),
+            _number(found.rate),
+            _number(found.jitter, 1e3),
+            str(len(found.gaps)),
+            _number(found.longest, 1e3),
+            _number(found.latency, 1e3),
+        )
+    Console(markup=False).print(table)
+    valid = ", ".join(f"{signal} {share:.0%}" for signal, share in recording.valid.items())
+    # Not through rich: a folder's name may look like markup.
+    for note in recording.notes:
+        typer.echo(f"note: {plain(note)}")
+    typer.echo(f"observed: {valid}\n{recording.behaviour.steps} steps: {out}")
+
+
+def _number(value: float | None, scale: float = 1.0) -> str:
+    return "-" if value is None else f"{value * scale:.1f}"

@@ -1,0 +1,157 @@
+"""Bags that the tests make: messages, written in every form that rosbag2 has."""
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+
+ROS = get_typestore(Stores.ROS2_HUMBLE)
+T0 = 1_700_000_000 * 10**9
+"""When the made-up bags begin, ns."""
+
+Item = tuple[str, int, object]
+"""A topic, a log time in ns, and a message."""
+
+FORMS = {
+    "mcap": (StoragePlugin.MCAP, CompressionMode.NONE),
+    "mcap-file": (StoragePlugin.MCAP, CompressionMode.FILE),
+    "mcap-message": (StoragePlugin.MCAP, CompressionMode.MESSAGE),
+    "mcap-chunks": (StoragePlugin.MCAP, CompressionMode.STORAGE),
+    "sqlite": (StoragePlugin.SQLITE3, CompressionMode.NONE),
+    "sqlite-file": (StoragePlugin.SQLITE3, CompressionMode.FILE),
+    "sqlite-message": (StoragePlugin.SQLITE3, CompressionMode.MESSAGE),
+}
+
+
+def write_bag(folder: Path, items: Iterable[Item], form: str = "mcap") -> Path:
+    """Writes a bag in one of ``FORMS`` and returns its folder."""
+    plugin, mode = FORMS[form]
+    writer = Writer(folder, version=9, storage_plugin=plugin)
+    writer.set_compression(mode, CompressionFormat.ZSTD)
+    with writer:
+        known = {}
+        for topic, time, message in sorted(items, key=lambda item: item[1]):
+            kind = message.__msgtype__
+            if topic not in known:
+                known[topic] = writer.add_connection(topic, kind, typestore=ROS)
+            writer.write(known[topic], time, ROS.serialize_cdr(message, kind))
+    return folder
+
+
+def storage(folder: Path) -> Path:
+    """The one storage file of a bag."""
+    (found,) = (path for path in folder.iterdir() if path.name != "metadata.yaml")
+    return found
+
+
+def made(kind: str, **fields: object) -> object:
+    """A message of a type, such as ``std_msgs/msg/Bool``."""
+    return ROS.types[kind](**fields)
+
+
+def header(stamp: int, frame: str = "") -> object:
+    time = made("builtin_interfaces/msg/Time", sec=stamp // 10**9, nanosec=stamp % 10**9)
+    return made("std_msgs/msg/Header", stamp=time, frame_id=frame)
+
+
+def joint_state(
+    stamp: int,
+    names: Sequence[str],
+    position: Sequence[float],
+    velocity: Sequence[float] = (),
+    effort: Sequence[float] = (),
+) -> object:
+    return made(
+        "sensor_msgs/msg/JointState",
+        header=header(stamp),
+        name=list(names),
+        position=np.array(position, dtype=np.float64),
+        velocity=np.array(velocity, dtype=np.float64),
+        effort=np.array(effort, dtype=np.float64),
+    )
+
+
+def array(values: Sequence[float]) -> object:
+    layout = made("std_msgs/msg/MultiArrayLayout", dim=[], data_offset=0)
+    return made(
+        "std_msgs/msg/Float64MultiArray", layout=layout, data=np.array(values, dtype=np.float64)
+    )
+
+
+def trajectory(stamp: int, names: Sequence[str], positions: Sequence[float]) -> object:
+    none = np.zeros(0)
+    point = made(
+        "trajectory_msgs/msg/JointTrajectoryPoint",
+        positions=np.array(positions, dtype=np.float64),
+        velocities=none,
+        accelerations=none,
+        effort=none,
+        time_from_start=made("builtin_interfaces/msg/Duration", sec=0, nanosec=0),
+    )
+    return made(
+        "trajectory_msgs/msg/JointTrajectory",
+        header=header(stamp),
+        joint_names=list(names),
+        points=[point],
+    )
+
+
+def vector(xyz: Sequence[float], kind: str = "Vector3") -> object:
+    return made(f"geometry_msgs/msg/{kind}", x=float(xyz[0]), y=float(xyz[1]), z=float(xyz[2]))
+
+
+def quaternion(wxyz: Sequence[float]) -> object:
+    w, x, y, z = map(float, wxyz)
+    return made("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w)
+
+
+def pose(xyz: Sequence[float], wxyz: Sequence[float]) -> object:
+    return made(
+        "geometry_msgs/msg/Pose", position=vector(xyz, "Point"), orientation=quaternion(wxyz)
+    )
+
+
+def odometry(
+    stamp: int,
+    xyz: Sequence[float],
+    wxyz: Sequence[float] = (1, 0, 0, 0),
+    linear: Sequence[float] = (0, 0, 0),
+    angular: Sequence[float] = (0, 0, 0),
+) -> object:
+    unknown = np.zeros(36)
+    twist = made("geometry_msgs/msg/Twist", linear=vector(linear), angular=vector(angular))
+    return made(
+        "nav_msgs/msg/Odometry",
+        header=header(stamp, "odom"),
+        child_frame_id="base",
+        pose=made("geometry_msgs/msg/PoseWithCovariance", pose=pose(xyz, wxyz), covariance=unknown),
+        twist=made("geometry_msgs/msg/TwistWithCovariance", twist=twist, covariance=unknown),
+    )
+
+
+def pose_stamped(stamp: int, xyz: Sequence[float], wxyz: Sequence[float]) -> object:
+    return made("geometry_msgs/msg/PoseStamped", header=header(stamp), pose=pose(xyz, wxyz))
+
+
+def imu(
+    stamp: int, wxyz: Sequence[float], angular: Sequence[float], *, known: bool = True
+) -> object:
+    nothing = np.zeros(9)
+    covariance = nothing if known else np.array([-1.0, *[0.0] * 8])
+    return made(
+        "sensor_msgs/msg/Imu",
+        header=header(stamp),
+        orientation=quaternion(wxyz),
+        orientation_covariance=covariance,
+        angular_velocity=vector(angular),
+        angular_velocity_covariance=nothing,
+        linear_acceleration=vector((0, 0, 9.81)),
+        linear_acceleration_covariance=nothing,
+    )
+
+
+def wrench(stamp: int, force: Sequence[float]) -> object:
+    told = made("geometry_msgs/msg/Wrench", force=vector(force), torque=vector((0, 0, 0)))
+    return made("geometry_msgs/msg/WrenchStamped", header=header(stamp), wrench=told)

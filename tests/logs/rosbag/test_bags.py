@@ -1,0 +1,215 @@
+"""Bags of every form are read, and whatever is damaged is said to be."""
+
+import shutil
+import struct
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+import zstandard
+from mcap.writer import CompressionType, Writer
+from rosbags.typesys import Stores, get_typestore
+
+from selfmodel.errors import InputError
+from selfmodel.logs.errors import (
+    CorruptError,
+    LogError,
+    NotMcapError,
+    TruncatedError,
+    UnsupportedError,
+)
+from selfmodel.logs.rosbag import unpack
+from selfmodel.logs.rosbag.bag import open_bag
+from selfmodel.logs.rosbag.checks import TYPES
+from selfmodel.logs.rosbag.messages import KINDS
+from selfmodel.logs.rosbag.series import read_series
+from selfmodel.logs.rosbag.suggest import suggest
+from selfmodel.robot import Robot
+from tests.logs.rosbag.bags import FORMS, ROS, T0, array, storage, write_bag
+from tests.logs.rosbag.conftest import imported, recorded
+
+SAMPLES = Path(__file__).parents[4] / "shared" / "samples"
+GENUINE = sorted((SAMPLES / "rosbag2").glob("*.mcap"))
+
+
+def read_all(path: Path) -> dict[str, int]:
+    """Reads every topic that can play a role, and counts the messages of all."""
+    known = {kind for kinds in TYPES.values() for kind in kinds}
+    with open_bag(path) as bag:
+        read_series(bag, [name for name, topic in bag.topics.items() if topic.type in known])
+        return {name: topic.count for name, topic in bag.topics.items()}
+
+
+@pytest.fixture(scope="module")
+def expected(biped: Robot, tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    """What the made-up recording is, in its plainest form."""
+    folder = write_bag(tmp_path_factory.mktemp("plain") / "bag", recorded())
+    return signals(folder, biped)
+
+
+def signals(path: Path, robot: Robot) -> dict[str, bytes]:
+    behaviour = imported(path, robot).behaviour
+    return {name: values.tobytes() for name, values in behaviour.signals.items()}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_every_form_says_the_same(form: str, biped: Robot, expected: dict, tmp_path: Path):
+    folder = write_bag(tmp_path / "bag", recorded(), form)
+    assert signals(folder, biped) == expected
+    assert signals(storage(folder), biped) == expected  # the bare file
+    (folder / "metadata.yaml").unlink()
+    assert signals(folder, biped) == expected
+
+
+@pytest.mark.parametrize("form", ["mcap", "sqlite", "mcap-file", "mcap-message"])
+@pytest.mark.parametrize("listed", [True, False])
+def test_split_files_are_one_bag(
+    form: str, *, listed: bool, biped: Robot, expected: dict, tmp_path: Path
+):
+    items = sorted(recorded(), key=lambda item: item[1])
+    whole = tmp_path / "whole"
+    whole.mkdir()
+    names = []
+    for k in range(11):
+        part = [item for n, item in enumerate(items) if n * 11 // len(items) == k]
+        source = storage(write_bag(tmp_path / f"part_{k}", part, form))
+        names.append(source.name)
+        shutil.move(source, whole / source.name)
+    if listed:
+        entries = "".join(f"  - old_folder/{name}\n" for name in names)
+        (whole / "metadata.yaml").write_text(
+            f"rosbag2_bagfile_information:\n  relative_file_paths:\n{entries}"
+        )
+    assert signals(whole, biped) == expected
+    with open_bag(whole) as bag:
+        assert [source.name for source in bag.sources] == names
+
+
+@pytest.mark.parametrize("chunked", [True, False])
+@pytest.mark.parametrize("compression", [CompressionType.LZ4, CompressionType.NONE])
+def test_other_writers_of_mcap_are_read(
+    *, chunked: bool, compression: CompressionType, biped: Robot, expected: dict, tmp_path: Path
+):
+    path = tmp_path / "bag.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file, compression=compression, use_chunking=chunked)
+        writer.start("ros2")
+        channels = {}
+        for topic, time, message in sorted(recorded(), key=lambda item: item[1]):
+            kind = message.__msgtype__
+            if topic not in channels:
+                # Old recordings leave out the middle of the name.
+                schema = writer.register_schema(kind.replace("/msg/", "/"), "ros2msg", b"")
+                channels[topic] = writer.register_channel(topic, "cdr", schema)
+            writer.add_message(channels[topic], time, bytes(ROS.serialize_cdr(message, kind)), time)
+        writer.finish()
+    assert signals(path, biped) == expected
+
+
+@pytest.mark.parametrize("path", GENUINE, ids=lambda path: path.stem)
+def test_genuine_recordings_are_read_or_refused(path: Path, biped: Robot):
+    assert read_all(path)
+    with open_bag(path) as bag:
+        assert "CHANGE: the bag has none" in suggest(bag, biped, "b.xml", with_timestep=True)
+    with pytest.raises(InputError, match=r"MAP\.toml:5: unknown topic of the bag"):
+        imported(path, biped)
+
+
+@pytest.mark.skipif(not GENUINE, reason="the samples are not here")
+def test_a_foreign_encoding_is_refused_only_where_it_is_wanted():
+    with open_bag(SAMPLES / "rosbag2" / "wrong_rmw_test_0.mcap") as bag:
+        assert bag.topics["/test_topic"].count == 3
+        with pytest.raises(UnsupportedError, match="in cdr on /test_topic, got 'wrong_format'"):
+            read_series(bag, ["/test_topic"])
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("damage", ["flip", "cut", "garbage"])
+def test_no_damage_crashes(form: str, damage: str, biped: Robot, tmp_path: Path):
+    path = storage(write_bag(tmp_path / "bag", recorded(0.1), form))
+    data = path.read_bytes()
+    rng = np.random.default_rng(list(FORMS).index(form))
+    for _ in range(25):
+        spoilt = bytearray(data)
+        at = int(rng.integers(len(data)))
+        match damage:
+            case "flip":
+                spoilt[at] ^= 1 << int(rng.integers(8))
+            case "cut":
+                del spoilt[at:]
+            case "garbage":
+                spoilt[at : at + 64] = rng.bytes(64)[: len(data) - at]
+        path.write_bytes(spoilt)
+        with suppress(LogError, InputError):
+            assert imported(path, biped).behaviour.steps >= 2
+
+
+def test_damaged_lists_of_files_do_not_crash(biped: Robot, bag: Path):
+    listing = bag / "metadata.yaml"
+    data = listing.read_bytes()
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        spoilt = bytearray(data)
+        spoilt[rng.integers(len(data))] ^= 1 << int(rng.integers(8))
+        listing.write_bytes(spoilt)
+        with suppress(LogError, InputError):
+            assert imported(bag, biped).behaviour.steps == 99
+
+
+def test_damage_is_called_by_its_name(bag: Path, tmp_path: Path):
+    path = storage(bag)
+    data = path.read_bytes()
+    path.write_bytes(data[:-20])
+    with pytest.raises(TruncatedError, match=r"ends too early; .* messages before that"):
+        read_all(path)
+    path.write_bytes(data + b"x")
+    with pytest.raises(CorruptError, match="something follows its end"):
+        read_all(path)
+    path.write_bytes(b"hello")
+    with pytest.raises(NotMcapError, match=r"no rosbag2 recording; give a bag's folder"):
+        read_all(path)
+    path.unlink()
+    with pytest.raises(CorruptError, match=r"lists bag\.mcap, which is not there"):
+        read_all(bag)
+    (bag / "metadata.yaml").unlink()
+    with pytest.raises(InputError, match="a folder without one"):
+        read_all(bag)
+    with pytest.raises(InputError, match="No such file"):
+        read_all(tmp_path / "nothing")
+
+
+def test_a_message_of_another_type_than_it_says_is_refused(tmp_path: Path):
+    path = storage(write_bag(tmp_path / "bag", [("/x", T0, array([1.5]))]))
+    count = struct.pack("<I4xd", 1, 1.5)
+    assert path.read_bytes().count(count) == 1
+    path.write_bytes(path.read_bytes().replace(count, struct.pack("<I4xd", 3, 1.5)))
+    with pytest.raises(CorruptError, match="a message on /x is damaged"):
+        read_all(path)
+
+
+def test_what_unpacks_to_too_much_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(unpack, "LARGEST", 10**6)
+    bomb = tmp_path / "bag.mcap.zstd"
+    bomb.write_bytes(zstandard.compress(bytes(10**8)))
+    with pytest.raises(CorruptError, match="unpacks to more than 100 times its size"):
+        read_all(bomb)
+    with pytest.raises(unpack.BombError, match="more than 1000 bytes"):
+        unpack.unzstd(zstandard.compress(bytes(10**6)), 1000)
+
+
+def test_the_digest_of_each_file_is_that_of_the_file_as_found(bag: Path):
+    import hashlib  # noqa: PLC0415 - for this test alone
+
+    with open_bag(bag) as opened:
+        (source,) = opened.sources
+    assert source.sha256 == hashlib.sha256(storage(bag).read_bytes()).hexdigest()
+
+
+@pytest.mark.parametrize("store", [store for store in Stores if store.name.startswith("ROS2")])
+def test_the_types_that_are_read_are_alike_in_every_ros_2(store: Stores):
+    other = get_typestore(store)
+    for kind in KINDS:
+        assert other.generate_msgdef(kind, ros_version=2) == ROS.generate_msgdef(
+            kind, ros_version=2
+        )
