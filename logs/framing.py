@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import zstandard
-from lz4.frame import LZ4FrameDecompressor
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile, McapError
 from mcap.opcode import Opcode
@@ -35,6 +34,8 @@ from mcap.records import (
     SummaryOffset,
 )
 from mcap.stream_reader import breakup_chunk
+
+from selfmodel.logs.unpack import unlz4, unzstd
 
 MAGIC = b"\x89MCAP0\r\n"
 
@@ -153,15 +154,9 @@ def _unpacked(chunk: Chunk) -> bytes:
     if chunk.compression == "":
         return chunk.data
     if chunk.compression == "zstd":
-        if zstandard.frame_content_size(chunk.data) > chunk.uncompressed_size:
-            raise ContradictionError("a chunk would unpack to more than it claims")
-        return zstandard.ZstdDecompressor().decompress(chunk.data, chunk.uncompressed_size)
+        return unzstd(chunk.data, chunk.uncompressed_size)
     if chunk.compression == "lz4":
-        # One byte more than claimed shows that there is more.
-        unpacked: bytes = LZ4FrameDecompressor().decompress(
-            chunk.data, max_length=chunk.uncompressed_size + 1
-        )
-        return unpacked
+        return unlz4(chunk.data, chunk.uncompressed_size)
     raise UnknownCompressionError(f"a chunk is packed with {chunk.compression!r}")
 
 

@@ -18,7 +18,7 @@ from selfmodel.logs.errors import CorruptError, NotMcapError
 from selfmodel.logs.rosbag.stored import Announced, Stored
 from selfmodel.logs.rosbag.stored_mcap import MCAP_MAGIC, read_mcap
 from selfmodel.logs.rosbag.stored_sqlite import SQLITE_MAGIC, read_sqlite
-from selfmodel.logs.rosbag.unpack import ZSTD_MAGIC, BombError, unzstd, unzstd_file
+from selfmodel.logs.unpack import ZSTD_MAGIC, BombError, unzstd, unzstd_file
 
 METADATA = "metadata.yaml"
 EXPECTED = "give a bag's folder, or its .mcap or .db3"

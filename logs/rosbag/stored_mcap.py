@@ -18,7 +18,7 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 
 from selfmodel.logs.errors import CorruptError, LogError, NotMcapError, TruncatedError
 from selfmodel.logs.rosbag.stored import Announced, DamageError, Stored, checked_time
-from selfmodel.logs.rosbag.unpack import LARGEST, unlz4, unzstd
+from selfmodel.logs.unpack import LARGEST, unlz4, unzstd
 
 MCAP_MAGIC = b"\x89MCAP0\r\n"
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from selfmodel.logs.errors import CorruptError
 from selfmodel.logs.rosbag.stored import Announced, DamageError, Stored, checked_time
-from selfmodel.logs.rosbag.unpack import LARGEST
+from selfmodel.logs.unpack import LARGEST
 
 SQLITE_MAGIC = b"SQLite format 3\x00"
 

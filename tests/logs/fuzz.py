@@ -55,6 +55,12 @@ def garbage(data: bytes, rng: np.random.Generator) -> bytes:
     return data[:start] + rng.bytes(size) + data[start + size :]
 
 
+def zeroed(data: bytes, rng: np.random.Generator) -> bytes:
+    """What a disk leaves of a block that it never wrote."""
+    start = int(rng.integers(len(data) - 4096))
+    return data[:start] + bytes(4096) + data[start + 4096 :]
+
+
 def record_dropped(data: bytes, rng: np.random.Generator) -> bytes:
     frame = _some_record(data, rng)
     return data[: frame.offset] + data[frame.end :]
@@ -73,7 +79,7 @@ def _some_record(data: bytes, rng: np.random.Generator) -> Frame:
     return found[rng.integers(len(found))]
 
 
-DAMAGES: tuple[Damage, ...] = (flipped, cut, garbage, record_dropped, record_doubled)
+DAMAGES: tuple[Damage, ...] = (flipped, cut, garbage, zeroed, record_dropped, record_doubled)
 
 
 def packed(data: bytes, compression: CompressionType, chunk_size: int | None) -> bytes:

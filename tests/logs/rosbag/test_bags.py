@@ -12,6 +12,7 @@ from mcap.writer import CompressionType, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from selfmodel.errors import InputError
+from selfmodel.logs import unpack
 from selfmodel.logs.errors import (
     CorruptError,
     LogError,
@@ -19,7 +20,6 @@ from selfmodel.logs.errors import (
     TruncatedError,
     UnsupportedError,
 )
-from selfmodel.logs.rosbag import unpack
 from selfmodel.logs.rosbag.bag import open_bag
 from selfmodel.logs.rosbag.checks import TYPES
 from selfmodel.logs.rosbag.messages import KINDS
