@@ -13,6 +13,9 @@ LENGTHS: Mapping[str, float] = MappingProxyType({"m": 1.0, "cm": 0.01, "mm": 0.0
 FORCES = ("N", "kN", "raw")
 """A touch sensor's threshold has the unit of its topic, so none of these needs converting."""
 
+UNKNOWN = "?"
+"""What a suggested mapping has in the place of a name that is still to be filled in."""
+
 RoleKind = Literal["joints", "commands", "base", "imu", "touch"]
 
 CLOCKS = ("header", "log")

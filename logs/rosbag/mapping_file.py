@@ -10,6 +10,7 @@ from selfmodel.logs.rosbag.mapping import (
     FORCES,
     FRAMES,
     LENGTHS,
+    UNKNOWN,
     Angles,
     BagMapping,
     Base,
@@ -92,6 +93,10 @@ def _angles(table: Table, role: Literal["joints", "commands"]) -> Angles:
     links = {name: _link(names, name, scale) for name in names.keys}
     told: dict[str, str] = {}
     for name, link in links.items():
+        if link.name == UNKNOWN:
+            raise table.document.error(
+                (*names.path, name), f"{name} is still {UNKNOWN!r}: fill in its name in the bag"
+            )
         if link.name in told:
             raise table.document.error(
                 (*names.path, name),

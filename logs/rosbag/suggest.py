@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from selfmodel.logs.rosbag.bag import Bag, Topic
 from selfmodel.logs.rosbag.checks import TYPES
 from selfmodel.logs.rosbag.likeness import Guess, matched
-from selfmodel.logs.rosbag.mapping import RoleKind
+from selfmodel.logs.rosbag.mapping import UNKNOWN, RoleKind
 from selfmodel.logs.rosbag.messages import ARRAY, JOINT_STATE, NUMBERS, ODOMETRY, WRENCH
 from selfmodel.logs.rosbag.series import Series, read_series
 from selfmodel.robot import Robot
@@ -124,13 +124,13 @@ def _order(width: int, order: tuple[str, ...]) -> tuple[str, ...]:
 def _link(guess: Guess | None, offered: Sequence[str]) -> str:
     if guess is None:
         known = ", ".join("".join(map(_escaped, name)) for name in offered) or "nothing"
-        return f'"?"  # CHANGE: the bag has {known}'
+        return f'"{UNKNOWN}"  # CHANGE: the bag has {known}'
     return _quoted(guess.name) + ("" if guess.sure else "  # CHECK: not sure")
 
 
 def _topic(topics: Sequence[Topic]) -> str:
     if not topics:
-        return 'topic = "?"  # CHANGE: the bag has none of a type that fits'
+        return f'topic = "{UNKNOWN}"  # CHANGE: the bag has none of a type that fits'
     others = ", ".join("".join(map(_escaped, topic.name)) for topic in topics[1:])
     return f"topic = {_quoted(topics[0].name)}" + (f"  # CHECK: or {others}" if others else "")
 

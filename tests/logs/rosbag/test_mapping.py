@@ -116,6 +116,15 @@ def test_keys_may_be_dotted_quoted_or_inline():
         parse_mapping(wrong, "M")
 
 
+def test_what_was_not_filled_in_is_told_as_such():
+    text = (
+        'robot = "r"\n[joints]\ntopic = "/j"\nunit = "rad"\n[joints.names]\n'
+        'hip = "l"\nknee = "?"\nankle = "?"\n'
+    )
+    with pytest.raises(InputError, match=r"M:7: knee is still '\?': fill in its name"):
+        parse_mapping(text, "M")
+
+
 def test_a_file_that_is_no_mapping_is_told(tmp_path: Path):
     with pytest.raises(InputError, match="expected a mapping that can be read"):
         read_mapping(tmp_path / "none.toml")
