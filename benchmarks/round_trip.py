@@ -1,0 +1,88 @@
+"""Every single fault, recorded as a robot's driver would, imported and diagnosed again.
+
+Run with ``python -m benchmarks.round_trip``; it takes five minutes on two cores, and prints the
+table that ``docs/real-robots.md`` has.
+"""
+
+import os
+import tempfile
+from pathlib import Path
+
+from selfmodel.comparators import FORWARD_DISPLACEMENT
+from selfmodel.controller import Controller
+from selfmodel.diagnose import Diagnose
+from selfmodel.explain import explain
+from selfmodel.faults import KINDS, Fault
+from selfmodel.hypothesis import INTACT, Hypothesis, canonical
+from selfmodel.logs import TrialLog, read_log
+from selfmodel.logs.robots import robot_of
+from selfmodel.logs.rosbag.importer import import_bag, write_recording
+from selfmodel.logs.rosbag.mapping_file import parse_mapping
+from selfmodel.logs.writer import write_trial
+from selfmodel.physical import SimulatedRobot
+from selfmodel.repair import Repair
+from selfmodel.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.simulator import Simulator
+from selfmodel.streams import repair_stream
+from selfmodel.tasks import ROBOTS
+from selfmodel.trial import Plan
+from tests.logs.rosbag import driver
+
+SETTINGS = Settings()
+SEED = 0
+
+
+def main() -> None:
+    """Prints a row for each single fault of the quadruped."""
+    robot = ROBOTS["quadruped"].robot()
+    simulator = Simulator(robot, os.cpu_count() or 1)
+    rng = repair_stream(SEED, 0)
+    gait = Repair(simulator, SETTINGS)(INTACT, (), rng, lambda _: None)
+    print("| fault | exact log | imported, with its controller | imported, commands played back |")
+    print("|---|---|---|---|")
+    for truth in single_faults(robot):
+        with tempfile.TemporaryDirectory() as folder:
+            logs = recorded(Path(folder), robot, truth, gait)
+            print(f"| `{truth}` | {' | '.join(judged(log, truth) for log in logs)} |", flush=True)
+
+
+def single_faults(robot: Robot) -> list[Hypothesis]:
+    """Returns every hypothesis of one fault that a diagnosis may propose."""
+    anatomy = robot.anatomy
+    return [
+        canonical([Fault(kind.name, part)], anatomy)
+        for kind in KINDS.values()
+        if kind.hypothesised
+        for part in kind.parts(anatomy)
+    ]
+
+
+def recorded(folder: Path, robot: Robot, truth: Hypothesis, gait: Controller) -> list[TrialLog]:
+    """Returns one trial as simulated, as imported, and as imported without its controller."""
+    steps = SETTINGS.steps
+    plan = Plan("trial", "single", gait, steps, SEED)
+    samples = SimulatedRobot(robot, truth).run(gait, steps)
+    exact = write_trial(folder / "exact.mcap", robot, plan, samples, settings=SETTINGS)
+    bag = driver.record(folder / "bag", robot, truth, gait, steps)
+    mapping = parse_mapping(driver.mapping(robot, steps, None), "mapping")
+    recording = import_bag(bag, mapping, robot)
+    imported = [
+        write_recording(folder / f"{number}.mcap", robot, recording, mapping, controller)
+        for number, controller in enumerate((gait, None))
+    ]
+    return [read_log(path) for path in (exact, *imported)]
+
+
+def judged(log: TrialLog, truth: Hypothesis) -> str:
+    """Returns what the diagnosis of a log says, and how far the truth is from it."""
+    simulator = Simulator(robot_of(log), os.cpu_count() or 1)
+    search = Diagnose(simulator, FORWARD_DISPLACEMENT, log.settings)
+    best = explain([log.trial], search, SEED, lambda _: None).best
+    distance = 1000 * float(search.distances([truth], [log.trial])[0])
+    said = "right" if best == truth else f"`{best}`"
+    return f"{said}, {distance:.2f} mm"
+
+
+if __name__ == "__main__":
+    main()
