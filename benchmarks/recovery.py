@@ -17,9 +17,9 @@ from time import perf_counter
 
 from selfmodel.behaviour import Sample
 from selfmodel.comparators import FORWARD_DISPLACEMENT
-from selfmodel.controller import Controller
 from selfmodel.database import Database, Journal
 from selfmodel.diagnosis import Diagnosis
+from selfmodel.driver import Driver
 from selfmodel.logs.journal import open_journal
 from selfmodel.notation import parse
 from selfmodel.physical import PhysicalRobot, SimulatedRobot
@@ -39,7 +39,7 @@ class TimedRobot:
         self._robot = robot
         self.seconds = 0.0
 
-    def run(self, controller: Controller, steps: int) -> Iterator[Sample]:
+    def run(self, controller: Driver, steps: int) -> Iterator[Sample]:
         """Runs a controller."""
         samples = self._robot.run(controller, steps)
         while True:

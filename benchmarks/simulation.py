@@ -10,7 +10,8 @@ from mujoco import rollout
 
 from benchmarks.results import Facts
 from selfmodel import tasks
-from selfmodel.controller import Controller, Population, draw_weights
+from selfmodel.controller import Controller, draw_weights
+from selfmodel.driver import drive
 from selfmodel.hypothesis import INTACT
 from selfmodel.robot import Robot
 from selfmodel.simulator import Run, Simulator
@@ -63,7 +64,8 @@ def closed_loop_over_environment(robot: Robot, count: int, steps: int, threads: 
 
     def loop() -> None:
         for _, controller in batch[:LOOPED]:
-            alone = Population([controller], np.ones((1, robot.network.hidden)))
+            neurons = np.ones((1, robot.network.hidden))
+            alone = drive([controller], neurons, len(robot.anatomy.sensors))
             step = environment.reset()
             for _ in range(steps - 1):
                 alone.readings[:] = step.observation["sensors"]

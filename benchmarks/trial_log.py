@@ -49,7 +49,7 @@ def measure(robot: Robot) -> dict[str, float]:
             library = _with_the_library(path, plain)
             late = float(np.percentile(delays, 99))
             rows.append((write, write_cpu, late, read, path.stat().st_size, *library))
-    write, write_cpu, late, read, size, *library = (
+    write, write_cpu, late, read, size, other_write, other_read, other_size = (
         median(column) for column in zip(*rows[1:], strict=True)
     )
     return {
@@ -59,9 +59,9 @@ def measure(robot: Robot) -> dict[str, float]:
         "log_step_delay_p99_seconds": late,
         "log_read_seconds": read,
         "log_kilobytes": size / 1000,
-        "library_write_seconds": library[0],
-        "library_read_seconds": library[1],
-        "library_kilobytes": library[2] / 1000,
+        "library_write_seconds": other_write,
+        "library_read_seconds": other_read,
+        "library_kilobytes": other_size / 1000,
     }
 
 
