@@ -34,9 +34,13 @@ from mcap.records import (
     Statistics,
     SummaryOffset,
 )
-from mcap.stream_reader import breakup_chunk
+from mcap.stream_reader import get_chunk_data_stream
+
+from selfmodel.logs.budget import Budget
 
 MAGIC = b"\x89MCAP0\r\n"
+
+_IN_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
 
 FRAME = 1 + 8
 """Bytes before a record's own: what it is, and its length."""
@@ -127,8 +131,12 @@ def parse(frame: Frame) -> McapRecord | None:
     return read(stream) if read else None
 
 
-def unpack(chunk: Chunk) -> list[McapRecord]:
+def unpack(chunk: Chunk, budget: Budget) -> list[McapRecord]:
     """Returns the records in a chunk.
+
+    Args:
+        chunk: It is changed.
+        budget: Counts what it holds.
 
     Raises:
         Exception: One of ``FAILURES``: it is damaged, unpacks to more than ``CHUNK_LIMIT`` bytes,
@@ -140,13 +148,32 @@ def unpack(chunk: Chunk) -> list[McapRecord]:
         )
     if chunk.uncompressed_crc == 0 and chunk.uncompressed_size:
         raise UncheckedError("a chunk has no checksum")
+    budget.chunk(chunk.uncompressed_size)
     chunk.data = _unpacked(chunk)
     chunk.compression = ""
     if len(chunk.data) != chunk.uncompressed_size:
         raise ContradictionError(
             f"a chunk claims {chunk.uncompressed_size} bytes, and has {len(chunk.data)}"
         )
-    return breakup_chunk(chunk, validate_crc=True)
+    get_chunk_data_stream(chunk, validate_crc=True)
+    return _records(chunk.data, budget)
+
+
+def _records(data: bytes, budget: Budget) -> list[McapRecord]:
+    """Cuts a chunk up as the library does, but stops where there are too many records."""
+    found = []
+    offset = 0
+    while offset < len(data):
+        opcode, length = struct.unpack_from("<BQ", data, offset)
+        budget.record(opcode, length)
+        start = offset + FRAME
+        if length > len(data) - start:
+            raise EndOfFile
+        if opcode in _IN_CHUNKS:
+            record = parse(Frame(offset, opcode, data[start : start + length]))
+            found += [] if record is None else [record]
+        offset = start + length
+    return found
 
 
 def _unpacked(chunk: Chunk) -> bytes:
