@@ -15,7 +15,8 @@ OTHER_LIMIT = 32 * 2**20
 """Bytes of all that is neither chunk, message nor attachment: in memory it takes twenty times as
 much."""
 
-_LARGE = (Opcode.CHUNK, Opcode.MESSAGE, Opcode.ATTACHMENT)
+ATTACHED_LIMIT = 32 * 2**20
+"""Bytes that all attachments of a log may have."""
 
 
 class ExcessError(ValueError):
@@ -26,23 +27,33 @@ class Budget:
     """Counts what one file has asked for.
 
     Args:
-        unpacked: Bytes that its chunks may unpack to; those that are damaged count as well.
+        passes: How often one thing may be counted: a search for what is whole tries all twice.
     """
 
-    def __init__(self, unpacked: int = UNPACKED_LIMIT) -> None:
-        self._most_unpacked = unpacked
-        self._frames = self._records = self._unpacked = self._other = 0
+    def __init__(self, passes: int = 1) -> None:
+        self._passes = passes
+        self._frames = self._records = self._unpacked = self._attached = self._other = 0
 
     def frame(self, opcode: int, size: int) -> None:
-        """Counts a record that stands in no chunk.
+        """Counts a record that is no message in a chunk.
 
         Raises:
             ExcessError: It is one too many.
         """
         self._frames += 1
-        if self._frames > FRAME_LIMIT:
+        if self._frames > FRAME_LIMIT * self._passes:
             raise ExcessError(f"it holds more than a log may: {FRAME_LIMIT} records and chunks")
-        self._add_other(opcode, size)
+        if opcode == Opcode.ATTACHMENT:
+            self._attached += size
+        elif opcode not in (Opcode.CHUNK, Opcode.MESSAGE):
+            self._other += size
+        if self._attached > ATTACHED_LIMIT * self._passes:
+            raise ExcessError(f"it holds more than a log may: {ATTACHED_LIMIT} bytes attached")
+        if self._other > OTHER_LIMIT * self._passes:
+            raise ExcessError(
+                f"it holds more than a log may: {OTHER_LIMIT} bytes beside its messages and "
+                f"attachments"
+            )
 
     def chunk(self, size: int) -> None:
         """Counts a chunk before it is unpacked.
@@ -51,10 +62,8 @@ class Budget:
             ExcessError: It is one too many.
         """
         self._unpacked += size
-        if self._unpacked > self._most_unpacked:
-            raise ExcessError(
-                f"it holds more than a log may: {self._most_unpacked} bytes, unpacked"
-            )
+        if self._unpacked > UNPACKED_LIMIT * self._passes:
+            raise ExcessError(f"it holds more than a log may: {UNPACKED_LIMIT} bytes, unpacked")
 
     def record(self, opcode: int, size: int) -> None:
         """Counts a record within a chunk.
@@ -63,15 +72,7 @@ class Budget:
             ExcessError: It is one too many.
         """
         self._records += 1
-        if self._records > RECORD_LIMIT:
+        if self._records > RECORD_LIMIT * self._passes:
             raise ExcessError(f"it holds more than a log may: {RECORD_LIMIT} messages")
-        self._add_other(opcode, size)
-
-    def _add_other(self, opcode: int, size: int) -> None:
-        if opcode not in _LARGE:
-            self._other += size
-            if self._other > OTHER_LIMIT:
-                raise ExcessError(
-                    f"it holds more than a log may: {OTHER_LIMIT} bytes beside its messages and "
-                    f"attachments"
-                )
+        if opcode != Opcode.MESSAGE:
+            self.frame(opcode, size)

@@ -31,7 +31,7 @@ from selfmodel.logs.framing import (
 from selfmodel.logs.records import OWN, without_digest
 from selfmodel.logs.scan import scan
 
-FILE_LIMIT = 256 * 2**20
+FILE_LIMIT = 128 * 2**20
 """Bytes that a log may have: ten seconds of a quadruped take 0.65 MB."""
 
 _Item = TypeVar("_Item")

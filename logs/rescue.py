@@ -8,7 +8,7 @@ from pathlib import Path
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Metadata, Schema
 
-from selfmodel.logs.budget import UNPACKED_LIMIT, Budget, ExcessError
+from selfmodel.logs.budget import Budget, ExcessError
 from selfmodel.logs.contents import (
     FILE_LIMIT,
     Contents,
@@ -129,7 +129,7 @@ class _Work:
     """Counts what was tried, in vain or not: bytes can be such that every one begins a record."""
 
     def __init__(self) -> None:
-        self.budget = Budget(2 * UNPACKED_LIMIT)  # what is found is unpacked twice
+        self.budget = Budget(passes=2)
         self._tried = 0
 
     def attempt(self, frame: Frame) -> None:
