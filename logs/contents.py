@@ -10,6 +10,7 @@ from mcap.exceptions import EndOfFile, InvalidMagic
 from mcap.records import Attachment, Channel, Header, McapRecord, Message, Metadata, Schema
 
 from selfmodel.errors import InputError
+from selfmodel.logs.budget import ExcessError
 from selfmodel.logs.errors import (
     ANOTHER,
     IMPORT,
@@ -30,14 +31,8 @@ from selfmodel.logs.framing import (
 from selfmodel.logs.records import OWN, without_digest
 from selfmodel.logs.scan import scan
 
-FILE_LIMIT = 256 * 2**20
+FILE_LIMIT = 128 * 2**20
 """Bytes that a log may have: ten seconds of a quadruped take 0.65 MB."""
-
-UNPACKED_LIMIT = 384 * 2**20
-"""Bytes that the messages of a log may have, unpacked."""
-
-MESSAGE_LIMIT = 1_500_000
-"""Messages that a log may have: six topics at 100 Hz for 40 minutes."""
 
 _Item = TypeVar("_Item")
 
@@ -139,15 +134,8 @@ def put(items: dict[str, _Item], name: str, item: _Item) -> None:
 def _gather(records: Iterator[McapRecord], contents: Contents, unread: Collection[str]) -> None:
     schemas: dict[int, Schema] = {}
     channels: dict[int, Messages] = {}
-    count = size = 0
     for record in records:
         if isinstance(record, Message):
-            count, size = count + 1, size + len(record.data)
-            if count > MESSAGE_LIMIT or size > UNPACKED_LIMIT:
-                raise ContradictionError(
-                    f"it holds more than a log may: {MESSAGE_LIMIT} messages, "
-                    f"{UNPACKED_LIMIT} bytes"
-                )
             channels[record.channel_id].payloads.append(record.data)
             channels[record.channel_id].times.append((record.log_time, record.publish_time))
         elif isinstance(record, Schema):
@@ -179,8 +167,9 @@ def _explain(path: Path, data: bytes, failure: Exception, contents: Contents) ->
     good = contents.good
     if isinstance(failure, InvalidMagic):
         return NotMcapError(path, "this is not an MCAP file", advice=ANOTHER)
-    if isinstance(failure, UnknownCompressionError):
-        return UnsupportedError(path, str(failure), good=good, advice="pack it again with zstd")
+    if isinstance(failure, (UnknownCompressionError, ExcessError)):
+        advice = ANOTHER if isinstance(failure, ExcessError) else "pack it again with zstd"
+        return UnsupportedError(path, str(failure), good=good, advice=advice)
     if isinstance(failure, UncheckedError):
         what = f"{failure}: it is no log that selfmodel wrote"
         return UnsupportedError(path, what, good=good, advice=IMPORT)

@@ -11,6 +11,9 @@ IMPORT = "a recording of a robot becomes a trial log with `selfmodel logs import
 OTHER_VERSION = "read it with the version of selfmodel that wrote it"
 
 
+_LONGEST = 2000
+
+
 def salvage_it(path: str | PathLike[str]) -> str:
     """Returns the advice to save what is complete, as a command that can be pasted."""
     return f"save what is complete with `selfmodel logs salvage {path} -o NEW.mcap`"
@@ -35,6 +38,8 @@ class LogError(WorkError):
     def __init__(
         self, path: str | PathLike[str], what: str, *, good: str = "", advice: str = AGAIN
     ) -> None:
+        if len(what) > _LONGEST:  # what a log says may be megabytes
+            what = f"{what[:_LONGEST]}..."
         self.path, self.what, self.good, self.advice = str(path), what, good, advice
         super().__init__(f"{path}: " + "; ".join(part for part in (what, good, advice) if part))
 

@@ -33,8 +33,9 @@ from mcap.records import (
     Statistics,
     SummaryOffset,
 )
-from mcap.stream_reader import breakup_chunk
+from mcap.stream_reader import get_chunk_data_stream
 
+from selfmodel.logs.budget import Budget
 from selfmodel.logs.unpack import unlz4, unzstd
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -122,14 +123,18 @@ def parse(frame: Frame) -> McapRecord | None:
         return message
     if frame.opcode == Opcode.ATTACHMENT:
         checksum = int.from_bytes(frame.body[-4:], "little")
-        if checksum and zlib.crc32(frame.body[:-4]) != checksum:
+        if checksum and zlib.crc32(memoryview(frame.body)[:-4]) != checksum:
             raise ContradictionError("the checksum of an attachment is wrong")
     read = _READERS.get(frame.opcode)
     return read(stream) if read else None
 
 
-def unpack(chunk: Chunk) -> list[McapRecord]:
+def unpack(chunk: Chunk, budget: Budget) -> list[McapRecord]:
     """Returns the records in a chunk.
+
+    Args:
+        chunk: It is changed.
+        budget: Counts what it holds.
 
     Raises:
         Exception: One of ``FAILURES``: it is damaged, unpacks to more than ``CHUNK_LIMIT`` bytes,
@@ -141,13 +146,43 @@ def unpack(chunk: Chunk) -> list[McapRecord]:
         )
     if chunk.uncompressed_crc == 0 and chunk.uncompressed_size:
         raise UncheckedError("a chunk has no checksum")
+    budget.chunk(chunk.uncompressed_size)
     chunk.data = _unpacked(chunk)
     chunk.compression = ""
     if len(chunk.data) != chunk.uncompressed_size:
         raise ContradictionError(
             f"a chunk claims {chunk.uncompressed_size} bytes, and has {len(chunk.data)}"
         )
-    return breakup_chunk(chunk, validate_crc=True)
+    get_chunk_data_stream(chunk, validate_crc=True)
+    return _records(chunk.data, budget)
+
+
+def _records(data: bytes, budget: Budget) -> list[McapRecord]:
+    """Cuts a chunk up as the library does, but stops where there are too many records."""
+    found: list[McapRecord] = []
+    offset = 0
+    while offset < len(data):
+        opcode, length = struct.unpack_from("<BQ", data, offset)
+        budget.record(opcode, length)
+        start = offset + FRAME
+        if length > len(data) - start:
+            raise EndOfFile
+        if opcode == Opcode.MESSAGE:
+            found.append(_message(data[start : start + length]))
+        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            record = parse(Frame(offset, opcode, data[start : start + length]))
+            found += [] if record is None else [record]
+        offset = start + length
+    return found
+
+
+def _message(body: bytes) -> Message:
+    """Reads a message as the library does, in a third of the time."""
+    channel, sequence, log_time, publish_time = _MESSAGE.unpack_from(body)
+    return Message(channel, log_time, body[_MESSAGE.size :], publish_time, sequence)
+
+
+_MESSAGE = struct.Struct("<HIQQ")
 
 
 def _unpacked(chunk: Chunk) -> bytes:

@@ -3,7 +3,6 @@
 import dataclasses
 import hashlib
 import json
-import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -51,6 +50,11 @@ INTERRUPTED = "interrupted"
 
 LARGEST_SETTING = 10**6
 """A setting of a log that is larger would fill the memory, or take for ever."""
+
+SHORTEST, LONGEST = 1e-9, 3600.0
+"""Seconds that a control step may take: a log's clock ticks in nanoseconds, and ends."""
+
+LONGEST_TEXT = 1000
 
 _NAME = re.compile(r"[A-Za-z0-9-]{1,100}")
 
@@ -142,9 +146,15 @@ def trial_record(texts: Mapping[str, str]) -> TrialRecord:
     stage = next((known for known in stages if known == texts["stage"]), None)
     if stage is None:
         raise ValueError(f"stage must be one of {', '.join(stages)}, got {texts['stage']!r}")
+    long = [name for name in fields if len(texts[name]) > LONGEST_TEXT]
+    if long:
+        raise ValueError(f"expected at most {LONGEST_TEXT} characters in {', '.join(long)}")
     timestep = float(texts["control_timestep"])
-    if not (math.isfinite(timestep) and timestep > 0):
-        raise ValueError(f"control_timestep must be above 0 s, got {texts['control_timestep']!r}")
+    if not SHORTEST <= timestep <= LONGEST:
+        raise ValueError(
+            f"control_timestep must be above 0 s, from {SHORTEST} to {LONGEST}, "
+            f"got {texts['control_timestep']!r}"
+        )
     return TrialRecord(
         format=texts["format"],
         name=texts["name"],

@@ -1,5 +1,6 @@
 """Finds what is whole in a damaged file: records whose own checksum holds, wherever they lie."""
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -7,18 +8,17 @@ from pathlib import Path
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Metadata, Schema
 
+from selfmodel.logs.budget import Budget, ExcessError
 from selfmodel.logs.contents import (
-    MESSAGE_LIMIT,
-    UNPACKED_LIMIT,
+    FILE_LIMIT,
     Contents,
     Messages,
     messages_of,
     read_bytes,
 )
-from selfmodel.logs.errors import ANOTHER, CorruptError, NotMcapError
+from selfmodel.logs.errors import ANOTHER, CorruptError, NotMcapError, UnsupportedError
 from selfmodel.logs.framing import (
     FAILURES,
-    FRAME,
     MAGIC,
     ContradictionError,
     Frame,
@@ -52,6 +52,9 @@ def rescue(path: Path) -> Contents:
         contents = found.contents()
     except ContradictionError as error:
         raise CorruptError(path, f"nothing can be salvaged: {error}") from error
+    except ExcessError as error:
+        what = f"nothing can be salvaged: {error}"
+        raise UnsupportedError(path, what, advice=ANOTHER) from error
     if not contents.metadata:
         raise NotMcapError(path, "nothing in this file is of a trial log", advice=ANOTHER)
     return contents
@@ -66,7 +69,6 @@ class _Found:
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     messages: dict[tuple[int, int], Message] = field(default_factory=dict)
-    size: int = 0
 
     def add(self, record: McapRecord) -> None:
         if isinstance(record, Metadata):
@@ -83,15 +85,8 @@ class _Found:
 
     def _add_message(self, message: Message) -> None:
         first = self.messages.setdefault((message.channel_id, message.log_time), message)
-        if first is not message:
-            if first.data != message.data:
-                raise ContradictionError(
-                    f"it has two different messages of time {message.log_time} ns"
-                )
-            return
-        self.size += len(message.data)
-        if len(self.messages) > MESSAGE_LIMIT or self.size > UNPACKED_LIMIT:
-            raise ContradictionError("it holds more than a log may")
+        if first.data != message.data:
+            raise ContradictionError(f"it has two different messages of time {message.log_time} ns")
 
     def contents(self) -> Contents:
         """Returns all of it, as a sound file would have it."""
@@ -111,13 +106,16 @@ class _Found:
 def _whole(data: bytes) -> Iterator[McapRecord]:
     """Yields what is whole; schemas and channels that no chunk vouches for come last."""
     bare: list[McapRecord] = []
+    work = _Work()
     offset = len(MAGIC)
     while offset < len(data):
         try:
             frame = next(frames(data, offset))
-            records = _vouched(frame)
+            records = _vouched(frame, work)
+        except ExcessError:
+            raise
         except FAILURES:
-            offset = _next_whole(data, offset + 1)
+            offset = _next_whole(data, offset + 1, work)
             continue
         if frame.opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             bare += records
@@ -127,15 +125,36 @@ def _whole(data: bytes) -> Iterator[McapRecord]:
     yield from bare
 
 
-def _vouched(frame: Frame) -> list[McapRecord]:
+class _Work:
+    """Counts what was tried, in vain or not: bytes can be such that every one begins a record."""
+
+    def __init__(self) -> None:
+        self.budget = Budget(passes=2)
+        self._tried = 0
+
+    def attempt(self, frame: Frame) -> None:
+        self.budget.frame(frame.opcode, len(frame.body))
+        self._tried += len(frame.body)
+        if self._tried > _MOST_TRIED:
+            raise ExcessError("too much of it looks like a log and is none")
+
+
+_MOST_TRIED = 4 * FILE_LIMIT
+_BEGINNING = re.compile(rb"[\x06\x09\x0c](?=.{3}[\x00-\x10]\x00{4})", re.DOTALL)
+"""How a chunk, an attachment or a record of ours begins: what it is, and a length that a file may
+have."""
+
+
+def _vouched(frame: Frame, work: _Work) -> list[McapRecord]:
     """The records of a frame that are what was written, as far as their checksums can say.
 
     Raises:
         Exception: One of ``FAILURES``: they are not.
     """
+    work.attempt(frame)
     record = parse(frame)
     if isinstance(record, Chunk):
-        return unpack(record)
+        return unpack(record, work.budget)
     if isinstance(record, Attachment) and not any(frame.body[-4:]):
         raise UncheckedError("an attachment has no checksum")
     if isinstance(record, Metadata):
@@ -146,13 +165,14 @@ def _vouched(frame: Frame) -> list[McapRecord]:
     return [record] if kept and record is not None else []
 
 
-def _next_whole(data: bytes, offset: int) -> int:
+def _next_whole(data: bytes, offset: int, work: _Work) -> int:
     """Where the next chunk, attachment or record of ours begins that is whole; or the end."""
-    for at in range(offset, len(data) - FRAME):
-        if data[at] in (Opcode.CHUNK, Opcode.ATTACHMENT, Opcode.METADATA):
-            try:
-                if _vouched(next(frames(data, at))):
-                    return at
-            except FAILURES:
-                continue
+    for match in _BEGINNING.finditer(data, offset):
+        try:
+            if _vouched(next(frames(data, match.start())), work):
+                return match.start()
+        except ExcessError:
+            raise
+        except FAILURES:
+            continue
     return len(data)

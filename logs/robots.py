@@ -1,13 +1,14 @@
 """The robot of a log, made from the log alone, whoever wrote it."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import mujoco
 
 from selfmodel.errors import InputError
 from selfmodel.logs.errors import SchemaMismatchError
 from selfmodel.logs.reader import TrialLog
-from selfmodel.logs.untrusted import checked_mjcf
+from selfmodel.logs.untrusted import checked_model
 from selfmodel.robot import Robot
 
 MOST_SUBSTEPS = 1000
@@ -27,17 +28,18 @@ def robot_of(log: TrialLog) -> Robot:
     """
     path = log.trial.path
     try:
-        mjcf = checked_mjcf(log.mjcf, log.assets)
-        robot = Robot(log.trial.robot, mjcf, log.control_timestep, log.assets)
-    except (ValueError, KeyError, mujoco.FatalError) as error:
+        checked = checked_model(log.mjcf, log.assets)
+        with _silent():
+            robot = Robot(log.trial.robot, checked.mjcf, log.control_timestep, checked.files)
+    except _FAILURES as error:
         raise SchemaMismatchError(
             path, f"its model cannot be loaded: {_line(error)}", good=GOOD
         ) from error
     if robot.substeps > MOST_SUBSTEPS:
         raise SchemaMismatchError(
             path,
-            f"its model takes {robot.substeps} physics steps for each of {log.control_timestep} s, "
-            f"expected at most {MOST_SUBSTEPS}",
+            f"its model takes {robot.substeps:.6g} physics steps for each of "
+            f"{log.control_timestep} s, expected at most {MOST_SUBSTEPS}",
             good=GOOD,
         )
     names = log.trial.behaviour.names
@@ -49,6 +51,28 @@ def robot_of(log: TrialLog) -> Robot:
             good=GOOD,
         )
     return robot
+
+
+_FAILURES = (
+    ValueError,
+    KeyError,  # a part without a name
+    OverflowError,  # more physics steps than there are numbers
+    MemoryError,
+    RuntimeError,  # "unknown exception": MuJoCo is out of memory
+    mujoco.FatalError,
+)
+"""Everything that MuJoCo and a robot's parts raise over a model that is none."""
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Keeps MuJoCo from writing its warnings to a file in the working folder."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda _: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
 
 
 def the_robot_of(logs: Sequence[TrialLog]) -> Robot:

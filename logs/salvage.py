@@ -8,7 +8,8 @@ import numpy as np
 
 from selfmodel.behaviour import forward_displacement
 from selfmodel.errors import InputError
-from selfmodel.logs.contents import MESSAGE_LIMIT, Contents, Messages
+from selfmodel.logs.budget import RECORD_LIMIT, UNPACKED_LIMIT
+from selfmodel.logs.contents import Contents, Messages
 from selfmodel.logs.errors import CorruptError, LogError, SchemaMismatchError
 from selfmodel.logs.files import explained, part_of, refuse_existing
 from selfmodel.logs.logfile import LogFile
@@ -129,7 +130,7 @@ def _complete(path: Path, contents: Contents, record: TrialRecord) -> tuple[tupl
         every = topics(read_names(path, contents), record.root)
     except SchemaMismatchError as error:
         raise _nothing(path) from error
-    if record.steps > MESSAGE_LIMIT // len(every):
+    if record.steps > RECORD_LIMIT // len(every):
         raise CorruptError(path, f"it claims {record.steps} steps, more than a log may have")
     whole = set(range(record.steps))
     for topic in every:
@@ -138,7 +139,11 @@ def _complete(path: Path, contents: Contents, record: TrialRecord) -> tuple[tupl
         whole = {k for k in whole if _time_of(k, record) in times}
     if not whole:
         raise _nothing(path)
-    return every, max(whole) + 1
+    steps = max(whole) + 1
+    # What is missing is filled in, and could be many times what is there.
+    if steps * sum(len(topic.template.payload) for topic in every) > UNPACKED_LIMIT:
+        raise CorruptError(path, f"{steps} steps of it have more bytes than a log may")
+    return every, steps
 
 
 def _nothing(path: Path) -> CorruptError:

@@ -22,6 +22,7 @@ from mcap.records import (
     Statistics,
 )
 
+from selfmodel.logs.budget import Budget
 from selfmodel.logs.framing import (
     MAGIC,
     ContradictionError,
@@ -45,15 +46,16 @@ def scan(data: bytes) -> Iterator[McapRecord]:
         Exception: One of ``selfmodel.logs.framing.FAILURES``: damage, as the library meets it.
     """
     _check_start(data)
-    tally = _Tally()
+    tally, budget = _Tally(), Budget()
     end = len(MAGIC)
     for frame in frames(data):
+        budget.frame(frame.opcode, len(frame.body))
         outer = parse(frame)
         if isinstance(outer, DataEnd):
             _check_data(data, frame, outer)
         elif isinstance(outer, Footer):
             _check_summary(data, frame, outer)
-        for record in _opened(outer):
+        for record in _opened(outer, budget):
             tally.add(record)
             yield record
         end = frame.end
@@ -78,11 +80,11 @@ def _check_end(data: bytes, end: int) -> None:
         raise ContradictionError("something follows its end")
 
 
-def _opened(record: McapRecord | None) -> list[McapRecord]:
+def _opened(record: McapRecord | None, budget: Budget) -> list[McapRecord]:
     """The record and, for a chunk, what is in it."""
     if record is None:
         return []
-    return [*unpack(record), record] if isinstance(record, Chunk) else [record]
+    return [*unpack(record, budget), record] if isinstance(record, Chunk) else [record]
 
 
 def _check_data(data: bytes, frame: Frame, end: DataEnd) -> None:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from selfmodel.logs.errors import SchemaMismatchError
 from selfmodel.logs.reader import TrialLog, read_log
-from selfmodel.logs.untrusted import checked_mjcf
+from selfmodel.logs.untrusted import checked_model
 
 
 def verify(path: Path) -> TrialLog:
@@ -18,7 +18,7 @@ def verify(path: Path) -> TrialLog:
     """
     log = read_log(path)
     try:
-        checked_mjcf(log.mjcf, log.assets)
+        checked_model(log.mjcf, log.assets)
     except ValueError as error:
         raise SchemaMismatchError(path, str(error), good="what was observed reads well") from error
     return log

@@ -39,6 +39,8 @@ class Robot:
 
     def __post_init__(self) -> None:
         model = mujoco.MjModel.from_xml_string(self.mjcf, dict(self.assets))
+        if not model.opt.timestep > 0:
+            raise ValueError(f"the physics time step must be above 0 s, got {model.opt.timestep}")
         object.__setattr__(self, "model", model)
         object.__setattr__(self, "anatomy", read_anatomy(model))
         object.__setattr__(self, "root", _root(model))

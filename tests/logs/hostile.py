@@ -1,0 +1,60 @@
+"""What the tests of hostile logs share: a child process whose memory and time are measured."""
+
+import multiprocessing
+import resource
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+
+from selfmodel.logs import LogError
+
+MEMORY = 3 * 2**30
+SECONDS = 5.0
+MEGABYTES = 1000
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a call in a child ended.
+
+    Attributes:
+        error: The sentence of its ``LogError``, or "".
+        seconds: How long it took.
+        megabytes: By how much the child's memory grew at most.
+    """
+
+    error: str
+    seconds: float
+    megabytes: float
+
+
+def outcome(call: Callable[[], object]) -> Outcome:
+    """Returns how a call ends in a child, which must be well, or with a ``LogError``."""
+    context = multiprocessing.get_context("fork")
+    receiver, sender = context.Pipe(duplex=False)
+    child = context.Process(target=_run, args=(call, sender))
+    child.start()
+    sender.close()
+    try:
+        assert receiver.poll(4 * SECONDS), "it takes for ever"
+        found: Outcome = receiver.recv()
+    finally:
+        child.kill()
+        child.join()
+    assert found.seconds < SECONDS, found
+    assert found.megabytes < MEGABYTES, found
+    return found
+
+
+def _run(call: Callable[[], object], sender: Connection) -> None:
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    start, error = time.perf_counter(), ""
+    try:
+        call()
+    except LogError as failure:
+        error = str(failure)
+    seconds = time.perf_counter() - start
+    grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+    sender.send(Outcome(error, seconds, grown / 1000))

@@ -1,0 +1,266 @@
+import dataclasses
+import struct
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from selfmodel.logs import LogError, read_log
+from selfmodel.logs.reader import TrialLog
+from selfmodel.logs.robots import robot_of
+from selfmodel.logs.untrusted import LARGEST_FILES, checked_model
+from tests.logs.conftest import MJCF
+from tests.logs.hostile import outcome
+
+TASKS = Path(__file__).parents[2] / "tasks"
+
+
+@pytest.fixture
+def trial(log: Path) -> TrialLog:
+    return read_log(log)
+
+
+def attacked(trial: TrialLog, mjcf: str, files: Mapping[str, bytes] | None = None) -> TrialLog:
+    return dataclasses.replace(trial, mjcf=mjcf, assets=files or {})
+
+
+def top(text: str) -> str:
+    """The biped's model with something before its bodies."""
+    return MJCF.replace("<worldbody>", f"{text}<worldbody>", 1)
+
+
+def within(end: str, text: str) -> str:
+    """The biped's model with something at the end of an element."""
+    return MJCF.replace(end, f"{text}{end}", 1)
+
+
+def asset(text: str) -> str:
+    return top(f"<asset>{text}</asset>")
+
+
+def mesh(file: str, more: str = "") -> str:
+    model = asset(f'<mesh name="m" file="{file}" {more}/>')
+    return model.replace("<worldbody>", '<worldbody><geom type="mesh" mesh="m"/>')
+
+
+def stl(faces: int) -> bytes:
+    """Triangles whose corners all lie on a sphere, so that each is a corner of the hull."""
+    corners = np.random.default_rng(0).normal(size=(faces, 3, 3))
+    corners /= np.linalg.norm(corners, axis=-1, keepdims=True)
+    rows = np.zeros(faces, dtype=[("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")])
+    rows["v"] = corners
+    return bytes(80) + struct.pack("<I", faces) + rows.tobytes()
+
+
+def png(width: int, height: int, pixels: bytes | None = None, texts: int = 0) -> bytes:
+    raw = bytes((3 * width + 1) * height) if pixels is None else pixels
+    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    chunks = [(b"IHDR", header), *[(b"zTXt", b"k\0\0" + zlib.compress(b"t"))] * texts]
+    chunks += [(b"IDAT", zlib.compress(raw)), (b"IEND", b"")]
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+        for kind, body in chunks
+    )
+
+
+OBJ = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
+
+@pytest.mark.parametrize("name", ["quadruped", "hexapod"])
+def test_a_checked_model_compiles_to_the_same_bytes(name: str, tmp_path: Path):
+    text = (TASKS / f"{name}.xml").read_text()
+    compiled = []
+    for version, mjcf in enumerate((text, checked_model(text, {}).mjcf)):
+        path = tmp_path / f"{version}.mjb"
+        mujoco.mj_saveModel(mujoco.MjModel.from_xml_string(mjcf), str(path))
+        compiled.append(path.read_bytes())
+    assert compiled[0] == compiled[1]
+
+
+@pytest.mark.parametrize(
+    ("mjcf", "files"),
+    [
+        (mesh("m.stl"), {"m.stl": stl(50)}),
+        (mesh("m.STL"), {"m.STL": stl(50)}),
+        (mesh("m.obj"), {"m.obj": OBJ}),
+        (asset('<texture name="t" type="2d" file="t.png"/>'), {"t.png": png(8, 8)}),
+        (asset('<hfield name="h" size="1 1 1 1" file="h.png"/>'), {"h.png": png(8, 8)}),
+        (asset('<texture name="t" builtin="gradient" width="512" height="3072"/>'), {}),
+        (mesh("m.stl"), {"m.stl": stl(50), "../../etc/passwd": b"", "a\0b": b"", "\x1b[2J": b""}),
+    ],
+)
+def test_what_is_attached_and_small_loads(trial: TrialLog, mjcf: str, files: dict[str, bytes]):
+    robot = robot_of(attacked(trial, mjcf, files))
+    assert set(robot.assets) <= {"m.stl", "m.STL", "m.obj", "t.png", "h.png"}
+
+
+FILES = ("/etc/passwd", "../m.stl", "sub/m.stl", "file:///m.stl", "%2e%2e/m.stl", "M.STL", " m.stl")
+
+
+@pytest.mark.parametrize(
+    "file", [*FILES, "m.stl\n", "m.stl&#10;", "~/m.stl", "C:\\m.stl", ".m.stl"]
+)
+@pytest.mark.parametrize(
+    "element",
+    [
+        '<mesh name="m" file="{}"/>',
+        '<texture name="t" type="2d" file="{}"/>',
+        '<texture name="t" type="cube" fileright="{}"/>',
+        '<hfield name="h" size="1 1 1 1" file="{}"/>',
+        '<skin name="s" file="{}"/>',
+    ],
+)
+def test_no_file_is_read_but_those_attached(trial: TrialLog, element: str, file: str):
+    hostile = attacked(trial, asset(element.format(file)), {"m.stl": stl(50), ".m.stl": b""})
+    with pytest.raises(LogError, match=r"names the file '.*', which is not attached"):
+        robot_of(hostile)
+
+
+@pytest.mark.parametrize(
+    ("mjcf", "match"),
+    [
+        (top('<include file="/etc/passwd"/>'), r"has <include> \('/etc/passwd'\), which reads"),
+        (asset('<model name="a" file="/etc/passwd"/>'), r"<model> \('/etc/passwd'\)"),
+        (within("</worldbody>", '<attach model="a"/>'), "has <attach>, which reads another"),
+        (top('<extension><plugin plugin="a.b"/></extension>'), "has <extension>, which runs"),
+        (within("</sensor>", '<plugin plugin="a.b"/>'), r"has <plugin> \('a\.b'\), which runs"),
+        (within("</worldbody>", '<replicate count="9"/>'), "has <replicate>, which makes any"),
+        (within("</worldbody>", '<composite type="cable"/>'), "has <composite>, which makes"),
+        (within("</worldbody>", '<flexcomp name="f"/>'), r"has <flexcomp> \('f'\), which makes"),
+        (within("</actuator>", '<muscle joint="left_hip_x"/>'), "has <muscle>, which is simul"),
+        (within("</actuator>", '<general gaintype="muscle"/>'), "is simulated, for any time"),
+        (top('<compiler><lengthrange mode="all"/></compiler>'), "has <lengthrange>, which has"),
+        ('<robot name="r"><link name="a"/></robot>', "expected a model in <mujoco>, got <robot>"),
+        ("<!DOCTYPE mujoco><mujoco/>", "has a <!DOCTYPE>"),
+        ('<!DOCTYPE m SYSTEM "file:///etc/passwd"><mujoco/>', "has a <!DOCTYPE>"),
+        ('<!DOCTYPE m [<!ENTITY a "b"><!ENTITY c "&a;&a;">]><mujoco/>', "has a <!DOCTYPE>"),
+        ("<mujoco>&file;</mujoco>", "not XML: undefined entity"),
+        ('<m:mujoco xmlns:m="x"/>', "expected a model in <mujoco>"),
+        ("", "not XML"),
+        ("\0", "not XML"),
+        (top("<body>" * 250 + "</body>" * 250), "200 within each other"),
+        (top("<body/>" * 20_001), "more than 20000 elements"),
+        (top("<!--" + "x" * 2**21 + "-->"), "characters, more than 2097152"),
+        (within("</worldbody>", "<body><joint/></body>" * 1001), "more than 1000 of <joint>"),
+        (within("</actuator>", '<motor joint="j"/>' * 1001), "more than 1000 of <actuator>"),
+        (top("<keyframe>" + "<key/>" * 101 + "</keyframe>"), "more than 100 of <key>"),
+        (top('<size nkey="1000000"/>'), "asks for nkey='1000000', expected at most 100"),
+        (top('<size nuser_geom="101"/>'), "asks for nuser_geom='101'"),
+        (top('<size nuserdata="0x7fffffff"/>'), "nuserdata='0x7fffffff', expected a number"),
+        (top('<size nconmax="nan"/>'), "asks for nconmax='nan'"),
+        (top('<size memory="99999999K"/>'), "'99999999K' of memory, expected less than 100 MB"),
+        (top('<size memory="1G"/>'), "'1G' of memory"),
+        (top(f'<custom><numeric name="n" size="{10**9}"/></custom>'), "<numeric> asks for size"),
+        (MJCF.replace("<geom type", f'<geom user="{"0 " * 101}" type'), "more than 100 numbers"),
+        (asset('<texture builtin="flat" width="4096" height="4096"/>'), "more than 8388608 pix"),
+        (asset('<texture builtin="flat" width="1900"/>'), "more than 8388608 pixels"),
+        (asset('<texture width="1000" height="1000"/>' * 9), "more than 8388608 pixels"),
+        (top('<default><texture width="9"/></default>'), "<default> gives <texture> the size wid"),
+        (asset('<hfield name="h" nrow="4096" ncol="4096"/>'), "more than 8388608 pixels"),
+        (asset('<hfield name="h" nrow="99999" ncol="1"/>'), "<hfield> asks for nrow='99999'"),
+        (asset('<mesh builtin="cone" params="1e6 1"/>'), "made of any number of points"),
+        (asset('<mesh name="m" file="m.stl" content_type="application/zip"/>'), "content type"),
+        (within("</sensor>", '<user dim="10000"/>' * 900), "more than 8388608"),
+        (within("</sensor>", '<contact num="10000" nsample="9"/>'), "more than 8388608"),
+        (within("</sensor>", '<rangefinder camera="c"/>'), "reads every pixel of a camera"),
+        (within("</actuator>", f'<general actdim="{10**9}"/>'), "asks for actdim"),
+        (MJCF.replace("<option ", '<option iterations="10001" '), "asks for iterations='10001'"),
+        (MJCF.replace('timestep="0.005"', 'timestep="0"'), "must be above 0 s"),
+        (MJCF.replace('timestep="0.005"', 'timestep="nan"'), "must be above 0 s"),
+        (MJCF.replace('timestep="0.005"', 'timestep="1e-10"'), "takes 1e.08 physics steps"),
+        (MJCF.replace('<freejoint name="root"/>', ""), "needs a root body with a free joint"),
+        (MJCF.replace('name="torso"', 'name="' + "t" * 10**6 + '"'), "is of a robot with"),
+        (MJCF.replace("<geom type", '<geom mass="0" type'), "must be larger than mjMINVAL"),
+        (
+            mesh("m.stl")
+            .replace("<compiler", "<")
+            .replace("<asset", '<compiler meshdir="/etc"/><asset'),
+            "in the folder '/etc'",
+        ),
+    ],
+)
+def test_what_a_model_in_a_log_may_not_ask_for_is_refused_by_name(
+    trial: TrialLog, mjcf: str, match: str
+):
+    with pytest.raises(LogError, match=match) as caught:
+        robot_of(attacked(trial, mjcf, {"m.stl": stl(50)}))
+    assert len(str(caught.value)) < 4000
+
+
+@pytest.mark.parametrize(
+    ("file", "data", "match"),
+    [
+        ("m.stl", b"", "is empty"),
+        ("m.stl", stl(50)[:-7], "wrong size"),
+        ("m.stl", bytes(80) + b"\xff" * 204, "number of faces"),
+        ("m.stl", bytes(80) + struct.pack("<I", 4) + b"\xff" * 200, "not finite"),
+        ("m.obj", OBJ + b"f 1 2 9999999\n", "does not exist"),
+        ("m.obj", OBJ + b"f -1 -2 -9999\n", "could not parse"),
+        ("m.msh", struct.pack("<4i", -1, -1, -1, -1), "invalid sizes"),
+        ("m.msh", struct.pack("<4i", 2**30, 0, 0, 2**30), "too large sizes"),
+        ("m.zip", b"PK", r"a model in a log may name \.stl"),
+        ("m.mjz", b"PK", r"a model in a log may name \.stl"),
+        ("m.xml", b"<mujoco/>", r"a model in a log may name \.stl"),
+    ],
+)
+def test_a_damaged_or_unknown_mesh_is_refused(trial: TrialLog, file: str, data: bytes, match: str):
+    with pytest.raises(LogError, match=match):
+        robot_of(attacked(trial, mesh(file), {file: data}))
+
+
+@pytest.mark.parametrize(
+    ("data", "match"),
+    [
+        (b"no picture", "is no PNG"),
+        (b"\x89PNG\r\n\x1a\n", "its header is missing"),
+        (png(8, 8, b"x"), "cannot be loaded"),
+        (png(8, 8)[:-20], "cannot be loaded"),
+        (png(8, 8).replace(b"IDAT", b"IDOT"), "cannot be loaded"),
+        (png(10_000, 10_000, b""), "more than 8388608 pixels"),
+        (png(2**31 - 1, 2**31 - 1, b""), "more than 8388608 pixels"),
+        (png(8, 8, bytes(10**8)), "unpacks to more than its size"),
+        (png(8, 8, texts=5), "more than 4 packed texts"),
+    ],
+)
+def test_a_picture_that_is_damaged_or_a_bomb_is_refused(trial: TrialLog, data: bytes, match: str):
+    mjcf = asset('<texture name="t" type="2d" file="t.png"/>')
+    with pytest.raises(LogError, match=match):
+        robot_of(attacked(trial, mjcf, {"t.png": data}))
+
+
+def test_a_file_counts_as_often_as_it_is_named(trial: TrialLog):
+    data = stl(2000)
+    mjcf = asset("".join(f'<mesh name="m{k}" file="m.stl"/>' for k in range(50)))
+    with pytest.raises(LogError, match=f"more than {LARGEST_FILES} bytes"):
+        robot_of(attacked(trial, mjcf, {"m.stl": data}))
+
+
+@pytest.mark.parametrize(
+    ("mjcf", "files"),
+    [
+        (mesh("m.stl"), {"m.stl": stl(40_000)}),
+        (asset('<texture builtin="flat" width="1180" height="7080"/>'), {}),
+        (asset('<hfield name="h" nrow="2896" ncol="2896" size="1 1 1 1"/>'), {}),
+        (within("</sensor>", '<user dim="10000"/>' * 838), {}),
+        (within("</worldbody>", '<body><geom size="1"/></body>' * 9000), {}),
+        (within("</worldbody>", "<body><freejoint/><geom size='1'/></body>" * 990), {}),
+    ],
+)
+def test_the_largest_that_is_allowed_takes_little(
+    trial: TrialLog, mjcf: str, files: dict[str, bytes]
+):
+    outcome(lambda: robot_of(attacked(trial, mjcf, files)))
+
+
+def test_a_model_that_fails_leaves_no_file(
+    trial: TrialLog, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    folder = tmp_path / "empty"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    for mjcf in (mesh("m.stl"), MJCF.replace('pos="0 0 0.6"', 'pos="0 0 nan"')):
+        outcome(lambda mjcf=mjcf: robot_of(attacked(trial, mjcf, {"m.stl": b"x" * 99})))
+    assert list(folder.iterdir()) == []
