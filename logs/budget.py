@@ -24,14 +24,9 @@ class ExcessError(ValueError):
 
 
 class Budget:
-    """Counts what one file has asked for.
+    """Counts what one file has asked for."""
 
-    Args:
-        passes: How often one thing may be counted: a search for what is whole tries all twice.
-    """
-
-    def __init__(self, passes: int = 1) -> None:
-        self._passes = passes
+    def __init__(self) -> None:
         self._frames = self._records = self._unpacked = self._attached = self._other = 0
 
     def frame(self, opcode: int, size: int) -> None:
@@ -41,15 +36,15 @@ class Budget:
             ExcessError: It is one too many.
         """
         self._frames += 1
-        if self._frames > FRAME_LIMIT * self._passes:
+        if self._frames > FRAME_LIMIT:
             raise ExcessError(f"it holds more than a log may: {FRAME_LIMIT} records and chunks")
         if opcode == Opcode.ATTACHMENT:
             self._attached += size
         elif opcode not in (Opcode.CHUNK, Opcode.MESSAGE):
             self._other += size
-        if self._attached > ATTACHED_LIMIT * self._passes:
+        if self._attached > ATTACHED_LIMIT:
             raise ExcessError(f"it holds more than a log may: {ATTACHED_LIMIT} bytes attached")
-        if self._other > OTHER_LIMIT * self._passes:
+        if self._other > OTHER_LIMIT:
             raise ExcessError(
                 f"it holds more than a log may: {OTHER_LIMIT} bytes beside its messages and "
                 f"attachments"
@@ -62,7 +57,7 @@ class Budget:
             ExcessError: It is one too many.
         """
         self._unpacked += size
-        if self._unpacked > UNPACKED_LIMIT * self._passes:
+        if self._unpacked > UNPACKED_LIMIT:
             raise ExcessError(f"it holds more than a log may: {UNPACKED_LIMIT} bytes, unpacked")
 
     def record(self, opcode: int, size: int) -> None:
@@ -72,7 +67,7 @@ class Budget:
             ExcessError: It is one too many.
         """
         self._records += 1
-        if self._records > RECORD_LIMIT * self._passes:
+        if self._records > RECORD_LIMIT:
             raise ExcessError(f"it holds more than a log may: {RECORD_LIMIT} messages")
         if opcode != Opcode.MESSAGE:
             self.frame(opcode, size)

@@ -129,7 +129,7 @@ class _Work:
     """Counts what was tried, in vain or not: bytes can be such that every one begins a record."""
 
     def __init__(self) -> None:
-        self.budget = Budget(passes=2)
+        self.budget = Budget()
         self._tried = 0
 
     def attempt(self, frame: Frame) -> None:
