@@ -32,7 +32,7 @@ from selfmodel.logs.records import OWN, without_digest
 from selfmodel.logs.scan import scan
 
 FILE_LIMIT = 128 * 2**20
-"""Bytes that a log may have: ten seconds of a quadruped take 0.65 MB."""
+"""Bytes that a log may have: ten seconds of a quadruped take 0.52 MB."""
 
 _Item = TypeVar("_Item")
 
