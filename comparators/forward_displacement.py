@@ -34,7 +34,7 @@ class ForwardDisplacement:
         if not np.isfinite(trial.displacement):
             raise InputError(
                 f"{trial.path}: {self.name} needs base_position at the first and the last step, "
-                f"and the log does not have it: choose a comparator that does without"
+                f"and the log does not have it: leave this log out, or give another comparator"
             )
         return ClosedLoop(record=("base_position",))
 

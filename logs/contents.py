@@ -9,7 +9,6 @@ from typing import TypeVar
 from mcap.exceptions import EndOfFile, InvalidMagic
 from mcap.records import Attachment, Channel, Header, McapRecord, Message, Metadata, Schema
 
-from selfmodel.errors import InputError
 from selfmodel.logs.budget import ExcessError
 from selfmodel.logs.errors import (
     ANOTHER,
@@ -21,6 +20,7 @@ from selfmodel.logs.errors import (
     UnsupportedError,
     salvage_it,
 )
+from selfmodel.logs.files import check_regular, read_bounded
 from selfmodel.logs.framing import (
     FAILURES,
     MAGIC,
@@ -106,18 +106,12 @@ def read_bytes(path: Path) -> bytes:
         LogError: It is too large for a log.
         InputError: There is no such file, or it cannot be opened.
     """
-    try:
-        with path.open("rb") as file:
-            data = file.read(FILE_LIMIT + 1)
-    except OSError as failure:
-        raise InputError(
-            f"{path}: expected a log file that can be read, got: {failure.strerror}"
-        ) from failure
-    if len(data) > FILE_LIMIT:
+    check_regular(path, "a log file")
+    if path.stat().st_size > FILE_LIMIT:
         raise UnsupportedError(
             path, f"expected at most {FILE_LIMIT} bytes, got more", advice=ANOTHER
         )
-    return data
+    return read_bounded(path, "a log file", FILE_LIMIT)
 
 
 def put(items: dict[str, _Item], name: str, item: _Item) -> None:

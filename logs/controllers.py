@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from selfmodel.controller import Controller, Network
 from selfmodel.errors import InputError
 from selfmodel.logs.errors import LogWriteError
+from selfmodel.logs.files import read_bounded
 
 LARGEST = 2**20
 """Bytes that a controller may have: the paper's have under 3,000."""
@@ -48,14 +49,7 @@ def load_controller(path: Path) -> Controller:
     Raises:
         InputError: There is none; the message names the file.
     """
-    try:
-        with path.open("rb") as file:
-            data = file.read(LARGEST + 1)
-    except OSError as error:
-        raise InputError(
-            f"{path}: expected a controller file that can be read, got: {error.strerror}"
-        ) from error
-    return parse_controller(data, str(path))
+    return parse_controller(read_bounded(path, "a controller file", LARGEST), str(path))
 
 
 def controller_bytes(controller: Controller) -> bytes:

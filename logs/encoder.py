@@ -15,11 +15,8 @@ from selfmodel.logs.frames import (
     parent_names,
     to_micrometres,
 )
-from selfmodel.logs.topics import Part, topics, transforms
+from selfmodel.logs.topics import Part, frames_stride, topics, transforms
 from selfmodel.robot import Robot
-
-FRAMES_PERIOD = 0.05
-"""Seconds between two messages on ``/tf``: it is for eyes, and would be a fifth of a log."""
 
 
 class Encoder:
@@ -37,7 +34,7 @@ class Encoder:
         self.topics = (*topics(robot.anatomy.names, robot.root), frames)
         self._timestep = robot.control_timestep
         self._kinematics = Kinematics(robot)
-        self._stride = max(1, round(FRAMES_PERIOD / robot.control_timestep))
+        self._stride = frames_stride(robot.control_timestep)
 
     def encode(
         self, first: int, rows: Mapping[Signal, FloatArray]

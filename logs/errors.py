@@ -1,6 +1,7 @@
 """What can be wrong with a log: one small family, each sentence with the file and the way out."""
 
 import errno
+import shlex
 from os import PathLike
 
 from selfmodel.errors import WorkError
@@ -16,7 +17,8 @@ _LONGEST = 2000
 
 def salvage_it(path: str | PathLike[str]) -> str:
     """Returns the advice to save what is complete, as a command that can be pasted."""
-    return f"save what is complete with `selfmodel logs salvage {path} -o NEW.mcap`"
+    name = shlex.quote(str(path))
+    return f"save what is complete with `selfmodel logs salvage {name} -o NEW.mcap`"
 
 
 class LogError(WorkError):
@@ -77,6 +79,7 @@ class LogWriteError(OSError):
     """
 
     def __init__(self, path: str | PathLike[str], cause: OSError) -> None:
+        self.reason = cause.strerror or str(cause)
         super().__init__(f"{path}: {_reason(cause)}; what was written before stays in that file")
         self.errno = cause.errno
         self.filename = str(path)

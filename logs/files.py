@@ -2,6 +2,7 @@
 
 import errno
 import os
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,6 +10,49 @@ from typing import IO
 
 from selfmodel.errors import InputError
 from selfmodel.logs.errors import LogWriteError
+
+
+def read_bounded(path: Path, what: str, limit: int) -> bytes:
+    """Returns all of a file that somebody named.
+
+    Args:
+        path: The file.
+        what: What it should be, such as "a trial log".
+        limit: Bytes that such a file may have.
+
+    Raises:
+        InputError: There is none, it cannot be read, is no file but a pipe, a device or a folder,
+            or is larger.
+    """
+    check_regular(path, what)
+    try:
+        with path.open("rb") as file:
+            data = file.read(limit + 1)
+    except OSError as error:
+        raise InputError(
+            f"{path}: expected {what} that can be read, got: {error.strerror}"
+        ) from error
+    if len(data) > limit:
+        raise InputError(f"{path}: expected {what} of at most {limit} bytes, got more")
+    return data
+
+
+def check_regular(path: Path, what: str) -> None:
+    """Checks that a name is that of a file: a pipe would be waited for, a device never ends.
+
+    Raises:
+        InputError: It is not.
+    """
+    try:
+        mode = path.stat().st_mode
+    except OSError as error:
+        raise InputError(
+            f"{path}: expected {what} that can be read, got: {error.strerror}"
+        ) from error
+    if stat.S_ISDIR(mode):
+        raise InputError(f"{path}: expected {what} that can be read, got: Is a directory")
+    if not stat.S_ISREG(mode):
+        raise InputError(f"{path}: expected {what}, got a pipe or a device: give a file")
 
 
 def part_of(path: Path) -> Path:

@@ -41,8 +41,11 @@ from selfmodel.logs.records import (
     sha256,
     trial_record,
 )
+from selfmodel.logs.records import (
+    IMPORT as IMPORT_RECORD,
+)
 from selfmodel.logs.signals import read_behaviour
-from selfmodel.playback import Playback
+from selfmodel.playback import played_back
 from selfmodel.settings import Settings
 from selfmodel.trial import Plan, Trial
 
@@ -61,6 +64,7 @@ class TrialLog:
         settings: The paper's numbers, as they were.
         software: Versions, by the name of what they are of.
         status: ``finished``, or ``interrupted`` where the steps that were salvaged are all.
+        imported: Whether it is a recording that was resampled, and rounded by that.
     """
 
     trial: Trial
@@ -71,6 +75,7 @@ class TrialLog:
     settings: Settings
     software: Mapping[str, str]
     status: str
+    imported: bool
 
 
 def read_log(path: str | Path) -> TrialLog:
@@ -132,6 +137,7 @@ def interpret(path: Path, contents: Contents) -> TrialLog:
         settings=settings,
         software=MappingProxyType(dict(contents.metadata.get(SOFTWARE, {}))),
         status=result.status,
+        imported=IMPORT_RECORD in contents.metadata,
     )
 
 
@@ -243,7 +249,7 @@ def _result(path: Path, contents: Contents, record: TrialRecord) -> Result:
 
 def _playback(path: Path, behaviour: Behaviour) -> Driver:
     try:
-        return Playback(behaviour.names.motors, behaviour["commands"])
+        return played_back(behaviour.names.motors, behaviour["commands"])
     except ValueError as error:
         raise SchemaMismatchError(
             path, f"it has no controller, and cannot be played back: {error}"

@@ -48,8 +48,6 @@ TRUTH = "truth"
 FINISHED = "finished"
 INTERRUPTED = "interrupted"
 
-LARGEST_SETTING = 10**6
-"""A setting of a log that is larger would fill the memory, or take for ever."""
 
 SHORTEST, LONGEST = 1e-9, 3600.0
 """Seconds that a control step may take: a log's clock ticks in nanoseconds, and ends."""
@@ -201,8 +199,6 @@ def parse_settings(data: bytes) -> Settings:
             raise ValueError(f"there is no setting {name!r}")
         if type(value) not in (int, type(defaults[name])):
             raise TypeError(f"{name} must be a number such as {defaults[name]}, got {value!r}")
-        if value > LARGEST_SETTING:
-            raise ValueError(f"{name} must be at most {LARGEST_SETTING}, got {value}")
     return Settings(**values)
 
 

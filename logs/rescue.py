@@ -115,14 +115,19 @@ def _whole(data: bytes) -> Iterator[McapRecord]:
         except ExcessError:
             raise
         except FAILURES:
-            offset = _next_whole(data, offset + 1, work)
+            offset = _next_whole(data, offset + 1, work, len(data))
             continue
-        if frame.opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-            bare += records
-        else:
+        if frame.opcode in _VOUCHED and records:
             yield from records
-        offset = frame.end
+            offset = frame.end
+        else:
+            bare += records
+            # Nothing vouches for its length: it may have swallowed what is whole.
+            offset = _next_whole(data, frame.offset + 1, work, frame.end)
     yield from bare
+
+
+_VOUCHED = (Opcode.CHUNK, Opcode.ATTACHMENT, Opcode.METADATA)
 
 
 class _Work:
@@ -165,9 +170,9 @@ def _vouched(frame: Frame, work: _Work) -> list[McapRecord]:
     return [record] if kept and record is not None else []
 
 
-def _next_whole(data: bytes, offset: int, work: _Work) -> int:
-    """Where the next chunk, attachment or record of ours begins that is whole; or the end."""
-    for match in _BEGINNING.finditer(data, offset):
+def _next_whole(data: bytes, offset: int, work: _Work, end: int) -> int:
+    """Where the next chunk, attachment or record of ours begins that is whole; or ``end``."""
+    for match in _BEGINNING.finditer(data, offset, end):
         try:
             if _vouched(next(frames(data, match.start())), work):
                 return match.start()
@@ -175,4 +180,4 @@ def _next_whole(data: bytes, offset: int, work: _Work) -> int:
             raise
         except FAILURES:
             continue
-    return len(data)
+    return end

@@ -5,6 +5,7 @@ from contextlib import contextmanager
 
 import mujoco
 
+from selfmodel.behaviour import Names
 from selfmodel.errors import InputError
 from selfmodel.logs.errors import SchemaMismatchError
 from selfmodel.logs.reader import TrialLog
@@ -44,10 +45,11 @@ def robot_of(log: TrialLog) -> Robot:
         )
     names = log.trial.behaviour.names
     if (robot.anatomy.names, robot.root) != (names, log.root):
+        what = described_difference(robot.anatomy.names, names)
         raise SchemaMismatchError(
             path,
-            f"its model is of a robot with {robot.anatomy.names} and the base {robot.root!r}, its "
-            f"messages are of one with {names} and {log.root!r}",
+            f"its model is of another robot than its messages: {what}; the base is {robot.root!r} "
+            f"in the one and {log.root!r} in the others",
             good=GOOD,
         )
     return robot
@@ -73,6 +75,20 @@ def _silent() -> Iterator[None]:
         yield
     finally:
         mujoco.set_mju_user_warning(before)
+
+
+def described_difference(names: Names, logged: Names) -> str:
+    """Returns in what a robot differs from that of a log, in words."""
+    told = []
+    for what in ("sensors", "motors", "hinges"):
+        mine, theirs = getattr(names, what), getattr(logged, what)
+        if mine != theirs:
+            lacks = [name for name in theirs if name not in mine]
+            told.append(
+                f"it has {len(mine)} {what}, the log {len(theirs)}"
+                + (f", of which it lacks {', '.join(lacks[:3])}" if lacks else " or in other order")
+            )
+    return "; ".join(told) or "their parts are called alike"
 
 
 def the_robot_of(logs: Sequence[TrialLog]) -> Robot:

@@ -28,7 +28,7 @@ from selfmodel.logs.records import (
 )
 from selfmodel.logs.rescue import rescue
 from selfmodel.logs.signals import read_behaviour, read_names
-from selfmodel.logs.topics import DESCRIPTION, TRANSFORMS, Topic, topics
+from selfmodel.logs.topics import DESCRIPTION, TRANSFORMS, Topic, frames_stride, topics
 from selfmodel.settings import Settings
 
 
@@ -38,16 +38,18 @@ class Salvaged:
 
     Attributes:
         log: The new file.
-        steps: How many steps it has, from the first to the last of which everything is known.
+        steps: How many steps are complete.
+        span: How many steps it has, from the first to the last that is complete.
         planned: How many the trial was to last.
         missing: For each topic, how many messages of those steps are lost; they are NaN, which
-            means not observed.
-        lost: Attachments that are lost. Without the controller, the commands are played back;
-            without the settings, those of the paper stand in their place.
+            means not observed, and on ``/tf`` they are not there.
+        lost: What else is lost. Without the controller, the commands are played back; without the
+            settings, those of the paper stand in their place.
     """
 
     log: str
     steps: int
+    span: int
     planned: int
     missing: dict[str, int]
     lost: tuple[str, ...]
@@ -67,21 +69,9 @@ def salvage(path: Path, out: Path) -> Salvaged:
     """
     refuse_existing(out)
     _refuse_sound(path)
-    contents = rescue(path)
-    record, lost = _with_what_is_left(path, contents)
-    controller = read_controller(path, contents, record)
-    every, steps = _complete(path, contents, record)
-    missing = {topic.name: _fill(contents, topic, steps, record) for topic in every}
-    _cut(contents, {topic.name for topic in every}, _time_of(steps, record))
-    behaviour = read_behaviour(path, contents, record, steps, controller)
-    result = Result(INTERRUPTED, steps, float(forward_displacement(behaviour)))
-    contents.metadata[RESULT] = result.texts()
-    contents.metadata[SALVAGE] = {"source": path.name, "steps": str(steps)}
-    interpret(path, contents)  # nothing is written that could not be read
+    contents, saved = _saved(path)
     _write(out, contents)
-    return Salvaged(
-        str(out), steps, record.steps, {name: n for name, n in missing.items() if n}, lost
-    )
+    return dataclasses.replace(saved, log=str(out))
 
 
 def salvageable_steps(path: Path) -> int:
@@ -91,11 +81,28 @@ def salvageable_steps(path: Path) -> int:
         InputError: There is no such file.
     """
     try:
-        contents = rescue(path)
-        record, _ = _with_what_is_left(path, contents)
-        return _complete(path, contents, record)[1]
+        return _saved(path)[1].steps
     except LogError:
         return 0
+
+
+def _saved(path: Path) -> tuple[Contents, Salvaged]:
+    """What the new log would hold; nothing is written that could not be read."""
+    contents = rescue(path)
+    record, lost = _with_what_is_left(path, contents)
+    controller = read_controller(path, contents, record)
+    every, whole = _complete(path, contents, record)
+    span = max(whole) + 1
+    missing = {topic.name: _fill(contents, topic, span, record) for topic in every}
+    _cut(contents, {topic.name for topic in every}, _time_of(span, record))
+    missing[TRANSFORMS] = _missing_frames(contents, span, record)
+    behaviour = read_behaviour(path, contents, record, span, controller)
+    result = Result(INTERRUPTED, span, float(forward_displacement(behaviour)))
+    contents.metadata[RESULT] = result.texts()
+    contents.metadata[SALVAGE] = {"source": path.name, "complete_steps": str(len(whole))}
+    interpret(path, contents)
+    told = {name: count for name, count in missing.items() if count}
+    return contents, Salvaged("", len(whole), span, record.steps, told, lost)
 
 
 def _refuse_sound(path: Path) -> None:
@@ -121,11 +128,15 @@ def _with_what_is_left(path: Path, contents: Contents) -> tuple[TrialRecord, tup
     if SETTINGS_FILE not in contents.attachments:
         contents.attachments[SETTINGS_FILE] = settings_json(Settings())
         lost.append(SETTINGS_FILE)
+    if DESCRIPTION not in contents.topics or not contents.topics[DESCRIPTION].payloads:
+        lost.append(DESCRIPTION)
     return record, tuple(lost)
 
 
-def _complete(path: Path, contents: Contents, record: TrialRecord) -> tuple[tuple[Topic, ...], int]:
-    """The topics, and how many steps there are up to the last that all of them tell of."""
+def _complete(
+    path: Path, contents: Contents, record: TrialRecord
+) -> tuple[tuple[Topic, ...], set[int]]:
+    """The topics, and the steps that all of them tell of."""
     try:
         every = topics(read_names(path, contents), record.root)
     except SchemaMismatchError as error:
@@ -139,11 +150,11 @@ def _complete(path: Path, contents: Contents, record: TrialRecord) -> tuple[tupl
         whole = {k for k in whole if _time_of(k, record) in times}
     if not whole:
         raise _nothing(path)
-    steps = max(whole) + 1
+    span = max(whole) + 1
     # What is missing is filled in, and could be many times what is there.
-    if steps * sum(len(topic.template.payload) for topic in every) > UNPACKED_LIMIT:
-        raise CorruptError(path, f"{steps} steps of it have more bytes than a log may")
-    return every, steps
+    if span * sum(len(topic.template.payload) for topic in every) > UNPACKED_LIMIT:
+        raise CorruptError(path, f"{span} steps of it have more bytes than a log may")
+    return every, whole
 
 
 def _nothing(path: Path) -> CorruptError:
@@ -174,6 +185,13 @@ def _cut(contents: Contents, names: set[str], end: int) -> None:
         kept = [k for k, (log, _) in enumerate(messages.times) if log < end]
         messages.payloads = [messages.payloads[k] for k in kept]
         messages.times = [messages.times[k] for k in kept]
+
+
+def _missing_frames(contents: Contents, span: int, record: TrialRecord) -> int:
+    """How many messages on ``/tf`` there should be more than there are."""
+    stride = frames_stride(record.control_timestep)
+    held = contents.topics.get(TRANSFORMS)
+    return len(range(0, span, stride)) - (len(held.payloads) if held else 0)
 
 
 def _time_of(step: int, record: TrialRecord) -> int:

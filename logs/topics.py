@@ -16,6 +16,9 @@ DESCRIPTION = "/robot_description"
 TRANSFORMS = "/tf"
 DESCRIPTION_TYPE = "std_msgs/msg/String"
 
+FRAMES_PERIOD = 0.05
+"""Seconds between two messages on ``/tf``: it is for eyes, and would be a fifth of a log."""
+
 Derived = Literal["child_linear_velocity", "transforms"]
 """What a log holds for other tools and the reader leaves alone: the base's velocity in its own
 frame, ``(steps, 3)`` m/s; each body's position and orientation (x y z w) in its parent's frame,
@@ -127,6 +130,11 @@ def transforms(bodies: Sequence[str], parents: Sequence[str]) -> Topic:
         layout.floats(7)
     parts: tuple[tuple[Part, int], ...] = (("transforms", 7 * len(bodies)),)
     return Topic(TRANSFORMS, "tf2_msgs/msg/TFMessage", layout.template(), parts)
+
+
+def frames_stride(control_timestep: float) -> int:
+    """Returns how many control steps there are from one message on ``/tf`` to the next."""
+    return max(1, round(FRAMES_PERIOD / control_timestep))
 
 
 def description(text: str) -> bytes:

@@ -78,6 +78,21 @@ class Diagnose:
             trials=len(trials),
         )
 
+    def check(self, trials: Sequence[Trial]) -> None:
+        """Checks that the comparator can judge all trials, before any search.
+
+        Raises:
+            InputError: It cannot; the sentence names every trial that it cannot judge, and why.
+        """
+        problems = []
+        for trial in trials:
+            try:
+                self._comparator.request(trial)
+            except InputError as error:
+                problems.append(str(error))
+        if problems:
+            raise InputError("; ".join(problems))
+
     def distances(self, hypotheses: Sequence[Hypothesis], trials: Sequence[Trial]) -> FloatArray:
         """Returns how far each hypothesis is from all trials together, ``(n,)``.
 

@@ -46,6 +46,23 @@ class Playback:
         return self.commands.shape, self.commands.tobytes()
 
 
+def played_back(motors: tuple[str, ...], commands: FloatArray) -> Playback:
+    """Returns the recording of commands of which some may not be known: NaN.
+
+    A command that was lost is taken to be the one before it, which stood until the next.
+
+    Args:
+        motors: What is commanded, in order.
+        commands: ``(steps, motors)`` motor targets, rad.
+
+    Raises:
+        ValueError: The first is not known.
+    """
+    last = np.where(np.isnan(commands), 0, np.arange(len(commands))[:, np.newaxis])
+    np.maximum.accumulate(last, axis=0, out=last)
+    return Playback(motors, np.take_along_axis(commands, last, axis=0))
+
+
 class Playbacks:
     """The recorded commands of many robots, stepped together like a ``Population``.
 

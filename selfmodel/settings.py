@@ -1,9 +1,20 @@
 """The paper's numbers, as one record."""
 
 import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from selfmodel.errors import InputError
+
+MOST: Mapping[str, int] = MappingProxyType(
+    {
+        **dict.fromkeys(("population", "generations", "kept"), 10_000),
+        **dict.fromkeys(("genes", "trials", "tournament"), 100),
+        "steps": 10**6,
+    }
+)
+"""The largest settings: more would fill the memory, and they may come from somebody's log."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +55,9 @@ class Settings:
         for name in ("trials", "generations", "survivors", "tournament", "genes", "kept"):
             if getattr(self, name) < 1:
                 raise InputError(f"{name} must be at least 1, got {getattr(self, name)}")
+        for name, most in MOST.items():
+            if getattr(self, name) > most:
+                raise InputError(f"{name} must be at most {most}, got {getattr(self, name)}")
         if self.steps < 2:
             raise InputError(
                 f"steps must be at least 2, so that there is a first and a last, got {self.steps}"

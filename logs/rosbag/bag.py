@@ -15,6 +15,7 @@ from ruamel.yaml.error import YAMLError
 
 from selfmodel.errors import InputError
 from selfmodel.logs.errors import CorruptError, NotMcapError
+from selfmodel.logs.files import check_regular, read_bounded
 from selfmodel.logs.rosbag.stored import Announced, Stored
 from selfmodel.logs.rosbag.stored_mcap import MCAP_MAGIC, read_mcap
 from selfmodel.logs.rosbag.stored_sqlite import SQLITE_MAGIC, read_sqlite
@@ -130,9 +131,10 @@ def _within(filename: object, path: Path) -> bool:
 def _files(path: Path) -> list[Path]:
     """The storage files of a bag, in order."""
     if not path.is_dir():
+        check_regular(path, "a bag")
         return [path]
     if not (path / METADATA).exists():
-        found = [name for name in path.iterdir() if re.search(r"\.(mcap|db3)(\.zstd)?$", name.name)]
+        found = [name for name in path.iterdir() if _STORAGE.search(name.name) and name.is_file()]
         return sorted(found, key=_natural)
     files = [path / name for name in _listed(path / METADATA)]
     if missing := [file.name for file in files if not file.is_file()]:
@@ -144,6 +146,9 @@ def _files(path: Path) -> list[Path]:
     return files
 
 
+_STORAGE = re.compile(r"\.(mcap|db3)(\.zstd)?$")
+
+
 def _natural(path: Path) -> list[tuple[int, str]]:
     """Sorts ``bag_2`` before ``bag_10``."""
     return [(int(part) if part.isdecimal() else 0, part) for part in re.split(r"(\d+)", path.name)]
@@ -153,7 +158,7 @@ def _listed(path: Path) -> list[str]:
     """The files that ``metadata.yaml`` lists; of older versions, with the folder before them."""
     try:
         # The base loader makes everything a text, so no value can fail to be what it claims.
-        data: Any = YAML(typ="base", pure=True).load(path.read_text(encoding="utf-8"))
+        data: Any = YAML(typ="base", pure=True).load(read_bounded(path, METADATA, 2**20))
         listed = data["rosbag2_bagfile_information"]["relative_file_paths"]
     except (YAMLError, ValueError, KeyError, TypeError, RecursionError) as failure:
         reason = re.sub(r"\s+", " ", str(failure))

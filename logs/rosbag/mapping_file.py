@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Literal
 
 from selfmodel.errors import InputError
+from selfmodel.logs.files import read_bounded
 from selfmodel.logs.rosbag.mapping import (
     ANGLES,
     CLOCKS,
@@ -19,6 +20,9 @@ from selfmodel.logs.rosbag.mapping import (
 )
 from selfmodel.logs.rosbag.tables import Table, parse_document
 
+LARGEST = 2**20
+"""Bytes that a mapping may have."""
+
 
 def read_mapping(path: Path) -> BagMapping:
     """Returns the mapping in a file.
@@ -27,11 +31,7 @@ def read_mapping(path: Path) -> BagMapping:
         InputError: It cannot be read, or is wrong; the sentence names the line.
     """
     try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as failure:
-        raise InputError(
-            f"{path}: expected a mapping that can be read, got: {failure.strerror}"
-        ) from failure
+        text = read_bounded(path, "a mapping", LARGEST).decode()
     except UnicodeDecodeError as failure:
         raise InputError(f"{path}: expected TOML in UTF-8, got: {failure.reason}") from failure
     return parse_mapping(text, path.name)

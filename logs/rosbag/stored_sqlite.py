@@ -1,11 +1,12 @@
 """The SQLite file of a bag (``.db3``), as ROS 2 wrote them by default up to Humble."""
 
+import shlex
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
-from selfmodel.logs.errors import CorruptError
+from selfmodel.logs.errors import CorruptError, IncompleteError
 from selfmodel.logs.rosbag.stored import Announced, DamageError, Stored, checked_time
 from selfmodel.logs.unpack import LARGEST
 
@@ -22,6 +23,7 @@ def read_sqlite(path: Path, name: Path) -> Iterator[Announced | Stored]:
     Raises:
         CorruptError: The file is damaged, or no rosbag2 recording.
     """
+    _refuse_unfinished(path, name)
     count = 0
     try:
         for item in _items(path):
@@ -43,6 +45,23 @@ _FAILURES = (
     MemoryError,
 )
 """Everything that comes of damaged bytes."""
+
+
+def _refuse_unfinished(path: Path, name: Path) -> None:
+    """Refuses a file beside which lies what SQLite has not written into it yet.
+
+    Raises:
+        IncompleteError: There is such a file.
+    """
+    for suffix in ("-wal", "-journal"):
+        beside = path.with_name(path.name + suffix)
+        if beside.is_file() and beside.stat().st_size:
+            raise IncompleteError(
+                name,
+                f"its recorder did not close it: {beside.name} holds what is not in it yet",
+                advice=f"bring them together with `sqlite3 {shlex.quote(str(path))} "
+                f"'PRAGMA wal_checkpoint(TRUNCATE)'`",
+            )
 
 
 def _items(path: Path) -> Iterator[Announced | Stored]:

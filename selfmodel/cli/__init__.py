@@ -39,7 +39,7 @@ def main() -> None:
         # A disk that is full, a folder that may not be written: the file's name is in it.
         _fail(str(error), 1)
     except MemoryError as error:
-        _fail(f"there is not enough memory ({error}): ask for a smaller population", 1)
+        _fail(f"there is not enough memory ({error or 'for this'}): ask for less at once", 1)
     except KeyboardInterrupt:
         _fail("interrupted", 130)
 

@@ -22,7 +22,7 @@ def diagnose(
     seed: Annotated[
         int | None,
         typer.Option(
-            min=0, help="Every random choice comes from it.", show_default="that of the logs"
+            min=0, help="Every random choice comes from it.", show_default="that of the first log"
         ),
     ] = None,
     threads: Threads = 0,
@@ -49,13 +49,17 @@ def diagnose(
     first = used[0]
     chosen = first.trial.plan.seed if seed is None else seed
     search = Diagnose(Simulator(model, resolve.threads(threads)), judge, first.settings)
+    for note in _notes(used):
+        typer.echo(f"note: {note}", err=True)
     with display() as watch:
         diagnosis = explain([log.trial for log in used], search, chosen, watch)
     result = {
         "robot": model.name,
         "comparator": judge.name,
         "seed": chosen,
+        "settings_from": first.trial.path,
         "logs": [log.trial.path for log in used],
+        "played_back": [log.trial.path for log in used if _is_played_back(log)],
         "passed_over": [log.trial.path for log in logs if log not in used],
         "diagnosis": as_values(diagnosis.ranked),
         "evaluations": search.evaluations,
@@ -66,6 +70,28 @@ def diagnose(
         typer.echo(json.dumps(result, indent=2, allow_nan=False))
     else:
         _print(result)
+
+
+def _is_played_back(log: "TrialLog") -> bool:
+    from selfmodel.playback import Playback  # noqa: PLC0415  # with the other work
+
+    return isinstance(log.trial.plan.controller, Playback)
+
+
+def _notes(logs: "list[TrialLog]") -> list[str]:
+    """What a user should know before reading the ranking."""
+    first = logs[0]
+    notes = [
+        f"{log.trial.path} has no controller: its commands are played back, so no fault of a "
+        f"sensor shows in it"
+        for log in logs
+        if _is_played_back(log)
+    ]
+    if any(log.settings != first.settings for log in logs):
+        notes.append(f"the logs have different settings: those of {first.trial.path} are taken")
+    if any(log.trial.plan.seed != first.trial.plan.seed for log in logs):
+        notes.append(f"the logs have different seeds: without --seed, that of {first.trial.path}")
+    return notes
 
 
 def _since_the_failure(logs: "list[TrialLog]") -> "list[TrialLog]":

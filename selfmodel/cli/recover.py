@@ -22,9 +22,11 @@ def recover(
         int, typer.Option(min=1, max=99, help="Physical trials after the failing one.")
     ] = 3,
     population: Annotated[
-        int, typer.Option(min=2, max=10**6, help="Genomes in a generation.")
+        int, typer.Option(min=2, max=10_000, help="Genomes in a generation.")
     ] = 100,
-    generations: Annotated[int, typer.Option(min=1, help="Generations of each EA.")] = 30,
+    generations: Annotated[
+        int, typer.Option(min=1, max=10_000, help="Generations of each EA.")
+    ] = 30,
     out: Annotated[
         Path | None,
         typer.Option(

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from selfmodel.replay import Replay
 
 TOLERANCE = 1e-6
-"""By how much numbers may differ and count as the same between versions of MuJoCo, in their SI
-unit: some thousand roundings, before contact makes more of them."""
+"""By how much numbers may differ and count as the same between versions of MuJoCo, or after
+an import, in their SI unit: some thousand roundings, before contact makes more of them."""
 
 WINDOWS = 10
 """Rows of the table of errors over time."""
@@ -63,7 +63,8 @@ def replay(
     robot = resolve.robot_of_logs([log], None)
     assumed = parse(hypothesis, robot.anatomy)
     logged = log.software.get("mujoco", "unknown")
-    tolerance = 0.0 if logged == mujoco.__version__ else TOLERANCE
+    exact = logged == mujoco.__version__ and not log.imported
+    tolerance = 0.0 if exact else TOLERANCE
     simulator = Simulator(robot, resolve.threads(threads))
     found = simulate(log.trial, assumed, simulator, tolerance)
     result = {
@@ -92,9 +93,8 @@ def _finite(value: float) -> float | None:
 
 
 def _print(result: dict[str, Any], log: "TrialLog", found: "Replay") -> None:
-    from rich.console import Console  # noqa: PLC0415  # only where a table is drawn
-
-    from selfmodel.cli.plain import plain  # noqa: PLC0415  # the same
+    from selfmodel.cli.plain import plain  # noqa: PLC0415  # only where it is printed
+    from selfmodel.cli.tables import show  # noqa: PLC0415  # the same
 
     typer.echo(
         plain(f"{result['log']}: {result['steps']} steps of {result['robot']}, replayed as ")
@@ -106,6 +106,11 @@ def _print(result: dict[str, Any], log: "TrialLog", found: "Replay") -> None:
             f"The log was made with MuJoCo {plain(versions['logged'])}, this is "
             f"{versions['running']}: what differs by less than {TOLERANCE:g} counts as the same."
         )
+    if log.imported:
+        typer.echo(
+            f"The log was imported, and resampled: what differs by less than {TOLERANCE:g} counts "
+            f"as the same."
+        )
     if found.broke_down:
         typer.echo("The simulation broke down: with this hypothesis the model is unstable.")
     if found.identical:
@@ -113,26 +118,22 @@ def _print(result: dict[str, Any], log: "TrialLog", found: "Replay") -> None:
         return
     step = found.first_divergence_step
     if step is None:
-        typer.echo("the same within the tolerance, all the way.")
+        typer.echo(f"the same all the way, but for what is within {result['tolerance']:g}.")
     else:
         time = step * log.control_timestep
         typer.echo(f"They part at step {step} ({time:g} s). Root mean square of the difference:")
-    Console(markup=False).print(_table(log, found))
+    show(("time, s", *(title for _, title in COLUMNS)), _rows(log, found), texts=0)
 
 
-def _table(log: "TrialLog", found: "Replay") -> Any:  # noqa: ANN401  # rich comes when it is drawn
-    from rich.table import Table  # noqa: PLC0415  # only where a table is drawn
-
+def _rows(log: "TrialLog", found: "Replay") -> list[tuple[str, ...]]:
+    """The error of each signal in each part of the trial."""
     steps = log.trial.behaviour.steps
-    table = Table("time, s", *(title for _, title in COLUMNS))
-    for column in table.columns:
-        column.justify = "right"
     windows = min(WINDOWS, steps)
+    rows = []
     for k in range(windows):
         first, last = steps * k // windows, steps * (k + 1) // windows
         errors = [found.rms(signal, slice(first, last)) for signal, _ in COLUMNS]
-        table.add_row(
-            f"{first * log.control_timestep:.2f}-{(last - 1) * log.control_timestep:.2f}",
-            *("-" if math.isnan(error) else f"{error:.3g}" for error in errors),
-        )
-    return table
+        start, end = first * log.control_timestep, (last - 1) * log.control_timestep
+        told = ("-" if math.isnan(error) else f"{error:.3g}" for error in errors)
+        rows.append((f"{start:.2f}-{end:.2f}", *told))
+    return rows

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from selfmodel.errors import InputError
+from selfmodel.errors import InputError, WorkError
+from selfmodel.logs.errors import LogWriteError
 from selfmodel.logs.files import refuse_existing, replace
 from selfmodel.logs.reader import TrialLog
 from selfmodel.replay import Replay
@@ -42,7 +43,7 @@ def draw(path: Path, log: TrialLog, found: Replay, hypothesis: str) -> None:
     """Draws a replay into a file.
 
     Raises:
-        LogWriteError: It could not be written.
+        WorkError: It could not be written.
     """
     logged = log.trial.behaviour
     figure = Figure(figsize=(8, 6), layout="constrained")
@@ -70,7 +71,10 @@ def draw(path: Path, log: TrialLog, found: Replay, hypothesis: str) -> None:
     way.set_title(_title(log, found))
     data = io.BytesIO()
     figure.savefig(data, format=path.suffix.lower().removeprefix("."), dpi=150)
-    replace(path, data.getvalue())
+    try:
+        replace(path, data.getvalue())
+    except LogWriteError as error:
+        raise WorkError(f"{path}: the figure could not be written: {error.reason}") from error
 
 
 def _title(log: TrialLog, found: Replay) -> str:

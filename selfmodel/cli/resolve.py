@@ -1,8 +1,8 @@
 """From the names on the command line to the objects that they stand for."""
 
+import hashlib
 import importlib
 import os
-from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,9 +11,13 @@ from selfmodel.comparators import COMPARATORS
 from selfmodel.controller import Controller, Network
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.logs import LogError, TrialLog, load_controller, read_log
-from selfmodel.logs.robots import the_robot_of
+from selfmodel.logs.files import read_bounded
+from selfmodel.logs.robots import described_difference, the_robot_of
 from selfmodel.robot import Robot
 from selfmodel.tasks import ROBOTS, Entry
+
+LARGEST_MODEL = 64 * 2**20
+"""Bytes that an MJCF file may have."""
 
 
 def robot_entry(name: str) -> Entry:
@@ -110,13 +114,17 @@ def logs(paths: Sequence[Path]) -> list[TrialLog]:
     Raises:
         InputError: One cannot be used, or is given twice.
     """
-    twice = [path for path, count in Counter(path.resolve() for path in paths).items() if count > 1]
-    if twice:
-        raise InputError(f"{twice[0]} is given more than once: give each log once")
     try:
-        return [read_log(path) for path in paths]
+        found = [read_log(path) for path in paths]
     except LogError as error:
         raise InputError(str(error)) from error
+    digests: dict[bytes, Path] = {}
+    for path in paths:
+        with path.open("rb") as file:
+            first = digests.setdefault(hashlib.file_digest(file, "sha256").digest(), path)
+        if first is not path:
+            raise InputError(f"{first} and {path} are the same log: give each log once")
+    return found
 
 
 def robot_of_logs(found: Sequence[TrialLog], override: str | None) -> Robot:
@@ -139,8 +147,8 @@ def robot_of_logs(found: Sequence[TrialLog], override: str | None) -> Robot:
     chosen = robot(override, own.control_timestep)
     if chosen.anatomy.names != own.anatomy.names:
         raise InputError(
-            f"{override} is another robot than that of {found[0].trial.path}: it has "
-            f"{chosen.anatomy.names}, the log has {own.anatomy.names}"
+            f"{override} is another robot than that of {found[0].trial.path}: "
+            f"{described_difference(chosen.anatomy.names, own.anatomy.names)}"
         )
     return chosen
 
@@ -159,9 +167,10 @@ def robot(name: str, control_timestep: float) -> Robot:
     if path.suffix.lower() != ".xml":
         return robot_entry(name).robot()
     try:
-        return Robot(path.stem, path.read_text(encoding="utf-8"), control_timestep)
-    except OSError as error:
-        raise InputError(f"{path}: expected an MJCF file that can be read: {error}") from error
+        text = read_bounded(path, "an MJCF file", LARGEST_MODEL).decode()
+        return Robot(path.stem, text, control_timestep)
+    except InputError:
+        raise
     except (ValueError, KeyError) as error:
         what = " ".join(str(error).split())
         raise InputError(

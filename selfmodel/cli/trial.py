@@ -13,7 +13,10 @@ def trial(
     robot: RobotName,
     *,
     out: Annotated[
-        Path, typer.Option(metavar="FILE.mcap", help="The log to write; it must not exist.")
+        Path,
+        typer.Option(
+            "--out", "-o", metavar="FILE.mcap", help="The log to write; it must not exist."
+        ),
     ],
     damage: Damage = None,
     controller: Annotated[

@@ -15,16 +15,18 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter
+from typing import cast
 
 import numpy as np
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Message, Metadata, Schema
+from mcap.records import Attachment, Channel, Chunk, Message, Metadata, Schema
 from mcap.writer import CompressionType, Writer
 
 from selfmodel.behaviour import SIGNALS
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError, TrialLog, read_log
-from selfmodel.logs.framing import Frame, frames
+from selfmodel.logs.budget import Budget
+from selfmodel.logs.framing import Frame, frames, parse, unpack
 from selfmodel.logs.salvage import salvage
 from selfmodel.logs.scan import scan
 from selfmodel.logs.writer import write_trial
@@ -128,21 +130,66 @@ def check(path: Path, damaged: bytes, whole: TrialLog) -> str:
     return "same"
 
 
-def check_salvage(path: Path, whole: TrialLog) -> str:
-    """Returns how salvage ended; raises where it saved what was not written."""
+def check_salvage(path: Path, form: "Form", whole: TrialLog) -> str:
+    """Returns how salvage ended; raises where it saved what was not written, or less than it could.
+
+    Args:
+        path: The damaged log.
+        form: The log as it was.
+        whole: What it said.
+    """
     out = path.with_name("saved.mcap")
+    expected = form.surviving_steps(path.read_bytes())
     try:
-        salvage(path, out)
+        told = salvage(path, out)
     except LogError as error:
+        if expected:
+            raise AssertionError(f"{expected} whole steps were not saved: {error}") from error
         return type(error).__name__
     except InputError:
         return "sound"
     saved = read_log(out)
     out.unlink()
-    if saved.status != "interrupted":
-        raise AssertionError(f"a salvaged log says that it is {saved.status}")
+    if saved.status != "interrupted" or told.steps < expected:
+        raise AssertionError(f"{expected} steps are whole, saved: {saved.status} {told}")
     _same(saved, whole, allow_unobserved=True)
     return "saved"
+
+
+class Form:
+    """A log in one packing, and which steps each of its chunks tells of.
+
+    Args:
+        data: The file.
+    """
+
+    def __init__(self, data: bytes) -> None:
+        self.data = data
+        every = [(frame, data[frame.offset : frame.end]) for frame in frames(data)]
+        first = [text for frame, text in every if frame.opcode in (Opcode.METADATA, Opcode.CHUNK)]
+        models = [text for frame, text in every if frame.opcode == Opcode.ATTACHMENT]
+        chunks = [(frame, text) for frame, text in every if frame.opcode == Opcode.CHUNK]
+        # The trial's record, its model, and the chunks that announce the topics.
+        self._needed = [first[0], *models]
+        self._steps: list[tuple[bytes, Counter[int]]] = []
+        for frame, text in chunks:
+            records = unpack(cast("Chunk", parse(frame)), Budget())
+            if any(isinstance(record, Channel) for record in records):
+                self._needed.append(text)
+            times = [r.log_time for r in records if isinstance(r, Message)]
+            self._steps.append((text, Counter(times)))
+
+    def surviving_steps(self, damaged: bytes) -> int:
+        """Returns how many steps have all their messages in chunks that are still there."""
+        if not self._steps or any(text not in damaged for text in self._needed):
+            return 0
+        full: Counter[int] = Counter()
+        left: Counter[int] = Counter()
+        for text, times in self._steps:
+            full += times
+            if text in damaged:
+                left += times
+        return sum(left[time] == count for time, count in full.items())
 
 
 def _same(read: TrialLog, whole: TrialLog, *, allow_unobserved: bool) -> None:
@@ -184,21 +231,22 @@ def main() -> None:
         )
         whole, data = read_log(written), written.read_bytes()
         forms = (
-            data,
-            packed(data, CompressionType.ZSTD, 8 * 2**10),
-            packed(data, CompressionType.LZ4, 64 * 2**10),
-            packed(data, CompressionType.NONE, 64 * 2**10),
-            packed(data, CompressionType.NONE, None),
+            Form(data),
+            Form(packed(data, CompressionType.ZSTD, 8 * 2**10)),
+            Form(packed(data, CompressionType.LZ4, 64 * 2**10)),
+            Form(packed(data, CompressionType.NONE, 64 * 2**10)),
+            Form(packed(data, CompressionType.NONE, None)),
         )
         for number in range(options.count):
             rng = np.random.default_rng([options.seed, number])
             damage = DAMAGES[number % len(DAMAGES)]
-            damaged = damage(forms[number // len(DAMAGES) % len(forms)], rng)
+            form = forms[number // len(DAMAGES) % len(forms)]
+            damaged = damage(form.data, rng)
             start = perf_counter()
             try:
                 outcomes[check(path, damaged, whole)] += 1
                 if number // (len(DAMAGES) * len(forms)) % SALVAGED == 0:
-                    salvages[check_salvage(path, whole)] += 1
+                    salvages[check_salvage(path, form, whole)] += 1
             except Exception:
                 print(f"case {number} of seed {options.seed}: {damage.__name__}", file=sys.stderr)
                 raise

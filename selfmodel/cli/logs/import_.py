@@ -38,7 +38,9 @@ def import_(
     ] = False,
     robot: Annotated[
         str | None,
-        typer.Option(metavar="NAME|MJCF", help="Whose mapping to suggest; for --suggest only."),
+        typer.Option(
+            metavar="NAME|MODEL.xml", help="Whose mapping to suggest; for --suggest only."
+        ),
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -89,13 +91,11 @@ def _timestep(path: Path) -> float:
 
 def _import(bag: Path, out: Path, path: Path, *, as_json: bool) -> None:
     # Whatever brings MuJoCo or ROS's messages waits until the command runs.
-    from selfmodel.logs.files import part_of  # noqa: PLC0415
+    from selfmodel.logs.files import refuse_existing  # noqa: PLC0415
     from selfmodel.logs.rosbag.importer import import_bag, write_recording  # noqa: PLC0415
     from selfmodel.logs.rosbag.mapping_file import read_mapping  # noqa: PLC0415
 
-    for existing in (out, part_of(out)):
-        if existing.exists():
-            raise InputError(f"{existing} exists, and is not overwritten: choose another name")
+    refuse_existing(out)
     mapping = read_mapping(path)
     made = _mapped_robot(mapping, path.parent)
     controller = _controller(mapping, path.parent, made)
@@ -151,15 +151,10 @@ def _facts(out: Path, mapping: "BagMapping", recording: "Recording") -> dict[str
 
 
 def _print(out: Path, recording: "Recording") -> None:
-    from rich.console import Console  # noqa: PLC0415  # only where a table is drawn
-    from rich.table import Table  # noqa: PLC0415
+    from selfmodel.cli.tables import show  # noqa: PLC0415  # only where a table is drawn
 
-    table = Table("topic", "msgs", "Hz", "jitter, ms", "gaps", "longest, ms", "late, ms")
-    table.columns[0].overflow = "fold"
-    for column in table.columns[1:]:
-        column.justify = "right"
-    for topic, found in recording.qualities.items():
-        table.add_row(
+    rows = [
+        (
             plain(topic),
             str(found.messages),
             _number(found.rate),
@@ -168,7 +163,9 @@ def _print(out: Path, recording: "Recording") -> None:
             _number(found.longest, 1e3),
             _number(found.latency, 1e3),
         )
-    Console(markup=False).print(table)
+        for topic, found in recording.qualities.items()
+    ]
+    show(("topic", "msgs", "Hz", "jitter, ms", "gaps", "longest, ms", "late, ms"), rows)
     valid = ", ".join(f"{signal} {share:.0%}" for signal, share in recording.valid.items())
     # Not through rich: a folder's name may look like markup.
     for note in recording.notes:

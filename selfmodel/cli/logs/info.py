@@ -9,6 +9,7 @@ import typer
 
 from selfmodel.cli.options import Json, LogFiles
 from selfmodel.cli.plain import plain
+from selfmodel.errors import InputError
 
 if TYPE_CHECKING:
     from selfmodel.logs.info import Info
@@ -41,12 +42,18 @@ def _facts(path: Path) -> dict[str, Any]:
     try:
         return _as_object(path, read_info(path))
     except LogError as error:
-        return {
-            "file": str(path),
-            "error": str(error),
-            "kind": type(error).__name__,
-            "salvageable_steps": salvageable_steps(path),
-        }
+        return _damage(path, error, salvageable_steps(path))
+    except InputError as error:
+        return _damage(path, error, 0)
+
+
+def _damage(path: Path, error: Exception, steps: int) -> dict[str, Any]:
+    return {
+        "file": str(path),
+        "error": str(error),
+        "kind": type(error).__name__,
+        "salvageable_steps": steps,
+    }
 
 
 def _as_object(path: Path, found: "Info") -> dict[str, Any]:
@@ -81,8 +88,7 @@ def _as_object(path: Path, found: "Info") -> dict[str, Any]:
 
 
 def _print(one: dict[str, Any]) -> None:
-    from rich.console import Console  # noqa: PLC0415  # only where a table is drawn
-    from rich.table import Table  # noqa: PLC0415  # the same
+    from selfmodel.cli.tables import show  # noqa: PLC0415  # only where a table is drawn
 
     if "error" in one:
         typer.echo(plain(f"error: {one['error']}"))
@@ -103,14 +109,11 @@ def _print(one: dict[str, Any]) -> None:
     typer.echo(plain(told))
     for name, text in one["source"].items():
         typer.echo(plain(f"{name}: {text if len(text) <= 100 else text[:97] + '...'}"))
-    table = Table("topic", "type", "messages", "Hz")
-    for column in table.columns[2:]:
-        column.justify = "right"
-    for name, topic in one["topics"].items():
-        table.add_row(
-            plain(name), plain(topic["type"]), str(topic["messages"]), f"{topic['rate']:.1f}"
-        )
-    Console(markup=False).print(table)
+    rows = [
+        (plain(name), plain(topic["type"]), str(topic["messages"]), f"{topic['rate']:.1f}")
+        for name, topic in one["topics"].items()
+    ]
+    show(("topic", "type", "messages", "Hz"), rows, texts=2)
     partly = {signal: share for signal, share in one["observed"].items() if share < 1}
     typer.echo(
         "observed: everything"

@@ -28,13 +28,18 @@ def salvage(
         typer.echo(json.dumps({"source": str(file), **dataclasses.asdict(saved)}))
         return
     typer.echo(f"saved {saved.steps} of {saved.planned} steps in {saved.log}")
+    if saved.span > saved.steps:
+        typer.echo(
+            f"it spans {saved.span} steps; what is lost of the others is marked as not observed"
+        )
     for topic, count in saved.missing.items():
-        typer.echo(f"{topic}: {count} of their messages are lost; they are marked as not observed")
+        typer.echo(f"{topic}: {count} {'message is' if count == 1 else 'messages are'} lost")
     for name in saved.lost:
         typer.echo(f"{name} is lost: {_CONSEQUENCES[name]}")
 
 
 _CONSEQUENCES = {
     "controller.npz": "the commands that were logged will be played back instead",
+    "/robot_description": "viewers will not draw the robot",
     "settings.json": "the paper's numbers stand in its place",
 }

@@ -27,7 +27,7 @@ def _checked(path: Path) -> dict[str, Any]:
     from selfmodel.logs.verify import verify as check  # noqa: PLC0415  # the same
 
     try:
-        log = check(path)
+        log, loaded = check(path)
     except (LogError, InputError) as error:
         return {"file": str(path), "ok": False, "error": str(error), "kind": type(error).__name__}
     return {
@@ -35,10 +35,12 @@ def _checked(path: Path) -> dict[str, Any]:
         "ok": True,
         "status": log.status,
         "steps": log.trial.behaviour.steps,
+        "model_loaded": loaded,
     }
 
 
 def _line(one: dict[str, Any]) -> str:
     if one["ok"]:
-        return f"ok: {one['file']}: {one['steps']} steps, {one['status']}"
+        unloaded = "" if one["model_loaded"] else " (no MuJoCo here: its model was not loaded)"
+        return f"ok: {one['file']}: {one['steps']} steps, {one['status']}{unloaded}"
     return f"error: {one['error']}"
