@@ -1,6 +1,9 @@
 """Promises of the commands that work on logs: logs, replay, diagnose."""
 
 import json
+import os
+import shlex
+import subprocess
 import sys
 from pathlib import Path
 
@@ -34,6 +37,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         assert done.returncode == 0, done.stderr
     data = (folder / "a.mcap").read_bytes()
     (folder / "cut.mcap.part").write_bytes(data[: len(data) // 2])
+    (folder / "copy.mcap").write_bytes(data)
+    os.mkfifo(folder / "pipe")
     (folder / "flipped.mcap").write_bytes(data[:200_000] + b"\x00" + data[200_001:])
     return folder
 
@@ -62,7 +67,7 @@ def test_info_tells_what_is_in_a_log_but_not_what_is_hidden(folder: Path):
 
 @pytest.mark.parametrize(
     ("name", "kind", "steps"),
-    [("cut.mcap.part", "TruncatedError", 501), ("flipped.mcap", "CorruptError", 1000)],
+    [("cut.mcap.part", "TruncatedError", 501), ("flipped.mcap", "CorruptError", 950)],
 )
 def test_damage_is_told_with_what_can_be_saved_and_how(
     folder: Path, tmp_path: Path, name: str, kind: str, steps: int
@@ -88,7 +93,47 @@ def test_damage_is_told_with_what_can_be_saved_and_how(
             *("replay", str(out), "--hypothesis", "break:front_left_knee", "--json"), cwd=folder
         ).stdout
     )
-    assert (told["identical"], told["steps"]) == (True, steps)
+    assert (told["identical"], told["steps"]) == (True, 1000 if "flipped" in name else steps)
+
+
+def test_a_file_that_is_not_there_hides_nothing_of_the_others(folder: Path):
+    done = selfmodel("logs", "info", "a.mcap", "no.mcap", "pipe", "--json", cwd=folder)
+    there, missing, pipe = json.loads(done.stdout)["files"]
+
+    assert done.returncode == 1
+    assert there["steps"] == 1000
+    assert missing["kind"] == pipe["kind"] == "InputError"
+
+
+def test_the_command_that_helps_can_be_pasted_whatever_the_file_is_called(
+    folder: Path, tmp_path: Path
+):
+    name = tmp_path / "cut half é.mcap"
+    name.write_bytes((folder / "cut.mcap.part").read_bytes())
+    (told,) = json.loads(selfmodel("logs", "info", str(name), "--json", cwd=folder).stdout)["files"]
+    command = told["error"].partition("`")[2].partition("`")[0]
+    arguments = shlex.split(command.replace("NEW.mcap", str(tmp_path / "new.mcap")))[1:]
+
+    assert selfmodel(*arguments, cwd=folder).returncode == 0
+
+
+@pytest.mark.parametrize(
+    "arguments", [("replay", "a.mcap"), ("logs", "info", "a.mcap")], ids=["replay", "info"]
+)
+def test_a_narrow_terminal_loses_no_number(folder: Path, arguments: tuple[str, ...]):
+    narrow = selfmodel(*arguments, cwd=folder, COLUMNS="40").stdout
+    wide = selfmodel(*arguments, cwd=folder, COLUMNS="120").stdout
+    cells = [cell.strip() for line in wide.splitlines() for cell in line.split("│")[1:-1]]
+
+    assert len(cells) > 20
+    assert "…" not in narrow
+    assert all(cell in narrow for cell in cells)
+
+
+def test_verify_loads_the_model_too(folder: Path):
+    done = selfmodel("logs", "verify", "a.mcap", "--json", cwd=folder)
+
+    assert json.loads(done.stdout)["files"][0]["model_loaded"] is True
 
 
 def test_verify_says_ok_or_what_is_wrong_a_line_a_file(folder: Path):
@@ -104,8 +149,6 @@ def test_verify_says_ok_or_what_is_wrong_a_line_a_file(folder: Path):
 
 
 def test_logs_are_looked_into_where_there_is_no_simulator(folder: Path, tmp_path: Path):
-    import subprocess  # noqa: PLC0415  # for this test alone
-
     for arguments in (
         ("logs", "info", "a.mcap"),
         ("logs", "verify", "a.mcap"),
@@ -114,6 +157,7 @@ def test_logs_are_looked_into_where_there_is_no_simulator(folder: Path, tmp_path
         command = [sys.executable, "-c", BLOCKED, *arguments]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
+        assert ("its model was not loaded" in done.stdout) == (arguments[1] == "verify")
 
 
 def test_replay_of_the_truth_is_identical_and_says_so(folder: Path):
@@ -198,8 +242,20 @@ def test_diagnosis_shows_its_ranking_and_takes_another_self_model(
     ("arguments", "said"),
     [
         (["diagnose", "a.mcap", "b.mcap"], "a.mcap is of 'quadruped', b.mcap of 'hexapod'"),
-        (["diagnose", "a.mcap", "a.mcap"], "a.mcap is given more than once"),
-        (["diagnose", "a.mcap", "--robot", "hexapod"], "hexapod is another robot than that of"),
+        (["diagnose", "a.mcap", "a.mcap"], "a.mcap and a.mcap are the same log"),
+        (["diagnose", "a.mcap", "copy.mcap"], "a.mcap and copy.mcap are the same log"),
+        (
+            ["diagnose", "a.mcap", "--robot", "hexapod"],
+            "hexapod is another robot than that of a.mcap: it has 12 sensors, the log 8",
+        ),
+        (["diagnose", "pipe"], "pipe: expected a log file, got a pipe or a device"),
+        (["replay", "pipe"], "pipe: expected a log file, got a pipe or a device"),
+        (["logs", "salvage", "pipe", "-o", "n.mcap"], "expected a log file, got a pipe"),
+        (["logs", "import", "pipe", "--suggest", "--robot", "quadruped"], "a bag, got a pipe"),
+        (
+            ["logs", "import", "a.mcap", "--mapping", "/dev/zero", "-o", "n.mcap"],
+            "/dev/zero: expected a mapping, got a pipe or a device",
+        ),
         (["diagnose", "a.mcap", "--robot", "no.xml"], "no.xml: expected an MJCF file"),
         (["diagnose", "a.mcap", "--robot", "octopod"], "unknown robot 'octopod'"),
         (["diagnose", "cut.mcap.part"], "selfmodel logs salvage cut.mcap.part"),

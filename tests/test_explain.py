@@ -66,6 +66,21 @@ def test_there_must_be_a_trial_to_explain(quadruped: Robot):
         explain([], search, 0, lambda _: None)
 
 
+def test_trials_that_cannot_be_judged_are_named_before_any_search(quadruped: Robot, tmp_path: Path):
+    three = trials(quadruped, tmp_path, "intact", 3)
+    blind = [three[0], *(unobserved(trial) for trial in three[1:])]
+    search = Diagnose(Simulator(quadruped, 1), FORWARD_DISPLACEMENT, SMALL)
+    with pytest.raises(InputError, match=r"1\.mcap: .* needs .*; .*2\.mcap: .* needs "):
+        explain(blind, search, 0, lambda _: pytest.fail("a search began"))
+
+
+def unobserved(trial: Trial) -> Trial:
+    """A trial of which nothing was observed."""
+    behaviour = trial.behaviour
+    nothing = {signal: np.full_like(rows, np.nan) for signal, rows in behaviour.signals.items()}
+    return dataclasses.replace(trial, behaviour=Behaviour(behaviour.names, behaviour.time, nothing))
+
+
 def test_a_trial_that_other_software_drove_is_explained_by_its_commands(
     quadruped: Robot, tmp_path: Path
 ):
@@ -83,10 +98,5 @@ def test_a_trial_that_other_software_drove_is_explained_by_its_commands(
 @pytest.mark.parametrize("name", COMPARATORS)
 def test_a_comparator_says_what_a_trial_lacks(name: str, quadruped: Robot, tmp_path: Path):
     (trial,) = trials(quadruped, tmp_path, "intact", 1)
-    behaviour = trial.behaviour
-    nothing = {signal: np.full_like(rows, np.nan) for signal, rows in behaviour.signals.items()}
-    blind = dataclasses.replace(
-        trial, behaviour=Behaviour(behaviour.names, behaviour.time, nothing)
-    )
     with pytest.raises(InputError, match=r"0\.mcap: .* needs \w+"):
-        COMPARATORS[name].request(blind)
+        COMPARATORS[name].request(unobserved(trial))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from selfmodel.driver import drive
-from selfmodel.playback import Playback
+from selfmodel.playback import Playback, played_back
 from selfmodel.robot import Robot
 from tests.conftest import random_controllers
 
@@ -34,6 +34,17 @@ def test_two_recordings_are_equal_when_their_motors_and_bits_are():
     assert Playback(("a", "b"), COMMANDS + 1e-30) == same
     assert Playback(("a", "b"), np.nextafter(COMMANDS, 1)) != same
     assert same != "a recording"
+
+
+def test_a_command_that_was_lost_is_the_one_before_it():
+    lost = COMMANDS.copy()
+    lost[1, 0] = lost[1:, 1] = np.nan
+
+    expected = [[0.1, 0.2], [0.1, 0.2], [0.5, 0.2]]
+    assert np.array_equal(played_back(("a", "b"), lost).commands, expected)
+    lost[0] = np.nan
+    with pytest.raises(ValueError, match="of step 0 are not all known"):
+        played_back(("a", "b"), lost)
 
 
 @pytest.mark.parametrize(

@@ -22,10 +22,11 @@ def show(columns: Sequence[str], rows: Sequence[Sequence[str]], *, texts: int = 
     for row in rows:
         table.add_row(*row)
     console = Console(markup=False, highlight=False)
-    if Measurement.get(console, console.options, table).maximum <= console.width:
+    unbounded = console.options.update(width=10_000)
+    if Measurement.get(console, unbounded, table).maximum <= console.width:
         console.print(table)
         return
     for row in rows:
-        typer.echo(row[0])
+        typer.echo(f"{columns[0]}: {row[0]}")
         for title, cell in zip(columns[1:], row[1:], strict=True):
             typer.echo(f"  {title}: {cell}")

@@ -15,7 +15,7 @@ from selfmodel.controller import Controller
 from selfmodel.errors import InputError
 from selfmodel.logs import CorruptError, LogError, LogWriteError, read_log, read_truth
 from selfmodel.logs.contents import read_contents
-from selfmodel.logs.framing import frames
+from selfmodel.logs.framing import FRAME, frames
 from selfmodel.logs.logfile import LogFile
 from selfmodel.logs.records import HIDDEN, SALVAGE
 from selfmodel.logs.salvage import salvage, salvageable_steps
@@ -45,8 +45,11 @@ def test_a_hole_is_marked_and_what_follows_it_is_saved(log: Path, saved: Path):
     told = salvage(log, saved)
     read = read_log(saved)
 
-    assert (told.steps, told.planned, read.status) == (STEPS, STEPS, "interrupted")
+    assert (told.steps, told.span, told.planned) == (STEPS - 50, STEPS, STEPS)
+    assert read.status == "interrupted"
+    assert told.missing.pop("/tf") == 10
     assert set(told.missing.values()) == {50}
+    assert salvageable_steps(log) == STEPS - 50
     for signal in SIGNALS:
         assert np.isnan(read.trial.behaviour[signal][1:51]).all()
         for kept in (slice(1), slice(51, None)):
@@ -110,6 +113,42 @@ def test_without_its_controller_a_trial_is_played_back(log: Path, saved: Path):
     assert driver == Playback(true.behaviour.names.motors, true.behaviour["commands"])
 
 
+def test_without_its_controller_a_command_that_is_lost_stands_until_the_next(
+    log: Path, saved: Path
+):
+    commands = read_log(log).trial.behaviour["commands"]
+    spoiled(log, Opcode.ATTACHMENT, 1)
+    spoiled(log, Opcode.CHUNK, 2)  # steps 1 to 50
+    assert salvageable_steps(log) == STEPS - 50
+    salvage(log, saved)
+    trial = read_log(saved).trial
+    driver = trial.plan.controller
+
+    assert isinstance(driver, Playback)
+    assert np.isnan(trial.behaviour["commands"][1:51]).all()
+    assert np.array_equal(driver.commands[1:51], np.tile(commands[0], (50, 1)))
+    assert np.array_equal(driver.commands[51:], commands[51:])
+
+
+def test_a_record_that_claims_more_bytes_swallows_nothing(log: Path, saved: Path):
+    data = bytearray(log.read_bytes())
+    every = list(frames(bytes(data)))
+    chunk = [frame for frame in every if frame.opcode == Opcode.CHUNK][3]
+    index = [f for f in every if f.opcode == Opcode.MESSAGE_INDEX and f.end <= chunk.offset][-1]
+    length = chunk.end - index.offset - FRAME
+    data[index.offset + 1 : index.offset + FRAME] = length.to_bytes(8, "little")
+    log.write_bytes(data)
+    told = salvage(log, saved)
+
+    assert (told.steps, told.missing, told.lost) == (STEPS, {}, ())
+
+
+def test_what_viewers_draw_by_is_told_when_it_is_lost(log: Path, saved: Path):
+    spoiled(log, Opcode.CHUNK, 0, at=300)  # the description, and what the topics are called
+
+    assert salvage(log, saved).lost == ("/robot_description",)
+
+
 def test_without_its_settings_a_trial_has_those_of_the_paper(log: Path, saved: Path):
     spoiled(log, Opcode.ATTACHMENT, 2)
 
@@ -142,7 +181,8 @@ def test_the_original_is_left_alone_and_the_truth_goes_along_unseen(log: Path, s
     assert (log.read_bytes(), log.stat().st_mtime_ns) == before
     assert read_truth(saved) == "intact"
     contents = read_contents(saved, unread=(HIDDEN,))
-    assert contents.metadata[SALVAGE] == {"source": "trial.mcap", "steps": str(STEPS)}
+    told = {"source": "trial.mcap", "complete_steps": str(STEPS - 50)}
+    assert contents.metadata[SALVAGE] == told
 
 
 def test_a_sound_log_is_not_salvaged(log: Path, saved: Path):

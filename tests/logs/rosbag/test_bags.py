@@ -1,8 +1,10 @@
 """Bags of every form are read, and whatever is damaged is said to be."""
 
+import os
 import shutil
+import sqlite3
 import struct
-from contextlib import suppress
+from contextlib import closing, suppress
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +17,7 @@ from selfmodel.errors import InputError
 from selfmodel.logs import unpack
 from selfmodel.logs.errors import (
     CorruptError,
+    IncompleteError,
     LogError,
     NotMcapError,
     TruncatedError,
@@ -60,6 +63,28 @@ def test_every_form_says_the_same(form: str, biped: Robot, expected: dict, tmp_p
     assert signals(storage(folder), biped) == expected  # the bare file
     (folder / "metadata.yaml").unlink()
     assert signals(folder, biped) == expected
+
+
+def test_what_a_recorder_left_beside_its_database_is_not_passed_over(tmp_path: Path):
+    database = storage(write_bag(tmp_path / "bag", recorded(), "sqlite"))
+    with closing(sqlite3.connect(database)) as recorder:
+        recorder.execute("PRAGMA journal_mode=WAL")
+        recorder.execute("PRAGMA wal_autocheckpoint=0")
+        recorder.execute("DELETE FROM messages WHERE id > 5")
+        recorder.commit()
+        with (
+            pytest.raises(IncompleteError, match=r"did not close it: .*-wal .*wal_checkpoint"),
+            open_bag(database),
+        ):
+            pass
+
+
+def test_a_pipe_among_the_files_of_a_bag_is_not_waited_for(bag: Path):
+    name = storage(bag).name
+    (bag / "metadata.yaml").unlink()
+    os.mkfifo(bag / "more.mcap")
+    with open_bag(bag) as opened:
+        assert [source.name for source in opened.sources] == [name]
 
 
 @pytest.mark.parametrize("form", ["mcap", "sqlite", "mcap-file", "mcap-message"])
