@@ -114,7 +114,7 @@ def read_bytes(path: Path) -> bytes:
     return read_bounded(path, "a log file", FILE_LIMIT)
 
 
-def put(items: dict[str, _Item], name: str, item: _Item) -> None:
+def _put(items: dict[str, _Item], name: str, item: _Item) -> None:
     """Adds what must be there only once.
 
     Raises:
@@ -136,13 +136,13 @@ def _gather(records: Iterator[McapRecord], contents: Contents, unread: Collectio
             schemas[record.id] = record
         elif isinstance(record, Channel) and record.id not in channels:
             channels[record.id] = messages_of(record, schemas)
-            put(contents.topics, record.topic, channels[record.id])
+            _put(contents.topics, record.topic, channels[record.id])
         elif isinstance(record, Metadata) and record.name not in unread:
             ours = record.name.startswith(OWN)
             texts = without_digest(record.name, record.metadata) if ours else record.metadata
-            put(contents.metadata, record.name, texts)
+            _put(contents.metadata, record.name, texts)
         elif isinstance(record, Attachment):
-            put(contents.attachments, record.name, record.data)
+            _put(contents.attachments, record.name, record.data)
         elif isinstance(record, Header):
             contents.profile = record.profile
 

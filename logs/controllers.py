@@ -98,8 +98,7 @@ _FAILURES = (
     KeyError,
     EOFError,
     MemoryError,
-    NotImplementedError,  # an unknown compression
-    RuntimeError,  # an encrypted file
+    RuntimeError,  # an encrypted file, or an unknown compression
     OverflowError,
     SyntaxError,
     tokenize.TokenError,  # numpy's headers are Python literals

@@ -147,12 +147,7 @@ def unpack(chunk: Chunk, budget: Budget) -> list[McapRecord]:
     if chunk.uncompressed_crc == 0 and chunk.uncompressed_size:
         raise UncheckedError("a chunk has no checksum")
     budget.chunk(chunk.uncompressed_size)
-    chunk.data = _unpacked(chunk)
-    chunk.compression = ""
-    if len(chunk.data) != chunk.uncompressed_size:
-        raise ContradictionError(
-            f"a chunk claims {chunk.uncompressed_size} bytes, and has {len(chunk.data)}"
-        )
+    unpack_chunk(chunk)
     get_chunk_data_stream(chunk, validate_crc=True)
     return _records(chunk.data, budget)
 
@@ -185,14 +180,24 @@ def _message(body: bytes) -> Message:
 _MESSAGE = struct.Struct("<HIQQ")
 
 
-def _unpacked(chunk: Chunk) -> bytes:
-    if chunk.compression == "":
-        return chunk.data
+def unpack_chunk(chunk: Chunk) -> None:
+    """Puts what a chunk holds in the place of what it was packed to.
+
+    Raises:
+        Exception: One of ``FAILURES``: it is damaged, or unpacks to another size than it claims.
+    """
+    size = chunk.uncompressed_size
     if chunk.compression == "zstd":
-        return unzstd(chunk.data, chunk.uncompressed_size)
-    if chunk.compression == "lz4":
-        return unlz4(chunk.data, chunk.uncompressed_size)
-    raise UnknownCompressionError(f"a chunk is packed with {chunk.compression!r}")
+        chunk.data = unzstd(chunk.data, size)
+    elif chunk.compression == "lz4":
+        chunk.data = unlz4(chunk.data, size)
+    elif chunk.compression:
+        raise UnknownCompressionError(
+            f"a chunk is packed with {chunk.compression!r}; zstd and lz4 are known"
+        )
+    chunk.compression = ""
+    if len(chunk.data) != size:
+        raise ContradictionError(f"a chunk claims {size} bytes, and has {len(chunk.data)}")
 
 
 _READERS: Mapping[int, Callable[[ReadDataStream], McapRecord]] = MappingProxyType(

@@ -1,6 +1,7 @@
 """Saves what is complete of a damaged or unfinished log in a new one."""
 
 import dataclasses
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -200,7 +201,8 @@ def _time_of(step: int, record: TrialRecord) -> int:
 
 def _write(out: Path, contents: Contents) -> None:
     log = LogFile(out)
-    try:
+    with ExitStack() as undo:
+        undo.callback(log.abandon)  # whatever ends this, the damaged file still has everything
         for name, texts in contents.metadata.items():
             if name != RESULT:
                 log.metadata(name, texts)
@@ -209,9 +211,7 @@ def _write(out: Path, contents: Contents) -> None:
         _write_messages(log, contents.topics)
         log.metadata(RESULT, contents.metadata[RESULT])
         log.finish()
-    except BaseException:  # whatever ends it: the damaged file still has everything
-        log.abandon()
-        raise
+        undo.pop_all()
 
 
 def _write_messages(log: LogFile, every: dict[str, Messages]) -> None:

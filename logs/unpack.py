@@ -33,9 +33,7 @@ def unzstd(data: bytes, limit: int = LARGEST) -> bytes:
     # Not decompress(): that allocates what the frame claims before it looks.
     with zstandard.ZstdDecompressor().stream_reader(data) as reader:
         unpacked = reader.read(limit + 1)
-    if len(unpacked) > limit:
-        raise BombError(f"it unpacks to more than {limit} bytes")
-    return unpacked
+    return _within(unpacked, limit)
 
 
 def unlz4(data: bytes, limit: int = LARGEST) -> bytes:
@@ -50,6 +48,10 @@ def unlz4(data: bytes, limit: int = LARGEST) -> bytes:
         RuntimeError: It is damaged.
     """
     unpacked: bytes = lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=limit + 1)
+    return _within(unpacked, limit)
+
+
+def _within(unpacked: bytes, limit: int) -> bytes:
     if len(unpacked) > limit:
         raise BombError(f"it unpacks to more than {limit} bytes")
     return unpacked

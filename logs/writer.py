@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Iterable
+from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -107,7 +108,8 @@ class TrialWriter:
 
     def __enter__(self) -> Self:
         self._log = LogFile(self.path)
-        try:
+        with ExitStack() as undo:
+            undo.callback(self._log.close)  # `__exit__` is not called where this is interrupted
             write_preamble(
                 self._log,
                 self._robot,
@@ -120,9 +122,7 @@ class TrialWriter:
                 self._log.channel(topic.name, topic.type) for topic in self._encoder.topics
             ]
             self._log.sync()  # before the robot moves, the disk has all that steps are read by
-        except BaseException:  # whatever ends it, Ctrl-C too: `__exit__` is not called then
-            self._log.close()
-            raise
+            undo.pop_all()
         self._sound = True
         return self
 

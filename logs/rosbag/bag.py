@@ -16,8 +16,9 @@ from ruamel.yaml.error import YAMLError
 from selfmodel.errors import InputError
 from selfmodel.logs.errors import CorruptError, NotMcapError
 from selfmodel.logs.files import check_regular, read_bounded
+from selfmodel.logs.framing import MAGIC
 from selfmodel.logs.rosbag.stored import Announced, Stored
-from selfmodel.logs.rosbag.stored_mcap import MCAP_MAGIC, read_mcap
+from selfmodel.logs.rosbag.stored_mcap import read_mcap
 from selfmodel.logs.rosbag.stored_sqlite import SQLITE_MAGIC, read_sqlite
 from selfmodel.logs.unpack import ZSTD_MAGIC, BombError, unzstd, unzstd_file
 
@@ -189,7 +190,7 @@ def _begins(path: Path, magic: bytes) -> bool:
 def _read(file: Path, name: Path) -> Iterator[Announced | Stored]:
     if _begins(file, SQLITE_MAGIC):
         return read_sqlite(file, name)
-    if _begins(file, MCAP_MAGIC):
+    if _begins(file, MAGIC):
         return read_mcap(file, name)
     raise NotMcapError(name, "this is no rosbag2 recording", advice=EXPECTED)
 

@@ -7,7 +7,6 @@ made: the checksums that are not 0, and the count of messages.
 
 import struct
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import IO
 
@@ -17,10 +16,9 @@ from mcap.records import Channel, Chunk, Footer, McapRecord, Message, Schema, St
 from mcap.stream_reader import StreamReader, breakup_chunk
 
 from selfmodel.logs.errors import CorruptError, LogError, NotMcapError, TruncatedError
+from selfmodel.logs.framing import unpack_chunk
 from selfmodel.logs.rosbag.stored import Announced, DamageError, Stored, checked_time
-from selfmodel.logs.unpack import LARGEST, unlz4, unzstd
-
-MCAP_MAGIC = b"\x89MCAP0\r\n"
+from selfmodel.logs.unpack import LARGEST
 
 ADVICE = "record it again, or recover what is whole with `mcap recover`"
 
@@ -98,21 +96,10 @@ def _records(file: IO[bytes]) -> Iterator[McapRecord]:
 
 
 def _unpacked(chunk: Chunk) -> Chunk:
-    size = chunk.uncompressed_size
-    if size > LARGEST:
-        raise DamageError(f"a chunk claims {size} bytes, more than {LARGEST}")
-    match chunk.compression:
-        case "":
-            data = chunk.data
-        case "zstd":
-            data = unzstd(chunk.data, size)
-        case "lz4":
-            data = unlz4(chunk.data, size)
-        case other:
-            raise DamageError(f"a chunk is packed with {other!r}; zstd and lz4 are known")
-    if len(data) != size:
-        raise DamageError(f"a chunk of {size} bytes unpacks to {len(data)}")
-    return replace(chunk, compression="", data=data)
+    if chunk.uncompressed_size > LARGEST:
+        raise DamageError(f"a chunk claims {chunk.uncompressed_size} bytes, more than {LARGEST}")
+    unpack_chunk(chunk)
+    return chunk
 
 
 def _explained(name: Path, failure: Exception, good: str) -> LogError:

@@ -166,11 +166,9 @@ def robot(name: str, control_timestep: float) -> Robot:
     path = Path(name)
     if path.suffix.lower() != ".xml":
         return robot_entry(name).robot()
+    data = read_bounded(path, "an MJCF file", LARGEST_MODEL)
     try:
-        text = read_bounded(path, "an MJCF file", LARGEST_MODEL).decode()
-        return Robot(path.stem, text, control_timestep)
-    except InputError:
-        raise
+        return Robot(path.stem, data.decode(), control_timestep)
     except (ValueError, KeyError) as error:
         what = " ".join(str(error).split())
         raise InputError(

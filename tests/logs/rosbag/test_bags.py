@@ -141,12 +141,20 @@ def test_genuine_recordings_are_read_or_refused(path: Path, biped: Robot):
         imported(path, biped)
 
 
-@pytest.mark.skipif(not GENUINE, reason="the samples are not here")
-def test_a_foreign_encoding_is_refused_only_where_it_is_wanted():
-    with open_bag(SAMPLES / "rosbag2" / "wrong_rmw_test_0.mcap") as bag:
-        assert bag.topics["/test_topic"].count == 3
-        with pytest.raises(UnsupportedError, match="in cdr on /test_topic, got 'wrong_format'"):
-            read_series(bag, ["/test_topic"])
+def test_a_foreign_encoding_is_refused_only_where_it_is_wanted(tmp_path: Path):
+    path = tmp_path / "foreign.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start("ros2")
+        schema = writer.register_schema("std_msgs/msg/Bool", "ros2msg", b"bool data")
+        channel = writer.register_channel("/foreign", "wrong_format", schema)
+        for time in range(3):
+            writer.add_message(channel, T0 + time, b"?", T0 + time)
+        writer.finish()
+    with open_bag(path) as bag:
+        assert bag.topics["/foreign"].count == 3
+        with pytest.raises(UnsupportedError, match="in cdr on /foreign, got 'wrong_format'"):
+            read_series(bag, ["/foreign"])
 
 
 @pytest.mark.parametrize("form", FORMS)
