@@ -12,7 +12,7 @@ from mcap.records import Attachment, Channel, Header, McapRecord, Message, Metad
 from selfmodel.logs.budget import ExcessError
 from selfmodel.logs.errors import (
     ANOTHER,
-    IMPORT,
+    IMPORT_IT,
     CorruptError,
     LogError,
     NotMcapError,
@@ -166,7 +166,7 @@ def _explain(path: Path, data: bytes, failure: Exception, contents: Contents) ->
         return UnsupportedError(path, str(failure), good=good, advice=advice)
     if isinstance(failure, UncheckedError):
         what = f"{failure}: it is no log that selfmodel wrote"
-        return UnsupportedError(path, what, good=good, advice=IMPORT)
+        return UnsupportedError(path, what, good=good, advice=IMPORT_IT)
     if isinstance(failure, (EndOfFile, struct.error)) and not data.endswith(MAGIC):
         if len(data) <= len(MAGIC):
             return NotMcapError(path, "the file is empty or too short", advice=ANOTHER)

@@ -8,7 +8,7 @@ from selfmodel.errors import WorkError
 
 AGAIN = "make the trial again"
 ANOTHER = "give a trial log, NAME.mcap"
-IMPORT = "a recording of a robot becomes a trial log with `selfmodel logs import`"
+IMPORT_IT = "a recording of a robot becomes a trial log with `selfmodel logs import`"
 OTHER_VERSION = "read it with the version of selfmodel that wrote it"
 
 

@@ -13,7 +13,7 @@ from selfmodel.logs.contents import Contents, read_contents
 from selfmodel.logs.controllers import parse_controller
 from selfmodel.logs.errors import (
     ANOTHER,
-    IMPORT,
+    IMPORT_IT,
     OTHER_VERSION,
     CorruptError,
     IncompleteError,
@@ -26,6 +26,7 @@ from selfmodel.logs.records import (
     FINISHED,
     FORMAT,
     HIDDEN,
+    IMPORT,
     INTERRUPTED,
     MAPPING_FILE,
     MODEL_FILE,
@@ -40,9 +41,6 @@ from selfmodel.logs.records import (
     result_record,
     sha256,
     trial_record,
-)
-from selfmodel.logs.records import (
-    IMPORT as IMPORT_RECORD,
 )
 from selfmodel.logs.signals import read_behaviour
 from selfmodel.playback import played_back
@@ -137,7 +135,7 @@ def interpret(path: Path, contents: Contents) -> TrialLog:
         settings=settings,
         software=MappingProxyType(dict(contents.metadata.get(SOFTWARE, {}))),
         status=result.status,
-        imported=IMPORT_RECORD in contents.metadata,
+        imported=IMPORT in contents.metadata,
     )
 
 
@@ -164,7 +162,7 @@ def read_record(path: Path, contents: Contents) -> TrialRecord:
     """
     texts = contents.metadata.get(TRIAL)
     if texts is None:
-        advice = f"{ANOTHER}; {IMPORT}"
+        advice = f"{ANOTHER}; {IMPORT_IT}"
         raise SchemaMismatchError(
             path, f"it has no record {TRIAL}", good=contents.good, advice=advice
         )
