@@ -47,7 +47,9 @@ def import_(
     """Import a rosbag2 recording of a real robot as a trial's log, without ROS."""
     if suggest:
         if robot is None or out or mapping or as_json:
-            raise InputError("--suggest needs --robot NAME|MJCF, and goes with no other option")
+            raise InputError(
+                "--suggest needs --robot NAME|MODEL.xml, and goes with no other option"
+            )
         typer.echo(_suggestion(bag, robot), nl=False)
         return
     if robot is not None:
@@ -55,7 +57,7 @@ def import_(
     if out is None or mapping is None:
         raise InputError(
             "an import needs --out TRIAL.mcap and --mapping MAP.toml; "
-            "--suggest --robot NAME|MJCF prints a mapping to start from"
+            "--suggest --robot NAME|MODEL.xml prints a mapping to start from"
         )
     check_log_name(out)
     _import(bag, out, mapping, as_json=as_json)
