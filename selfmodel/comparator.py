@@ -1,5 +1,6 @@
 """What a comparator is: a distance between simulated behaviour and a logged trial."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -13,10 +14,57 @@ class ClosedLoop:
     """A request to simulate the whole trial: its controller, from the start, for all its steps.
 
     Attributes:
-        record: The signals that the comparator looks at.
+        record: The signals that the comparator looks at, ``(n, steps, width)`` each.
     """
 
     record: tuple[Signal, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Segments:
+    """A request to predict short stretches of the trial, each from a state that was logged.
+
+    Attributes:
+        states: The state at the beginning of each segment, ``(segments, width)`` for each signal
+            of the joints' and the base's positions and velocities.
+        commands: What was commanded then, ``(segments, lead + horizon, motors)``: the first
+            ``lead`` rows were commanded before the segment begins, and matter to a model whose
+            commands take effect late.
+        lead: Rows of ``commands`` from before the segment.
+        record: The signals that the comparator looks at, ``(n, segments, horizon + 1, width)``
+            each; row 0 is the beginning.
+    """
+
+    states: Mapping[Signal, FloatArray]
+    commands: FloatArray
+    lead: int
+    record: tuple[Signal, ...]
+
+    @property
+    def horizon(self) -> int:
+        """Control steps that a segment lasts."""
+        return self.commands.shape[1] - self.lead
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """A request to simulate the whole trial many times, each with a self-model a little different.
+
+    The members are the same for every hypothesis (common random numbers).
+
+    Attributes:
+        record: The signals that the comparator looks at, ``(n, members, steps, width)`` each.
+        members: Simulations of each hypothesis.
+        level: The level of the reality gap that the members are drawn from.
+    """
+
+    record: tuple[Signal, ...]
+    members: int
+    level: float
+
+
+Request = ClosedLoop | Segments | Ensemble
+"""What may be simulated to judge a trial."""
 
 
 @runtime_checkable
@@ -32,7 +80,7 @@ class Comparator(Protocol):
         """What it is called on the command line and in results."""
         ...
 
-    def request(self, trial: Trial) -> ClosedLoop:
+    def request(self, trial: Trial) -> Request:
         """Returns what must be simulated to judge a trial.
 
         Raises:
@@ -46,11 +94,33 @@ class Comparator(Protocol):
         It depends on its arguments alone and changes neither.
 
         Args:
-            simulated: What was requested, ``(n, steps, width)`` for each signal.
+            simulated: What was requested, with a leading axis of ``n`` hypotheses.
             trial: The logged trial, ``(steps, width)`` for each signal.
 
         Returns:
             ``(n,)`` finite numbers of at least 0, smaller is closer; 0 for a simulation that did
             what the trial shows.
+        """
+        ...
+
+
+@runtime_checkable
+class Piecewise(Comparator, Protocol):
+    """A comparator whose distance is the mean over pieces of the trial, such as windows of it.
+
+    Only such a comparator can be asked whether one hypothesis is *significantly* closer than
+    another: paired over the pieces.
+    """
+
+    def losses(self, simulated: Behaviour, trial: Trial) -> FloatArray:
+        """Returns how badly each piece of the trial is predicted.
+
+        Args:
+            simulated: As for ``distances``.
+            trial: As for ``distances``.
+
+        Returns:
+            ``(n, pieces)`` finite numbers of at least 0; ``distances`` is their mean over the
+            pieces. The pieces are the same, in the same order, for every hypothesis.
         """
         ...
