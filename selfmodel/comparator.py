@@ -43,7 +43,7 @@ class Segments:
     @property
     def horizon(self) -> int:
         """Control steps that a segment lasts."""
-        return self.commands.shape[1] - self.lead
+        return int(self.commands.shape[1]) - self.lead
 
 
 @dataclass(frozen=True)
