@@ -1,40 +1,52 @@
 """The diagnostic EA: evolves hypotheses that explain all trials."""
 
 from collections.abc import Sequence
-from functools import partial
 
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.behaviour import SIGNALS
 from selfmodel.comparator import Comparator
-from selfmodel.diagnosis import Candidate, Diagnosis
-from selfmodel.errors import InputError
+from selfmodel.diagnosis import Candidate, Diagnosis, Verdict
+from selfmodel.evidence import Evidence
 from selfmodel.evolution import Evolution, Observe, evolve
-from selfmodel.genome import VALUES, decode, encode
-from selfmodel.hypothesis import Hypothesis
-from selfmodel.memo import Memo
+from selfmodel.faults import Fault
+from selfmodel.genome import VALUES, decode, encode, hypothesised_kinds
+from selfmodel.hypothesis import INTACT, Hypothesis
+from selfmodel.refine import refined
 from selfmodel.settings import Settings
+from selfmodel.significance import TEST, is_better, is_worse_than_ever
 from selfmodel.simulator import Simulator
 from selfmodel.trial import Trial
+
+EQUAL = "equal distances"
+"""The test of a comparator that gives one number for a trial."""
 
 
 class Diagnose:
     """Evolves hypotheses against logged trials; it remembers every distance.
 
     Fitness is minus the sum of the distances over all trials. Source: the paper, section III.
+    Where the comparator judges in pieces, what the EA found is refined: see ``refine``.
 
     Args:
         simulator: The self-model.
         comparator: Says what to simulate and how far it is from a trial.
         settings: The numbers of the search.
+        intact: Trials of the robot with nothing wrong, which show how well the self-model
+            predicts when it is right; without any, no verdict can be ``unexplained``.
     """
 
-    def __init__(self, simulator: Simulator, comparator: Comparator, settings: Settings) -> None:
-        self._simulator = simulator
-        self._comparator = comparator
+    def __init__(
+        self,
+        simulator: Simulator,
+        comparator: Comparator,
+        settings: Settings,
+        intact: Sequence[Trial] = (),
+    ) -> None:
+        self._anatomy = simulator.robot.anatomy
         self._settings = settings
-        self._distances: dict[str, Memo[Hypothesis]] = {}  # by the trial's log
+        self._intact = tuple(intact)
+        self.evidence = Evidence(simulator, comparator)
         self.evaluations = 0
 
     def __call__(
@@ -52,12 +64,37 @@ class Diagnose:
             rng: Every random choice comes from it.
             observe: Is told of every generation.
         """
-        anatomy, genes = self._simulator.robot.anatomy, self._settings.genes
+        totals = self._evolved(trials, seeds, rng, observe)
+        kept = self._settings.kept
+        best = _ranked(totals)[0]
+        if self.evidence.in_pieces:
+            best = self._refined(trials, _ranked(totals)[:2], totals)
+        totals.setdefault(INTACT, float(self.evidence.distances([INTACT], trials)[0]))
+        ranked = [best, *(other for other in _ranked(totals) if other != best)]
+        rivals = self._rivals(best, ranked[1:], trials)
+        return Diagnosis(
+            ranked=tuple(Candidate(known, totals[known]) for known in ranked[:kept]),
+            trials=len(trials),
+            intact_distance=totals[INTACT],
+            rivals=rivals[:kept],
+            verdict=self._verdict(best, rivals, trials),
+            test=TEST if self.evidence.in_pieces else EQUAL,
+        )
+
+    def _evolved(
+        self,
+        trials: Sequence[Trial],
+        seeds: Sequence[Hypothesis],
+        rng: np.random.Generator,
+        observe: Observe,
+    ) -> dict[Hypothesis, float]:
+        """The distance of every hypothesis that the EA looked at."""
+        genes, anatomy = self._settings.genes, self._anatomy
         totals: dict[Hypothesis, float] = {}
 
         def fitness(genomes: FloatArray) -> FloatArray:
             hypotheses = [decode(genome, anatomy) for genome in genomes]
-            distances = self.distances(hypotheses, trials)
+            distances = self.evidence.distances(hypotheses, trials)
             totals.update(zip(hypotheses, map(float, distances), strict=True))
             return 0.0 - distances  # not -distances: a perfect fitness reads 0, not -0
 
@@ -70,61 +107,51 @@ class Diagnose:
         )
         evolve(search, fitness, observe)
         self.evaluations += search.evaluations
-        ranked = sorted(totals, key=lambda known: (totals[known], len(known), known))
-        return Diagnosis(
-            ranked=tuple(
-                Candidate(known, totals[known]) for known in ranked[: self._settings.kept]
-            ),
-            trials=len(trials),
-        )
+        return totals
 
-    def check(self, trials: Sequence[Trial]) -> None:
-        """Checks that the comparator can judge all trials, before any search.
+    def _refined(
+        self, trials: Sequence[Trial], known: Sequence[Hypothesis], totals: dict[Hypothesis, float]
+    ) -> Hypothesis:
+        """The best hypothesis around those known; whatever was looked at is noted in ``totals``."""
 
-        Raises:
-            InputError: It cannot; the sentence names every trial that it cannot judge, and why.
-        """
-        problems = []
-        for trial in trials:
-            try:
-                self._comparator.request(trial)
-            except InputError as error:
-                problems.append(str(error))
-        if problems:
-            raise InputError("; ".join(problems))
+        def losses(hypotheses: Sequence[Hypothesis]) -> FloatArray:
+            new = [one for one in dict.fromkeys(hypotheses) if one not in totals]
+            if new:
+                totals.update(
+                    zip(new, map(float, self.evidence.distances(new, trials)), strict=True)
+                )
+                self.evaluations += len(new)
+            return self.evidence.losses(hypotheses, trials)
 
-    def distances(self, hypotheses: Sequence[Hypothesis], trials: Sequence[Trial]) -> FloatArray:
-        """Returns how far each hypothesis is from all trials together, ``(n,)``.
+        faults = [
+            Fault(kind.name, part)
+            for kind in hypothesised_kinds()
+            for part in kind.parts(self._anatomy)
+        ]
+        return refined(known, faults, self._settings.genes, losses, self._anatomy)
 
-        A hypothesis whose simulation diverges is infinitely far.
-        """
-        total = np.zeros(len(hypotheses))
-        for trial in trials:
-            memo = self._distances.setdefault(trial.path, Memo())
-            total += memo.values(hypotheses, partial(self._simulate, trial))
-        return total
+    def _rivals(
+        self, best: Hypothesis, others: Sequence[Hypothesis], trials: Sequence[Trial]
+    ) -> tuple[Hypothesis, ...]:
+        """Those that cannot be told from the best, but for those that only say more."""
+        candidates = [other for other in others if not set(best.faults) < set(other.faults)]
+        mine, *theirs = self.evidence.losses([best, *candidates], trials)
+        if self.evidence.in_pieces:
+            told = [is_better(mine, losses) for losses in theirs]
+        else:
+            told = [bool(losses.sum() != mine.sum()) for losses in theirs]
+        return tuple(other for other, apart in zip(candidates, told, strict=True) if not apart)
 
-    @property
-    def distinct_hypotheses(self) -> int:
-        """How many hypotheses were ever simulated."""
-        return len({hypothesis for memo in self._distances.values() for hypothesis in memo})
+    def _verdict(
+        self, best: Hypothesis, rivals: Sequence[Hypothesis], trials: Sequence[Trial]
+    ) -> Verdict:
+        if self._intact:
+            mine = self.evidence.losses([best], trials)[0]
+            usual = self.evidence.losses([INTACT], self._intact)[0]
+            if is_worse_than_ever(mine, usual):
+                return "unexplained"
+        return "ambiguous" if rivals else "explained"
 
-    def _simulate(self, trial: Trial, hypotheses: list[Hypothesis]) -> FloatArray:
-        controller, steps = trial.plan.controller, trial.behaviour.steps
-        record = self._comparator.request(trial).record
-        if not record or not set(record) <= set(SIGNALS):
-            raise self._broken(f"asked for the signals {record!r}, of {', '.join(SIGNALS)}")
-        runs = [(hypothesis, controller) for hypothesis in hypotheses]
-        outcome = self._simulator.run(runs, steps, record)
-        distances = np.asarray(self._comparator.distances(outcome.behaviour, trial))
-        if distances.shape != (len(runs),):
-            raise self._broken(f"gave {distances.shape} distances for {len(runs)} simulations")
-        if not np.all((distances >= 0) | outcome.diverged):
-            raise self._broken(f"gave a distance that is not a number of at least 0: {distances}")
-        return np.where(outcome.diverged, np.inf, distances)
 
-    def _broken(self, what: str) -> InputError:
-        return InputError(
-            f"the comparator {self._comparator.name!r} {what}: run "
-            f"selfmodel.contract.check_comparator on it"
-        )
+def _ranked(totals: dict[Hypothesis, float]) -> list[Hypothesis]:
+    return sorted(totals, key=lambda known: (totals[known], len(known), known))

@@ -1,8 +1,14 @@
-"""A diagnosis: hypotheses ranked by how well they explain all trials."""
+"""A diagnosis: hypotheses ranked by how well they explain all trials, and how sure that is."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 from selfmodel.hypothesis import Hypothesis
+
+Verdict = Literal["explained", "ambiguous", "unexplained"]
+"""``explained``: the best hypothesis predicts the trials about as well as the self-model predicts
+the intact robot, and no other does. ``ambiguous``: others cannot be told from it.
+``unexplained``: it predicts significantly worse, so something is wrong that it does not say."""
 
 
 @dataclass(frozen=True)
@@ -23,12 +29,23 @@ class Diagnosis:
     """Hypotheses, best first.
 
     Attributes:
-        ranked: At least one; of equal distances the one with fewer faults comes first.
+        ranked: At least one. The first is the best: the one with the fewest faults of which every
+            one makes the prediction significantly better; where a comparator allows no such test,
+            the closest. The others follow by distance; of equal distances the one with fewer faults
+            comes first.
         trials: How many trials they had to explain.
+        intact_distance: The distance that "nothing changed" gets.
+        rivals: Other hypotheses that the trials cannot tell from the best, closest first.
+        verdict: Whether the best hypothesis explains the trials.
+        test: By which test the rivals were told from the others.
     """
 
     ranked: tuple[Candidate, ...]
     trials: int
+    intact_distance: float
+    rivals: tuple[Hypothesis, ...]
+    verdict: Verdict
+    test: str
 
     @property
     def best(self) -> Hypothesis:

@@ -5,7 +5,7 @@ limb stays as a ghost that touches nothing, a jammed joint stays as one that not
 """
 
 import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
@@ -35,12 +35,14 @@ class Embodiment:
         gain: Multiplies each nominal sensor reading, ``(sensors,)``.
         offset: Is added to it then, ``(sensors,)``.
         neurons: 1 for each hidden neuron that works, 0 for a silent one, ``(hidden,)``.
+        held: Of each hinge that is held still its places in ``qpos`` and ``qvel`` and its angle.
     """
 
     model: mujoco.MjModel
     gain: FloatArray
     offset: FloatArray
     neurons: FloatArray
+    held: list[tuple[int, int, float]] = field(default_factory=list)
 
     def lose_body(self, name: str) -> None:
         """Makes a body a ghost: no mass, no collisions, no force from its motors."""
@@ -74,6 +76,7 @@ class Embodiment:
         model.dof_armature[hinge.dofadr[0]] = WELD_ARMATURE
         # A limit that it touches must not push against the weld.
         model.jnt_limited[hinge.id] = 0
+        self.held.append((int(hinge.qposadr[0]), int(hinge.dofadr[0]), angle))
 
     def release_motor(self, motor: int) -> None:
         """Takes all force from the motor of that number."""

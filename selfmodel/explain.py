@@ -33,7 +33,7 @@ def explain(
     """
     if not trials:
         raise InputError("expected at least one trial to explain, got none")
-    diagnose.check(trials)
+    diagnose.evidence.check(trials)
     known = Database()
     for number in range(1, len(trials) + 1):
         watch(SearchBegins("diagnostic"))

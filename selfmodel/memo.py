@@ -1,14 +1,12 @@
-"""Numbers that are computed once.
+"""What is computed once.
 
-Each of the EAs has its own: a repair keeps the way that a run went, a diagnosis its distance to one
-trial. Behaviours are not kept, so a controller that was tried is simulated once more for each trial
-it is compared with; everything else is simulated once.
+Each of the EAs has its own: a repair keeps the way that a run went, a diagnosis the losses of a
+hypothesis in one trial. Behaviours are not kept, so a controller that was tried is simulated once
+more for each trial it is compared with; everything else is simulated once.
 """
 
 from collections.abc import Callable, Hashable, Iterator, Sequence
-from typing import Generic, TypeVar
-
-import numpy as np
+from typing import Any, Generic, TypeVar
 
 from selfmodel.arrays import FloatArray
 
@@ -16,10 +14,10 @@ Key = TypeVar("Key", bound=Hashable)
 
 
 class Memo(Generic[Key]):
-    """Remembers a number for every key it was ever asked for."""
+    """Remembers a row of numbers for every key it was ever asked for."""
 
     def __init__(self) -> None:
-        self._known: dict[Key, float] = {}
+        self._known: dict[Key, Any] = {}
 
     def __len__(self) -> int:
         return len(self._known)
@@ -27,14 +25,16 @@ class Memo(Generic[Key]):
     def __iter__(self) -> Iterator[Key]:
         return iter(self._known)
 
-    def values(self, keys: Sequence[Key], compute: Callable[[list[Key]], FloatArray]) -> FloatArray:
-        """Returns the number of each key, ``(n,)``.
+    def values(
+        self, keys: Sequence[Key], compute: Callable[[list[Key]], FloatArray]
+    ) -> list[FloatArray]:
+        """Returns the row of each key.
 
         Args:
             keys: What is asked for; repetitions are fine.
-            compute: From the keys not known yet, each once, to their numbers.
+            compute: From the keys not known yet, each once, to their rows, ``(n, ...)``.
         """
         unknown = list(dict.fromkeys(key for key in keys if key not in self._known))
         if unknown:
-            self._known.update(zip(unknown, map(float, compute(unknown)), strict=True))
-        return np.array([self._known[key] for key in keys])
+            self._known.update(zip(unknown, compute(unknown), strict=True))
+        return [self._known[key] for key in keys]

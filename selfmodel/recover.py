@@ -122,5 +122,5 @@ def recover(
         diagnosis=diagnosis,
         repair_evaluations=repair.evaluations,
         diagnostic_evaluations=diagnose.evaluations,
-        distinct_hypotheses=diagnose.distinct_hypotheses,
+        distinct_hypotheses=diagnose.evidence.distinct_hypotheses,
     )

@@ -49,7 +49,7 @@ class Repair:
 
         def fitness(genomes: FloatArray) -> FloatArray:
             runs = [(hypothesis, Controller(network, genome)) for genome in genomes]
-            return self._fitness.values(runs, self._simulate)
+            return np.array(self._fitness.values(runs, self._simulate))
 
         search = Evolution(
             network.weights,

@@ -11,6 +11,9 @@ from selfmodel.controller import HIDDEN_NEURONS, Network
 from selfmodel.embodiment import Embodiment, embody
 from selfmodel.hypothesis import Hypothesis
 
+CONTROL_DELAY = "selfmodel_control_delay"
+"""The custom numeric of an MJCF that says how many control steps a command takes to its effect."""
+
 
 @dataclass(frozen=True, eq=False)
 class Robot:
@@ -54,6 +57,13 @@ class Robot:
     def substeps(self) -> int:
         """Physics steps in a control step."""
         return max(1, round(self.control_timestep / float(self.model.opt.timestep)))
+
+    @property
+    def control_delay(self) -> int:
+        """Control steps from a command to its effect, as the model's ``CONTROL_DELAY`` says."""
+        model = self.model
+        found = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, CONTROL_DELAY)
+        return int(model.numeric(found).data[0]) if found >= 0 else 0
 
     @property
     def network(self) -> Network:

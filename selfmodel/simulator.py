@@ -1,59 +1,28 @@
 """The self-model in motion: many robots, each with its hypothesis and driver, in one batch."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Sequence
 from functools import lru_cache
 from time import perf_counter
 
-import mujoco
 import numpy as np
-from mujoco.batch import Batch, SimulationError
 
-from selfmodel.arrays import BoolArray, FloatArray, IndexArray
+from selfmodel.arrays import FloatArray
+from selfmodel.batches import Alive, counted_not_printed, live_signals, new_batch
 from selfmodel.behaviour import Behaviour, Signal
+from selfmodel.comparator import Segments
 from selfmodel.driver import Driver, drive
 from selfmodel.embodiment import Embodiment
 from selfmodel.hypothesis import Hypothesis
-from selfmodel.places import places
+from selfmodel.prediction import predict
 from selfmodel.robot import Robot
 from selfmodel.senses import Senses
+from selfmodel.tally import Simulated, Tally
 
 Run = tuple[Hypothesis, Driver]
 """What one simulation runs: a robot with what the hypothesis says wrong, and what drives it."""
 
 REMEMBERED_EMBODIMENTS = 1024
 """Built models that are kept: a few tens of kB each."""
-
-
-@dataclass
-class Tally:
-    """What a simulator has done so far.
-
-    Attributes:
-        runs: Simulations.
-        steps: Control steps, over all simulations.
-        diverged: Simulations that diverged, or in which MuJoCo warned.
-        physics_seconds: Wall time spent inside MuJoCo's steps.
-    """
-
-    runs: int = 0
-    steps: int = 0
-    diverged: int = 0
-    physics_seconds: float = 0.0
-
-
-@dataclass(frozen=True, eq=False)
-class Simulated:
-    """The outcome of a batch of runs.
-
-    Attributes:
-        behaviour: The signals that were asked for, ``(n, steps, width)``.
-        diverged: ``(n,)``: which runs mean nothing, because the simulation broke down.
-    """
-
-    behaviour: Behaviour
-    diverged: BoolArray
 
 
 class Simulator:
@@ -66,8 +35,8 @@ class Simulator:
 
     def __init__(self, robot: Robot, threads: int) -> None:
         self.robot = robot
+        self.threads = threads
         self.tally = Tally()
-        self._threads = threads
         self._embodiment = lru_cache(REMEMBERED_EMBODIMENTS)(robot.build)
 
     def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> Simulated:
@@ -78,28 +47,45 @@ class Simulator:
             steps: Control steps, and rows of every signal.
             record: The signals to keep; what is not kept costs nothing.
         """
-        robot, n = self.robot, len(runs)
         embodiments = [self._embodiment(hypothesis) for hypothesis, _ in runs]
-        batch = _batch(robot.model, embodiments, self._threads)
+        return self._run(embodiments, [driver for _, driver in runs], steps, record)
+
+    def predict(self, hypotheses: Sequence[Hypothesis], segments: Segments) -> Simulated:
+        """Predicts segments of a trial under each hypothesis; see ``prediction.predict``."""
+        embodiments = [self._embodiment(hypothesis) for hypothesis in hypotheses]
+        return predict(self.robot, embodiments, segments, threads=self.threads, tally=self.tally)
+
+    def _run(
+        self,
+        embodiments: Sequence[Embodiment],
+        drivers: Sequence[Driver],
+        steps: int,
+        record: Sequence[Signal],
+    ) -> Simulated:
+        robot, n = self.robot, len(embodiments)
+        batch = new_batch(robot.model, embodiments, self.threads)
         senses = Senses(robot.model, robot.anatomy, embodiments)
         brains = drive(
-            [driver for _, driver in runs],
+            drivers,
             np.array([embodiment.neurons for embodiment in embodiments]),
             len(robot.anatomy.sensors),
         )
         sensordata, qpos, ctrl = (batch.bind(field) for field in ("sensordata", "qpos", "ctrl"))
-        live = _live(robot, batch, brains.readings, record)
+        motors = _DelayLine(ctrl, robot.control_delay)
+        live = live_signals(robot, batch, record)
+        live |= {"sensors": (brains.readings, slice(None)), "commands": (motors.inlet, slice(None))}
         # By step while it runs, so that a step is written in one piece.
         kept = {
             signal: np.empty((steps, n, robot.anatomy.names.width(signal))) for signal in record
         }
         # After every field is bound: one that is bound later stays zero until the next step.
         batch.reset()
-        alive = _Alive(batch)
-        with _counted_not_printed():
+        alive = Alive(batch)
+        with counted_not_printed():
             for k in range(steps):
                 senses.read(sensordata, qpos, brains.readings)
-                brains.step(ctrl)
+                brains.step(motors.inlet)
+                motors.advance()
                 for signal, rows in kept.items():
                     values, chosen = live[signal]
                     rows[k] = values[:, chosen]
@@ -118,57 +104,25 @@ class Simulator:
         return Simulated(Behaviour(robot.anatomy.names, time, signals), diverged)
 
 
-@contextmanager
-def _counted_not_printed() -> Iterator[None]:
-    """Keeps MuJoCo's warnings off the terminal and out of a file: each is counted by its run."""
-    before, quiet = mujoco.MjLogConfig.get(), mujoco.MjLogConfig.get()
-    quiet.logto_console = quiet.logto_file = False
-    mujoco.MjLogConfig.set(quiet)
-    try:
-        yield
-    finally:
-        mujoco.MjLogConfig.set(before)
+class _DelayLine:
+    """Commands on their way to the motors; before the first arrives, the motors hold 0.
 
-
-class _Alive:
-    """Steps the simulations of a batch that MuJoCo has not raised in, and knows which broke down.
-
-    One that MuJoCo warns about is reset by it and goes on, worthless but harmless: rows of a batch
-    do not touch each other.
+    Args:
+        outlet: What the motors obey, ``(n, motors)``, written.
+        delay: Control steps from a command to its effect.
     """
 
-    def __init__(self, batch: Batch) -> None:
-        self._batch = batch
-        self._ids: IndexArray | None = None
-        self._failed = np.zeros(batch.nsim, dtype=bool)
+    def __init__(self, outlet: FloatArray, delay: int) -> None:
+        self._outlet = outlet
+        self._line = np.zeros((delay, *outlet.shape))
+        self._step = 0
+        self.inlet = np.zeros(outlet.shape) if delay else outlet
+        """Where the next command is written: where nothing is delayed, the outlet itself."""
 
-    def step(self, substeps: int) -> None:
-        try:
-            self._batch.step(self._ids, nstep=substeps)
-        except SimulationError as error:
-            self._failed[error.ids] = True
-            self._ids = np.flatnonzero(~self._failed)
-
-    def diverged(self) -> BoolArray:
-        warned: BoolArray = self._batch.warning[:, :, 1].any(axis=1)
-        return self._failed | warned
-
-
-def _batch(model: mujoco.MjModel, embodiments: Sequence[Embodiment], threads: int) -> Batch:
-    """A batch with each simulation on its embodiment's model."""
-    batch = Batch(model, len(embodiments), nthread=threads)
-    batch.set_models([embodiment.model for embodiment in embodiments])
-    return batch
-
-
-def _live(
-    robot: Robot, batch: Batch, readings: FloatArray, record: Sequence[Signal]
-) -> dict[Signal, tuple[FloatArray, slice | list[int]]]:
-    """For each signal the array that always holds its present value, and its columns in it."""
-    state = places(robot)
-    return {
-        signal: (readings, slice(None))
-        if signal == "sensors"
-        else (batch.bind(state[signal].field), state[signal].columns)
-        for signal in record
-    }
+    def advance(self) -> None:
+        """Takes what stands in the inlet, and hands on what is due."""
+        if len(self._line):
+            place = self._step % len(self._line)
+            self._outlet[:] = self._line[place]
+            self._line[place] = self.inlet
+            self._step += 1

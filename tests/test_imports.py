@@ -56,7 +56,7 @@ def test_dependencies_point_one_way(module: str):
 LAYERS = (
     # Plain data and plain algorithms; then MuJoCo; then what takes a comparator; then the story.
     (
-        *("errors", "arrays", "behaviour", "anatomy", "controller", "settings", "memo"),
+        *("errors", "arrays", "rotation", "behaviour", "anatomy", "controller", "settings", "memo"),
         *("evolution", "playback", "driver", "streams"),
     ),
     (
@@ -68,10 +68,15 @@ LAYERS = (
         "trial",
         "comparator",
         "contract",
+        "estimate",
+        "significance",
         "events",
     ),
-    ("embodiment", "robot", "places", "senses", "simulator", "physical", "judge", "replay"),
-    ("database", "diagnose", "repair"),
+    (
+        *("embodiment", "robot", "places", "senses", "batches", "tally", "prediction"),
+        *("simulator", "physical", "judge", "replay", "parameters"),
+    ),
+    ("database", "evidence", "refine", "diagnose", "repair", "calibrate"),
     ("recover", "explain"),
 )
 

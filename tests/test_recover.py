@@ -25,7 +25,8 @@ from selfmodel.physical import SimulatedRobot
 from selfmodel.recover import Recovery, recover
 from selfmodel.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulator import Run, Simulated, Simulator
+from selfmodel.simulator import Run, Simulator
+from selfmodel.tally import Simulated
 from selfmodel.trial import Trial
 from tests.memory import MemoryJournal
 

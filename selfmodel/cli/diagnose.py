@@ -63,7 +63,7 @@ def diagnose(
         "passed_over": [log.trial.path for log in logs if log not in used],
         "diagnosis": as_values(diagnosis.ranked),
         "evaluations": search.evaluations,
-        "distinct_hypotheses": search.distinct_hypotheses,
+        "distinct_hypotheses": search.evidence.distinct_hypotheses,
         "seconds": perf_counter() - start,
     }
     if as_json:

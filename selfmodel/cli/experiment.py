@@ -15,7 +15,8 @@ from selfmodel.physical import SimulatedRobot
 from selfmodel.recover import Recovery, recover
 from selfmodel.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulator import Simulator, Tally
+from selfmodel.simulator import Simulator
+from selfmodel.tally import Tally
 
 
 @dataclass(frozen=True, eq=False)

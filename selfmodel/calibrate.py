@@ -1,0 +1,218 @@
+"""Calibration of the self-model: its continuous parameters, fitted to trials of the intact robot.
+
+The parameters are found by a box-constrained least squares over short predictions from logged
+states (``mujoco.minimize``), with a prior that keeps what the trials do not show near nominal. The
+delay, which is a whole number, is tried out.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco.minimize
+import numpy as np
+
+from selfmodel.arrays import FloatArray
+from selfmodel.behaviour import Signal
+from selfmodel.comparator import Segments
+from selfmodel.embodiment import embody
+from selfmodel.errors import InputError
+from selfmodel.estimate import STATE, estimated_states
+from selfmodel.hypothesis import INTACT
+from selfmodel.parameters import Parameters, edited_model, from_factors, nominal, with_parameters
+from selfmodel.prediction import predict
+from selfmodel.robot import Robot
+from selfmodel.rotation import rotation_between
+from selfmodel.tally import Tally
+from selfmodel.trial import Trial
+
+PRIOR = 0.15
+"""How far a parameter may be expected from nominal, as a deviation of its logarithm."""
+
+BOUND = 1.2
+"""How far the logarithm of a parameter may be from nominal: a factor of 0.3 to 3.3."""
+
+STEP = 0.1
+"""The finite difference of a logarithm. Contact makes a small one meaningless: a parameter moves
+when a foot comes down, and that shows as noise between near values."""
+
+DELAYS = range(6)
+"""Control delays that are tried."""
+
+SEGMENTS, HORIZON, LEAD = 80, 10, max(DELAYS)
+"""Segments of a trial, their length, and the commands from before each that a delay may need."""
+
+SCALES: dict[Signal, float] = {
+    "joint_positions": 0.03,
+    "joint_velocities": 1.0,
+    "base_position": 0.01,
+    "base_orientation": 0.03,
+    "base_linear_velocity": 0.1,
+    "base_angular_velocity": 0.3,
+}
+"""Errors beyond these count by their size, smaller ones by their square: an impact that is missed
+by a step is no statement about masses."""
+
+ITERATIONS = 5
+
+EXACT = 1e-6
+"""The root mean square error, in ``SCALES``, below which the model is taken to be the robot."""
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """A self-model fitted to trials.
+
+    Attributes:
+        robot: The robot whose MJCF says the fitted parameters.
+        parameters: The fitted parameters.
+        deviations: The standard deviation of each factor's logarithm, ``(factors,)`` in the order
+            of ``Parameters.factors``: that of the prior where the trials show nothing.
+        error_before: Root mean square error of the predictions with the nominal parameters, in
+            units of ``SCALES``.
+        error: The same with the fitted ones.
+    """
+
+    robot: Robot
+    parameters: Parameters
+    deviations: FloatArray
+    error_before: float
+    error: float
+
+
+def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibration:
+    """Fits the continuous parameters of a robot to trials in which nothing was wrong with it.
+
+    The result does not depend on the number of threads. A model that predicts the trials exactly
+    is left as it is, to the bit.
+
+    Args:
+        robot: The robot as its model describes it.
+        trials: At least one, each with the whole state.
+        threads: Threads for the physics.
+
+    Raises:
+        InputError: There are no trials, or one was not observed well enough.
+    """
+    if not trials:
+        raise InputError("expected at least one trial of the intact robot, got none")
+    data = [_stretches(trial) for trial in trials]
+    start = nominal(robot)
+
+    def residuals(logarithms: FloatArray, delay: int) -> FloatArray:
+        """From ``(factors, m)`` to ``(residuals, m)``, the prior's among them."""
+        models = [from_factors(np.exp(row), delay) for row in logarithms.T]
+        errors = _errors(robot, models, data, threads)
+        weight = np.sqrt(len(errors)) * SHARE / PRIOR
+        return np.concatenate([_damped(errors), weight * logarithms])
+
+    def error(parameters: Parameters) -> float:
+        return float(np.sqrt(np.mean(_errors(robot, [parameters], data, threads) ** 2)))
+
+    before = error(start)
+    deviations = np.full(len(start.factors), PRIOR)
+    if before < EXACT:
+        return Calibration(robot, start, deviations, before, before)
+    zero = np.zeros((len(start.factors), 1))
+    delay = min(DELAYS, key=lambda steps: float(np.sum(residuals(zero, steps) ** 2)))
+
+    def residual(x: FloatArray) -> FloatArray:
+        return residuals(np.reshape(x, (len(zero), -1)), delay)
+
+    def jacobian(x: FloatArray, _residual: FloatArray) -> FloatArray:
+        steps = STEP * np.eye(len(zero))
+        ahead, behind = residual(x + steps), residual(x - steps)
+        return np.asarray((ahead - behind) / (2 * STEP))
+
+    fitted, _ = mujoco.minimize.least_squares(
+        zero,
+        residual,
+        bounds=[np.full_like(zero, -BOUND), np.full_like(zero, BOUND)],
+        jacobian=jacobian,
+        max_iter=ITERATIONS,
+        xtol=1e-3,
+        verbose=mujoco.minimize.Verbosity.SILENT,
+    )
+    found = from_factors(np.exp(fitted.ravel()), delay)
+    slopes, rest = jacobian(fitted, zero), residual(fitted)
+    spread = np.linalg.inv(slopes.T @ slopes) * np.mean(rest**2) / SHARE**2
+    return Calibration(
+        robot=with_parameters(robot, found),
+        parameters=found,
+        deviations=np.minimum(np.sqrt(np.diag(spread)), PRIOR),
+        error_before=before,
+        error=error(found),
+    )
+
+
+SHARE = 0.05
+"""The weight of the prior beside the data: errors of neighbouring steps and columns say the same
+thing again and again."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Stretches:
+    """A trial cut into segments, and what was observed in each, ``(segments, horizon, width)``."""
+
+    segments: Segments
+    observed: dict[Signal, FloatArray]
+
+
+def _stretches(trial: Trial) -> _Stretches:
+    behaviour = trial.behaviour
+    states, commands = estimated_states(behaviour), behaviour["commands"]
+    last = behaviour.steps - 1 - HORIZON
+    evenly = np.unique(np.linspace(LEAD, max(last, LEAD), SEGMENTS).round().astype(int))
+    whole = np.concatenate([*(states[signal] for signal in STATE), commands], axis=1)
+    starts = [
+        int(k) for k in evenly if k <= last and np.isfinite(whole[k - LEAD : k + HORIZON + 1]).all()
+    ]
+    if not starts:
+        raise InputError(
+            f"{trial.path}: calibration needs {LEAD + HORIZON + 1} steps or more with the whole "
+            f"state ({', '.join(STATE)}) and the commands, and the log has none: leave it out"
+        )
+    return _Stretches(
+        Segments(
+            states={signal: states[signal][starts] for signal in STATE},
+            commands=np.stack([commands[k - LEAD : k + HORIZON] for k in starts]),
+            lead=LEAD,
+            record=STATE,
+        ),
+        {
+            signal: np.stack([states[signal][k + 1 : k + HORIZON + 1] for k in starts])
+            for signal in STATE
+        },
+    )
+
+
+def _errors(
+    robot: Robot, models: Sequence[Parameters], data: Sequence[_Stretches], threads: int
+) -> FloatArray:
+    """The errors of the predictions in units of ``SCALES``, ``(errors, models)``."""
+    embodiments = [
+        embody(edited_model(robot, parameters), robot.anatomy, INTACT) for parameters in models
+    ]
+    rows = []
+    for stretches in data:
+        outcome = predict(
+            robot,
+            embodiments,
+            stretches.segments,
+            threads=threads,
+            tally=Tally(),
+            delay=models[0].delay,
+        )
+        for signal, scale in SCALES.items():
+            made = outcome.behaviour[signal][:, :, 1:]
+            error = (
+                rotation_between(made, stretches.observed[signal])
+                if signal == "base_orientation"
+                else made - stretches.observed[signal]
+            )
+            rows.append((error / scale).reshape(len(models), -1))
+    return np.concatenate(rows, axis=1).T
+
+
+def _damped(errors: FloatArray) -> FloatArray:
+    """Residuals whose squares grow as errors do, once these exceed 1 (pseudo-Huber)."""
+    return np.asarray(np.sign(errors) * np.sqrt(2 * (np.sqrt(1 + errors**2) - 1)))

@@ -1,0 +1,89 @@
+"""The state of a robot at each step of a trial, as well as its log tells it.
+
+Positions are noisy; how far a body moved between two steps is known better, from its velocity. So a
+position is averaged over the steps around it, each moved along by the velocities between.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from selfmodel.arrays import FloatArray
+from selfmodel.behaviour import Behaviour, Signal
+
+JOINTS: tuple[Signal, ...] = ("joint_positions", "joint_velocities")
+IMU: tuple[Signal, ...] = ("base_orientation", "base_angular_velocity")
+BASE: tuple[Signal, ...] = ("base_position", "base_linear_velocity")
+STATE: tuple[Signal, ...] = JOINTS + IMU + BASE
+"""The signals that make up the state."""
+
+_SMOOTHED: tuple[tuple[Signal, Signal, int, float], ...] = (
+    ("joint_positions", "joint_velocities", 3, 3e-3),
+    ("base_position", "base_linear_velocity", 6, 5e-4),
+)
+"""Which positions move by which velocities, over how many steps to either side they are averaged,
+and from which noise on, in their unit: below it, averaging adds more error than it takes."""
+
+_TENTH = 0.1257
+"""The tenth percentile of the magnitude of a normal variable of deviation 1."""
+
+
+def estimated_states(
+    behaviour: Behaviour, signals: tuple[Signal, ...] = STATE
+) -> Mapping[Signal, FloatArray]:
+    """Returns the state at each step.
+
+    Args:
+        behaviour: Of one run.
+        signals: The parts of the state that are to be estimated.
+
+    Returns:
+        Each signal, ``(steps, width)``. Where the noise is small it is what was logged, to the
+        bit; NaN where something that it would be estimated from was not observed.
+    """
+    states = {signal: behaviour[signal] for signal in signals}
+    timestep = float(behaviour.time[1] - behaviour.time[0]) if behaviour.steps > 1 else 0.0
+    for position, velocity, reach, threshold in _SMOOTHED:
+        if position in states:
+            values = behaviour[position]
+            moved = np.diff(values, axis=0) - _steps_along(behaviour[velocity], timestep)
+            if _noise(moved) > threshold:
+                states[position] = _averaged(values, behaviour[velocity], timestep, reach)
+    return states
+
+
+def _steps_along(velocities: FloatArray, timestep: float) -> FloatArray:
+    """How far the velocities lead from each step to the next."""
+    return np.asarray((velocities[1:] + velocities[:-1]) / 2 * timestep)
+
+
+def _noise(moved: FloatArray) -> float:
+    """The deviation of a position's noise, from what its velocity does not explain.
+
+    At impacts the velocity explains little even without noise. In the quietest tenth of the steps
+    it explains almost everything.
+    """
+    known = np.abs(moved[np.isfinite(moved)])
+    return float(np.quantile(known, 0.1)) / _TENTH / np.sqrt(2) if len(known) else 0.0
+
+
+def _averaged(
+    values: FloatArray, velocities: FloatArray, timestep: float, reach: int
+) -> FloatArray:
+    steps = len(values)
+    along = np.concatenate(
+        [np.zeros((1, values.shape[1])), np.nancumsum(_steps_along(velocities, timestep), axis=0)]
+    )
+    still = values - along
+    known = np.isfinite(still) & np.isfinite(velocities)
+    sums = _summed(np.where(known, still, 0.0))
+    counts = _summed(known.astype(np.float64))
+    first = np.maximum(np.arange(steps) - reach, 0)
+    last = np.minimum(np.arange(steps) + reach + 1, steps)
+    all_known = counts[last] - counts[first] == (last - first)[:, np.newaxis]
+    mean = (sums[last] - sums[first]) / (last - first)[:, np.newaxis] + along
+    return np.where(all_known, mean, np.nan)
+
+
+def _summed(values: FloatArray) -> FloatArray:
+    return np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])

@@ -1,0 +1,115 @@
+"""How badly hypotheses predict logged trials: simulated once, remembered."""
+
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+
+from selfmodel.arrays import FloatArray
+from selfmodel.behaviour import SIGNALS
+from selfmodel.comparator import ClosedLoop, Comparator, Ensemble, Piecewise, Segments
+from selfmodel.errors import InputError
+from selfmodel.hypothesis import Hypothesis
+from selfmodel.memo import Memo
+from selfmodel.simulator import Simulator
+from selfmodel.tally import Simulated
+from selfmodel.trial import Trial
+
+
+class Evidence:
+    """What a comparator makes of logged trials; it remembers every hypothesis.
+
+    Args:
+        simulator: The self-model.
+        comparator: Says what to simulate and how far it is from a trial.
+    """
+
+    def __init__(self, simulator: Simulator, comparator: Comparator) -> None:
+        self._simulator = simulator
+        self._comparator = comparator
+        self._losses: dict[str, Memo[Hypothesis]] = {}  # by the trial's log
+
+    @property
+    def in_pieces(self) -> bool:
+        """Whether the comparator judges in pieces, so that two hypotheses can be tested."""
+        return isinstance(self._comparator, Piecewise)
+
+    @property
+    def distinct_hypotheses(self) -> int:
+        """How many hypotheses were ever simulated."""
+        return len({hypothesis for memo in self._losses.values() for hypothesis in memo})
+
+    def check(self, trials: Sequence[Trial]) -> None:
+        """Checks that the comparator can judge all trials, before any search.
+
+        Raises:
+            InputError: It cannot; the sentence names every trial that it cannot judge, and why.
+        """
+        problems = []
+        for trial in trials:
+            try:
+                self._comparator.request(trial)
+            except InputError as error:
+                problems.append(str(error))
+        if problems:
+            raise InputError("; ".join(problems))
+
+    def distances(self, hypotheses: Sequence[Hypothesis], trials: Sequence[Trial]) -> FloatArray:
+        """Returns how far each hypothesis is from all trials together, ``(n,)``.
+
+        It is the sum of the comparator's distances; a hypothesis whose simulation diverges is
+        infinitely far.
+        """
+        total = np.zeros(len(hypotheses))
+        for trial in trials:
+            total += np.array([row.mean() for row in self._of(hypotheses, trial)])
+        return total
+
+    def losses(self, hypotheses: Sequence[Hypothesis], trials: Sequence[Trial]) -> FloatArray:
+        """Returns how badly each hypothesis predicts each piece of all trials, ``(n, pieces)``.
+
+        A comparator that does not judge in pieces has one for each trial.
+        """
+        return np.concatenate([np.array(self._of(hypotheses, trial)) for trial in trials], axis=1)
+
+    def _of(self, hypotheses: Sequence[Hypothesis], trial: Trial) -> list[FloatArray]:
+        memo = self._losses.setdefault(trial.path, Memo())
+        return memo.values(hypotheses, partial(self._simulate, trial))
+
+    def _simulate(self, trial: Trial, hypotheses: list[Hypothesis]) -> FloatArray:
+        outcome = self._simulated(trial, hypotheses)
+        comparator = self._comparator
+        if isinstance(comparator, Piecewise):
+            losses = np.asarray(comparator.losses(outcome.behaviour, trial))
+            if losses.ndim != 2 or len(losses) != len(hypotheses):
+                raise self._broken(f"gave losses {losses.shape} for {len(hypotheses)} simulations")
+        else:
+            distances = np.asarray(comparator.distances(outcome.behaviour, trial))
+            if distances.shape != (len(hypotheses),):
+                raise self._broken(
+                    f"gave {distances.shape} distances for {len(hypotheses)} simulations"
+                )
+            losses = distances[:, np.newaxis]
+        if not np.all((losses >= 0) | outcome.diverged[:, np.newaxis]):
+            raise self._broken(f"gave a distance that is not a number of at least 0: {losses}")
+        return np.where(outcome.diverged[:, np.newaxis], np.inf, losses)
+
+    def _simulated(self, trial: Trial, hypotheses: list[Hypothesis]) -> Simulated:
+        request, simulator = self._comparator.request(trial), self._simulator
+        if not request.record or not set(request.record) <= set(SIGNALS):
+            raise self._broken(f"asked for the signals {request.record!r}, of {', '.join(SIGNALS)}")
+        driver, steps = trial.plan.controller, trial.behaviour.steps
+        match request:
+            case ClosedLoop():
+                runs = [(hypothesis, driver) for hypothesis in hypotheses]
+                return simulator.run(runs, steps, request.record)
+            case Segments():
+                return simulator.predict(hypotheses, request)
+            case Ensemble():
+                return simulator.run_ensemble(hypotheses, driver, steps, request)
+
+    def _broken(self, what: str) -> InputError:
+        return InputError(
+            f"the comparator {self._comparator.name!r} {what}: run "
+            f"selfmodel.contract.check_comparator on it"
+        )

@@ -1,0 +1,98 @@
+"""The continuous parameters of a self-model, and the robot that has others."""
+
+import copy
+import dataclasses
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from selfmodel.arrays import FloatArray
+from selfmodel.robot import CONTROL_DELAY, Robot
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """By what factors a robot differs from its nominal model.
+
+    Attributes:
+        root_mass: Of the root body's mass and inertia.
+        limb_mass: Of the mass and inertia of all other bodies.
+        friction: Of the sliding friction of everything.
+        damping: Of the damping of every joint.
+        motor_gains: Of each motor's torque, in the model's order.
+        delay: Control steps from a command to its effect.
+    """
+
+    root_mass: float
+    limb_mass: float
+    friction: float
+    damping: float
+    motor_gains: tuple[float, ...]
+    delay: int = 0
+
+    @property
+    def factors(self) -> FloatArray:
+        """The factors in one row: root, limbs, friction, damping, motors."""
+        shared = (self.root_mass, self.limb_mass, self.friction, self.damping)
+        return np.array([*shared, *self.motor_gains])
+
+
+def nominal(robot: Robot) -> Parameters:
+    """Returns the parameters of a robot as its model describes it."""
+    return Parameters(1.0, 1.0, 1.0, 1.0, (1.0,) * robot.model.nu, robot.control_delay)
+
+
+def from_factors(factors: FloatArray, delay: int) -> Parameters:
+    """Returns parameters from a row of factors; see ``Parameters.factors``."""
+    root, limbs, friction, damping, *motors = (float(factor) for factor in factors)
+    return Parameters(root, limbs, friction, damping, tuple(motors), delay)
+
+
+def edited_model(robot: Robot, parameters: Parameters) -> mujoco.MjModel:
+    """Returns a copy of a robot's model that has these parameters, but for the delay."""
+    model = copy.copy(robot.model)
+    masses = _mass_factors(robot, parameters)
+    model.body_mass *= masses
+    model.body_inertia *= masses[:, np.newaxis]
+    model.geom_friction[:, 0] *= parameters.friction
+    model.dof_damping *= parameters.damping
+    motors = np.array(parameters.motor_gains)[:, np.newaxis]
+    model.actuator_gainprm *= motors
+    model.actuator_biasprm *= motors
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    return model
+
+
+def with_parameters(robot: Robot, parameters: Parameters) -> Robot:
+    """Returns a robot whose MJCF says these parameters, the delay included.
+
+    Numbers in an MJCF have six digits, so its model is that of ``edited_model`` to one part in a
+    million.
+    """
+    spec = mujoco.MjSpec.from_string(robot.mjcf, assets=dict(robot.assets))
+    model = edited_model(robot, parameters)
+    for body in spec.bodies[1:]:
+        compiled = model.body(body.name)
+        body.explicitinertial = True
+        body.mass, body.inertia = float(compiled.mass[0]), compiled.inertia
+        body.ipos, body.iquat = compiled.ipos, compiled.iquat
+    for geom in spec.geoms:
+        geom.friction = geom.friction * np.array([parameters.friction, 1.0, 1.0])
+    for joint in spec.joints:
+        joint.damping = joint.damping * parameters.damping
+    for motor, factor in zip(spec.actuators, parameters.motor_gains, strict=True):
+        motor.gainprm = motor.gainprm * factor
+        motor.biasprm = motor.biasprm * factor
+    for numeric in spec.numerics:
+        if numeric.name == CONTROL_DELAY:
+            numeric.delete()
+    spec.add_numeric(name=CONTROL_DELAY, data=[float(parameters.delay)])
+    return dataclasses.replace(robot, mjcf=spec.to_xml())
+
+
+def _mass_factors(robot: Robot, parameters: Parameters) -> FloatArray:
+    factors = np.full(robot.model.nbody, parameters.limb_mass)
+    factors[0] = 1.0
+    factors[robot.model.body(robot.root).id] = parameters.root_mass
+    return factors

@@ -1,0 +1,128 @@
+"""Short predictions from logged states, under the commands that were logged."""
+
+from collections.abc import Sequence
+from time import perf_counter
+
+import mujoco
+import numpy as np
+
+from selfmodel.arrays import BoolArray, FloatArray, IndexArray
+from selfmodel.batches import Alive, counted_not_printed, live_signals, new_batch
+from selfmodel.behaviour import Behaviour
+from selfmodel.comparator import Segments
+from selfmodel.embodiment import Embodiment
+from selfmodel.places import places
+from selfmodel.robot import Robot
+from selfmodel.senses import Senses
+from selfmodel.tally import Simulated, Tally
+
+
+def predict(
+    robot: Robot,
+    embodiments: Sequence[Embodiment],
+    segments: Segments,
+    *,
+    threads: int,
+    tally: Tally,
+    delay: int | None = None,
+) -> Simulated:
+    """Predicts segments of a trial with each of some models of a robot.
+
+    Where the segments say the whole state, all of them are simulated side by side. Where they do
+    not say where the base is and how fast, each begins there where the one before it ended: what
+    was logged is put into one long simulation again and again.
+
+    What an embodiment holds still, such as a jammed joint, begins where it is held.
+
+    Args:
+        robot: The robot with nothing wrong.
+        embodiments: At least one, of the robot's layout.
+        segments: Where to begin and what was commanded.
+        threads: Threads that MuJoCo steps on, the caller's included.
+        tally: Is told what was simulated.
+        delay: Control steps from a command to its effect; that of the robot if none is given.
+
+    Returns:
+        Signals of ``(n, segments, horizon + 1, width)``; a run has diverged if any of its segments
+        has.
+    """
+    n, count, horizon = len(embodiments), len(segments.commands), segments.horizon
+    whole = "base_position" in segments.states
+    stages: list[IndexArray] = np.split(np.arange(count), 1 if whole else count)
+    together = len(stages[0])
+    rows = [embodiment for embodiment in embodiments for _ in range(together)]
+    batch = new_batch(robot.model, rows, threads)
+    qpos, sensordata = batch.bind("qpos"), batch.bind("sensordata")
+    senses = Senses(robot.model, robot.anatomy, rows)
+    readings = np.empty((len(rows), len(robot.anatomy.sensors)))
+    live = live_signals(robot, batch, segments.record) | {"sensors": (readings, slice(None))}
+    kept = {
+        signal: np.empty(
+            (n, count, horizon + 1, robot.anatomy.names.width(signal)), dtype=np.float64
+        )
+        for signal in segments.record
+    }
+    start = _Start(robot, batch, embodiments)
+    batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE)
+    alive = Alive(batch)
+    first = segments.lead - (robot.control_delay if delay is None else delay)
+    with counted_not_printed():
+        for stage in stages:
+            start.write(segments, stage)
+            clock = perf_counter()
+            alive.forward()
+            tally.physics_seconds += perf_counter() - clock
+            for k in range(horizon + 1):
+                if "sensors" in kept:
+                    senses.read(sensordata, qpos, readings)
+                for signal, values in kept.items():
+                    source, chosen = live[signal]
+                    values[:, stage, k] = source[:, chosen].reshape(n, together, -1)
+                if k < horizon:
+                    start.command(segments.commands[stage, first + k])
+                    clock = perf_counter()
+                    alive.step(robot.substeps)
+                    tally.physics_seconds += perf_counter() - clock
+    diverged: BoolArray = np.any(alive.diverged().reshape(n, together), axis=1)
+    tally.runs += n
+    tally.steps += n * count * horizon
+    tally.diverged += int(diverged.sum())
+    time = np.arange(horizon + 1, dtype=np.float64) * robot.control_timestep
+    return Simulated(Behaviour(robot.anatomy.names, time, kept), diverged)
+
+
+class _Start:
+    """Writes logged states and commands into a batch, the same for each of the embodiments."""
+
+    def __init__(
+        self, robot: Robot, batch: mujoco.batch.Batch, embodiments: Sequence[Embodiment]
+    ) -> None:
+        self._n = len(embodiments)
+        self._state = {
+            signal: (batch.bind(place.field), place.columns)
+            for signal, place in places(robot).items()
+        }
+        self._ctrl = batch.bind("ctrl")
+        self._qpos, self._qvel = batch.bind("qpos"), batch.bind("qvel")
+        self._held = [
+            (number, *held)
+            for number, embodiment in enumerate(embodiments)
+            for held in embodiment.held
+        ]
+
+    def write(self, segments: Segments, stage: IndexArray) -> None:
+        """Begins the segments of these numbers."""
+        for signal, values in segments.states.items():
+            field, columns = self._state[signal]
+            field[:, columns] = self._for_all(values[stage])
+        for number, position, velocity, angle in self._held:
+            mine = slice(number * len(stage), (number + 1) * len(stage))
+            self._qpos[mine, position] = angle
+            self._qvel[mine, velocity] = 0.0
+
+    def command(self, commands: FloatArray) -> None:
+        """Gives the commands of one step, ``(segments, motors)``."""
+        self._ctrl[:] = self._for_all(commands)
+
+    def _for_all(self, values: FloatArray) -> FloatArray:
+        return np.tile(values, (self._n, 1))

@@ -1,0 +1,55 @@
+"""Whether one hypothesis predicts the trials significantly better than another.
+
+Two hypotheses are compared over the same pieces of the trials, so what makes a piece hard to
+predict for both does not count. A piece is not independent of the next one, and a model that is not
+the robot errs everywhere in the same way: so much more is asked for than a textbook would.
+"""
+
+import numpy as np
+
+from selfmodel.arrays import FloatArray
+
+Z = 4.0
+"""How many standard errors the mean difference must have."""
+
+RATIO = 3.0
+"""How many times as large a loss counts as larger whatever the errors: where prediction is all but
+perfect, a few pieces that tell are proof."""
+
+TEST = f"paired z over the pieces of the trials >= {Z:g}, or {RATIO:g} times the loss"
+"""The test in words."""
+
+
+def is_better(one: FloatArray, other: FloatArray) -> bool:
+    """Returns whether the first of two hypotheses predicts significantly better.
+
+    Args:
+        one: Its losses, ``(pieces,)``.
+        other: The losses of the other on the same pieces, ``(pieces,)``.
+    """
+    if not np.isfinite(other).all():
+        return bool(np.isfinite(one).all())
+    return bool(paired_z(other, one) >= Z or other.sum() > RATIO * one.sum())
+
+
+def paired_z(larger: FloatArray, smaller: FloatArray) -> float:
+    """Returns the mean difference over its standard error; 0 for less than two pieces."""
+    difference = larger - smaller
+    error = difference.std(ddof=1) / np.sqrt(len(difference)) if len(difference) > 1 else 0.0
+    return float(difference.mean() / error) if error > 0 else 0.0
+
+
+def is_worse_than_ever(losses: FloatArray, usual: FloatArray) -> bool:
+    """Returns whether losses are significantly higher than those of a model that was right.
+
+    Args:
+        losses: ``(pieces,)``.
+        usual: ``(pieces,)`` of other trials, so the two are not paired (Welch). Where either has
+            one piece only, nothing but the ratio can tell.
+    """
+    larger = bool(losses.mean() > RATIO * usual.mean())
+    if min(len(losses), len(usual)) < 2:
+        return larger
+    variance = losses.var(ddof=1) / len(losses) + usual.var(ddof=1) / len(usual)
+    difference = losses.mean() - usual.mean()
+    return larger or bool(difference > Z * np.sqrt(variance) and variance > 0)
