@@ -5,11 +5,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from selfmodel.anatomy import Anatomy
 from selfmodel.database import Database
-from selfmodel.diagnosis import Candidate, Diagnosis
+from selfmodel.diagnosis import Candidate, Diagnosis, Verdict
 from selfmodel.errors import InputError
 from selfmodel.logs.errors import CorruptError, SchemaMismatchError
 from selfmodel.logs.files import replace
@@ -139,15 +139,35 @@ def _number(path: Path) -> tuple[int, str]:
 def _as_json(diagnosis: Diagnosis) -> dict[str, Any]:
     return {
         "trials": diagnosis.trials,
+        "intact_distance": _finite(diagnosis.intact_distance),
+        "rivals": [str(rival) for rival in diagnosis.rivals],
+        "verdict": diagnosis.verdict,
+        "test": diagnosis.test,
         "ranked": [
             {
                 "hypothesis": str(candidate.hypothesis),
-                # JSON has no infinity, which is the distance of a simulation that diverged.
-                "distance": candidate.distance if math.isfinite(candidate.distance) else None,
+                "distance": _finite(candidate.distance),
             }
             for candidate in diagnosis.ranked
         ],
     }
+
+
+def _finite(distance: float) -> float | None:
+    """JSON has no infinity, which is the distance of a simulation that diverged."""
+    return distance if math.isfinite(distance) else None
+
+
+def _read_finite(distance: float | None) -> float:
+    return math.inf if distance is None else float(distance)
+
+
+def _read_verdict(text: str) -> Verdict:
+    verdicts: tuple[Verdict, ...] = get_args(Verdict)
+    found = next((known for known in verdicts if known == text), None)
+    if found is None:
+        raise ValueError(f"verdict must be one of {', '.join(verdicts)}, got {text!r}")
+    return found
 
 
 def _read_diagnoses(folder: Path, anatomy: Anatomy) -> tuple[Diagnosis, ...]:
@@ -159,11 +179,15 @@ def _read_diagnoses(folder: Path, anatomy: Anatomy) -> tuple[Diagnosis, ...]:
                 ranked=tuple(
                     Candidate(
                         parse(candidate["hypothesis"], anatomy),
-                        math.inf if candidate["distance"] is None else float(candidate["distance"]),
+                        _read_finite(candidate["distance"]),
                     )
                     for candidate in item["ranked"]
                 ),
                 trials=int(item["trials"]),
+                intact_distance=_read_finite(item["intact_distance"]),
+                rivals=tuple(parse(rival, anatomy) for rival in item["rivals"]),
+                verdict=_read_verdict(item["verdict"]),
+                test=str(item["test"]),
             )
             for item in items
         )
