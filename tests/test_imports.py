@@ -70,7 +70,10 @@ LAYERS = (
         "contract",
         "events",
     ),
-    ("embodiment", "robot", "places", "senses", "simulator", "physical", "judge", "replay"),
+    (
+        *("embodiment", "robot", "places", "senses", "simulator", "physical", "judge", "replay"),
+        *("gap", "instruments", "start", "debris", "structure"),
+    ),
     ("database", "diagnose", "repair"),
     ("recover", "explain"),
 )
