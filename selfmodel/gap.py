@@ -1,4 +1,4 @@
-"""The reality gap: how a physical robot differs from its self-model where no hypothesis names it."""
+"""The reality gap: how a physical robot differs from its model where no hypothesis names it."""
 
 import copy
 import dataclasses
@@ -102,7 +102,7 @@ def draw_gap(robot: Robot, level: float, rng: np.random.Generator) -> Gap:
 
 
 def perturbed(model: mujoco.MjModel, gap: Gap) -> mujoco.MjModel:
-    """Returns a copy of a model of the robot, as heavy, slippery, damped and strong as the gap says.
+    """Returns a copy of a robot's model, as heavy, slippery, damped and strong as the gap says.
 
     Its layout is the same, so a hypothesis can be worked into it with ``embody``, and such copies
     share a batch. A body or motor that the gap does not name keeps what it has. What is not part

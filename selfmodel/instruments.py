@@ -99,7 +99,8 @@ def dead_sensors(anatomy: Anatomy, embodiment: Embodiment) -> BoolArray:
         and bool(model.dof_armature[model.joint(sensor.hinge).dofadr[0]] == WELD_ARMATURE)
         for sensor in anatomy.sensors
     ]
-    return (embodiment.gain == 0) & (embodiment.offset == 0) & ~np.array(held, dtype=bool)
+    silent = (embodiment.gain == 0) & (embodiment.offset == 0)
+    return np.logical_and(silent, np.logical_not(held))
 
 
 def turned(orientation: FloatArray, turn: FloatArray) -> FloatArray:

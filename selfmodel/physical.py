@@ -7,8 +7,7 @@ from typing import Protocol
 import mujoco
 import numpy as np
 
-from selfmodel.arrays import FloatArray
-from selfmodel.behaviour import SIGNALS, Sample, Signal
+from selfmodel.behaviour import SIGNALS, Sample
 from selfmodel.debris import add_debris, drop_debris, lost_limbs
 from selfmodel.driver import Driver, drive
 from selfmodel.embodiment import embody
@@ -95,28 +94,26 @@ class SimulatedRobot:
         mujoco.mj_forward(model, data)
         senses = Senses(model, robot.anatomy, [embodiment])
         brain = drive([controller], embodiment.neurons[np.newaxis], len(robot.anatomy.sensors))
-        where = places(robot, model)
         commands = np.zeros((1, model.nu))
         underway = deque(np.zeros((delay, model.nu)))
+        where = places(robot, model)
+        # What is logged as commanded is what the controller said, not what the motors have got.
+        live = {
+            **{signal: (getattr(data, at.field), at.columns) for signal, at in where.items()},
+            "sensors": (brain.readings[0], slice(None)),
+            "commands": (commands[0], slice(None)),
+        }
         for k in range(steps):
             senses.read(data.sensordata[np.newaxis], data.qpos[np.newaxis], brain.readings)
             instruments.receive(brain.readings[0])
             brain.step(commands)
             underway.append(commands[0].copy())
             data.ctrl[:] = underway.popleft()
-            told: dict[Signal, FloatArray] = {
-                "sensors": brain.readings[0],
-                "commands": commands[0],
-                **{
-                    signal: getattr(data, place.field)[place.columns]
-                    for signal, place in where.items()
-                    if signal != "commands"
-                },
-            }
             yield Sample(
                 time=k * robot.control_timestep,
                 values={
-                    signal: instruments.observe(signal, told[signal]).copy() for signal in SIGNALS
+                    signal: instruments.observe(signal, live[signal][0][live[signal][1]]).copy()
+                    for signal in SIGNALS
                 },
             )
             if k + 1 < steps:
