@@ -33,20 +33,26 @@ def add_debris(spec: mujoco.MjSpec, limbs: tuple[str, ...]) -> None:
         spec: The model, changed.
         limbs: The first body of each.
     """
-    source = spec.copy()
-    for part in (*source.actuators, *source.sensors):
-        source.delete(part)
+    nominal = spec.copy()
+    for part in (*nominal.actuators, *nominal.sensors):
+        nominal.delete(part)
     felt = 0
-    for geom in source.geoms:
+    for geom in nominal.geoms:
         felt |= int(geom.conaffinity)
-    for limb in limbs:
-        body = source.body(limb)
-        for joint in list(body.joints):
-            source.delete(joint)
-        spec.worldbody.add_frame().attach_body(body, DEBRIS, "")
-        copy = spec.body(DEBRIS + limb)
-        copy.add_freejoint(name=DEBRIS + limb)
-        for geom in copy.find_all("geom"):
+    for k, limb in enumerate(limbs):
+        # Every attachment brings materials and meshes of its own, under names of its own.
+        prefix = f"{DEBRIS}{k}_"
+        spec.worldbody.add_frame().attach_body(nominal.copy().body(limb), prefix, "")
+        piece = spec.body(prefix + limb)
+        for kind in ("body", "joint", "geom"):
+            for part in piece.find_all(kind):
+                if part.name:
+                    part.name = DEBRIS + part.name.removeprefix(prefix)
+        piece.name = DEBRIS + limb
+        for joint in list(piece.joints):
+            spec.delete(joint)
+        piece.add_freejoint(name=DEBRIS + limb)
+        for geom in piece.find_all("geom"):
             if geom.contype or geom.conaffinity:
                 geom.contype |= felt
                 geom.conaffinity |= felt

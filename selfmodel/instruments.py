@@ -100,7 +100,7 @@ def dead_sensors(anatomy: Anatomy, embodiment: Embodiment) -> BoolArray:
         for sensor in anatomy.sensors
     ]
     silent = (embodiment.gain == 0) & (embodiment.offset == 0)
-    return np.logical_and(silent, np.logical_not(held))
+    return np.asarray(silent & ~np.array(held, dtype=bool))
 
 
 def turned(orientation: FloatArray, turn: FloatArray) -> FloatArray:

@@ -85,7 +85,7 @@ class SimulatedRobot:
         robot, embodiment = self._robot, self._embodiment
         model, data = embodiment.model, mujoco.MjData(embodiment.model)
         instruments: Instruments = ExactInstruments()
-        delay = 0
+        delay, substeps = 0, round(robot.control_timestep / float(model.opt.timestep))
         if self._gap is not None:
             instruments = NoisyInstruments(self._gap.level, robot.anatomy, embodiment, rng)
             delay = self._gap.delay
@@ -117,7 +117,7 @@ class SimulatedRobot:
                 },
             )
             if k + 1 < steps:
-                mujoco.mj_step(model, data, robot.substeps)
+                mujoco.mj_step(model, data, substeps)
                 if data.warning.number.any():
                     raise TrialError(
                         f"the simulation of the physical robot broke down after step {k}: its "
