@@ -33,40 +33,54 @@ def add_debris(spec: mujoco.MjSpec, limbs: tuple[str, ...]) -> None:
         spec: The model, changed.
         limbs: The first body of each.
     """
-    nominal = spec.copy()
-    for part in (*nominal.actuators, *nominal.sensors):
-        nominal.delete(part)
-    felt = 0
-    for geom in nominal.geoms:
-        felt |= int(geom.conaffinity)
+    bare = spec.copy()
+    for part in (*bare.actuators, *bare.sensors):
+        bare.delete(part)
     for k, limb in enumerate(limbs):
-        # Every attachment brings materials and meshes of its own, under names of its own.
-        prefix = f"{DEBRIS}{k}_"
-        spec.worldbody.add_frame().attach_body(nominal.copy().body(limb), prefix, "")
-        piece = spec.body(prefix + limb)
-        for kind in ("body", "joint", "geom"):
-            for part in piece.find_all(kind):
-                if part.name:
-                    part.name = DEBRIS + part.name.removeprefix(prefix)
-        piece.name = DEBRIS + limb
-        for joint in list(piece.joints):
-            spec.delete(joint)
-        piece.add_freejoint(name=DEBRIS + limb)
-        for geom in piece.find_all("geom"):
-            if geom.contype or geom.conaffinity:
-                geom.contype |= felt
-                geom.conaffinity |= felt
+        _add_limb(spec, bare, limb, k)
     spec.memory = max(spec.memory, MEMORY)
+    for one, other in _overlapping(spec, limbs):
+        spec.add_exclude(bodyname1=one, bodyname2=other)
+
+
+def _add_limb(spec: mujoco.MjSpec, bare: mujoco.MjSpec, limb: str, number: int) -> None:
+    """Adds a free copy of one limb of a robot without motors and sensors."""
+    # Every attachment brings materials and meshes of its own, under names of its own.
+    prefix = f"{DEBRIS}{number}_"
+    spec.worldbody.add_frame().attach_body(bare.copy().body(limb), prefix, "")
+    piece = spec.body(prefix + limb)
+    for part in (piece, *(p for kind in _NAMED for p in piece.find_all(kind))):
+        part.name = part.name.replace(prefix, DEBRIS, 1)
+    for joint in list(piece.joints):
+        spec.delete(joint)
+    piece.add_freejoint(name=DEBRIS + limb)
+    felt = 0
+    for geom in bare.geoms:
+        felt |= int(geom.conaffinity)
+    for geom in piece.find_all("geom"):
+        if geom.contype or geom.conaffinity:
+            geom.contype |= felt
+            geom.conaffinity |= felt
+
+
+_NAMED = ("body", "joint", "geom")
+
+
+def _overlapping(spec: mujoco.MjSpec, limbs: tuple[str, ...]) -> list[tuple[str, str]]:
+    """The pairs of bodies, debris and other, that overlap when the limbs fall off."""
     model = spec.compile()
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     drop_debris(model, data, limbs)
     mujoco.mj_forward(model, data)
-    overlapping = data.contact.geom[data.contact.dist < 0]
-    for pair in np.unique(model.geom_bodyid[overlapping], axis=0):
-        names = [model.body(b).name for b in pair]
-        if 0 not in pair and any(name.startswith(DEBRIS) for name in names):
-            spec.add_exclude(bodyname1=names[0], bodyname2=names[1])
+    geoms = data.contact.geom[data.contact.dist < 0]
+    pairs = np.unique(np.sort(model.geom_bodyid[geoms], axis=1), axis=0)
+    # Debris stands last in the model, and what stands first is the world.
+    return [
+        (model.body(one).name, model.body(other).name)
+        for one, other in pairs
+        if one != 0 and model.body(other).name.startswith(DEBRIS)
+    ]
 
 
 def drop_debris(model: mujoco.MjModel, data: mujoco.MjData, limbs: tuple[str, ...]) -> None:
