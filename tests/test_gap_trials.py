@@ -20,7 +20,7 @@ from selfmodel.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulator import Simulator
 from selfmodel.trial import Plan
-from tests.command import selfmodel
+from tests.command import SMALL, selfmodel
 from tests.conftest import random_controllers, random_motion
 
 STEPS = 60
@@ -240,3 +240,21 @@ def test_a_level_out_of_range_is_refused_by_the_command_line(
     assert done.returncode == 2
     assert "level from 0 (none) to 0.5" in done.stderr
     assert not list(tmp_path.iterdir())
+
+
+def test_a_recovery_across_a_gap_is_of_one_robot_whose_trials_all_differ(tmp_path: Path):
+    done = selfmodel(
+        "recover", "quadruped", "--damage", "intact", *SMALL, "--trials", "1", "--gap", "0.1",
+        "--structure", "--out", "run", "--json", cwd=tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    paths = [tmp_path / trial["log"] for trial in told["trials"]]
+    hidden = [read_gap(path) for path in paths]
+
+    assert (told["gap"], told["structure"]) == (0.1, True)
+    assert len(paths) == 3
+    assert hidden[0] == hidden[1] == hidden[2]
+    assert hidden[0]["level"] == 0.1
+    starts = {read_log(path).trial.behaviour["joint_positions"][0].tobytes() for path in paths}
+    assert len(starts) == 3
