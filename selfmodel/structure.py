@@ -31,7 +31,7 @@ OUTPUT_ARMATURE = 0.001
 FINER = 5
 """How many steps such a robot's physics takes in one of the self-model's. Play of a hundredth of a
 radian is crossed within a step of 5 ms, so that its limits would be none: at 5 ms they gave way by
-2 to 60 mrad, at 1 ms by 0.1 on the mean."""
+1 to 4 mrad on the mean and by up to 70, at 1 ms by 0.1 and by up to 7."""
 
 OUTPUT_DAMPING = 0.05
 """Damping of an added hinge, N m s/rad: grease, and the inner friction of a soft limb."""

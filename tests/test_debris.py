@@ -11,6 +11,7 @@ from selfmodel.physical import SimulatedRobot
 from selfmodel.places import places
 from selfmodel.robot import Robot
 from selfmodel.tasks import ROBOTS
+from tests.conftest import random_controllers
 
 JOINTS = [
     (name, joint.name)
@@ -135,3 +136,23 @@ def test_debris_does_not_pass_through_the_robot(quadruped: Robot):
 
     # By then it would have fallen 0.78 m.
     assert data.body(DEBRIS + "front_left_lower").xpos[2] > data.body("torso").xpos[2]
+
+
+def test_in_a_trial_debris_starts_where_the_limb_is_however_the_robot_stands(
+    quadruped: Robot, monkeypatch: pytest.MonkeyPatch
+):
+    starts = []
+
+    def watched(model: mujoco.MjModel, data: mujoco.MjData, limbs: tuple[str, ...]) -> None:
+        drop_debris(model, data, limbs)
+        starts.append(data)
+
+    monkeypatch.setattr("selfmodel.physical.drop_debris", watched)
+    physical = broken(quadruped, "break:front_left_shoulder", 0.3)
+    (controller,) = random_controllers(quadruped, 1)
+    next(iter(physical.run(controller, 3)))
+    for body in ("front_left_upper", "front_left_lower"):
+        lost, left = starts[0].body(DEBRIS + body), starts[0].body(body)
+        np.testing.assert_allclose(lost.xpos, left.xpos, atol=1e-9)
+        np.testing.assert_allclose(lost.xmat, left.xmat, atol=1e-9)
+    assert not starts[0].joint("front_left_knee").qpos[0] == 0
