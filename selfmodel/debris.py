@@ -70,7 +70,6 @@ def _overlapping(spec: mujoco.MjSpec, limbs: tuple[str, ...]) -> list[tuple[str,
     """The pairs of bodies, debris and other, that overlap when the limbs fall off."""
     model = spec.compile()
     data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
     drop_debris(model, data, limbs)
     mujoco.mj_forward(model, data)
     geoms = data.contact.geom[data.contact.dist < 0]
@@ -88,9 +87,10 @@ def drop_debris(model: mujoco.MjModel, data: mujoco.MjData, limbs: tuple[str, ..
 
     Args:
         model: A physical robot's, with debris.
-        data: Its state, up to the places of bodies; the debris's positions are written.
+        data: Its state, of which the debris's positions are written.
         limbs: The first body of each.
     """
+    mujoco.mj_kinematics(model, data)
     for limb in limbs:
         body = data.body(limb)
         data.joint(DEBRIS + limb).qpos[:] = np.concatenate([body.xpos, body.xquat])
