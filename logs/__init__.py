@@ -15,7 +15,7 @@ from selfmodel.logs.errors import (
     TruncatedError,
     UnsupportedError,
 )
-from selfmodel.logs.reader import TrialLog, read_log, read_truth
+from selfmodel.logs.reader import TrialLog, read_gap, read_log, read_truth
 
 __all__ = [
     "CorruptError",
@@ -28,6 +28,7 @@ __all__ = [
     "TruncatedError",
     "UnsupportedError",
     "load_controller",
+    "read_gap",
     "read_log",
     "read_truth",
     "save_controller",

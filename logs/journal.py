@@ -40,6 +40,7 @@ class FolderJournal:
     robot: Robot
     settings: Settings
     _hidden: Mapping[Stage, str] = field(repr=False)
+    _gap: str | None = field(default=None, repr=False)
 
     def record(self, physical: PhysicalRobot, plan: Plan) -> Trial:
         """Runs a trial, logs it while it runs, and returns it as its file says it.
@@ -56,6 +57,7 @@ class FolderJournal:
             physical.run(plan.controller, plan.steps),
             settings=self.settings,
             hidden=self._hidden.get(plan.stage),
+            gap=self._gap,
         )
         return read_log(path).trial
 
@@ -71,7 +73,11 @@ class FolderJournal:
 
 
 def open_journal(
-    folder: Path, robot: Robot, settings: Settings, hidden: Mapping[Stage, str]
+    folder: Path,
+    robot: Robot,
+    settings: Settings,
+    hidden: Mapping[Stage, str],
+    gap: str | None = None,
 ) -> FolderJournal:
     """Makes the folder of a new run.
 
@@ -81,6 +87,7 @@ def open_journal(
         settings: The paper's numbers, for the record.
         hidden: What is wrong with the physical robot at each stage, in notation, for those who
             score: it goes into the logs and nowhere else. A stage that is missing has none.
+        gap: How else the physical robot differs from its model at every stage, as JSON, likewise.
 
     Raises:
         InputError: The folder holds something, or cannot be made.
@@ -100,7 +107,7 @@ def open_journal(
         raise InputError(
             f"{folder} cannot be made: {error.strerror}; choose another folder"
         ) from error
-    return FolderJournal(folder, robot, settings, dict(hidden))
+    return FolderJournal(folder, robot, settings, dict(hidden), gap)
 
 
 def read_database(folder: Path, anatomy: Anatomy) -> Database:

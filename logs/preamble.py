@@ -13,6 +13,7 @@ from selfmodel.logs.logfile import LogFile
 from selfmodel.logs.records import (
     CONTROLLER_FILE,
     FORMAT,
+    GAP,
     HIDDEN,
     IMPORT,
     MAPPING_FILE,
@@ -40,6 +41,7 @@ def write_preamble(
     *,
     settings: Settings,
     hidden: str | None,
+    gap: str | None,
     imported: Imported | None,
 ) -> None:
     """Writes the records, attachments and description that precede the first step.
@@ -50,6 +52,7 @@ def write_preamble(
         plan: What is to be done.
         settings: The paper's numbers.
         hidden: What is wrong with a simulated robot, in notation.
+        gap: How else it differs from its model, as JSON.
         imported: Where an imported trial comes from.
 
     Raises:
@@ -72,8 +75,9 @@ def write_preamble(
     )
     log.metadata(TRIAL, record.texts())
     log.metadata(SOFTWARE, _software())
-    if hidden is not None:
-        log.metadata(HIDDEN, {TRUTH: hidden})
+    secrets = {TRUTH: hidden, GAP: gap}
+    if known := {name: text for name, text in secrets.items() if text is not None}:
+        log.metadata(HIDDEN, known)
     log.attach(MODEL_FILE, model)
     for name, data in robot.assets.items():
         log.attach(name, data)

@@ -1,9 +1,11 @@
 """Reads a trial from its log, and believes nothing that it has not checked."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 from selfmodel.behaviour import Behaviour
 from selfmodel.controller import Controller
@@ -25,6 +27,7 @@ from selfmodel.logs.records import (
     CONTROLLER_FILE,
     FINISHED,
     FORMAT,
+    GAP,
     HIDDEN,
     IMPORT,
     INTERRUPTED,
@@ -149,6 +152,36 @@ def read_truth(path: str | Path) -> str | None:
         InputError: There is no such file.
     """
     return read_contents(Path(path)).metadata.get(HIDDEN, {}).get(TRUTH)
+
+
+def read_gap(path: str | Path) -> dict[str, Any] | None:
+    """Returns how a simulated physical robot differed from its model, beside what was wrong.
+
+    This is for scoring. Nothing that diagnoses may call it.
+
+    Returns:
+        The numbers of a ``selfmodel.gap.Gap``, and under ``structure`` those of a
+        ``selfmodel.structure.Structure`` or None; None where no gap is told.
+
+    Raises:
+        LogError: The file is damaged, or what it says is no gap.
+        InputError: There is no such file.
+    """
+    contents = read_contents(Path(path))
+    text = contents.metadata.get(HIDDEN, {}).get(GAP)
+    if text is None:
+        return None
+    try:
+        values: Any = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise SchemaMismatchError(
+            path, f"its gap cannot be read: {error}", good=contents.good
+        ) from error
+    if not isinstance(values, dict):
+        raise SchemaMismatchError(
+            path, f"expected its gap as an object, got {type(values).__name__}", good=contents.good
+        )
+    return values
 
 
 _OWN_FILES = (MODEL_FILE, CONTROLLER_FILE, SETTINGS_FILE, MAPPING_FILE)

@@ -45,6 +45,7 @@ MEDIA_TYPES: Mapping[str, str] = MappingProxyType(
 """What the attachments are; all others are bytes."""
 
 TRUTH = "truth"
+GAP = "gap"
 FINISHED = "finished"
 INTERRUPTED = "interrupted"
 

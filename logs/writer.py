@@ -35,6 +35,7 @@ def write_trial(
     *,
     settings: Settings,
     hidden: str | None = None,
+    gap: str | None = None,
     imported: Imported | None = None,
 ) -> Path:
     """Logs a trial while it runs; see ``TrialWriter``.
@@ -46,6 +47,7 @@ def write_trial(
         samples: What happens, as it happens; not more than the plan's steps are asked for.
         settings: The paper's numbers, for the record.
         hidden: What is wrong with a simulated robot, in notation; for ``read_truth`` only.
+        gap: How else it differs from its model, as JSON; for ``read_gap`` only.
         imported: Where an imported trial comes from.
 
     Returns:
@@ -56,7 +58,9 @@ def write_trial(
         IncompleteError: There were fewer samples than planned; they are in the ``.part``.
         LogWriteError: The disk is full, or failed.
     """
-    writer = TrialWriter(path, robot, plan, settings=settings, hidden=hidden, imported=imported)
+    writer = TrialWriter(
+        path, robot, plan, settings=settings, hidden=hidden, gap=gap, imported=imported
+    )
     with writer:
         for sample in itertools.islice(samples, plan.steps):
             writer.add(sample)
@@ -75,6 +79,7 @@ class TrialWriter:
         plan: What is to be done.
         settings: The paper's numbers.
         hidden: What is wrong with a simulated robot, in notation.
+        gap: How else it differs from its model, as JSON.
         imported: Where an imported trial comes from.
 
     Raises:
@@ -89,6 +94,7 @@ class TrialWriter:
         *,
         settings: Settings,
         hidden: str | None = None,
+        gap: str | None = None,
         imported: Imported | None = None,
     ) -> None:
         checked_name(plan.name)
@@ -99,7 +105,7 @@ class TrialWriter:
         self.path = path
         self.steps = 0
         self._robot, self._plan, self._settings = robot, plan, settings
-        self._hidden, self._imported = hidden, imported
+        self._hidden, self._gap, self._imported = hidden, gap, imported
         self._encoder = Encoder(robot)
         self._rows = {signal: np.empty((FLUSH_STEPS, names.width(signal))) for signal in SIGNALS}
         self._written = 0
@@ -116,6 +122,7 @@ class TrialWriter:
                 self._plan,
                 settings=self._settings,
                 hidden=self._hidden,
+                gap=self._gap,
                 imported=self._imported,
             )
             self._channels = [

@@ -1,5 +1,6 @@
 """Physical robots: what the algorithm may ask of one, and a simulated one that hides its fault."""
 
+from collections import deque
 from collections.abc import Iterator
 from typing import Protocol
 
@@ -7,12 +8,18 @@ import mujoco
 import numpy as np
 
 from selfmodel.behaviour import SIGNALS, Sample
+from selfmodel.debris import add_debris, drop_debris, lost_limbs
 from selfmodel.driver import Driver, drive
+from selfmodel.embodiment import embody
 from selfmodel.errors import TrialError
+from selfmodel.gap import Gap, perturbed
 from selfmodel.hypothesis import INTACT, Hypothesis
+from selfmodel.instruments import ExactInstruments, Instruments, NoisyInstruments
 from selfmodel.places import places
 from selfmodel.robot import Robot
 from selfmodel.senses import Senses
+from selfmodel.start import jitter_start
+from selfmodel.structure import Structure, add_structure
 
 
 class PhysicalRobot(Protocol):
@@ -41,40 +48,93 @@ class SimulatedRobot:
     Args:
         robot: The robot as its model describes it.
         hidden: What is wrong with it.
+        gap: How else it differs from its model; None, or a level of 0: not at all.
+        structure: How it is built differently from its model; None: not at all.
+        stream: Which of the gap's streams of noise is this robot's own: robots that share a gap,
+            such as one before and after its failure, have different ones.
     """
 
-    def __init__(self, robot: Robot, hidden: Hypothesis = INTACT) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        hidden: Hypothesis = INTACT,
+        gap: Gap | None = None,
+        structure: Structure | None = None,
+        stream: int = 0,
+    ) -> None:
         self._robot = robot
-        self._embodiment = robot.build(hidden)
+        self._gap = gap if gap is not None and gap.level > 0 else None
+        self._limbs = lost_limbs(robot, hidden) if self._gap is not None else ()
+        model = _model(robot, self._gap, structure, self._limbs)
+        self._embodiment = embody(model, robot.anatomy, hidden)
+        self._noise = np.random.SeedSequence(gap.seed if gap else 0, spawn_key=(stream,))
 
     def run(self, controller: Driver, steps: int) -> Iterator[Sample]:
-        """Runs a controller; see ``PhysicalRobot``. The same bits as the ``Simulator``'s.
+        """Runs a controller; see ``PhysicalRobot``.
+
+        Without a gap, the same bits as the ``Simulator``'s. With one, each run takes the next
+        stream of noise: two runs differ, and the n-th of the same seed is the same to the bit.
 
         Raises:
             TrialError: The simulation diverged.
         """
+        (child,) = self._noise.spawn(1)
+        return self._run(controller, steps, np.random.default_rng(child))
+
+    def _run(self, controller: Driver, steps: int, rng: np.random.Generator) -> Iterator[Sample]:
         robot, embodiment = self._robot, self._embodiment
         model, data = embodiment.model, mujoco.MjData(embodiment.model)
+        instruments: Instruments = ExactInstruments()
+        delay, substeps = 0, round(robot.control_timestep / float(model.opt.timestep))
+        if self._gap is not None:
+            instruments = NoisyInstruments(self._gap.level, robot.anatomy, embodiment, rng)
+            delay = self._gap.delay
+            jitter_start(robot, model, data, self._gap.level, rng)
+            drop_debris(model, data, self._limbs)
         mujoco.mj_forward(model, data)
         senses = Senses(model, robot.anatomy, [embodiment])
         brain = drive([controller], embodiment.neurons[np.newaxis], len(robot.anatomy.sensors))
-        where = places(robot)
+        commands = np.zeros((1, model.nu))
+        underway = deque(np.zeros((delay, model.nu)))
+        where = places(robot, model)
+        # What is logged as commanded is what the controller said, not what the motors have got.
+        live = {
+            **{signal: (getattr(data, at.field), at.columns) for signal, at in where.items()},
+            "sensors": (brain.readings[0], slice(None)),
+            "commands": (commands[0], slice(None)),
+        }
         for k in range(steps):
             senses.read(data.sensordata[np.newaxis], data.qpos[np.newaxis], brain.readings)
-            brain.step(data.ctrl[np.newaxis])
+            instruments.receive(brain.readings[0])
+            brain.step(commands)
+            underway.append(commands[0].copy())
+            data.ctrl[:] = underway.popleft()
             yield Sample(
                 time=k * robot.control_timestep,
                 values={
-                    signal: brain.readings[0].copy()
-                    if signal == "sensors"
-                    else getattr(data, where[signal].field)[where[signal].columns].copy()
+                    signal: instruments.observe(signal, live[signal][0][live[signal][1]]).copy()
                     for signal in SIGNALS
                 },
             )
             if k + 1 < steps:
-                mujoco.mj_step(model, data, robot.substeps)
+                mujoco.mj_step(model, data, substeps)
                 if data.warning.number.any():
                     raise TrialError(
                         f"the simulation of the physical robot broke down after step {k}: its "
                         f"model is unstable under this controller; try a smaller physics time step"
                     )
+
+
+def _model(
+    robot: Robot, gap: Gap | None, structure: Structure | None, limbs: tuple[str, ...]
+) -> mujoco.MjModel:
+    """The model of a physical robot with no fault in it."""
+    model = robot.model
+    if structure is not None or limbs:
+        spec = mujoco.MjSpec.from_string(robot.mjcf, assets=dict(robot.assets))
+        if structure is not None:
+            add_structure(spec, structure)
+        if limbs:
+            add_debris(spec, limbs)
+        model = spec.compile()
+    return model if gap is None else perturbed(model, gap)

@@ -74,6 +74,7 @@ LAYERS = (
     ),
     (
         *("embodiment", "robot", "places", "senses", "batches", "tally", "prediction"),
+        *("gap", "instruments", "start", "debris", "structure"),
         *("simulator", "physical", "judge", "replay", "parameters"),
     ),
     ("database", "evidence", "refine", "diagnose", "repair", "calibrate"),

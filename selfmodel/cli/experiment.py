@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
+from selfmodel.cli.reality import draw_reality
 from selfmodel.comparator import Comparator
 from selfmodel.controller import Controller
 from selfmodel.events import Event
 from selfmodel.hypothesis import INTACT, Hypothesis
 from selfmodel.judge import is_correct
 from selfmodel.logs.journal import open_journal
-from selfmodel.physical import SimulatedRobot
 from selfmodel.recover import Recovery, recover
 from selfmodel.robot import Robot
 from selfmodel.settings import Settings
@@ -33,6 +33,8 @@ class Experiment:
         threads: Threads for the physics.
         folder: Where the run is kept.
         gait: How the robot walks before it fails; evolved if there is none.
+        gap: How far the physical robot is from its model, a level.
+        structure: Whether it is built differently, too.
     """
 
     robot: Robot
@@ -44,6 +46,8 @@ class Experiment:
     threads: int
     folder: Path
     gait: Controller | None = None
+    gap: float = 0.0
+    structure: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,9 +72,10 @@ def run(experiment: Experiment, watch: Callable[[Event], None]) -> Outcome:
     start = perf_counter()
     robot, truth = experiment.robot, experiment.truth
     simulator = Simulator(robot, experiment.threads)
+    reality = draw_reality(robot, experiment.seed, experiment.gap, structure=experiment.structure)
     recovery = recover(
-        healthy=SimulatedRobot(robot),
-        damaged=SimulatedRobot(robot, truth),
+        healthy=reality.robot(robot),
+        damaged=reality.robot(robot, truth, stream=1),
         simulator=simulator,
         comparator=experiment.comparator,
         journal=open_journal(
@@ -78,6 +83,7 @@ def run(experiment: Experiment, watch: Callable[[Event], None]) -> Outcome:
             robot,
             experiment.settings,
             hidden={"before": str(INTACT), "after": str(truth), "recovery": str(truth)},
+            gap=reality.text,
         ),
         settings=experiment.settings,
         seed=experiment.seed,

@@ -19,6 +19,23 @@ Damage = Annotated[
     ),
 ]
 Seed = Annotated[int, typer.Option(min=0, help="Every random choice comes from it.")]
+GapLevel = Annotated[
+    float,
+    typer.Option(
+        "--gap",
+        metavar="LEVEL",
+        help="How far the physical robot is from its model, 0 to 0.5: 0.05 is 5 % in masses and "
+        "motors, and as much noise.",
+    ),
+]
+Structural = Annotated[
+    bool,
+    typer.Option(
+        "--structure",
+        help="Let the physical robot also have backlash, a soft limb, a foot of another size and a "
+        "weak motor.",
+    ),
+]
 Threads = Annotated[
     int,
     typer.Option(min=0, max=1024, help="Threads for the physics; 0 means one for each processor."),

@@ -5,7 +5,16 @@ from typing import Annotated
 
 import typer
 
-from selfmodel.cli.options import ComparatorName, Damage, Json, RobotName, Seed, Threads
+from selfmodel.cli.options import (
+    ComparatorName,
+    Damage,
+    GapLevel,
+    Json,
+    RobotName,
+    Seed,
+    Structural,
+    Threads,
+)
 from selfmodel.comparators import DEFAULT
 
 
@@ -17,6 +26,8 @@ def recover(
     ] = None,
     damage: Damage = None,
     comparator: ComparatorName = DEFAULT,
+    gap: GapLevel = 0.0,
+    structure: Structural = False,
     seed: Seed = 0,
     trials: Annotated[
         int, typer.Option(min=1, max=99, help="Physical trials after the failing one.")
@@ -57,6 +68,8 @@ def recover(
         seed=seed,
         threads=resolve.threads(threads),
         folder=out or _new_folder(robot),
+        gap=gap,
+        structure=structure,
     )
     try:
         with display() as watch:

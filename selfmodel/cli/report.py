@@ -30,7 +30,7 @@ def print_report(experiment: Experiment, outcome: Outcome) -> None:
     verdict = "right" if found["correct"] else "wrong"
     # Not through rich: a folder's name may look like markup, and must not be folded.
     typer.echo(
-        f"truth: {found['truth']}; the diagnosis is {verdict}.\n"
+        f"truth: {found['truth']}{_reality(found)}; the diagnosis is {verdict}.\n"
         f"The robot went {found['displacement']['before']:.2f} m before, "
         f"{found['displacement']['after']:.2f} m after the failure, and "
         f"{found['displacement']['recovered']:.2f} m at best in "
@@ -41,6 +41,12 @@ def print_report(experiment: Experiment, outcome: Outcome) -> None:
     )
 
 
+def _reality(found: dict[str, Any]) -> str:
+    """How the physical robot differed from its model beside the truth, in words."""
+    gap = f", at a reality gap of {found['gap']:g}" if found["gap"] else ""
+    return gap + (", built differently" if found["structure"] else "")
+
+
 def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
     """Returns the outcome as plain values, as ``recover --json`` prints it."""
     recovery, tally = outcome.recovery, outcome.tally
@@ -49,7 +55,8 @@ def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
         "case": experiment.case,
         "truth": str(experiment.truth),
         "comparator": experiment.comparator.name,
-        "gap": 0.0,
+        "gap": experiment.gap,
+        "structure": experiment.structure,
         "seed": experiment.seed,
         "trials": [
             {

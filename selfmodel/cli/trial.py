@@ -6,7 +6,15 @@ from typing import Annotated
 
 import typer
 
-from selfmodel.cli.options import Damage, Json, RobotName, Seed, check_log_name
+from selfmodel.cli.options import (
+    Damage,
+    GapLevel,
+    Json,
+    RobotName,
+    Seed,
+    Structural,
+    check_log_name,
+)
 
 
 def trial(
@@ -26,6 +34,8 @@ def trial(
             help="Whose controller drives the robot; without it, a random one from the seed.",
         ),
     ] = None,
+    gap: GapLevel = 0.0,
+    structure: Structural = False,
     seed: Seed = 0,
     as_json: Json = False,
 ) -> None:
@@ -34,17 +44,18 @@ def trial(
     import numpy as np  # noqa: PLC0415
 
     from selfmodel.cli import resolve  # noqa: PLC0415
+    from selfmodel.cli.reality import draw_reality  # noqa: PLC0415
     from selfmodel.controller import Controller, draw_weights  # noqa: PLC0415
     from selfmodel.logs import read_log  # noqa: PLC0415
     from selfmodel.logs.writer import write_trial  # noqa: PLC0415
     from selfmodel.notation import parse  # noqa: PLC0415
-    from selfmodel.physical import SimulatedRobot  # noqa: PLC0415
     from selfmodel.settings import Settings  # noqa: PLC0415
     from selfmodel.trial import Plan  # noqa: PLC0415
 
     made = resolve.robot_entry(robot).robot()
     check_log_name(out)
     hidden = parse("intact" if damage is None else damage, made.anatomy)
+    reality = draw_reality(made, seed, gap, structure=structure)
     if controller:
         driver = resolve.controller(controller, made.network)
     else:
@@ -52,9 +63,11 @@ def trial(
         driver = Controller(made.network, draw_weights(rng, (made.network.weights,)))
     settings = Settings()
     plan = Plan("trial", "single", driver, settings.steps, seed)
-    samples = SimulatedRobot(made, hidden).run(driver, settings.steps)
+    samples = reality.robot(made, hidden).run(driver, settings.steps)
     try:
-        write_trial(out, made, plan, samples, settings=settings, hidden=str(hidden))
+        write_trial(
+            out, made, plan, samples, settings=settings, hidden=str(hidden), gap=reality.text
+        )
     except KeyboardInterrupt:
         typer.echo(f"interrupted: the steps so far are in {out}.part", err=True)
         raise typer.Exit(130) from None
@@ -63,6 +76,8 @@ def trial(
         "log": str(out),
         "robot": robot,
         "truth": str(hidden),
+        "gap": gap,
+        "structure": structure,
         "seed": seed,
         "steps": log.trial.behaviour.steps,
         "displacement": log.trial.displacement,

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from selfmodel.cli.logs import app
 from selfmodel.errors import InputError
-from selfmodel.logs import LogError, read_log, read_truth
+from selfmodel.logs import LogError, read_gap, read_log, read_truth
 from selfmodel.logs.framing import MAGIC, frames
 from selfmodel.logs.info import read_info
 from selfmodel.logs.records import (
@@ -38,6 +38,7 @@ from tests.logs.test_damage import rewritten
 READERS: tuple[Callable[[Path], object], ...] = (
     read_log,
     read_truth,
+    read_gap,
     read_info,
     verify,
     salvageable_steps,
