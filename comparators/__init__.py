@@ -4,12 +4,23 @@ from collections.abc import Mapping
 
 from selfmodel.comparator import Comparator
 from selfmodel.comparators.forward_displacement import FORWARD_DISPLACEMENT
+from selfmodel.comparators.gait_pattern import GAIT_PATTERN
+from selfmodel.comparators.paper_sensors import PAPER_SENSORS
+from selfmodel.comparators.sensor_series import SENSOR_SERIES
 
 COMPARATORS: Mapping[str, Comparator] = {
-    comparator.name: comparator for comparator in (FORWARD_DISPLACEMENT,)
+    comparator.name: comparator
+    for comparator in (FORWARD_DISPLACEMENT, PAPER_SENSORS, SENSOR_SERIES, GAIT_PATTERN)
 }
 """Every comparator that comes with selfmodel."""
 
 DEFAULT = FORWARD_DISPLACEMENT.name
 
-__all__ = ["COMPARATORS", "DEFAULT", "FORWARD_DISPLACEMENT"]
+__all__ = [
+    "COMPARATORS",
+    "DEFAULT",
+    "FORWARD_DISPLACEMENT",
+    "GAIT_PATTERN",
+    "PAPER_SENSORS",
+    "SENSOR_SERIES",
+]
