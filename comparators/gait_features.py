@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from selfmodel.arrays import BoolArray, FloatArray
+from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 
 GROUPS: Mapping[str, float] = {
     "duty": 0.1,
@@ -99,23 +99,27 @@ def observed(seen: BoolArray, readings: int) -> dict[str, BoolArray]:
     first, second = _pairs(seen.shape[1])
     return {
         "duty": seen[:, :readings],
-        "sequence": seen[:, :readings].any(axis=1, keepdims=True),
+        "sequence": np.asarray(seen[:, :readings].any(axis=1, keepdims=True)),
         "phase": seen[:, first] & seen[:, second],
-        "rhythm": seen.any(axis=1, keepdims=True),
+        "rhythm": np.asarray(seen.any(axis=1, keepdims=True)),
         "posture": seen,
         "excursion": seen,
     }
 
 
-def _pairs(columns: int) -> tuple[FloatArray, FloatArray]:
-    return np.triu_indices(columns, 1)
+def _pairs(columns: int) -> tuple[IndexArray, IndexArray]:
+    first, second = np.triu_indices(columns, 1)
+    return first, second
 
 
 def _sequence(on: BoolArray) -> FloatArray:
     """How often each reading comes on next after each other one, as a part of all transitions."""
     runs, windows, length, readings = on.shape
     last = max(length - STEADY + 1, 0)
-    most = sum(on[:, :, k : k + last].view(np.uint8) for k in range(STEADY)) > STEADY // 2
+    counted = np.zeros((runs, windows, last, readings), dtype=np.uint8)
+    for k in range(STEADY):
+        counted += on[:, :, k : k + last]
+    most = counted > STEADY // 2
     onsets = (most[:, :, 1:] & ~most[:, :, :-1]).reshape(runs * windows, -1)
     # In the order of time, and of columns where two come on at once.
     where, which = np.nonzero(onsets)
@@ -125,7 +129,7 @@ def _sequence(on: BoolArray) -> FloatArray:
     counts = np.bincount(kind[together], minlength=runs * windows * readings**2)
     counts = counts.reshape(runs, windows, -1)
     # One more than there were: a single transition is not yet a sequence.
-    return counts / (counts.sum(axis=-1, keepdims=True) + 1)
+    return np.asarray(counts / (counts.sum(axis=-1, keepdims=True) + 1))
 
 
 def _spectral(centred: FloatArray, frequencies: int) -> tuple[FloatArray, FloatArray]:

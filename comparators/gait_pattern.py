@@ -65,7 +65,7 @@ class GaitPattern:
 
     def distances(self, simulated: Behaviour, trial: Trial) -> FloatArray:
         """Returns the distance of each simulation, ``(n,)``, from 0 to 1."""
-        return self.losses(simulated, trial).mean(axis=1)
+        return np.asarray(self.losses(simulated, trial).mean(axis=1))
 
     def losses(self, simulated: Behaviour, trial: Trial) -> FloatArray:
         """Returns the loss of each group of features in each window.
@@ -90,7 +90,7 @@ class GaitPattern:
             axis=-1,
         )
         judged = np.stack([known[group].any(axis=-1) for group in GROUPS], axis=-1)
-        return (pieces / judged.mean()).reshape(len(moved), -1)
+        return np.asarray((pieces / judged.mean()).reshape(len(moved), -1))
 
     def _observed(self, trial: Trial) -> tuple[Signal, ...]:
         found = tuple(s for s in SIGNALS if np.isfinite(trial.behaviour[s]).any())
@@ -109,8 +109,7 @@ def _timestep(time: FloatArray) -> float:
 def _in_windows(seen: BoolArray, windows: int) -> BoolArray:
     """Whether anything of a column was seen in a window, ``(windows, columns)``."""
     length = len(seen) // windows
-    whole: BoolArray = seen[: windows * length].reshape(windows, length, -1).any(axis=1)
-    return whole
+    return np.asarray(seen[: windows * length].reshape(windows, length, -1).any(axis=1))
 
 
 def _mean(losses: FloatArray, known: BoolArray) -> FloatArray:

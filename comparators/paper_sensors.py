@@ -17,6 +17,7 @@ FAR = 0.25
 """A difference of displacements that is large, as a part of the displacement itself."""
 FLOOR = 0.1
 """And at least this, m."""
+READINGS = SensorSeries("paper-sensors", ("sensors",))
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class PaperSensors:
     """
 
     name: str = "paper-sensors"
-    series: SensorSeries = SensorSeries("paper-sensors", ("sensors",))
+    series: SensorSeries = READINGS
 
     def request(self, trial: Trial) -> ClosedLoop:
         """Returns that it looks at the controller's readings and at where the root body is.
@@ -43,7 +44,7 @@ class PaperSensors:
 
     def distances(self, simulated: Behaviour, trial: Trial) -> FloatArray:
         """Returns the distance of each simulation, ``(n,)``, from 0 to 1."""
-        return self.losses(simulated, trial).mean(axis=1)
+        return np.asarray(self.losses(simulated, trial).mean(axis=1))
 
     def losses(self, simulated: Behaviour, trial: Trial) -> FloatArray:
         """Returns the loss of each window, and of the displacement where the trial has it.
