@@ -42,7 +42,8 @@ class Gait:
     Attributes:
         duty: ``(n, windows, readings)``, part of the time that each is on.
         sequence: ``(n, windows, readings²)``, how often one comes on next after another.
-        phase: ``(n, windows, pairs)``, complex: the coherency of every two columns.
+        phase: ``(2, n, windows, pairs)``, the coherency of every two columns: its real part and
+            its imaginary part.
         rhythm: ``(n, windows, frequencies)``, the part of all power up to each frequency.
         posture: ``(n, windows, columns)``, the mean.
         excursion: ``(n, windows, columns)``, the standard deviation.
@@ -58,17 +59,19 @@ class Gait:
         seen = seen[:whole].reshape(windows, length, columns)
         kept = np.zeros((runs, windows, length, columns))
         np.copyto(kept, values[:, :whole].reshape(kept.shape), where=seen)
-        count = np.maximum(seen.sum(axis=1), 1)
-        self.posture = kept.sum(axis=2) / count
+        # Without it, part of a stride at either end would tell when the strides begin.
+        taper = np.sin(np.pi * (np.arange(length) + 0.5) / length) ** 2
+        share = np.where(seen.any(axis=1), taper @ seen, 1)
+        self.posture = taper @ kept / share
         on = kept[..., :readings] > LEVEL
-        self.duty = on.sum(axis=2) / count[:, :readings]
-        self.sequence = _sequence(on)
+        self.duty = taper @ on / share[:, :readings]
+        self.sequence = _sequence(on, taper)
         kept -= self.posture[:, :, np.newaxis]
         if not seen.all():
             kept *= seen
-        self.excursion = np.sqrt(np.square(kept).sum(axis=2) / count)
+        self.excursion = np.sqrt(taper @ np.square(kept) / share)
         self.resolution = 1 / (length * timestep)
-        self.phase, self.rhythm = _spectral(kept, max(1, int(FASTEST / self.resolution)))
+        self.phase, self.rhythm = _spectral(kept, taper, max(1, int(FASTEST / self.resolution)))
 
 
 def differences(one: Gait, other: Gait) -> dict[str, FloatArray]:
@@ -82,7 +85,8 @@ def differences(one: Gait, other: Gait) -> dict[str, FloatArray]:
     return {
         "duty": np.abs(one.duty - other.duty),
         "sequence": sequence,
-        "phase": np.abs(one.phase - other.phase),
+        # Not by complex numbers: numpy's depend in the last bit on their place in an array.
+        "phase": np.sqrt(np.square(one.phase - other.phase).sum(axis=0)),
         "rhythm": rhythm,
         "posture": np.abs(one.posture - other.posture),
         "excursion": np.abs(one.excursion - other.excursion),
@@ -112,7 +116,7 @@ def _pairs(columns: int) -> tuple[IndexArray, IndexArray]:
     return first, second
 
 
-def _sequence(on: BoolArray) -> FloatArray:
+def _sequence(on: BoolArray, taper: FloatArray) -> FloatArray:
     """How often each reading comes on next after each other one, as a part of all transitions."""
     runs, windows, length, readings = on.shape
     last = max(length - STEADY + 1, 0)
@@ -122,33 +126,44 @@ def _sequence(on: BoolArray) -> FloatArray:
     most = counted > STEADY // 2
     onsets = (most[:, :, 1:] & ~most[:, :, :-1]).reshape(runs * windows, -1)
     # In the order of time, and of columns where two come on at once.
-    where, which = np.nonzero(onsets)
-    which %= max(readings, 1)
+    where, event = np.nonzero(onsets)
+    moment, which = np.divmod(event, max(readings, 1))
     together = where[1:] == where[:-1]
     kind = (where[1:] * readings + which[:-1]) * readings + which[1:]
-    counts = np.bincount(kind[together], minlength=runs * windows * readings**2)
-    counts = counts.reshape(runs, windows, -1)
+    counts = np.bincount(
+        kind[together],
+        weights=taper[moment[1:]][together],
+        minlength=runs * windows * readings**2,
+    ).reshape(runs, windows, -1)
     # One more than there were: a single transition is not yet a sequence.
     return np.asarray(counts / (counts.sum(axis=-1, keepdims=True) + 1))
 
 
-def _spectral(centred: FloatArray, frequencies: int) -> tuple[FloatArray, FloatArray]:
+def _spectral(
+    centred: FloatArray, taper: FloatArray, frequencies: int
+) -> tuple[FloatArray, FloatArray]:
     """The coherency of every two columns, and the part of all power up to each frequency."""
     runs, windows, length, columns = centred.shape
     step = np.arange(length) + 0.5
-    taper = np.sin(np.pi * step / length) ** 2
     angle = 2 * np.pi * np.arange(1, frequencies + 1)[:, np.newaxis] * step / length
     # By a product of matrices, because only the lowest of the frequencies are needed.
     basis = np.concatenate([np.cos(angle), np.sin(angle)]) * taper
     # So that the power over all frequencies is the variance.
     basis *= np.sqrt(2 / (length * np.sum(taper**2)))
-    parts = (basis @ centred).reshape(runs, windows, 2, frequencies, columns)
-    lines = parts[:, :, 0] + 1j * parts[:, :, 1]
-    power = np.square(parts).sum(axis=2)
+    lines = (basis @ centred).reshape(runs, windows, 2, frequencies, columns)
+    power = np.square(lines).sum(axis=2)
     first, second = _pairs(columns)
     total = power.sum(axis=2) + STILL**2
-    cross = (lines.swapaxes(-1, -2) @ lines.conj())[..., first, second]
-    phase = cross / np.sqrt(total[..., first] * total[..., second])
+    real, imaginary = lines[:, :, 0], lines[:, :, 1]
+    quadrature = imaginary.swapaxes(-1, -2) @ real
+    cross = np.stack(
+        [
+            real.swapaxes(-1, -2) @ real + imaginary.swapaxes(-1, -2) @ imaginary,
+            quadrature - quadrature.swapaxes(-1, -2),
+        ]
+    )[..., first, second]
+    # In C order, as everything else: the order in memory decides the order in which numpy adds.
+    phase = np.ascontiguousarray(cross / np.sqrt(total[..., first] * total[..., second]))
     moved = power.sum(axis=3)
     rhythm = moved.cumsum(axis=2) / (moved.sum(axis=2, keepdims=True) + STILL**2)
     return phase, rhythm

@@ -24,8 +24,9 @@ SHORTEST = 100
 class GaitPattern:
     """The difference of gaits: what they are like, not when a stride begins.
 
-    A trial is cut into at most four windows. In each, six groups of features are compared, and
-    their bounded loss is a piece of the trial:
+    A trial is cut into at most four windows, each looked at through a taper, so that it does not
+    matter where in a stride it begins. In each, six groups of features are compared, and their
+    bounded loss is a piece of the trial:
 
     * duty: how much of the time each reading is above one half (for a touch: the duty factor);
     * sequence: which reading rises above one half after which (for touches: the footfall sequence,
@@ -45,9 +46,10 @@ class GaitPattern:
     factor and phase, and orders gaits by their footfall sequences. The rest is a choice made here.
 
     Limits: it sees nothing of where the robot goes. Failures that leave the gait alone (a sensor
-    that the controller hardly listens to) are close to the intact robot. Windows are of fixed
-    time, so a shift matters a little where the gait changes. A robot that lies still has hardly
-    any gait: its posture decides.
+    that the controller hardly listens to) are close to the intact robot. A shift matters a little
+    where a window has fewer than two strides, or where the gait changes. Of feet that touch down
+    together, noise decides which came first. A robot that lies still has no gait: its posture
+    decides.
 
     Attributes:
         name: What it is called.

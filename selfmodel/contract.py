@@ -51,7 +51,7 @@ def check_comparator(comparator: Comparator, trial: Trial, simulated: Behaviour)
 def _check_request(request: Request, trial: Trial) -> None:
     """Checks that a request can be met."""
     if not isinstance(request, ClosedLoop | Segments | Ensemble):
-        raise ValueError(  # noqa: TRY004: every breach of the contract is a ValueError
+        raise ValueError(  # noqa: TRY004  # every breach of the contract is a ValueError
             f"a request must be a ClosedLoop, Segments or an Ensemble, got {request!r}"
         )
     if not request.record or not set(request.record) <= set(SIGNALS):
