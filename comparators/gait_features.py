@@ -42,8 +42,7 @@ class Gait:
     Attributes:
         duty: ``(n, windows, readings)``, part of the time that each is on.
         sequence: ``(n, windows, readings²)``, how often one comes on next after another.
-        phase: ``(2, n, windows, pairs)``, the coherency of every two columns: its real part and
-            its imaginary part.
+        phase: ``(n, windows, pairs)``, complex: the coherency of every two columns.
         rhythm: ``(n, windows, frequencies)``, the part of all power up to each frequency.
         posture: ``(n, windows, columns)``, the mean.
         excursion: ``(n, windows, columns)``, the standard deviation.
@@ -85,8 +84,7 @@ def differences(one: Gait, other: Gait) -> dict[str, FloatArray]:
     return {
         "duty": np.abs(one.duty - other.duty),
         "sequence": sequence,
-        # Not by complex numbers: numpy's depend in the last bit on their place in an array.
-        "phase": np.sqrt(np.square(one.phase - other.phase).sum(axis=0)),
+        "phase": np.abs(one.phase - other.phase),
         "rhythm": rhythm,
         "posture": np.abs(one.posture - other.posture),
         "excursion": np.abs(one.excursion - other.excursion),
@@ -150,18 +148,12 @@ def _spectral(
     basis = np.concatenate([np.cos(angle), np.sin(angle)]) * taper
     # So that the power over all frequencies is the variance.
     basis *= np.sqrt(2 / (length * np.sum(taper**2)))
-    lines = (basis @ centred).reshape(runs, windows, 2, frequencies, columns)
-    power = np.square(lines).sum(axis=2)
+    parts = (basis @ centred).reshape(runs, windows, 2, frequencies, columns)
+    lines = parts[:, :, 0] + 1j * parts[:, :, 1]
+    power = np.square(parts).sum(axis=2)
     first, second = _pairs(columns)
     total = power.sum(axis=2) + STILL**2
-    real, imaginary = lines[:, :, 0], lines[:, :, 1]
-    quadrature = imaginary.swapaxes(-1, -2) @ real
-    cross = np.stack(
-        [
-            real.swapaxes(-1, -2) @ real + imaginary.swapaxes(-1, -2) @ imaginary,
-            quadrature - quadrature.swapaxes(-1, -2),
-        ]
-    )[..., first, second]
+    cross = (lines.swapaxes(-1, -2) @ lines.conj())[..., first, second]
     # In C order, as everything else: the order in memory decides the order in which numpy adds.
     phase = np.ascontiguousarray(cross / np.sqrt(total[..., first] * total[..., second]))
     moved = power.sum(axis=3)

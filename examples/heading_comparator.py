@@ -40,7 +40,7 @@ class Heading:
     def losses(self, simulated: Behaviour, trial: Trial) -> FloatArray:
         """Returns the loss of each step that was observed, ``(n, steps)``, rad."""
         seen = self._seen(trial)
-        x, y = forward(simulated["base_orientation"][:, seen])
+        x, y = forward(np.compress(seen, simulated["base_orientation"], axis=1))
         along, across = forward(trial.behaviour["base_orientation"][seen])
         # Exactly 0 between equal headings, and never more than half a turn.
         return np.abs(np.arctan2(x * across - y * along, x * along + y * across))
