@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from selfmodel.behaviour import Behaviour
@@ -15,6 +15,7 @@ from tests.gaits import TROT, WALK, batch, changed, gait, logged
 GROUP = list(GROUPS)
 
 
+@settings(deadline=None)
 @given(
     frequency=st.floats(1.2, 3.0),
     late=st.floats(0.0, 1.0),

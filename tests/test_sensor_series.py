@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from selfmodel.behaviour import Behaviour
@@ -22,6 +22,7 @@ def disturbed(start: int, stop: int) -> Behaviour:
     return changed(gait(), joint_positions=joints)
 
 
+@settings(deadline=None)
 @given(factor=st.floats(1.0, 1e3))
 def test_the_unit_of_a_column_does_not_matter(factor: float):
     walking, trot = gait(swing=0.8), gait(TROT, swing=0.8)
