@@ -4,15 +4,21 @@ from collections.abc import Mapping
 
 from selfmodel.comparator import Comparator
 from selfmodel.comparators.forward_displacement import FORWARD_DISPLACEMENT
+from selfmodel.comparators.gait_pattern import GAIT_PATTERN
+from selfmodel.comparators.paper_sensors import PAPER_SENSORS
 from selfmodel.comparators.segment_prediction import (
     SEGMENT_PREDICTION,
     SEGMENT_PREDICTION_ONBOARD,
 )
+from selfmodel.comparators.sensor_series import SENSOR_SERIES
 
 COMPARATORS: Mapping[str, Comparator] = {
     comparator.name: comparator
     for comparator in (
         FORWARD_DISPLACEMENT,
+        PAPER_SENSORS,
+        SENSOR_SERIES,
+        GAIT_PATTERN,
         SEGMENT_PREDICTION,
         SEGMENT_PREDICTION_ONBOARD,
     )
@@ -25,6 +31,9 @@ __all__ = [
     "COMPARATORS",
     "DEFAULT",
     "FORWARD_DISPLACEMENT",
+    "GAIT_PATTERN",
+    "PAPER_SENSORS",
     "SEGMENT_PREDICTION",
     "SEGMENT_PREDICTION_ONBOARD",
+    "SENSOR_SERIES",
 ]

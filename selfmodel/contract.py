@@ -2,34 +2,39 @@
 
 import numpy as np
 
+from selfmodel.arrays import FloatArray
 from selfmodel.behaviour import SIGNALS, Behaviour
-from selfmodel.comparator import Comparator
+from selfmodel.comparator import ClosedLoop, Comparator, Ensemble, Piecewise, Request, Segments
 from selfmodel.trial import Trial
+
+CROWDED = (
+    "must not depend on the other runs, not in the last bit: numpy adds in the order of memory, "
+    "which np.ascontiguousarray before a sum or a mean fixes"
+)
 
 
 def check_comparator(comparator: Comparator, trial: Trial, simulated: Behaviour) -> None:
-    """Checks that a comparator does what ``Comparator`` says.
+    """Checks that a comparator does what ``Comparator`` says, and ``Piecewise`` if it is one.
 
     Args:
         comparator: The one to check.
         trial: A logged trial.
-        simulated: All signals of at least two runs with the trial's controller, the first of
-            which did what the trial shows, ``(n, steps, width)``.
+        simulated: What ``comparator.request(trial)`` asks to simulate, for at least two
+            hypotheses, of which the first did what the trial shows. Signals that it did not ask
+            for do no harm: all signals, ``(n, steps, width)``, serve every ``ClosedLoop`` request.
 
     Raises:
-        ValueError: It breaks its contract; the message says in which way.
+        ValueError: It breaks its contract, or ``simulated`` is not what it asked for; the message
+            says in which way.
     """
     if not comparator.name or comparator.name != comparator.name.strip():
         raise ValueError(f"a comparator needs a name, got {comparator.name!r}")
-    record = comparator.request(trial).record
-    if not record or not set(record) <= set(SIGNALS):
-        raise ValueError(f"a request must record some of {SIGNALS}, got {record}")
-    asked = Behaviour(
-        simulated.names, simulated.time, {signal: simulated[signal] for signal in record}
-    )
-    before = {signal: asked[signal].copy() for signal in record}
+    request = comparator.request(trial)
+    _check_request(request, trial)
+    asked = _as_requested(request, trial, simulated)
+    before = {signal: asked[signal].copy() for signal in request.record}
     distances = comparator.distances(asked, trial)
-    runs = len(asked[record[0]])
+    runs = len(asked[request.record[0]])
     if distances.shape != (runs,):
         raise ValueError(f"expected a distance for each of {runs} runs, got {distances.shape}")
     if not np.all(np.isfinite(distances)) or np.any(distances < 0):
@@ -38,11 +43,101 @@ def check_comparator(comparator: Comparator, trial: Trial, simulated: Behaviour)
         raise ValueError(f"a run that did what the trial shows must be at 0, got {distances[0]}")
     if not np.array_equal(distances, comparator.distances(asked, trial)):
         raise ValueError("the same arguments must give the same distances")
-    if any(not np.array_equal(before[signal], asked[signal]) for signal in record):
-        raise ValueError("a comparator must not change what it is given")
     for run in range(runs):
-        alone = Behaviour(
-            asked.names, asked.time, {signal: asked[signal][run : run + 1] for signal in record}
+        alone = comparator.distances(_only(asked, run), trial)
+        if not np.array_equal(alone, distances[run : run + 1]):
+            raise ValueError(f"the distance of run {run} {CROWDED}")
+    if isinstance(comparator, Piecewise):
+        _check_pieces(comparator, trial, asked, distances)
+    if any(not np.array_equal(before[signal], asked[signal]) for signal in request.record):
+        raise ValueError("a comparator must not change what it is given")
+
+
+def _check_request(request: Request, trial: Trial) -> None:
+    """Checks that a request can be met."""
+    if not isinstance(request, ClosedLoop | Segments | Ensemble):
+        raise ValueError(  # noqa: TRY004  # every breach of the contract is a ValueError
+            f"a request must be a ClosedLoop, Segments or an Ensemble, got {request!r}"
         )
-        if not np.array_equal(comparator.distances(alone, trial), distances[run : run + 1]):
-            raise ValueError(f"the distance of run {run} must not depend on the other runs")
+    if not request.record or not set(request.record) <= set(SIGNALS):
+        raise ValueError(f"a request must record some of {SIGNALS}, got {request.record}")
+    if isinstance(request, Ensemble) and not (request.members >= 1 and request.level >= 0):
+        raise ValueError(
+            f"an ensemble needs at least one member and a level of at least 0, got "
+            f"{request.members} members at level {request.level}"
+        )
+    if isinstance(request, Segments):
+        _check_segments(request, trial)
+
+
+def _check_segments(request: Segments, trial: Trial) -> None:
+    names, commands = trial.behaviour.names, request.commands
+    if commands.ndim != 3 or commands.shape[2] != len(names.motors) or not len(commands):
+        raise ValueError(
+            f"the commands of segments must have shape (segments, lead + horizon, motors) = "
+            f"(1 or more, ..., {len(names.motors)}), got {commands.shape}"
+        )
+    if not 0 <= request.lead < commands.shape[1]:
+        raise ValueError(
+            f"segments need a lead of at least 0 and a horizon of at least 1 step, got a lead of "
+            f"{request.lead} in {commands.shape[1]} rows of commands"
+        )
+    for signal, values in request.states.items():
+        expected = (len(commands), names.width(signal))
+        if values.shape != expected:
+            raise ValueError(
+                f"the states of {signal} must have shape (segments, width) = {expected}, got "
+                f"{values.shape}"
+            )
+    if not all(np.isfinite(values).all() for values in (commands, *request.states.values())):
+        raise ValueError("the states and the commands of segments must all be known, got NaN")
+
+
+def _as_requested(request: Request, trial: Trial, simulated: Behaviour) -> Behaviour:
+    """What was asked for of what was simulated, once its shapes are seen to fit."""
+    lengths: tuple[int, ...] = (trial.behaviour.steps,)
+    if isinstance(request, Segments):
+        lengths = (len(request.commands), request.horizon + 1)
+    elif isinstance(request, Ensemble):
+        lengths = (request.members, trial.behaviour.steps)
+    for signal in request.record:
+        if simulated[signal].shape[1:-1] != lengths:
+            raise ValueError(
+                f"its request is a {type(request).__name__}: {signal} must have been simulated as "
+                f"(n, {', '.join(map(str, lengths))}, width), got {simulated[signal].shape}"
+            )
+    return Behaviour(
+        simulated.names, simulated.time, {signal: simulated[signal] for signal in request.record}
+    )
+
+
+def _only(simulated: Behaviour, run: int) -> Behaviour:
+    return Behaviour(
+        simulated.names,
+        simulated.time,
+        {signal: values[run : run + 1] for signal, values in simulated.signals.items()},
+    )
+
+
+def _check_pieces(
+    comparator: Piecewise, trial: Trial, simulated: Behaviour, distances: FloatArray
+) -> None:
+    losses = comparator.losses(simulated, trial)
+    if losses.ndim != 2 or len(losses) != len(distances) or not losses.shape[1]:
+        raise ValueError(
+            f"expected losses of shape (n, pieces) = ({len(distances)}, 1 or more), got "
+            f"{losses.shape}"
+        )
+    if not np.all(np.isfinite(losses)) or np.any(losses < 0):
+        raise ValueError("losses must be finite and at least 0")
+    if not np.allclose(losses.mean(axis=1), distances, rtol=1e-12, atol=0):
+        raise ValueError(
+            f"the mean of the losses must be the distance, got {losses.mean(axis=1)} for "
+            f"{distances}"
+        )
+    if not np.array_equal(losses, comparator.losses(simulated, trial)):
+        raise ValueError("the same arguments must give the same losses")
+    for run in range(len(losses)):
+        alone = comparator.losses(_only(simulated, run), trial)
+        if not np.array_equal(alone, losses[run : run + 1]):
+            raise ValueError(f"the losses of run {run} {CROWDED}")

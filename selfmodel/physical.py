@@ -85,10 +85,13 @@ class SimulatedRobot:
         robot, embodiment = self._robot, self._embodiment
         model, data = embodiment.model, mujoco.MjData(embodiment.model)
         instruments: Instruments = ExactInstruments()
-        delay, substeps = 0, round(robot.control_timestep / float(model.opt.timestep))
+        delay, substeps = (
+            robot.control_delay,
+            round(robot.control_timestep / float(model.opt.timestep)),
+        )
         if self._gap is not None:
             instruments = NoisyInstruments(self._gap.level, robot.anatomy, embodiment, rng)
-            delay = self._gap.delay
+            delay += self._gap.delay
             jitter_start(robot, model, data, self._gap.level, rng)
             drop_debris(model, data, self._limbs)
         mujoco.mj_forward(model, data)

@@ -1,11 +1,13 @@
 """The contract of every registered comparator: add one, and it is tested."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from selfmodel.arrays import FloatArray
 from selfmodel.behaviour import SIGNALS, Behaviour
-from selfmodel.comparator import ClosedLoop, Comparator
+from selfmodel.comparator import ClosedLoop, Comparator, Ensemble, Request, Segments
 from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT
 from selfmodel.contract import check_comparator
 from selfmodel.notation import parse
@@ -102,3 +104,124 @@ def test_the_contract_kit_sees_each_way_to_break_it(
 ):
     with pytest.raises(ValueError, match=said):
         check_comparator(Broken(way), *logged_and_simulated)
+
+
+class Pieces:
+    """A comparator in pieces, of any request, that can break its contract in one way."""
+
+    name = "pieces"
+
+    def __init__(self, asks: Request, way: str = "") -> None:
+        self.asks = asks
+        self.way = way
+        self.calls = 0
+
+    def request(self, _trial: Trial) -> Request:
+        """Asks for what it was made with."""
+        return self.asks
+
+    def distances(self, simulated: Behaviour, _trial: Trial) -> FloatArray:
+        """Is the mean of the sound losses."""
+        return self._sound(simulated).mean(axis=1)
+
+    def losses(self, simulated: Behaviour, _trial: Trial) -> FloatArray:
+        """Is how far each joint is from the first run's, spoilt."""
+        self.calls += 1
+        right = self._sound(simulated)
+        return {
+            "": right,
+            "shape": right[:, 0],
+            "none": right[:, :0],
+            "sign": right - right.max(),
+            "mean": right * 2,
+            "impure": right * (1 + 1e-15 * self.calls),
+            "crowd": right * (1 + 1e-15 * len(right)),
+        }[self.way]
+
+    def _sound(self, simulated: Behaviour) -> FloatArray:
+        values = simulated["joint_positions"]
+        return np.abs(values - TRUTH).reshape(len(values), -1, values.shape[-1]).mean(axis=1)
+
+
+TRUTH = 0.25
+"""Where all joints stand in the runs that the pieces of these tests are about."""
+
+
+def runs_of_shape(trial: Trial, *lengths: int) -> Behaviour:
+    """Two runs of joints that stand still, the first where the trial has them."""
+    names = trial.behaviour.names
+    values = np.full((2, *lengths, len(names.hinges)), TRUTH)
+    values[1] += 0.5
+    return Behaviour(names, np.arange(lengths[-1]) * 0.01, {"joint_positions": values})
+
+
+def segments(trial: Trial, *, lead: int = 2, rows: int = 27) -> Segments:
+    """Three segments of a trial."""
+    names = trial.behaviour.names
+    return Segments(
+        states={"joint_positions": np.zeros((3, len(names.hinges)))},
+        commands=np.zeros((3, rows, len(names.motors))),
+        lead=lead,
+        record=("joint_positions",),
+    )
+
+
+ENSEMBLE = Ensemble(("joint_positions",), members=4, level=0.05)
+
+
+def test_the_contract_kit_judges_requests_of_every_kind(logged_and_simulated: Both):
+    trial, _ = logged_and_simulated
+    steps = trial.behaviour.steps
+
+    check_comparator(Pieces(ClosedLoop(("joint_positions",))), trial, runs_of_shape(trial, steps))
+    check_comparator(Pieces(segments(trial)), trial, runs_of_shape(trial, 3, 26))
+    check_comparator(Pieces(ENSEMBLE), trial, runs_of_shape(trial, 4, steps))
+
+
+def test_the_contract_kit_wants_what_was_requested(logged_and_simulated: Both):
+    trial, _ = logged_and_simulated
+
+    with pytest.raises(ValueError, match=r"its request is a Segments: .* \(n, 3, 26, width\)"):
+        check_comparator(Pieces(segments(trial)), trial, runs_of_shape(trial, 300))
+    with pytest.raises(ValueError, match=r"is a Ensemble: .* \(n, 4, 300, width\)"):
+        check_comparator(Pieces(ENSEMBLE), trial, runs_of_shape(trial, 300))
+
+
+def test_the_contract_kit_sees_a_request_that_cannot_be_met(logged_and_simulated: Both):
+    trial, simulated = logged_and_simulated
+    unknown = segments(trial)
+    unknown.commands[0] = np.nan
+    narrow = replace(segments(trial), commands=np.zeros((3, 27, 1)))
+    fewer = replace(segments(trial), states={"joint_positions": np.zeros((2, 1))})
+    broken: list[tuple[object, str]] = [
+        ("joint_positions", "must be a ClosedLoop, Segments or an Ensemble"),
+        (replace(ENSEMBLE, members=0), "at least one member"),
+        (segments(trial, lead=27), "a horizon of at least 1 step"),
+        (unknown, "must all be known"),
+        (narrow, "the commands of segments must have shape"),
+        (fewer, "the states of joint_positions must have shape"),
+    ]
+    for asks, said in broken:
+        with pytest.raises(ValueError, match=said):
+            check_comparator(Pieces(asks), trial, simulated)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("way", "said"),
+    [
+        ("shape", "expected losses of shape"),
+        ("none", "expected losses of shape"),
+        ("sign", "losses must be finite and at least 0"),
+        ("mean", "the mean of the losses must be the distance"),
+        ("impure", "the same arguments must give the same losses"),
+        ("crowd", "the losses of run 1 must not depend on the other runs"),
+    ],
+)
+def test_the_contract_kit_sees_each_way_to_break_it_in_pieces(
+    way: str, said: str, logged_and_simulated: Both
+):
+    trial, _ = logged_and_simulated
+    comparator = Pieces(ClosedLoop(("joint_positions",)), way)
+
+    with pytest.raises(ValueError, match=said):
+        check_comparator(comparator, trial, runs_of_shape(trial, 300))

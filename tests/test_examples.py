@@ -1,8 +1,17 @@
 """Promises of the examples: each runs as its usage says, and draws or prints what it promises."""
 
+import importlib.util
+import json
 import subprocess
 import sys
 from pathlib import Path
+
+import numpy as np
+
+from selfmodel.comparator import Piecewise
+from selfmodel.contract import check_comparator
+from tests.command import SMALL, selfmodel
+from tests.gaits import batch, changed, gait, logged
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
@@ -20,3 +29,44 @@ def test_a_recovery_in_python_is_drawn_from_its_logs(tmp_path: Path):
     assert "(the truth: break:back_left_shoulder)" in told
     assert (tmp_path / "figure.png").read_bytes().startswith(b"\x89PNG")
     assert len(list((tmp_path / "run" / "trials").glob("*.mcap"))) == 5
+
+
+def heading_comparator() -> Piecewise:
+    """The example's comparator, imported as its user's own file would be."""
+    spec = importlib.util.spec_from_file_location("heading", EXAMPLES / "heading_comparator.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # where a dataclass looks for its annotations
+    spec.loader.exec_module(module)
+    return module.HEADING
+
+
+def turning(rate: float) -> np.ndarray:
+    """Orientations of a base that turns to the left, rad/s."""
+    half = np.arange(1000) * 0.01 * rate / 2
+    return np.column_stack([np.cos(half), np.zeros(1000), np.zeros(1000), np.sin(half)])
+
+
+def test_a_comparator_of_ones_own_keeps_the_contract():
+    left = changed(gait(), base_orientation=turning(0.1))
+    unknown = turning(0.1)
+    unknown[200:300] = np.nan
+    trial = logged(changed(left, base_orientation=unknown))
+    runs = batch(left, gait(), changed(gait(), base_orientation=turning(-0.1)))
+
+    check_comparator(heading_comparator(), logged(left), runs)
+    check_comparator(heading_comparator(), trial, runs)
+    # A mean over 10 s of turning 0.1 rad/s apart.
+    np.testing.assert_allclose(
+        heading_comparator().distances(runs, logged(left)), [0, 0.4995, 0.999], rtol=1e-6
+    )
+
+
+def test_a_comparator_of_ones_own_plugs_in(tmp_path: Path):
+    done = selfmodel(
+        *("recover", "quadruped", "--case", "2", *SMALL, "--trials", "1"),
+        *("--comparator", "heading_comparator:HEADING", "--out", str(tmp_path / "run"), "--json"),
+        cwd=EXAMPLES,
+    )
+
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["comparator"] == "heading"
