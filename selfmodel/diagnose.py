@@ -11,6 +11,7 @@ from selfmodel.comparator import Comparator
 from selfmodel.diagnosis import Candidate, Diagnosis
 from selfmodel.errors import InputError
 from selfmodel.evolution import Evolution, Observe, evolve
+from selfmodel.faults import PAPER_KINDS, Kind
 from selfmodel.genome import VALUES, decode, encode
 from selfmodel.hypothesis import Hypothesis
 from selfmodel.memo import Memo
@@ -28,12 +29,20 @@ class Diagnose:
         simulator: The self-model.
         comparator: Says what to simulate and how far it is from a trial.
         settings: The numbers of the search.
+        kinds: What is considered.
     """
 
-    def __init__(self, simulator: Simulator, comparator: Comparator, settings: Settings) -> None:
+    def __init__(
+        self,
+        simulator: Simulator,
+        comparator: Comparator,
+        settings: Settings,
+        kinds: Sequence[Kind] = PAPER_KINDS,
+    ) -> None:
         self._simulator = simulator
         self._comparator = comparator
         self._settings = settings
+        self._kinds = tuple(kinds)
         self._distances: dict[str, Memo[Hypothesis]] = {}  # by the trial's log
         self.evaluations = 0
 
@@ -56,7 +65,7 @@ class Diagnose:
         totals: dict[Hypothesis, float] = {}
 
         def fitness(genomes: FloatArray) -> FloatArray:
-            hypotheses = [decode(genome, anatomy) for genome in genomes]
+            hypotheses = [decode(genome, anatomy, self._kinds) for genome in genomes]
             distances = self.distances(hypotheses, trials)
             totals.update(zip(hypotheses, map(float, distances), strict=True))
             return 0.0 - distances  # not -distances: a perfect fitness reads 0, not -0
@@ -66,7 +75,7 @@ class Diagnose:
             np.random.Generator.random,
             self._settings,
             rng,
-            [encode(hypothesis, genes, anatomy) for hypothesis in seeds],
+            [encode(hypothesis, genes, anatomy, self._kinds) for hypothesis in seeds],
         )
         evolve(search, fitness, observe)
         self.evaluations += search.evaluations

@@ -66,9 +66,29 @@ class Robot:
         """Height of the root body above the ground at the start, m."""
         return float(self.model.body(self.root).pos[2])
 
-    def build(self, hypothesis: Hypothesis) -> Embodiment:
-        """Returns this robot with what the hypothesis says wrong with it."""
-        return embody(self.model, self.anatomy, hypothesis)
+    def build(self, hypothesis: Hypothesis, seed: int = 0) -> Embodiment:
+        """Returns this robot with what the hypothesis says wrong with it.
+
+        Args:
+            hypothesis: In canonical form.
+            seed: Of what is random in it, such as the shape of rough terrain. The self-model's is
+                0; a physical robot's is another, which no hypothesis knows.
+
+        Raises:
+            InputError: The model has no place for what the hypothesis says.
+        """
+        return embody(self._reshaped(hypothesis, seed), self.anatomy, hypothesis, seed)
+
+    def _reshaped(self, hypothesis: Hypothesis, seed: int) -> mujoco.MjModel:
+        """The model with what only the specification of a model can express."""
+        reshaping = [fault for fault in hypothesis.faults if fault.kind.reshape]
+        if not reshaping:
+            return self.model
+        spec = mujoco.MjSpec.from_string(self.mjcf, assets=dict(self.assets))
+        for fault in reshaping:
+            if fault.kind.reshape:
+                fault.kind.reshape(spec, fault, seed)
+        return spec.compile()
 
 
 def read_anatomy(model: mujoco.MjModel, neurons: int = HIDDEN_NEURONS) -> Anatomy:

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from selfmodel.faults import Fault
+from selfmodel.faults import KINDS, Fault
 from selfmodel.hypothesis import INTACT, canonical
 from selfmodel.notation import parse
 from selfmodel.tasks import ROBOTS
@@ -68,6 +68,7 @@ def test_no_faults_mean_intact():
 
 
 def test_one_degree_a_part_is_kept():
-    twice = [Fault("jam", "front_left_knee", 0.1), Fault("jam", "front_left_knee", 0.2)]
+    kind = KINDS["jam-angle"]
+    twice = [Fault(kind, "front_left_knee", 0.1), Fault(kind, "front_left_knee", 0.2)]
 
     assert canonical(twice, ANATOMIES["quadruped"]).faults == (twice[0],)

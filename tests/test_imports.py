@@ -70,7 +70,17 @@ LAYERS = (
         "contract",
         "events",
     ),
-    ("embodiment", "robot", "places", "senses", "simulator", "physical", "judge", "replay"),
+    (
+        "embodiment",
+        "robot",
+        "places",
+        "noise",
+        "senses",
+        "simulator",
+        "physical",
+        "judge",
+        "replay",
+    ),
     ("database", "diagnose", "repair"),
     ("recover", "explain"),
 )

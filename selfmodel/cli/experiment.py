@@ -8,6 +8,7 @@ from time import perf_counter
 from selfmodel.comparator import Comparator
 from selfmodel.controller import Controller
 from selfmodel.events import Event
+from selfmodel.faults import PAPER_KINDS, Kind, known
 from selfmodel.hypothesis import INTACT, Hypothesis
 from selfmodel.judge import is_correct
 from selfmodel.logs.journal import open_journal
@@ -32,6 +33,7 @@ class Experiment:
         threads: Threads for the physics.
         folder: Where the run is kept.
         gait: How the robot walks before it fails; evolved if there is none.
+        kinds: What a diagnosis considers.
     """
 
     robot: Robot
@@ -43,6 +45,7 @@ class Experiment:
     threads: int
     folder: Path
     gait: Controller | None = None
+    kinds: tuple[Kind, ...] = PAPER_KINDS
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,11 +80,13 @@ def run(experiment: Experiment, watch: Callable[[Event], None]) -> Outcome:
             robot,
             experiment.settings,
             hidden={"before": str(INTACT), "after": str(truth), "recovery": str(truth)},
+            kinds=known(experiment.kinds),
         ),
         settings=experiment.settings,
         seed=experiment.seed,
         watch=watch,
         gait=experiment.gait,
+        kinds=experiment.kinds,
     )
     return Outcome(
         recovery=recovery,

@@ -49,6 +49,7 @@ def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
         "case": experiment.case,
         "truth": str(experiment.truth),
         "comparator": experiment.comparator.name,
+        "kinds": [kind.name for kind in experiment.kinds],
         "gap": 0.0,
         "seed": experiment.seed,
         "trials": [
