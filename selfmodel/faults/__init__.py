@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from selfmodel.faults.broken import BROKEN
 from selfmodel.faults.ground import FRICTION, SLOPE
 from selfmodel.faults.jammed import JAMMED, JAMMED_AT_ANGLE
-from selfmodel.faults.kind import WORLD, Fault, Kind
+from selfmodel.faults.kind import WORLD, Fault, Kind, between, grid
 from selfmodel.faults.motor import WEAK_MOTOR
 from selfmodel.faults.neuron import SILENT_NEURON
 from selfmodel.faults.sensor import FAILED_SENSOR, SENSOR_BIAS, SENSOR_GAIN, SENSOR_NOISE
@@ -34,4 +34,14 @@ def known(kinds: Iterable[Kind]) -> tuple[Kind, ...]:
     return tuple(dict.fromkeys((*KINDS.values(), *kinds)))
 
 
-__all__ = ["ALL_KINDS", "KINDS", "PAPER_KINDS", "WORLD", "Fault", "Kind", "known"]
+__all__ = [
+    "ALL_KINDS",
+    "KINDS",
+    "PAPER_KINDS",
+    "WORLD",
+    "Fault",
+    "Kind",
+    "between",
+    "grid",
+    "known",
+]
