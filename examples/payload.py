@@ -1,7 +1,7 @@
 """A kind of fault of your own: something heavy lies on the torso, or fell off it.
 
-Usage: selfmodel recover quadruped --damage payload=2 --kinds break,jam,payload:PAYLOAD
-(in this folder, so that ``payload`` can be imported)
+Usage:
+  PYTHONPATH=examples selfmodel recover quadruped --damage payload=2 --kinds jam,payload:PAYLOAD
 """
 
 from typing import TYPE_CHECKING

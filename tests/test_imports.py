@@ -80,6 +80,7 @@ LAYERS = (
         "physical",
         "judge",
         "replay",
+        "contract_kind",
     ),
     ("database", "diagnose", "repair"),
     ("recover", "explain"),
