@@ -12,7 +12,7 @@ from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.controller import Controller
 from selfmodel.diagnose import Diagnose
 from selfmodel.explain import explain
-from selfmodel.faults import KINDS, Fault
+from selfmodel.faults import PAPER_KINDS
 from selfmodel.hypothesis import INTACT, Hypothesis, canonical
 from selfmodel.logs import TrialLog, read_log
 from selfmodel.logs.robots import robot_of
@@ -48,13 +48,10 @@ def main() -> None:
 
 
 def single_faults(robot: Robot) -> list[Hypothesis]:
-    """Returns every hypothesis of one fault that a diagnosis may propose."""
+    """Returns every hypothesis of one fault that the paper's diagnosis may propose."""
     anatomy = robot.anatomy
     return [
-        canonical([Fault(kind.name, part)], anatomy)
-        for kind in KINDS.values()
-        if kind.hypothesised
-        for part in kind.parts(anatomy)
+        canonical([fault], anatomy) for kind in PAPER_KINDS for fault in kind.candidates(anatomy)
     ]
 
 

@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, get_args
@@ -11,6 +11,7 @@ from selfmodel.anatomy import Anatomy
 from selfmodel.database import Database
 from selfmodel.diagnosis import Candidate, Diagnosis, Verdict
 from selfmodel.errors import InputError
+from selfmodel.faults import KINDS, Kind
 from selfmodel.logs.errors import CorruptError, SchemaMismatchError
 from selfmodel.logs.files import replace
 from selfmodel.logs.reader import read_log
@@ -25,6 +26,9 @@ from selfmodel.trial import Plan, Stage, Trial
 TRIALS = "trials"
 DIAGNOSES = "diagnoses.json"
 
+EVERY_KIND = tuple(KINDS.values())
+"""What diagnoses may name, where no kinds of a third party are among it."""
+
 
 @dataclass(frozen=True, eq=False)
 class FolderJournal:
@@ -34,6 +38,7 @@ class FolderJournal:
         folder: ``trials/NAME.mcap`` for each trial, and ``diagnoses.json``.
         robot: Whose recovery it is.
         settings: The paper's numbers, for the record.
+        kinds: Those that its diagnoses may name.
     """
 
     folder: Path
@@ -41,6 +46,7 @@ class FolderJournal:
     settings: Settings
     _hidden: Mapping[Stage, str] = field(repr=False)
     _gap: str | None = field(default=None, repr=False)
+    _kinds: Sequence[Kind] = field(default=EVERY_KIND, repr=False)
 
     def record(self, physical: PhysicalRobot, plan: Plan) -> Trial:
         """Runs a trial, logs it while it runs, and returns it as its file says it.
@@ -63,13 +69,13 @@ class FolderJournal:
 
     def note(self, diagnosis: Diagnosis) -> None:
         """Keeps a diagnosis beside the earlier ones."""
-        kept = _read_diagnoses(self.folder, self.robot.anatomy)
+        kept = _read_diagnoses(self.folder, self.robot.anatomy, self._kinds)
         texts = [_as_json(each) for each in (*kept, diagnosis)]
         replace(self.folder / DIAGNOSES, json.dumps(texts, indent=1, allow_nan=False).encode())
 
     def read(self) -> Database:
         """Returns everything kept so far, read from the files and checked."""
-        return read_database(self.folder, self.robot.anatomy)
+        return read_database(self.folder, self.robot.anatomy, self._kinds)
 
 
 def open_journal(
@@ -77,7 +83,9 @@ def open_journal(
     robot: Robot,
     settings: Settings,
     hidden: Mapping[Stage, str],
+    *,
     gap: str | None = None,
+    kinds: Sequence[Kind] = EVERY_KIND,
 ) -> FolderJournal:
     """Makes the folder of a new run.
 
@@ -88,6 +96,7 @@ def open_journal(
         hidden: What is wrong with the physical robot at each stage, in notation, for those who
             score: it goes into the logs and nowhere else. A stage that is missing has none.
         gap: How else the physical robot differs from its model at every stage, as JSON, likewise.
+        kinds: Those that its diagnoses may name.
 
     Raises:
         InputError: The folder holds something, or cannot be made.
@@ -107,10 +116,10 @@ def open_journal(
         raise InputError(
             f"{folder} cannot be made: {error.strerror}; choose another folder"
         ) from error
-    return FolderJournal(folder, robot, settings, dict(hidden), gap)
+    return FolderJournal(folder, robot, settings, dict(hidden), gap, tuple(kinds))
 
 
-def read_database(folder: Path, anatomy: Anatomy) -> Database:
+def read_database(folder: Path, anatomy: Anatomy, kinds: Sequence[Kind] = EVERY_KIND) -> Database:
     """Returns what the folder of a run holds: every finished trial and every diagnosis.
 
     A ``.part``, which is a trial that was interrupted, is passed over.
@@ -118,6 +127,7 @@ def read_database(folder: Path, anatomy: Anatomy) -> Database:
     Args:
         folder: As ``FolderJournal`` keeps it.
         anatomy: The robot's parts, to read the hypotheses.
+        kinds: Those that its diagnoses may name.
 
     Raises:
         InputError: There is no such run.
@@ -135,7 +145,7 @@ def read_database(folder: Path, anatomy: Anatomy) -> Database:
                 f"it is of the robot {trial.robot!r}, with other sensors, motors or hinges",
                 advice="give the folder of a run of one robot",
             )
-    return Database(trials, _read_diagnoses(folder, anatomy))
+    return Database(trials, _read_diagnoses(folder, anatomy, kinds))
 
 
 def _number(path: Path) -> tuple[int, str]:
@@ -177,7 +187,7 @@ def _read_verdict(text: str) -> Verdict:
     return found
 
 
-def _read_diagnoses(folder: Path, anatomy: Anatomy) -> tuple[Diagnosis, ...]:
+def _read_diagnoses(folder: Path, anatomy: Anatomy, kinds: Sequence[Kind]) -> tuple[Diagnosis, ...]:
     path = folder / DIAGNOSES
     try:
         items: Any = json.loads(path.read_bytes())
@@ -185,7 +195,7 @@ def _read_diagnoses(folder: Path, anatomy: Anatomy) -> tuple[Diagnosis, ...]:
             Diagnosis(
                 ranked=tuple(
                     Candidate(
-                        parse(candidate["hypothesis"], anatomy),
+                        parse(candidate["hypothesis"], anatomy, kinds),
                         _read_finite(candidate["distance"]),
                     )
                     for candidate in item["ranked"]

@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 
+from selfmodel.faults.broken import BROKEN
 from selfmodel.gap import DEBRIS
 from selfmodel.hypothesis import Hypothesis
 from selfmodel.robot import Robot
@@ -15,7 +16,7 @@ def lost_limbs(robot: Robot, hidden: Hypothesis) -> tuple[str, ...]:
     """Returns the first body of each limb that falls off, in the hypothesis's order."""
     limbs = []
     for fault in hidden.faults:
-        if fault.kind == "break":
+        if fault.kind is BROKEN:
             bodies = robot.anatomy.joint(fault.part).bodies
             limbs.append(min(bodies, key=lambda name: int(robot.model.body(name).id)))
     return tuple(limbs)

@@ -9,8 +9,8 @@ from selfmodel.comparator import Comparator
 from selfmodel.diagnosis import Candidate, Diagnosis, Verdict
 from selfmodel.evidence import Evidence
 from selfmodel.evolution import Evolution, Observe, evolve
-from selfmodel.faults import Fault
-from selfmodel.genome import VALUES, decode, encode, hypothesised_kinds
+from selfmodel.faults import PAPER_KINDS, Kind
+from selfmodel.genome import VALUES, decode, encode
 from selfmodel.hypothesis import INTACT, Hypothesis
 from selfmodel.refine import refined
 from selfmodel.settings import Settings
@@ -32,6 +32,7 @@ class Diagnose:
         simulator: The self-model.
         comparator: Says what to simulate and how far it is from a trial.
         settings: The numbers of the search.
+        kinds: What is considered.
         intact: Trials of the robot with nothing wrong, which show how well the self-model
             predicts when it is right; without any, no verdict can be ``unexplained``.
     """
@@ -41,10 +42,13 @@ class Diagnose:
         simulator: Simulator,
         comparator: Comparator,
         settings: Settings,
+        kinds: Sequence[Kind] = PAPER_KINDS,
+        *,
         intact: Sequence[Trial] = (),
     ) -> None:
         self._anatomy = simulator.robot.anatomy
         self._settings = settings
+        self._kinds = tuple(kinds)
         self._intact = tuple(intact)
         self.evidence = Evidence(simulator, comparator)
         self.evaluations = 0
@@ -93,7 +97,7 @@ class Diagnose:
         totals: dict[Hypothesis, float] = {}
 
         def fitness(genomes: FloatArray) -> FloatArray:
-            hypotheses = [decode(genome, anatomy) for genome in genomes]
+            hypotheses = [decode(genome, anatomy, self._kinds) for genome in genomes]
             distances = self.evidence.distances(hypotheses, trials)
             totals.update(zip(hypotheses, map(float, distances), strict=True))
             return 0.0 - distances  # not -distances: a perfect fitness reads 0, not -0
@@ -103,7 +107,7 @@ class Diagnose:
             np.random.Generator.random,
             self._settings,
             rng,
-            [encode(hypothesis, genes, anatomy) for hypothesis in seeds],
+            [encode(hypothesis, genes, anatomy, self._kinds) for hypothesis in seeds],
         )
         evolve(search, fitness, observe)
         self.evaluations += search.evaluations
@@ -123,11 +127,7 @@ class Diagnose:
                 self.evaluations += len(new)
             return self.evidence.losses(hypotheses, trials)
 
-        faults = [
-            Fault(kind.name, part)
-            for kind in hypothesised_kinds()
-            for part in kind.parts(self._anatomy)
-        ]
+        faults = [fault for kind in self._kinds for fault in kind.candidates(self._anatomy)]
         return refined(known, faults, self._settings.genes, losses, self._anatomy)
 
     def _rivals(

@@ -12,7 +12,6 @@ import numpy as np
 
 from selfmodel.anatomy import Anatomy
 from selfmodel.arrays import FloatArray
-from selfmodel.faults import KINDS
 from selfmodel.hypothesis import Hypothesis
 
 GHOST_ARMATURE = 1.0
@@ -34,15 +33,21 @@ class Embodiment:
         model: A copy of the robot's model, of the same layout.
         gain: Multiplies each nominal sensor reading, ``(sensors,)``.
         offset: Is added to it then, ``(sensors,)``.
+        bias: Is added to that, whatever the sensor measures, ``(sensors,)``.
+        noise: Standard deviation of what is added last, ``(sensors,)``; see ``selfmodel.noise``.
         neurons: 1 for each hidden neuron that works, 0 for a silent one, ``(hidden,)``.
         held: Of each hinge that is held still its places in ``qpos`` and ``qvel`` and its angle.
+        seed: Of what is random in it: the noise, and the shape of rough terrain.
     """
 
     model: mujoco.MjModel
     gain: FloatArray
     offset: FloatArray
+    bias: FloatArray
+    noise: FloatArray
     neurons: FloatArray
     held: list[tuple[int, int, float]] = field(default_factory=list)
+    seed: int = 0
 
     def lose_body(self, name: str) -> None:
         """Makes a body a ghost: no mass, no collisions, no force from its motors."""
@@ -83,30 +88,60 @@ class Embodiment:
         self.model.actuator_gainprm[motor] = 0.0
         self.model.actuator_biasprm[motor] = 0.0
 
+    def weaken_motor(self, motor: int, part: float) -> None:
+        """Leaves the motor of that number a part of its torque, and of its largest torque."""
+        self.model.actuator_gainprm[motor] *= part
+        self.model.actuator_biasprm[motor] *= part
+        self.model.actuator_forcerange[motor] *= part
+
+    def set_friction(self, coefficient: float) -> None:
+        """Sets the sliding friction between the world and everything that can touch it."""
+        model = self.model
+        world = model.body_weldid[model.geom_bodyid] == 0
+        contype, conaffinity = model.geom_contype, model.geom_conaffinity
+        touching = (contype & np.bitwise_or.reduce(conaffinity[world])) | (
+            conaffinity & np.bitwise_or.reduce(contype[world])
+        )
+        # Of two geoms that touch, the larger coefficient counts.
+        model.geom_friction[world | (touching != 0), 0] = coefficient
+        paired = world[model.pair_geom1] | world[model.pair_geom2]
+        model.pair_friction[paired, :2] = coefficient
+
+    def scale_reading(self, sensor: int, factor: float) -> None:
+        """Multiplies what the sensor of that column measures."""
+        self.gain[sensor] *= factor
+        self.offset[sensor] *= factor
+
     def fix_reading(self, sensor: int, value: float) -> None:
         """Makes the sensor of that column read ``value`` whatever happens."""
         self.gain[sensor] = 0.0
         self.offset[sensor] = value
 
 
-def embody(model: mujoco.MjModel, anatomy: Anatomy, hypothesis: Hypothesis) -> Embodiment:
+def embody(
+    model: mujoco.MjModel, anatomy: Anatomy, hypothesis: Hypothesis, seed: int = 0
+) -> Embodiment:
     """Returns the embodiment of a hypothesis about the robot that ``model`` describes.
 
     Args:
-        model: The robot with nothing wrong; it is not changed.
+        model: The robot with nothing wrong but what reshapes it; it is not changed.
         anatomy: Its parts.
         hypothesis: What is to be wrong, in canonical form.
+        seed: Of what is random in it.
     """
     embodiment = Embodiment(
         model=copy.copy(model),
         gain=np.ones(len(anatomy.sensors)),
         offset=np.zeros(len(anatomy.sensors)),
+        bias=np.zeros(len(anatomy.sensors)),
+        noise=np.zeros(len(anatomy.sensors)),
         neurons=np.ones(anatomy.neurons),
+        seed=seed,
     )
     if not hypothesis.faults:
         return embodiment
     for fault in hypothesis.faults:
-        KINDS[fault.kind].strike(embodiment, anatomy, fault)
+        fault.kind.strike(embodiment, anatomy, fault)
     mujoco.mj_setConst(embodiment.model, mujoco.MjData(embodiment.model))
     # The solver's tolerance is relative to the mean inertia; a held hinge's would make any answer
     # good enough. Kept absolute, what is left of the robot is solved as exactly as ever.

@@ -130,5 +130,20 @@ def perturbed(model: mujoco.MjModel, gap: Gap) -> mujoco.MjModel:
     return model
 
 
+def perturbed_models(robot: Robot, members: int, level: float) -> tuple[mujoco.MjModel, ...]:
+    """Returns models of one robot, each perturbed by a gap of its own.
+
+    The same arguments give the same models, so that what is compared on them is compared on the
+    same draws.
+
+    Args:
+        robot: The robot as its model describes it.
+        members: How many.
+        level: Of the gaps.
+    """
+    rng = np.random.default_rng(members)
+    return tuple(perturbed(robot.model, draw_gap(robot, level, rng)) for _ in range(members))
+
+
 def _factor(spread: float, normal: FloatArray) -> FloatArray:
     return np.maximum(FLOOR, 1 + spread * normal)

@@ -1,10 +1,10 @@
-"""A hypothesis: a set of faults that may be wrong with a robot, in canonical form."""
+"""A hypothesis: what may be wrong with a robot and its world, in canonical form."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 from selfmodel.anatomy import Anatomy
-from selfmodel.faults import KINDS, Fault
+from selfmodel.faults import Fault, Kind
 
 
 @dataclass(frozen=True, order=True)
@@ -35,17 +35,17 @@ def canonical(faults: Iterable[Fault], anatomy: Anatomy) -> Hypothesis:
     """Returns the hypothesis that says the same in the fewest words.
 
     Order and repetition do not matter. A fault that another absorbs is dropped: what lies beyond
-    a broken joint is gone, whatever else was wrong with it. Of several degrees of one kind on one
-    part the first counts.
+    a broken joint is gone, whatever else was wrong with it. So is one whose degree says that
+    nothing is wrong. Of several degrees of one kind on one part the first counts.
     """
-    distinct: dict[tuple[str, str], Fault] = {}
-    for fault in faults:
+    distinct: dict[tuple[Kind, str], Fault] = {}
+    for fault in filter(None, (said.settled for said in faults)):
         distinct.setdefault((fault.kind, fault.part), fault)
     kept = [
         fault
         for fault in distinct.values()
         if not any(
-            KINDS[other.kind].absorbs(other, fault, anatomy)
+            other.kind.absorbs(other, fault, anatomy)
             for other in distinct.values()
             if other is not fault
         )

@@ -70,7 +70,7 @@ def with_parameters(robot: Robot, parameters: Parameters) -> Robot:
     Numbers in an MJCF have six digits, so its model is that of ``edited_model`` to one part in a
     million.
     """
-    spec = mujoco.MjSpec.from_string(robot.mjcf, assets=dict(robot.assets))
+    spec = robot.specification()
     model = edited_model(robot, parameters)
     for body in spec.bodies[1:]:
         compiled = model.body(body.name)

@@ -42,6 +42,11 @@ class PhysicalRobot(Protocol):
         ...
 
 
+OWN_SEED = 1
+"""The seed of what is random in a physical robot without a gap, such as its terrain: another than
+the self-model's, which is 0."""
+
+
 class SimulatedRobot:
     """A physical robot in simulation, with something wrong with it that it tells nobody.
 
@@ -65,9 +70,10 @@ class SimulatedRobot:
         self._robot = robot
         self._gap = gap if gap is not None and gap.level > 0 else None
         self._limbs = lost_limbs(robot, hidden) if self._gap is not None else ()
-        model = _model(robot, self._gap, structure, self._limbs)
-        self._embodiment = embody(model, robot.anatomy, hidden)
-        self._noise = np.random.SeedSequence(gap.seed if gap else 0, spawn_key=(stream,))
+        seed = gap.seed if gap else OWN_SEED
+        model = _model(robot, hidden, seed, gap=self._gap, structure=structure, limbs=self._limbs)
+        self._embodiment = embody(model, robot.anatomy, hidden, seed)
+        self._noise = np.random.SeedSequence(seed, spawn_key=(stream,))
 
     def run(self, controller: Driver, steps: int) -> Iterator[Sample]:
         """Runs a controller; see ``PhysicalRobot``.
@@ -129,12 +135,18 @@ class SimulatedRobot:
 
 
 def _model(
-    robot: Robot, gap: Gap | None, structure: Structure | None, limbs: tuple[str, ...]
+    robot: Robot,
+    hidden: Hypothesis,
+    seed: int,
+    *,
+    gap: Gap | None,
+    structure: Structure | None,
+    limbs: tuple[str, ...],
 ) -> mujoco.MjModel:
-    """The model of a physical robot with no fault in it."""
+    """The model of a physical robot with no fault in it but what reshapes it."""
     model = robot.model
-    if structure is not None or limbs:
-        spec = mujoco.MjSpec.from_string(robot.mjcf, assets=dict(robot.assets))
+    if structure is not None or limbs or any(fault.kind.reshape for fault in hidden.faults):
+        spec = robot.specification(hidden, seed)
         if structure is not None:
             add_structure(spec, structure)
         if limbs:

@@ -1,6 +1,6 @@
 """The paper's algorithm: act, log, diagnose, repair, with as few physical trials as possible."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from selfmodel.comparator import Comparator
@@ -9,6 +9,7 @@ from selfmodel.database import Journal
 from selfmodel.diagnose import Diagnose
 from selfmodel.diagnosis import Diagnosis
 from selfmodel.events import Event, SearchBegins
+from selfmodel.faults import PAPER_KINDS, Kind
 from selfmodel.hypothesis import INTACT, Hypothesis
 from selfmodel.physical import PhysicalRobot
 from selfmodel.repair import Repair
@@ -65,6 +66,7 @@ def recover(
     seed: int,
     watch: Callable[[Event], None],
     gait: Controller | None = None,
+    kinds: Sequence[Kind] = PAPER_KINDS,
 ) -> Recovery:
     """Lets a robot walk until it fails, then finds out what is wrong and how it walks again.
 
@@ -79,12 +81,13 @@ def recover(
         watch: Is told what happens.
         gait: How the robot walks before it fails; evolved if there is none. The rest of the
             recovery is the same whether a gait was evolved here, or earlier from the same seed.
+        kinds: What a diagnosis considers.
 
     Returns:
         What the journal says at the end.
     """
     repair = Repair(simulator, settings)
-    diagnose = Diagnose(simulator, comparator, settings)
+    diagnose = Diagnose(simulator, comparator, settings, kinds)
     tried: list[Hypothesis] = []
 
     def evolve_controller(hypothesis: Hypothesis) -> Controller:

@@ -9,7 +9,7 @@ import numpy as np
 from selfmodel.anatomy import Anatomy, Joint, Sensor
 from selfmodel.controller import HIDDEN_NEURONS, Network
 from selfmodel.embodiment import Embodiment, embody
-from selfmodel.hypothesis import Hypothesis
+from selfmodel.hypothesis import INTACT, Hypothesis
 
 CONTROL_DELAY = "selfmodel_control_delay"
 """The custom numeric of an MJCF that says how many control steps a command takes to its effect."""
@@ -76,9 +76,34 @@ class Robot:
         """Height of the root body above the ground at the start, m."""
         return float(self.model.body(self.root).pos[2])
 
-    def build(self, hypothesis: Hypothesis) -> Embodiment:
-        """Returns this robot with what the hypothesis says wrong with it."""
-        return embody(self.model, self.anatomy, hypothesis)
+    def build(self, hypothesis: Hypothesis, seed: int = 0) -> Embodiment:
+        """Returns this robot with what the hypothesis says wrong with it.
+
+        Args:
+            hypothesis: In canonical form.
+            seed: Of what is random in it, such as the shape of rough terrain. The self-model's is
+                0; a physical robot's is another, which no hypothesis knows.
+
+        Raises:
+            InputError: The model has no place for what the hypothesis says.
+        """
+        model = self.model
+        if any(fault.kind.reshape for fault in hypothesis.faults):
+            model = self.specification(hypothesis, seed).compile()
+        return embody(model, self.anatomy, hypothesis, seed)
+
+    def specification(self, hypothesis: Hypothesis = INTACT, seed: int = 0) -> mujoco.MjSpec:
+        """Returns the MJCF as a specification that can be edited before it is compiled.
+
+        Args:
+            hypothesis: Of which only what reshapes the model is in it.
+            seed: Of what is random in that.
+        """
+        spec = mujoco.MjSpec.from_string(self.mjcf, assets=dict(self.assets))
+        for fault in hypothesis.faults:
+            if fault.kind.reshape:
+                fault.kind.reshape(spec, fault, seed)
+        return spec
 
 
 def read_anatomy(model: mujoco.MjModel, neurons: int = HIDDEN_NEURONS) -> Anatomy:

@@ -8,6 +8,7 @@ import numpy as np
 from selfmodel.anatomy import Anatomy
 from selfmodel.arrays import FloatArray, columns
 from selfmodel.embodiment import Embodiment
+from selfmodel.noise import SensorNoise
 
 
 class Senses:
@@ -32,12 +33,13 @@ class Senses:
         self._angle = columns([int(model.joint(sensor.hinge).qposadr[0]) for sensor in angles])
         self._scale = np.array([1 / sensor.half_range for sensor in angles])
         gain = np.array([embodiment.gain for embodiment in embodiments])
-        offset = np.array([embodiment.offset for embodiment in embodiments])
+        offset = np.array([embodiment.offset + embodiment.bias for embodiment in embodiments])
         self._faulty = bool(np.any(gain != 1) or np.any(offset != 0))
         self._gain, self._offset = gain, offset
+        self._noise = SensorNoise(embodiments)
 
     def read(self, sensordata: FloatArray, qpos: FloatArray, readings: FloatArray) -> None:
-        """Writes the readings.
+        """Writes the readings of the next control step.
 
         Args:
             sensordata: ``(n, nsensordata)``, of which the touch forces are read, N.
@@ -51,3 +53,4 @@ class Senses:
         if self._faulty:
             readings *= self._gain
             readings += self._offset
+        self._noise.add(readings)

@@ -1,7 +1,7 @@
 """The self-model in motion: many robots, each with its hypothesis and driver, in one batch."""
 
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from time import perf_counter
 
 import numpy as np
@@ -9,9 +9,10 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.batches import Alive, counted_not_printed, live_signals, new_batch
 from selfmodel.behaviour import Behaviour, Signal
-from selfmodel.comparator import Segments
+from selfmodel.comparator import Ensemble, Segments
 from selfmodel.driver import Driver, drive
-from selfmodel.embodiment import Embodiment
+from selfmodel.embodiment import Embodiment, embody
+from selfmodel.gap import perturbed_models
 from selfmodel.hypothesis import Hypothesis
 from selfmodel.prediction import predict
 from selfmodel.robot import Robot
@@ -38,6 +39,7 @@ class Simulator:
         self.threads = threads
         self.tally = Tally()
         self._embodiment = lru_cache(REMEMBERED_EMBODIMENTS)(robot.build)
+        self._members = lru_cache(partial(perturbed_models, robot))
 
     def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> Simulated:
         """Simulates each run for ``steps`` control steps from its start.
@@ -54,6 +56,39 @@ class Simulator:
         """Predicts segments of a trial under each hypothesis; see ``prediction.predict``."""
         embodiments = [self._embodiment(hypothesis) for hypothesis in hypotheses]
         return predict(self.robot, embodiments, segments, threads=self.threads, tally=self.tally)
+
+    def run_ensemble(
+        self,
+        hypotheses: Sequence[Hypothesis],
+        driver: Driver,
+        steps: int,
+        ensemble: Ensemble,
+    ) -> Simulated:
+        """Simulates each hypothesis with each of some self-models that differ a little.
+
+        Args:
+            hypotheses: At least one.
+            driver: What drives the robot.
+            steps: Control steps, and rows of every signal.
+            ensemble: How many self-models, and how different.
+
+        Returns:
+            Signals of ``(n, members, steps, width)``; a hypothesis has diverged if any member has.
+        """
+        models = self._members(ensemble.members, ensemble.level)
+        embodiments = [
+            embody(model, self.robot.anatomy, hypothesis)
+            for hypothesis in hypotheses
+            for model in models
+        ]
+        outcome = self._run(embodiments, [driver] * len(embodiments), steps, ensemble.record)
+        shape = (len(hypotheses), len(models))
+        flat = outcome.behaviour
+        signals = {signal: flat[signal].reshape(*shape, steps, -1) for signal in ensemble.record}
+        return Simulated(
+            Behaviour(flat.names, flat.time, signals),
+            np.asarray(outcome.diverged.reshape(shape).any(axis=1)),
+        )
 
     def _run(
         self,

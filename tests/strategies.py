@@ -3,14 +3,14 @@
 from hypothesis import strategies as st
 
 from selfmodel.anatomy import Anatomy
-from selfmodel.faults import KINDS, Fault, Kind
+from selfmodel.faults import KINDS, PAPER_KINDS, Fault, Kind
 from selfmodel.hypothesis import Hypothesis, canonical
 
 
 def faults(anatomy: Anatomy, *, graded: bool) -> st.SearchStrategy[Fault]:
-    """Faults of the kinds that a diagnosis may propose, and of all kinds where ``graded``."""
-    kinds = [kind for kind in KINDS.values() if graded or kind.hypothesised]
-    return st.sampled_from(kinds).flatmap(lambda kind: _fault(kind, anatomy, graded=graded))
+    """Faults of the paper's kinds, and of any degree of all kinds where ``graded``."""
+    kinds = list(KINDS.values()) if graded else list(PAPER_KINDS)
+    return st.sampled_from(kinds).flatmap(lambda kind: _fault(kind, anatomy))
 
 
 def hypotheses(
@@ -21,13 +21,13 @@ def hypotheses(
     return sets.map(lambda chosen: canonical(chosen, anatomy))
 
 
-def _fault(kind: Kind, anatomy: Anatomy, *, graded: bool) -> st.SearchStrategy[Fault]:
+def _fault(kind: Kind, anatomy: Anatomy) -> st.SearchStrategy[Fault]:
     parts = st.sampled_from(kind.parts(anatomy))
-    if kind.degrees is None or not graded:
-        return parts.map(lambda part: Fault(kind.name, part))
+    if kind.degrees is None:
+        return parts.map(lambda part: Fault(kind, part))
     degrees = kind.degrees
     return parts.flatmap(
         lambda part: st.floats(*degrees(anatomy, part)).map(
-            lambda degree: Fault(kind.name, part, degree + 0.0)
+            lambda degree: Fault(kind, part, degree + 0.0)
         )
     )

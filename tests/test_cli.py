@@ -23,16 +23,9 @@ def test_recover_prints_one_json_object_with_everything_promised(recovered: tupl
     _, told = recovered
 
     assert set(told) == {
-        *("robot", "case", "truth", "comparator", "gap", "structure", "seed", "trials"),
-        *(
-            "diagnosis",
-            "correct",
-            "displacement",
-            "recovery",
-            "physical_trials",
-            "evaluations",
-            "seconds",
-        ),
+        *("robot", "case", "truth", "comparator", "kinds", "gap", "structure", "seed", "trials"),
+        *("diagnosis", "correct", "displacement", "recovery", "physical_trials"),
+        *("evaluations", "seconds"),
     }
     assert (told["robot"], told["case"], told["seed"], told["gap"]) == ("quadruped", 4, 0, 0)
     assert told["truth"] == "break:front_left_shoulder+sensor:front_right_touch"

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from selfmodel.faults import Fault
+from selfmodel.faults import KINDS, Fault
 from selfmodel.hypothesis import INTACT, canonical
 from selfmodel.notation import parse
 from selfmodel.tasks import ROBOTS
@@ -42,6 +42,19 @@ def test_canonical_form_is_a_fixed_point(name: str, data: st.DataObject):
         ("break:front_left_knee+sensor:front_left_touch", "break:front_left_knee"),
         ("break:front_left_shoulder+sensor:front_left_angle", "break:front_left_shoulder"),
         ("jam:front_left_shoulder+sensor:front_left_angle", "jam:front_left_shoulder"),
+        ("jam:front_left_shoulder+sensor:front_left_angle=gain0.2", "jam:front_left_shoulder"),
+        ("break:front_left_knee+jam:front_left_knee=0.2", "break:front_left_knee"),
+        ("break:front_left_shoulder+motor:front_left_knee=0.5", "break:front_left_shoulder"),
+        ("break:front_left_knee+motor:front_left_knee=0.5", "break:front_left_knee"),
+        (
+            "break:front_left_shoulder+sensor:front_left_angle=noise0.1",
+            "break:front_left_shoulder",
+        ),
+        ("jam:front_left_knee+motor:front_left_knee=0.5", "jam:front_left_knee"),
+        ("jam:front_left_knee=0.2+motor:front_left_knee=0.5", "jam:front_left_knee=0.2"),
+        ("sensor:back_left_angle+sensor:back_left_angle=gain0.5", "sensor:back_left_angle"),
+        ("sensor:back_left_angle+sensor:back_left_angle=bias0.5", "sensor:back_left_angle"),
+        ("sensor:back_left_angle=noise0.5+sensor:back_left_angle", "sensor:back_left_angle"),
     ],
 )
 def test_what_another_fault_leaves_without_effect_is_absorbed(said: str, meant: str):
@@ -56,6 +69,13 @@ def test_what_another_fault_leaves_without_effect_is_absorbed(said: str, meant: 
         "break:front_left_shoulder+sensor:front_right_touch",
         "jam:front_left_knee+sensor:front_left_touch",
         "jam:front_left_shoulder=0.3+sensor:front_left_angle",
+        "jam:front_left_shoulder=0.3+sensor:front_left_angle=gain0.2",
+        "jam:front_left_shoulder+sensor:front_left_angle=bias0.2",
+        "jam:front_left_shoulder+motor:front_left_knee=0.2",
+        "break:front_left_knee+motor:front_left_shoulder=0.2",
+        "sensor:front_left_angle=gain0.5+sensor:front_left_angle=bias0.2",
+        "break:front_left_shoulder+friction=0.4",
+        "wind=5+crosswind=5",
     ],
 )
 def test_faults_that_both_matter_are_both_kept(said: str):
@@ -68,6 +88,7 @@ def test_no_faults_mean_intact():
 
 
 def test_one_degree_a_part_is_kept():
-    twice = [Fault("jam", "front_left_knee", 0.1), Fault("jam", "front_left_knee", 0.2)]
+    kind = KINDS["jam-angle"]
+    twice = [Fault(kind, "front_left_knee", 0.1), Fault(kind, "front_left_knee", 0.2)]
 
     assert canonical(twice, ANATOMIES["quadruped"]).faults == (twice[0],)

@@ -73,8 +73,8 @@ LAYERS = (
         "events",
     ),
     (
-        *("embodiment", "robot", "places", "senses", "batches", "tally", "prediction"),
-        *("gap", "instruments", "start", "debris", "structure"),
+        *("embodiment", "robot", "places", "noise", "senses", "batches", "tally", "prediction"),
+        *("gap", "instruments", "start", "debris", "structure", "contract_kind"),
         *("simulator", "physical", "judge", "replay", "parameters"),
     ),
     ("database", "evidence", "refine", "diagnose", "repair", "calibrate"),

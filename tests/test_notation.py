@@ -38,12 +38,46 @@ def test_what_a_hypothesis_prints_parses_back_to_it(name: str, data: st.DataObje
         ("jam:front_left_knee=nan", "got 'nan'"),
         ("jam:front_left_knee=1", "got '1'"),
         ("break:front_left_knee=1", "break knows none: write no '='"),
+        ("friction", "cannot read the term 'friction'|needs a number from 0.01 to 3"),
+        ("friction=", "needs a number from 0.01 to 3 .* after '=', got ''"),
+        ("friction=-1", "got '-1'"),
+        ("friction:ground=0.4", "friction has none: write no ':'"),
+        ("break=0.4", "cannot read the term 'break=0.4'"),
+        ("motor:front_left_knee", "needs a number from 0 to 1 of its torque after '=', got ''"),
+        ("sensor:front_left_angle=0.2", "needs noise or gain or bias after '='"),
+        ("sensor:front_left_angle=gain", "after '=gain', got ''"),
+        ("sensor:front_left_angle=bias2", "after '=bias', got '2'"),
+        ("sensor:front_left_touch=noise0.1", "for sensor 'front_left_touch'"),
+        ("slope=0.1+slope=0.2", "gives slope two degrees, 0.1 and 0.2"),
+        ("jam:front_left_knee+jam:front_left_knee=0.2", "two degrees, 0.0 and 0.2"),
         ("jam:front_left_knee=0.1+jam:front_left_knee=0.2", "two degrees, 0.1 and 0.2"),
     ],
 )
 def test_a_malformed_notation_says_which_term_and_why(text: str, said: str):
     with pytest.raises(InputError, match=said):
         parse(text, ANATOMIES["quadruped"])
+
+
+@pytest.mark.parametrize(
+    ("said", "printed"),
+    [
+        ("friction=0.4+break:front_left_knee", "break:front_left_knee+friction=0.4"),
+        ("wind=-5", "wind=-5.0"),
+        ("crosswind=3+roughness=.03", "crosswind=3.0+roughness=0.03"),
+        ("motor:front_left_knee=0.50", "motor:front_left_knee=0.5"),
+        ("sensor:front_left_angle=gain0.2", "sensor:front_left_angle=gain0.2"),
+        ("sensor:front_left_angle=bias-1e-1", "sensor:front_left_angle=bias-0.1"),
+        ("sensor:front_left_angle=noise1e-5", "sensor:front_left_angle=noise1e-05"),
+        ("jam:front_left_knee=-0", "jam:front_left_knee"),
+        ("motor:front_left_knee=1", "intact"),
+        ("slope=0+wind=-0.0+sensor:front_left_touch=gain1", "intact"),
+    ],
+)
+def test_a_degree_is_printed_as_it_parses(said: str, printed: str):
+    hypothesis = parse(said, ANATOMIES["quadruped"])
+
+    assert str(hypothesis) == printed
+    assert parse(printed, ANATOMIES["quadruped"]) == hypothesis
 
 
 def test_spaces_around_terms_are_welcome():

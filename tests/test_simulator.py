@@ -25,6 +25,9 @@ def some_runs(robot: Robot, count: int) -> list[Run]:
         f"sensor:{robot.anatomy.sensors[0].name}",
         "neuron:1",
         f"break:{joints[1]}+jam:{joints[2]}+sensor:{robot.anatomy.sensors[-1].name}",
+        f"roughness=0.03+motor:{joints[0]}=0.5",
+        f"sensor:{robot.anatomy.sensors[-1].name}=noise0.3+friction=0.4+slope=0.1",
+        f"roughness=0.01+break:{joints[0]}+wind=-12+crosswind=8",
     ]
     hypotheses = [parse(text, robot.anatomy) for text in texts]
     return [
@@ -63,7 +66,7 @@ def test_a_run_does_not_depend_on_what_the_simulator_ran_before(robot: Robot):
 
 
 def test_the_physical_robot_in_simulation_has_the_same_bits(robot: Robot):
-    runs = some_runs(robot, 6)
+    runs = some_runs(robot, 9)
     simulated = Simulator(robot, 2).run(runs, STEPS, SIGNALS).behaviour
     for i, (hypothesis, controller) in enumerate(runs):
         samples = SimulatedRobot(robot, hypothesis).run(controller, STEPS)

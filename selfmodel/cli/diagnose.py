@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from selfmodel.cli.options import ComparatorName, Json, LogFiles, RobotOrModel, Threads
+from selfmodel.cli.options import (
+    DEFAULT_KINDS,
+    ComparatorName,
+    Json,
+    KindNames,
+    LogFiles,
+    RobotOrModel,
+    Threads,
+)
 from selfmodel.comparators import DEFAULT
 
 if TYPE_CHECKING:
@@ -19,6 +27,7 @@ def diagnose(
     *,
     robot: RobotOrModel = None,
     comparator: ComparatorName = DEFAULT,
+    kinds: KindNames = DEFAULT_KINDS,
     seed: Annotated[
         int | None,
         typer.Option(
@@ -43,12 +52,14 @@ def diagnose(
 
     start = perf_counter()
     judge = resolve.comparator(comparator)
+    considered = resolve.kinds(kinds)
     logs = resolve.logs(files)
     model = resolve.robot_of_logs(logs, robot)
     used = _since_the_failure(logs)
     first = used[0]
     chosen = first.trial.plan.seed if seed is None else seed
-    search = Diagnose(Simulator(model, resolve.threads(threads)), judge, first.settings)
+    simulator = Simulator(model, resolve.threads(threads))
+    search = Diagnose(simulator, judge, first.settings, considered)
     for note in _notes(used):
         typer.echo(f"note: {note}", err=True)
     with display() as watch:
@@ -56,6 +67,7 @@ def diagnose(
     result = {
         "robot": model.name,
         "comparator": judge.name,
+        "kinds": [kind.name for kind in considered],
         "seed": chosen,
         "settings_from": first.trial.path,
         "logs": [log.trial.path for log in used],

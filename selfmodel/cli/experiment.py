@@ -9,6 +9,7 @@ from selfmodel.cli.reality import draw_reality
 from selfmodel.comparator import Comparator
 from selfmodel.controller import Controller
 from selfmodel.events import Event
+from selfmodel.faults import PAPER_KINDS, Kind, known
 from selfmodel.hypothesis import INTACT, Hypothesis
 from selfmodel.judge import is_correct
 from selfmodel.logs.journal import open_journal
@@ -35,6 +36,7 @@ class Experiment:
         gait: How the robot walks before it fails; evolved if there is none.
         gap: How far the physical robot is from its model, a level.
         structure: Whether it is built differently, too.
+        kinds: What a diagnosis considers.
     """
 
     robot: Robot
@@ -48,6 +50,7 @@ class Experiment:
     gait: Controller | None = None
     gap: float = 0.0
     structure: bool = False
+    kinds: tuple[Kind, ...] = PAPER_KINDS
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,11 +87,13 @@ def run(experiment: Experiment, watch: Callable[[Event], None]) -> Outcome:
             experiment.settings,
             hidden={"before": str(INTACT), "after": str(truth), "recovery": str(truth)},
             gap=reality.text,
+            kinds=known(experiment.kinds),
         ),
         settings=experiment.settings,
         seed=experiment.seed,
         watch=watch,
         gait=experiment.gait,
+        kinds=experiment.kinds,
     )
     return Outcome(
         recovery=recovery,

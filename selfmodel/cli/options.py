@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from selfmodel.errors import InputError
+from selfmodel.faults import ALL_KINDS, PAPER_KINDS
 
 RobotName = Annotated[
     str, typer.Argument(metavar="ROBOT", help="One of those that `selfmodel robots` lists.")
@@ -55,6 +56,16 @@ ComparatorName = Annotated[
         help="How a simulation is compared with a logged trial.",
     ),
 ]
+KindNames = Annotated[
+    str,
+    typer.Option(
+        "--kinds",
+        metavar="KIND,...",
+        help="What may be wrong, as far as a diagnosis considers it: some of "
+        f"{', '.join(kind.name for kind in ALL_KINDS)}, or package.module:object; or all.",
+    ),
+]
+DEFAULT_KINDS = ",".join(kind.name for kind in PAPER_KINDS)
 LogFiles = Annotated[list[Path], typer.Argument(metavar="FILE...", help="Trial logs, NAME.mcap.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 

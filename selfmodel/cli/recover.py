@@ -6,10 +6,12 @@ from typing import Annotated
 import typer
 
 from selfmodel.cli.options import (
+    DEFAULT_KINDS,
     ComparatorName,
     Damage,
     GapLevel,
     Json,
+    KindNames,
     RobotName,
     Seed,
     Structural,
@@ -28,6 +30,7 @@ def recover(
     comparator: ComparatorName = DEFAULT,
     gap: GapLevel = 0.0,
     structure: Structural = False,
+    kinds: KindNames = DEFAULT_KINDS,
     seed: Seed = 0,
     trials: Annotated[
         int, typer.Option(min=1, max=99, help="Physical trials after the failing one.")
@@ -53,17 +56,21 @@ def recover(
     from selfmodel.cli.display import display  # noqa: PLC0415
     from selfmodel.cli.experiment import Experiment, run  # noqa: PLC0415
     from selfmodel.cli.report import as_object, print_report  # noqa: PLC0415
+    from selfmodel.faults import known  # noqa: PLC0415
     from selfmodel.logs.files import replace  # noqa: PLC0415
     from selfmodel.notation import parse  # noqa: PLC0415
     from selfmodel.settings import Settings  # noqa: PLC0415
 
     entry = resolve.robot_entry(robot)
+    considered = resolve.kinds(kinds)
+    damaged = resolve.case_notation(entry, case, damage)
     made = entry.robot()
     experiment = Experiment(
         robot=made,
         case=case,
-        truth=parse(resolve.case_notation(entry, case, damage), made.anatomy),
+        truth=parse(damaged, made.anatomy, known(considered)),
         comparator=resolve.comparator(comparator),
+        kinds=considered,
         settings=Settings(trials=trials, generations=generations).scaled(population),
         seed=seed,
         threads=resolve.threads(threads),

@@ -55,6 +55,7 @@ def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
         "case": experiment.case,
         "truth": str(experiment.truth),
         "comparator": experiment.comparator.name,
+        "kinds": [kind.name for kind in experiment.kinds],
         "gap": experiment.gap,
         "structure": experiment.structure,
         "seed": experiment.seed,

@@ -3,13 +3,14 @@
 import hashlib
 import importlib
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from selfmodel.comparator import Comparator
 from selfmodel.comparators import COMPARATORS
 from selfmodel.controller import Controller, Network
 from selfmodel.errors import InputError, unknown_name
+from selfmodel.faults import ALL_KINDS, KINDS, Kind
 from selfmodel.logs import LogError, TrialLog, load_controller, read_log
 from selfmodel.logs.files import read_bounded
 from selfmodel.logs.robots import described_difference, the_robot_of
@@ -58,22 +59,66 @@ def comparator(name: str) -> Comparator:
     """
     if name in COMPARATORS:
         return COMPARATORS[name]
-    module, colon, attribute = name.partition(":")
-    if not colon:
-        raise unknown_name("comparator", name, COMPARATORS)
-    try:
-        found = getattr(importlib.import_module(module), attribute)
-    except (ImportError, AttributeError, SyntaxError, TypeError, ValueError) as error:
-        raise InputError(
-            f"cannot find the comparator {name!r}: {error}; expected package.module:object, "
-            f"importable from here, or one of {', '.join(COMPARATORS)}"
-        ) from error
+    found = _plugged_in("comparator", name, COMPARATORS)
     if isinstance(found, type) or not isinstance(found, Comparator):
         raise InputError(
             f"{name!r} is no comparator: expected an object, not a class, with the members of "
             f"selfmodel.comparator.Comparator, got {found!r}"
         )
     return found
+
+
+def kinds(names: str) -> tuple[Kind, ...]:
+    """Returns the kinds of fault and of environment that a diagnosis is to consider.
+
+    Args:
+        names: Those of kinds that come with selfmodel, or another's ``package.module:object``,
+            separated by commas; ``all`` stands for all that come with it.
+
+    Raises:
+        InputError: There is none of a name, an object is no kind, or notation could not tell two
+            kinds apart.
+    """
+    chosen: list[Kind] = []
+    for name in (name.strip() for name in names.split(",")):
+        chosen += ALL_KINDS if name == "all" else [_kind(name)]
+    taken: dict[object, Kind] = {}
+    for kind in (*KINDS.values(), *chosen):
+        for called in (kind.name, (kind.word, kind.prefix, kind.degrees is None)):
+            if taken.setdefault(called, kind) is not kind:
+                raise InputError(
+                    f"two of the kinds are called {kind.name!r}, or {kind.word!r} in notation: "
+                    f"give yours a name and a word of its own"
+                )
+    return tuple(dict.fromkeys(chosen))
+
+
+def _kind(name: str) -> Kind:
+    own = {kind.name: kind for kind in ALL_KINDS}
+    if name in own:
+        return own[name]
+    found = _plugged_in("kind", name, (*own, "all"))
+    if not isinstance(found, Kind):
+        raise InputError(f"{name!r} is no kind: expected a selfmodel.faults.Kind, got {found!r}")
+    return found
+
+
+def _plugged_in(what: str, name: str, known: Iterable[str]) -> object:
+    """The object that ``package.module:object`` names.
+
+    Raises:
+        InputError: It names none; the message names the nearest of those that are known.
+    """
+    module, colon, attribute = name.partition(":")
+    if not colon:
+        raise unknown_name(what, name, known)
+    try:
+        return getattr(importlib.import_module(module), attribute)
+    except (ImportError, AttributeError, SyntaxError, TypeError, ValueError) as error:
+        raise InputError(
+            f"cannot find the {what} {name!r}: {error}; expected package.module:object, "
+            f"importable from here, or one of {', '.join(known)}"
+        ) from error
 
 
 def controller(path: Path, network: Network) -> Controller:

@@ -3,14 +3,11 @@
 from typing import TYPE_CHECKING
 
 from selfmodel.anatomy import Anatomy
+from selfmodel.faults.joints import joints
 from selfmodel.faults.kind import Fault, Kind
 
 if TYPE_CHECKING:
     from selfmodel.embodiment import Embodiment
-
-
-def _parts(anatomy: Anatomy) -> tuple[str, ...]:
-    return tuple(joint.name for joint in anatomy.joints)
 
 
 def _strike(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
@@ -30,4 +27,4 @@ def _absorbs(fault: Fault, other: Fault, anatomy: Anatomy) -> bool:
     return other.part in anatomy.joint(fault.part).lost
 
 
-BROKEN = Kind(name="break", parts=_parts, strike=_strike, absorbs=_absorbs)
+BROKEN = Kind(name="break", word="break", parts=joints, strike=_strike, absorbs=_absorbs)

@@ -1,57 +1,130 @@
-"""A fault, and what a kind of fault has to say about itself."""
+"""A fault, and what a kind of fault or of environment has to say about itself."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import TYPE_CHECKING, TypeVar
 
 from selfmodel.anatomy import Anatomy
 
 if TYPE_CHECKING:
+    from mujoco import MjSpec
+
     from selfmodel.embodiment import Embodiment
 
+Values = TypeVar("Values")
 
-@dataclass(frozen=True, order=True)
-class Fault:
-    """One thing wrong with a robot.
-
-    Attributes:
-        kind: The word for its kind, a key of ``KINDS``.
-        part: The joint, sensor or neuron it strikes.
-        degree: How far, in the kind's own unit; 0 for a kind without degrees.
-    """
-
-    kind: str
-    part: str
-    degree: float = 0.0
-
-    def __str__(self) -> str:
-        term = f"{self.kind}:{self.part}"
-        return f"{term}={self.degree!r}" if self.degree else term
+WORLD = ""
+"""The part that an environment strikes: the world, which notation does not name."""
 
 
-def harmless(_fault: Fault, _other: Fault, _anatomy: Anatomy) -> bool:
+def in_the_world(_anatomy: Anatomy) -> tuple[str, ...]:
+    """The parts of a kind of environment."""
+    return (WORLD,)
+
+
+def harmless(_fault: "Fault", _other: "Fault", _anatomy: Anatomy) -> bool:
     """A kind whose faults leave every other fault its effect."""
     return False
 
 
-@dataclass(frozen=True)
+def between(lowest: float, highest: float) -> Callable[[Anatomy, str], tuple[float, float]]:
+    """Returns the bounds of the degree of a kind for which all parts are alike."""
+    return partial(_same_for_all, (lowest, highest))
+
+
+def grid(*levels: float) -> Callable[[Anatomy, str], tuple[float, ...]]:
+    """Returns the levels of a kind for which all parts are alike."""
+    return partial(_same_for_all, levels)
+
+
+def _same_for_all(values: Values, _anatomy: Anatomy, _part: str) -> Values:
+    return values
+
+
+@dataclass(frozen=True, order=True, kw_only=True)
 class Kind:
-    """One kind of fault.
+    """One kind of fault or of environment; known, compared and sorted by its name.
+
+    In notation, a fault is ``word``, ``word:part``, ``word=degree`` or ``word:part=degree``, with
+    the prefix in front of the degree's number. Kinds may share a word, but not word and prefix:
+    ``sensor:X`` and ``sensor:X=gain0.2`` are of two kinds.
 
     Attributes:
-        name: The word for it in notation.
-        parts: The names of the parts it can strike, in the order of the genome's third value.
-        strike: Works the fault into an embodiment: its model, readings or neurons.
+        name: What it is called where kinds are chosen, such as ``sensor-gain``.
+        word: The word for it in notation, such as ``sensor``.
+        strike: Works the fault into an embodiment: its model, readings or neurons. It keeps the
+            layout of the model. Faults strike in the order of their kinds' names.
+        reshape: Works the fault into the robot's specification before that is compiled, given the
+            seed of what is random: for what a compiled model cannot be edited into. What MjData
+            holds must keep its sizes all the same.
+        parts: The names of the parts it can strike, in the order of the genome's third value; an
+            environment strikes ``WORLD`` alone.
         absorbs: Whether the first fault, of this kind, leaves the second without any effect.
         degrees: Lowest and highest degree a part can have, or None where a degree has no meaning.
+        levels: The degrees that a genome or a local search proposes for a part, in the order of
+            the genome's fourth value.
+        special: Degrees at which a fault of this kind is one of another kind, without a degree, or
+            None, which is nothing at all.
+        prefix: Letters in front of the degree's number in notation.
         unit: The unit of the degree.
         hypothesised: Whether a diagnosis may propose it; otherwise only a physical robot has it.
     """
 
     name: str
-    parts: Callable[[Anatomy], tuple[str, ...]]
-    strike: Callable[["Embodiment", Anatomy, Fault], None]
-    absorbs: Callable[[Fault, Fault, Anatomy], bool] = harmless
-    degrees: Callable[[Anatomy, str], tuple[float, float]] | None = None
-    unit: str = ""
-    hypothesised: bool = True
+    word: str = field(compare=False)
+    strike: Callable[["Embodiment", Anatomy, "Fault"], None] = field(compare=False, repr=False)
+    reshape: Callable[["MjSpec", "Fault", int], None] | None = field(
+        default=None, compare=False, repr=False
+    )
+    parts: Callable[[Anatomy], tuple[str, ...]] = field(
+        default=in_the_world, compare=False, repr=False
+    )
+    absorbs: Callable[["Fault", "Fault", Anatomy], bool] = field(
+        default=harmless, compare=False, repr=False
+    )
+    degrees: Callable[[Anatomy, str], tuple[float, float]] | None = field(
+        default=None, compare=False, repr=False
+    )
+    levels: Callable[[Anatomy, str], tuple[float, ...]] = field(
+        default=grid(0.0), compare=False, repr=False
+    )
+    special: Mapping[float, "Kind | None"] = field(default_factory=dict, compare=False, repr=False)
+    prefix: str = field(default="", compare=False, repr=False)
+    unit: str = field(default="", compare=False, repr=False)
+    hypothesised: bool = field(default=True, compare=False, repr=False)
+
+    def candidates(self, anatomy: Anatomy) -> tuple["Fault", ...]:
+        """Returns every fault that a genome or a local search proposes: each part, each level."""
+        return tuple(
+            Fault(self, part, degree)
+            for part in self.parts(anatomy)
+            for degree in self.levels(anatomy, part)
+        )
+
+
+@dataclass(frozen=True, order=True)
+class Fault:
+    """One thing that is not as the model says, with the robot or with the world.
+
+    Attributes:
+        kind: What kind of thing.
+        part: The joint, sensor or neuron it strikes; ``WORLD`` for an environment.
+        degree: How far, in the kind's own unit; 0 for a kind without degrees.
+    """
+
+    kind: Kind
+    part: str
+    degree: float = 0.0
+
+    def __str__(self) -> str:
+        term = f"{self.kind.word}:{self.part}" if self.part else self.kind.word
+        return term if self.kind.degrees is None else f"{term}={self.kind.prefix}{self.degree!r}"
+
+    @property
+    def settled(self) -> "Fault | None":
+        """The same in the fewest words; None where its degree says that nothing is wrong."""
+        if self.degree not in self.kind.special:
+            return self
+        kind = self.kind.special[self.degree]
+        return None if kind is None else Fault(kind, self.part)

@@ -17,4 +17,4 @@ def _strike(embodiment: "Embodiment", _anatomy: Anatomy, fault: Fault) -> None:
     embodiment.neurons[int(fault.part)] = 0.0
 
 
-SILENT_NEURON = Kind(name="neuron", parts=_parts, strike=_strike, hypothesised=False)
+SILENT_NEURON = Kind(name="neuron", word="neuron", parts=_parts, strike=_strike, hypothesised=False)

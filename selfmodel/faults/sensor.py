@@ -1,20 +1,87 @@
-"""A failed sensor: the controller receives 0 from it."""
+"""A sensor that fails, or that measures wrongly: with a gain, a bias, or noise.
+
+The controller receives gain times what is measured, plus the bias, plus noise: in the units of
+readings, in which touch is 0 or 1 and an angle is 1 at the end of its joint's range.
+"""
 
 from typing import TYPE_CHECKING
 
 from selfmodel.anatomy import Anatomy
-from selfmodel.faults.kind import Fault, Kind
+from selfmodel.faults.kind import Fault, Kind, between, grid
 
 if TYPE_CHECKING:
     from selfmodel.embodiment import Embodiment
 
 
-def _parts(anatomy: Anatomy) -> tuple[str, ...]:
+def _sensors(anatomy: Anatomy) -> tuple[str, ...]:
     return tuple(sensor.name for sensor in anatomy.sensors)
 
 
-def _strike(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
-    embodiment.fix_reading(_parts(anatomy).index(fault.part), 0.0)
+def _angle_sensors(anatomy: Anatomy) -> tuple[str, ...]:
+    """Touch is yes or no; noise that adds up has no meaning there."""
+    return tuple(sensor.name for sensor in anatomy.sensors if sensor.kind == "angle")
 
 
-FAILED_SENSOR = Kind(name="sensor", parts=_parts, strike=_strike)
+def _column(anatomy: Anatomy, fault: Fault) -> int:
+    return _sensors(anatomy).index(fault.part)
+
+
+def _fail(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+    embodiment.fix_reading(_column(anatomy, fault), 0.0)
+
+
+def _scale(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+    embodiment.scale_reading(_column(anatomy, fault), fault.degree)
+
+
+def _shift(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+    embodiment.bias[_column(anatomy, fault)] = fault.degree
+
+
+def _blur(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+    embodiment.noise[_column(anatomy, fault)] = fault.degree
+
+
+def _silences(fault: Fault, other: Fault, _anatomy: Anatomy) -> bool:
+    """From a failed sensor 0 is received, whatever else is wrong with it."""
+    return other.part == fault.part and other.kind in (SENSOR_GAIN, SENSOR_BIAS, SENSOR_NOISE)
+
+
+FAILED_SENSOR = Kind(name="sensor", word="sensor", parts=_sensors, strike=_fail, absorbs=_silences)
+
+SENSOR_GAIN = Kind(
+    name="sensor-gain",
+    word="sensor",
+    prefix="gain",
+    parts=_sensors,
+    strike=_scale,
+    degrees=between(0.0, 2.0),
+    levels=grid(0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.2, 1.4, 1.6, 1.8, 2.0),
+    # A gain of 0 is not a failed sensor: it may have a bias.
+    special={1.0: None},
+    unit="times",
+)
+
+SENSOR_BIAS = Kind(
+    name="sensor-bias",
+    word="sensor",
+    prefix="bias",
+    parts=_sensors,
+    strike=_shift,
+    degrees=between(-1.0, 1.0),
+    levels=grid(-0.9, -0.7, -0.5, -0.35, -0.2, -0.1, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9),
+    special={0.0: None},
+    unit="of the reading's range",
+)
+
+SENSOR_NOISE = Kind(
+    name="sensor-noise",
+    word="sensor",
+    prefix="noise",
+    parts=_angle_sensors,
+    strike=_blur,
+    degrees=between(0.0, 1.0),
+    levels=grid(0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8),
+    special={0.0: None},
+    unit="of the reading's range",
+)

@@ -1,0 +1,33 @@
+"""A kind of fault of your own: something heavy lies on the torso, or fell off it.
+
+Usage:
+  PYTHONPATH=examples selfmodel recover quadruped --damage payload=2 --kinds jam,payload:PAYLOAD
+"""
+
+from typing import TYPE_CHECKING
+
+import mujoco
+
+from selfmodel.anatomy import Anatomy
+from selfmodel.faults import Fault, Kind, between, grid
+
+if TYPE_CHECKING:
+    from selfmodel.embodiment import Embodiment
+
+
+def load(embodiment: "Embodiment", _anatomy: Anatomy, fault: Fault) -> None:
+    """Adds a point mass at the centre of mass of the body that moves freely."""
+    model = embodiment.model
+    (free,) = (model.jnt_type == mujoco.mjtJoint.mjJNT_FREE).nonzero()[0]
+    model.body_mass[model.jnt_bodyid[free]] += fault.degree
+
+
+PAYLOAD = Kind(
+    name="payload",
+    word="payload",
+    strike=load,
+    degrees=between(-2.0, 10.0),
+    levels=grid(-2.0, -1.0, -0.5, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0),
+    special={0.0: None},
+    unit="kg",
+)

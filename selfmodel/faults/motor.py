@@ -1,0 +1,27 @@
+"""A weak motor: it has a part of its torque."""
+
+from typing import TYPE_CHECKING
+
+from selfmodel.anatomy import Anatomy
+from selfmodel.faults.joints import joints
+from selfmodel.faults.kind import Fault, Kind, between, grid
+
+if TYPE_CHECKING:
+    from selfmodel.embodiment import Embodiment
+
+
+def _strike(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+    for motor in anatomy.joint(fault.part).motors:
+        embodiment.weaken_motor(anatomy.motors.index(motor), fault.degree)
+
+
+WEAK_MOTOR = Kind(
+    name="motor",
+    word="motor",
+    parts=joints,
+    strike=_strike,
+    degrees=between(0.0, 1.0),
+    levels=grid(0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9),
+    special={1.0: None},
+    unit="of its torque",
+)

@@ -1,0 +1,57 @@
+"""Wind: air that moves along forward, or across it."""
+
+from typing import TYPE_CHECKING
+
+from selfmodel.anatomy import Anatomy
+from selfmodel.faults.kind import Fault, Kind, between, grid
+
+if TYPE_CHECKING:
+    from selfmodel.embodiment import Embodiment
+
+AIR_DENSITY = 1.2
+"""Of air at 20 degrees Celsius, kg/m^3; a nominal robot walks in a vacuum."""
+
+AIR_VISCOSITY = 1.8e-5
+"""Of the same air, Pa s."""
+
+_BOUNDS = between(-40.0, 40.0)
+_LEVELS = grid(
+    -30.0, -25.0, -20.0, -16.0, -12.0, -8.0, -4.0, 4.0, 8.0, 12.0, 16.0, 20.0, 25.0, 30.0
+)
+
+
+def _blow(embodiment: "Embodiment", axis: int, speed: float) -> None:
+    option = embodiment.model.opt
+    option.density, option.viscosity = AIR_DENSITY, AIR_VISCOSITY
+    option.wind[axis] = speed
+
+
+def _along(embodiment: "Embodiment", _anatomy: Anatomy, fault: Fault) -> None:
+    _blow(embodiment, 0, fault.degree)
+
+
+def _across(embodiment: "Embodiment", _anatomy: Anatomy, fault: Fault) -> None:
+    _blow(embodiment, 1, fault.degree)
+
+
+WIND = Kind(
+    name="wind",
+    word="wind",
+    strike=_along,
+    degrees=_BOUNDS,
+    levels=_LEVELS,
+    special={0.0: None},
+    unit="m/s",
+)
+"""Along forward: positive wind blows from behind, -5 is against the robot."""
+
+CROSSWIND = Kind(
+    name="crosswind",
+    word="crosswind",
+    strike=_across,
+    degrees=_BOUNDS,
+    levels=_LEVELS,
+    special={0.0: None},
+    unit="m/s",
+)
+"""Along the world's y axis: positive wind blows from the right to the left."""
