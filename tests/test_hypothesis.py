@@ -92,3 +92,13 @@ def test_one_degree_a_part_is_kept():
     twice = [Fault(kind, "front_left_knee", 0.1), Fault(kind, "front_left_knee", 0.2)]
 
     assert canonical(twice, ANATOMIES["quadruped"]).faults == (twice[0],)
+
+
+def test_of_a_joint_said_to_be_jammed_at_zero_and_at_an_angle_zero_counts():
+    both = [
+        Fault(KINDS["jam"], "front_left_knee"),
+        Fault(KINDS["jam-angle"], "front_left_knee", 0.2),
+    ]
+
+    assert str(canonical(both, ANATOMIES["quadruped"])) == "jam:front_left_knee"
+    assert str(canonical(both[::-1], ANATOMIES["quadruped"])) == "jam:front_left_knee"
