@@ -1,6 +1,9 @@
 """Files that hold what they held before, or all that was written: never a half."""
 
+import fcntl
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
@@ -37,3 +40,14 @@ def sync_folder(folder: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
+
+
+@contextmanager
+def alone(folder: Path) -> Iterator[None]:
+    """Waits until no other process is alone in a folder, and then keeps the others waiting.
+
+    Only those that ask in the same way are kept out; a process that dies lets them in.
+    """
+    with (folder / "lock").open("wb") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)  # given up when the file is closed
+        yield

@@ -7,11 +7,10 @@ processes, on one machine or on many that share the folder, may work at one grid
 the first to get there, and the others find it done.
 """
 
-import fcntl
 import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -19,7 +18,7 @@ from time import perf_counter
 from typing import Any
 from urllib.parse import quote, unquote
 
-from selfmodel.atomic import put
+from selfmodel.atomic import alone, put
 from selfmodel.errors import InputError, WorkError
 from selfmodel.workers import Died, work_off
 
@@ -194,7 +193,7 @@ def _perform(folder: Path, work: Work, task: tuple[Job, str]) -> tuple[float, st
     """Does a part in a process of its own; returns the seconds, and why it failed if it did."""
     job, part = task
     run, start = folder / job.key, perf_counter()
-    with _alone(run):
+    with alone(run):
         if _is_done(run, part):  # another process got there first
             return 0.0, None
         try:
@@ -230,7 +229,7 @@ def _check(run: Path, job: Job) -> None:
 
 def _enrol(run: Path, job: Job) -> None:
     (run / PARTS).mkdir(parents=True, exist_ok=True)
-    with _alone(run):
+    with alone(run):
         _check(run, job)
         if not (run / RUN).exists():
             put(run / RUN, json.dumps(_described(job), indent=1, allow_nan=False).encode())
@@ -239,14 +238,6 @@ def _enrol(run: Path, job: Job) -> None:
 def _described(job: Job) -> Any:  # noqa: ANN401  # JSON
     said = {"key": job.key, "seed": job.seed, "parameters": dict(job.parameters)}
     return json.loads(json.dumps(said, allow_nan=False))  # tuples are lists in a file
-
-
-@contextmanager
-def _alone(run: Path) -> Iterator[None]:
-    """Waits until no other process works in the folder of a run, and keeps them out."""
-    with (run / "lock").open("wb") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)  # given up when the file is closed, or its process dies
-        yield
 
 
 def _is_done(run: Path, part: str) -> bool:

@@ -20,3 +20,12 @@ def test_a_recovery_in_python_is_drawn_from_its_logs(tmp_path: Path):
     assert "(the truth: break:back_left_shoulder)" in told
     assert (tmp_path / "figure.png").read_bytes().startswith(b"\x89PNG")
     assert len(list((tmp_path / "run" / "trials").glob("*.mcap"))) == 5
+
+
+def test_an_ablation_in_python_goes_on_where_it_was(tmp_path: Path):
+    first = run("ablation.py", "folder", cwd=tmp_path)
+    again = run("ablation.py", "folder", cwd=tmp_path)
+
+    assert "12 rows, 0 failed: folder/results.csv" in first
+    assert "GridBegins(total=4, finished=4)" in again
+    assert len((EXAMPLES / "ablation.py").read_text(encoding="utf-8").splitlines()) < 40

@@ -1,6 +1,7 @@
 """The figures of an ablation: how the gap tells on each comparator, and on which cases."""
 
 import io
+import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
@@ -62,7 +63,8 @@ def _by_gap(scores: Sequence[Score]) -> Figure:
             axes.spines[["top", "right"]].set_visible(False)
             axes.grid(axis="y", alpha=0.3)
             axes.tick_params(labelbottom=True)
-    figure.supxlabel("reality gap")
+    for axes in panels[-1]:
+        axes.set_xlabel("reality gap")
     figure.supylabel("right diagnoses (95 % interval)")
     handles: dict[str, Artist] = {}
     for axes in panels.flat:
@@ -102,12 +104,16 @@ def _by_case(robot: str, trials: int, rows: Sequence[Row]) -> Figure:
     gaps = sorted({row.gap for row in rows})
     cases = sorted({row.case for row in rows})
     comparators = sorted({row.comparator for row in rows})
+    across = min(2, len(gaps))
+    down = math.ceil(len(gaps) / across)
     names = 0.09 * max(map(len, comparators))
-    width = 1.2 + names + len(gaps) * (0.4 + 0.48 * len(cases))
-    size = (width, 1.6 + 0.42 * len(comparators))
+    width = 1.2 + names + across * (0.4 + 0.42 * len(cases))
+    size = (width, 0.6 + down * (0.8 + 0.36 * len(comparators)))
     figure = Figure(figsize=size, layout="constrained")
-    panels = figure.subplots(1, len(gaps), sharey=True, squeeze=False)[0]
-    for axes, gap in zip(panels, gaps, strict=True):
+    panels = figure.subplots(down, across, sharey=True, squeeze=False).flatten()
+    for axes in panels[len(gaps) :]:
+        axes.set_visible(False)
+    for axes, gap in zip(panels[: len(gaps)], gaps, strict=True):
         shares = np.full((len(comparators), len(cases)), np.nan)
         for i, comparator in enumerate(comparators):
             for j, case in enumerate(cases):

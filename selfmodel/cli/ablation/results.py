@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from selfmodel.atomic import put
+from selfmodel.atomic import alone, put
 from selfmodel.cli.ablation.figures import draw
 from selfmodel.cli.ablation.rows import Row, as_csv, as_objects
 from selfmodel.cli.ablation.scores import Score, summarise
@@ -47,18 +47,17 @@ def write_results(folder: Path) -> Results:
         InputError: A file in it is damaged.
         OSError: They cannot be written.
     """
-    rows = collect(folder)
-    scores = summarise(rows)
     folder.mkdir(parents=True, exist_ok=True)
-    files = [folder / "results.csv", folder / "results.json"]
-    put(files[0], as_csv(rows).encode())
-    text = json.dumps(as_object(rows, scores), indent=1, allow_nan=False)
-    put(files[1], f"{text}\n".encode())
-    for name, data in draw(rows, scores):
-        (folder / "figures").mkdir(exist_ok=True)
-        files.append(folder / "figures" / name)
-        put(files[-1], data)
-    return Results(rows, scores, tuple(files))
+    with alone(folder):  # on a cluster several may end at once
+        rows = collect(folder)
+        scores = summarise(rows)
+        found = json.dumps(as_object(rows, scores), indent=1, allow_nan=False)
+        files = {"results.csv": as_csv(rows).encode(), "results.json": f"{found}\n".encode()}
+        files |= {f"figures/{name}": data for name, data in draw(rows, scores)}
+        for name, data in files.items():
+            (folder / name).parent.mkdir(exist_ok=True)
+            put(folder / name, data)
+    return Results(rows, scores, tuple(folder / name for name in files))
 
 
 def as_object(rows: Iterable[Row], scores: Iterable[Score]) -> dict[str, Any]:
