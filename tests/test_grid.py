@@ -31,7 +31,8 @@ def work(job: Job, part: str, folder: Path) -> dict:
         case "crash":
             os._exit(7)
     sys.stdout.write("a plug-in may print")
-    return {"part": part, "number": job.seed * job.parameters["factor"]}
+    deaf = signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+    return {"part": part, "number": job.seed * job.parameters["factor"], "deaf": deaf}
 
 
 def jobs(count: int, parts: tuple[str, ...] = ("result",), **parameters: object) -> list[Job]:
@@ -176,6 +177,13 @@ def test_an_interrupt_ends_every_process_at_once_and_quietly(tmp_path: Path):
 
     assert told.count(b"Traceback") == 1  # the script's own KeyboardInterrupt
     assert len(calls(tmp_path / "runs")) == started < 6
+
+
+def test_a_worker_never_sees_an_interrupt_not_even_while_it_starts(tmp_path: Path):
+    run_grid(tmp_path, jobs(2), work, workers=2, watch=silent)
+
+    assert all(each.result["deaf"] for each in finished(tmp_path))
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
 
 def test_two_processes_at_one_grid_do_nothing_twice(tmp_path: Path):
