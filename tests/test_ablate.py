@@ -13,11 +13,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from selfmodel.cli import app
+from selfmodel.cli import app, lists
 from selfmodel.cli.ablation import Ablation, Row, ablate, collect, write_results
 from selfmodel.cli.ablation.figures import draw
+from selfmodel.cli.ablation.plan import cells
 from selfmodel.cli.ablation.scores import summarise
 from selfmodel.errors import InputError
 from selfmodel.grid import GridBegins, PartEnds
@@ -260,6 +263,20 @@ def test_a_bad_list_is_refused_in_a_sentence_before_anything_is_run(
     assert isinstance(told.exception, InputError)
     assert sentence in str(told.exception)
     assert not out.exists()
+
+
+@given(st.lists(st.text("abc:._", min_size=1), min_size=1))
+def test_a_list_is_what_stands_between_the_commas_each_once(items: list[str]):
+    assert lists.texts("--any", " , ".join(items)) == tuple(dict.fromkeys(items))
+
+
+@given(st.integers(1, 7), st.integers(1, 5), st.integers(1, 9))
+def test_the_shares_of_a_cluster_are_the_whole_and_nothing_twice(seeds: int, gaps: int, n: int):
+    ablation = small(Path("nowhere"), seeds=range(seeds), gaps=[float(gap) for gap in range(gaps)])
+    shares = [cells(ablation, (i, n)) for i in range(1, n + 1)]
+
+    assert sorted(map(str, itertools.chain(*shares))) == sorted(map(str, cells(ablation)))
+    assert max(map(len, shares)) - min(map(len, shares)) <= 1
 
 
 def scored(comparator: str, case: int, seconds: float, *, correct: bool) -> Row:
