@@ -174,9 +174,9 @@ def test_the_csv_says_what_the_json_says(done: Path):
     objects = json.loads((done / "results.json").read_text())["rows"]
 
     assert len(table) == len(objects) == len(results.rows) == 4
-    for cells, values in zip(table, objects, strict=True):
-        assert list(cells) == list(values)
-        for name, cell in cells.items():
+    for line, values in zip(table, objects, strict=True):
+        assert list(line) == list(values)
+        for name, cell in line.items():
             text = values[name] is not None and isinstance(values[name], str)
             assert (cell if text else json.loads(cell or "null")) == values[name]
     for path in results.files[2:]:
