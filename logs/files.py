@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
+from selfmodel.atomic import part_of, put, sync, sync_folder
 from selfmodel.errors import InputError
 from selfmodel.logs.errors import LogWriteError
 
@@ -53,11 +54,6 @@ def check_regular(path: Path, what: str) -> None:
         raise InputError(f"{path}: expected {what} that can be read, got: Is a directory")
     if not stat.S_ISREG(mode):
         raise InputError(f"{path}: expected {what}, got a pipe or a device: give a file")
-
-
-def part_of(path: Path) -> Path:
-    """Returns the name that a file has until it is whole."""
-    return path.with_name(path.name + ".part")
 
 
 def create_part(path: Path) -> IO[bytes]:
@@ -127,28 +123,8 @@ def replace(path: Path, data: bytes) -> None:
     Raises:
         LogWriteError: It could not be written; the file holds what it held.
     """
-    part = part_of(path)
-    with explained(part):
-        with part.open("wb") as file:
-            file.write(data)
-            sync(file)
-        part.replace(path)
-        sync_folder(path.parent)
-
-
-def sync(file: IO[bytes]) -> None:
-    """Waits until the disk has what was written."""
-    file.flush()
-    os.fsync(file.fileno())
-
-
-def sync_folder(folder: Path) -> None:
-    """Waits until the disk has the names in a folder."""
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+    with explained(part_of(path)):
+        put(path, data)
 
 
 @contextmanager

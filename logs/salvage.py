@@ -7,12 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
+from selfmodel.atomic import part_of
 from selfmodel.behaviour import forward_displacement
 from selfmodel.errors import InputError
 from selfmodel.logs.budget import RECORD_LIMIT, UNPACKED_LIMIT
 from selfmodel.logs.contents import Contents, Messages
 from selfmodel.logs.errors import CorruptError, LogError, SchemaMismatchError
-from selfmodel.logs.files import explained, part_of, refuse_existing
+from selfmodel.logs.files import explained, refuse_existing
 from selfmodel.logs.logfile import LogFile
 from selfmodel.logs.reader import interpret, read_controller, read_log, read_record
 from selfmodel.logs.records import (

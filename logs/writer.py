@@ -9,13 +9,14 @@ from typing import Self
 
 import numpy as np
 
+from selfmodel.atomic import part_of
 from selfmodel.behaviour import SIGNALS, Names, Sample
 from selfmodel.controller import Controller
 from selfmodel.driver import Driver
 from selfmodel.errors import InputError
 from selfmodel.logs.encoder import Encoder
 from selfmodel.logs.errors import IncompleteError, salvage_it
-from selfmodel.logs.files import explained, part_of
+from selfmodel.logs.files import explained
 from selfmodel.logs.logfile import LogFile
 from selfmodel.logs.preamble import write_preamble
 from selfmodel.logs.records import FINISHED, RESULT, Imported, Result, checked_name

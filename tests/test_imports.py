@@ -56,8 +56,9 @@ def test_dependencies_point_one_way(module: str):
 LAYERS = (
     # Plain data and plain algorithms; then MuJoCo; then what takes a comparator; then the story.
     (
-        *("errors", "arrays", "rotation", "behaviour", "anatomy", "controller", "settings", "memo"),
-        *("evolution", "playback", "driver", "streams"),
+        *("atomic", "errors", "arrays", "rotation", "behaviour", "anatomy", "controller"),
+        *("settings", "memo", "evolution", "playback", "driver", "streams", "intervals"),
+        *("workers", "grid"),
     ),
     (
         "faults",
@@ -116,7 +117,10 @@ def test_the_folders_are_imported_under_one_name(module: str):
 
 @pytest.mark.parametrize(
     "module",
-    ["selfmodel.evolution", "selfmodel.comparators", "selfmodel.logs", "selfmodel.notation"],
+    [
+        *("selfmodel.evolution", "selfmodel.comparators", "selfmodel.logs", "selfmodel.notation"),
+        *("selfmodel.grid", "selfmodel.intervals"),
+    ],
 )
 def test_what_needs_no_simulator_imports_without_mujoco(module: str):
     code = f"import sys; sys.modules['mujoco'] = None; import {module}"

@@ -5,6 +5,7 @@ import sys
 import typer
 
 from selfmodel.cli import logs
+from selfmodel.cli.ablate import ablate
 from selfmodel.cli.diagnose import diagnose
 from selfmodel.cli.plain import plain
 from selfmodel.cli.recover import recover
@@ -26,6 +27,7 @@ app.command()(recover)
 app.command()(trial)
 app.command()(diagnose)
 app.command()(replay)
+app.command()(ablate)
 app.add_typer(logs.app)
 
 

@@ -1,0 +1,146 @@
+"""``selfmodel ablate``: which comparator is right, how often, at which reality gap."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from selfmodel.cli.options import Json
+
+if TYPE_CHECKING:
+    from selfmodel.cli.ablation import Results
+    from selfmodel.cli.ablation.scores import Score
+    from selfmodel.intervals import Interval
+
+
+def ablate(
+    *,
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out", metavar="DIR", help="Folder of the ablation; one that was stopped goes on."
+        ),
+    ],
+    robots: Annotated[str, typer.Option(metavar="A,B|all", help="Robots.")] = "all",
+    cases: Annotated[
+        str, typer.Option(metavar="1,7|all", help="Failures of the paper's Table I.")
+    ] = "all",
+    comparators: Annotated[
+        str, typer.Option(metavar="A,B|all", help="Names, or package.module:object.")
+    ] = "all",
+    gaps: Annotated[str, typer.Option(metavar="0,0.05", help="Levels of the reality gap.")] = "0",
+    seeds: Annotated[int, typer.Option(min=1, help="Runs of each robot, case and gap.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="The first of their seeds.")] = 0,
+    next_trial: Annotated[
+        str, typer.Option(metavar="bank|repair", help="How the trials' controllers are chosen.")
+    ] = "bank",
+    trials: Annotated[
+        int, typer.Option(min=1, max=99, help="Physical trials of the damaged robot.")
+    ] = 3,
+    bank: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="Gaits, ROBOT-0.npz to ROBOT-5.npz.", show_default="evolved"
+        ),
+    ] = None,
+    population: Annotated[
+        int, typer.Option(min=2, max=10_000, help="Genomes in a generation.")
+    ] = 100,
+    generations: Annotated[
+        int, typer.Option(min=1, max=10_000, help="Generations of each EA.")
+    ] = 30,
+    workers: Annotated[
+        int, typer.Option(min=0, max=1024, help="Processes; 0 means one for each processor.")
+    ] = 0,
+    only: Annotated[
+        str, typer.Option(metavar="i/n", help="Only the i-th of every n runs, for a cluster.")
+    ] = "1/1",
+    as_json: Json = False,
+) -> None:
+    """Compare comparators on the same trials: robots x cases x gaps x seeds, with intervals."""
+    # Whatever brings MuJoCo waits until the command runs.
+    from selfmodel.cli import lists, resolve  # noqa: PLC0415
+    from selfmodel.cli.ablation import Ablation, write_results  # noqa: PLC0415
+    from selfmodel.cli.ablation import ablate as run  # noqa: PLC0415
+    from selfmodel.cli.ablation.results import as_object  # noqa: PLC0415
+    from selfmodel.cli.grid_display import grid_display  # noqa: PLC0415
+    from selfmodel.comparators import COMPARATORS  # noqa: PLC0415
+    from selfmodel.settings import Settings  # noqa: PLC0415
+    from selfmodel.tasks import ROBOTS  # noqa: PLC0415
+
+    names = lists.texts("--robots", robots, ROBOTS)
+    every_case = sorted({case for name in names for case in resolve.robot_entry(name).cases})
+    ablation = Ablation(
+        robots=names,
+        cases=lists.whole_numbers("--cases", cases, every_case),
+        comparators=lists.texts("--comparators", comparators, COMPARATORS),
+        gaps=lists.numbers("--gaps", gaps),
+        seeds=range(seed, seed + seeds),
+        folder=out,
+        settings=Settings(trials=trials, generations=generations).scaled(population),
+        next_trial=next_trial,
+        bank=bank,
+    )
+    part = lists.share("--only", only)
+    with grid_display() as watch:
+        try:
+            failed = run(ablation, workers=resolve.threads(workers), watch=watch, only=part)
+        except KeyboardInterrupt:
+            typer.echo(
+                f"interrupted: {watch.done} of {watch.total} are done and kept in {out}; the same "
+                f"command goes on with the rest",
+                err=True,
+            )
+            raise typer.Exit(130) from None
+    results = write_results(out)
+    if as_json:
+        failures = [{"run": one.key, "part": one.part, "error": one.error} for one in failed]
+        found = {**as_object(results.rows, results.scores), "failures": failures}
+        typer.echo(json.dumps(found, indent=1, allow_nan=False))
+    else:
+        _print(results)
+    if failed:
+        typer.echo(
+            f"{len(failed)} failed, the first of them {failed[0].key} {failed[0].part}: "
+            f"{failed[0].error}; the same command tries them again",
+            err=True,
+        )
+        raise typer.Exit(1)
+
+
+def _print(results: "Results") -> None:
+    from selfmodel.cli.tables import show  # noqa: PLC0415  # only where a table is drawn
+
+    ends = {score.trials for score in results.scores}
+    rows = [_texts(score) for score in results.scores if score.trials in (min(ends), max(ends))]
+    columns = ["robot", "gap", "comparator", "trials", "right", "right, %", "time"]
+    if any(score.recovery for score in results.scores):
+        columns.append("recovered ÷ before")
+    if rows:
+        show(columns, [row[: len(columns)] for row in rows], texts=3)
+        typer.echo("With 95 % intervals; time as a multiple of the paper's comparator's.")
+    for path in results.files:
+        typer.echo(str(path))
+
+
+def _texts(score: "Score") -> list[str]:
+    share = score.correct
+    return [
+        score.robot,
+        f"{score.gap:g}",
+        score.comparator,
+        str(score.trials),
+        f"{score.right} of {score.runs}",
+        f"{100 * share.estimate:.0f} ({100 * share.low:.0f} to {100 * share.high:.0f})",
+        _ratio(score.time),
+        _ratio(score.recovery),
+    ]
+
+
+def _ratio(interval: "Interval | None") -> str:
+    if interval is None:
+        return "-"
+    ends: Any = (interval.low, interval.high)
+    known = all(end == end for end in ends)  # noqa: PLR0124  # NaN is not itself
+    return f"{interval.estimate:.2f}" + (f" ({ends[0]:.2f} to {ends[1]:.2f})" if known else "")

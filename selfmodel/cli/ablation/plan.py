@@ -1,0 +1,201 @@
+"""What an ablation consists of, as the runs of a grid."""
+
+import dataclasses
+import hashlib
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from selfmodel import __version__
+from selfmodel.cli import resolve
+from selfmodel.errors import InputError, unknown_name
+from selfmodel.grid import Job, difference, parameters_of, runs
+from selfmodel.settings import Settings
+
+NEXT_TRIAL = ("bank", "repair")
+"""How the controllers of the trials are chosen: gaits from the bank, the same for every comparator;
+or, after the first trial, what the repair EA evolves for the diagnosis so far."""
+
+GAITS = 6
+"""Gaits of a robot in the bank."""
+
+HEALTHY_TRIALS = 2
+"""Trials before the failure."""
+
+
+@dataclass(frozen=True)
+class Ablation:
+    """What to compare, and on what.
+
+    Attributes:
+        robots: Names of robots.
+        cases: Numbers of failures of Table I.
+        comparators: Names, or ``package.module:object``.
+        gaps: Levels of the reality gap.
+        seeds: A run for each.
+        folder: Where all of it is kept.
+        settings: The paper's numbers; ``trials`` is how many trials of the damaged robot there are.
+        next_trial: One of ``NEXT_TRIAL``.
+        bank: A folder of gaits, ``ROBOT-K.npz``; without one they are evolved.
+    """
+
+    robots: Sequence[str]
+    cases: Sequence[int]
+    comparators: Sequence[str]
+    gaps: Sequence[float]
+    seeds: Sequence[int]
+    folder: Path
+    settings: Settings = Settings()  # noqa: RUF009  # it is frozen
+    next_trial: str = "bank"
+    bank: Path | None = None
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One run of the grid, but for its comparators.
+
+    Attributes:
+        robot: The robot's name.
+        case: The failure's number.
+        gap: The level of the reality gap.
+        seed: Every random choice comes from it.
+    """
+
+    robot: str
+    case: int
+    gap: float
+    seed: int
+
+    def gaits(self, settings: Settings) -> list[int]:
+        """Returns the numbers in the bank of the gaits of its trials, in their order."""
+        return [(self.seed + k) % GAITS for k in range(max(HEALTHY_TRIALS, settings.trials))]
+
+
+@dataclass(frozen=True)
+class Spec:
+    """All that a run needs to know, as its folder says it.
+
+    Attributes:
+        cell: Which run it is.
+        truth: What goes wrong with the robot, in notation.
+        settings: The paper's numbers.
+        next_trial: How the trials' controllers are chosen.
+    """
+
+    cell: Cell
+    truth: str
+    settings: Settings
+    next_trial: str
+
+
+def check(ablation: Ablation) -> None:
+    """Checks all that can be wrong with an ablation, before anything is run.
+
+    Raises:
+        InputError: Something is, and which.
+    """
+    for name in ("robots", "cases", "comparators", "gaps", "seeds"):
+        if not getattr(ablation, name):
+            raise InputError(f"an ablation needs at least one of its {name}, got none")
+    _check_names(ablation)
+    for gap in ablation.gaps:
+        if not (math.isfinite(gap) and gap >= 0):
+            raise InputError(f"a gap is a number of at least 0, such as 0.05, got {gap}")
+    if ablation.next_trial == "repair" and ablation.settings.trials < 2:
+        raise InputError(
+            "a repair follows the first diagnosis: with --next-trial repair there are at least 2 "
+            "trials, got 1"
+        )
+    _check_folder(ablation)
+
+
+def cells(ablation: Ablation, only: tuple[int, int] = (1, 1)) -> list[Cell]:
+    """Returns the runs of an ablation, one seed after another.
+
+    Args:
+        ablation: What to run.
+        only: ``(i, n)``: of every n runs the i-th, from 1.
+    """
+    found = [
+        Cell(robot, case, gap, seed)
+        for seed, robot, case, gap in itertools.product(
+            ablation.seeds, ablation.robots, ablation.cases, ablation.gaps
+        )
+    ]
+    part, parts = only
+    return found[part - 1 :: parts]
+
+
+def job(ablation: Ablation, cell: Cell, gaits: Sequence[str]) -> Job:
+    """Returns a run as the grid knows it.
+
+    Args:
+        ablation: What it belongs to.
+        cell: Which one.
+        gaits: A digest of each gait that it takes from the bank.
+    """
+    entry = resolve.robot_entry(cell.robot)
+    return Job(
+        key=f"{cell.robot}-case{cell.case:02d}-gap{cell.gap!r}-seed{cell.seed:03d}",
+        parameters={
+            "robot": cell.robot,
+            "model": model_digest(cell.robot),
+            "case": cell.case,
+            "truth": entry.cases[cell.case],
+            "gap": cell.gap,
+            "gaits": list(gaits),
+            "shared": _shared(ablation),
+        },
+        seed=cell.seed,
+        parts=tuple(ablation.comparators),
+    )
+
+
+def spec(of: Job) -> Spec:
+    """Returns what a run of the grid says of itself."""
+    said = of.parameters
+    return Spec(
+        cell=Cell(said["robot"], said["case"], said["gap"], of.seed),
+        truth=said["truth"],
+        settings=Settings(**said["shared"]["settings"]),
+        next_trial=said["shared"]["next_trial"],
+    )
+
+
+def model_digest(robot: str) -> str:
+    """Returns the digest of a robot's model, which its results depend on."""
+    return hashlib.sha256(resolve.robot_entry(robot).robot().mjcf.encode()).hexdigest()
+
+
+def _check_names(ablation: Ablation) -> None:
+    for robot in ablation.robots:
+        known = resolve.robot_entry(robot).cases
+        for case in ablation.cases:
+            if case not in known:
+                raise unknown_name(f"case of {robot}", str(case), map(str, known))
+    for comparator in ablation.comparators:
+        resolve.comparator(comparator)
+    if ablation.next_trial not in NEXT_TRIAL:
+        raise unknown_name("way to choose the next trial", ablation.next_trial, NEXT_TRIAL)
+
+
+def _check_folder(ablation: Ablation) -> None:
+    for run in runs(ablation.folder / "runs"):
+        where = difference(parameters_of(run)["shared"], _shared(ablation))
+        if where:
+            raise InputError(
+                f"{ablation.folder} holds an ablation that was made otherwise ({where}): choose "
+                f"another folder"
+            )
+
+
+def _shared(ablation: Ablation) -> dict[str, Any]:
+    """What is the same for all runs, and must be for their rows to stand in one table."""
+    return {
+        "selfmodel": __version__,
+        "settings": dataclasses.asdict(ablation.settings),
+        "next_trial": ablation.next_trial,
+    }

@@ -1,0 +1,76 @@
+"""The physical trials of a run: made once, and known from their logs."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from selfmodel.atomic import part_of
+from selfmodel.cli.ablation.plan import HEALTHY_TRIALS, Spec
+from selfmodel.comparator import Comparator
+from selfmodel.controller import Controller
+from selfmodel.errors import InputError
+from selfmodel.hypothesis import INTACT, Hypothesis
+from selfmodel.logs.reader import read_log
+from selfmodel.logs.writer import write_trial
+from selfmodel.physical import PhysicalRobot, SimulatedRobot
+from selfmodel.robot import Robot
+from selfmodel.trial import Plan, Stage, Trial
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """The objects that a run's specification stands for.
+
+    Attributes:
+        spec: The specification.
+        comparator: Judges hypotheses.
+        name: What it was asked for by.
+        robot: The robot as its model describes it.
+        truth: What goes wrong with it.
+        gaits: Its gaits for this run, in the order of the trials.
+        folder: Where the run is kept.
+    """
+
+    spec: Spec
+    comparator: Comparator
+    name: str
+    robot: Robot
+    truth: Hypothesis
+    gaits: tuple[Controller, ...]
+    folder: Path
+
+
+def physical_robot(setting: Setting, hidden: Hypothesis) -> PhysicalRobot:
+    """Returns the physical robot of a run, intact or damaged: the same but for what is hidden."""
+    if setting.spec.cell.gap:
+        raise InputError(f"simulated robots have no reality gap, got {setting.spec.cell.gap}")
+    return SimulatedRobot(setting.robot, hidden)
+
+
+def physical_trials(setting: Setting) -> tuple[list[Trial], list[Trial]]:
+    """Returns the trials before and after the failure, as their logs say; runs those missing."""
+    settings = setting.spec.settings
+    before = [
+        _trial(setting, number, "before", gait)
+        for number, gait in enumerate(setting.gaits[:HEALTHY_TRIALS])
+    ]
+    after = [
+        _trial(setting, number, "after", gait)
+        for number, gait in enumerate(setting.gaits[: settings.trials], start=HEALTHY_TRIALS)
+    ]
+    return before, after
+
+
+def _trial(setting: Setting, number: int, stage: Stage, gait: Controller) -> Trial:
+    """The trial as its log says it; run if there is no log yet."""
+    steps, seed = setting.spec.settings.steps, setting.spec.cell.seed
+    plan = Plan(f"{number:02d}-{stage}", stage, gait, steps, seed)
+    path = setting.folder / "trials" / f"{plan.name}.mcap"
+    if not path.exists():
+        path.parent.mkdir(exist_ok=True)
+        part_of(path).unlink(missing_ok=True)  # of a run that was killed
+        hidden = INTACT if stage == "before" else setting.truth
+        samples = physical_robot(setting, hidden).run(plan.controller, plan.steps)
+        write_trial(
+            path, setting.robot, plan, samples, settings=setting.spec.settings, hidden=str(hidden)
+        )
+    return read_log(path).trial

@@ -1,0 +1,312 @@
+"""Promises of the ablation: paired, resumable, extendable, and told in rows that anybody reads."""
+
+import csv
+import dataclasses
+import itertools
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from selfmodel.cli import app, lists
+from selfmodel.cli.ablation import Ablation, Row, ablate, collect, write_results
+from selfmodel.cli.ablation.figures import draw
+from selfmodel.cli.ablation.plan import cells
+from selfmodel.cli.ablation.scores import summarise
+from selfmodel.errors import InputError
+from selfmodel.grid import GridBegins, PartEnds
+from selfmodel.logs import load_controller, read_log, read_truth
+from selfmodel.settings import Settings
+from tests.command import selfmodel
+
+PAPERS = "forward-displacement"
+THEIRS = """
+from dataclasses import dataclass
+from selfmodel.comparators.forward_displacement import ForwardDisplacement
+from selfmodel.errors import InputError
+
+@dataclass(frozen=True)
+class Picky(ForwardDisplacement):
+    def request(self, trial):
+        raise InputError("this trial does not please")
+
+SAME = ForwardDisplacement(name="same")
+PICKY = Picky(name="picky")
+"""
+
+
+@pytest.fixture(autouse=True)
+def _their_comparators(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "theirs").mkdir()
+    (tmp_path / "theirs" / "their_comparators.py").write_text(THEIRS)
+    monkeypatch.syspath_prepend(str(tmp_path / "theirs"))
+
+
+def small(folder: Path, **changes: object) -> Ablation:
+    """An ablation that takes a second or two."""
+    ablation = Ablation(
+        robots=["quadruped"],
+        cases=[1, 9],
+        comparators=[PAPERS],
+        gaps=[0.0],
+        seeds=[5],
+        folder=folder,
+        settings=Settings(steps=60, generations=2, trials=2).scaled(6),
+    )
+    return dataclasses.replace(ablation, **changes)
+
+
+def run(ablation: Ablation, workers: int = 1, **more: object) -> tuple[PartEnds, ...]:
+    return ablate(ablation, workers=workers, watch=lambda _event: None, **more)
+
+
+def timeless(rows: Sequence[Row]) -> list[Row]:
+    return [dataclasses.replace(row, seconds=0) for row in rows]
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a small ablation that nobody stopped."""
+    folder = tmp_path_factory.mktemp("done") / "ablation"
+    assert run(small(folder), workers=2) == ()
+    return folder
+
+
+def test_a_run_keeps_its_trials_and_has_a_row_for_the_diagnosis_after_each(done: Path):
+    (folder,) = done.glob("runs/*case01*")
+    logs = sorted((folder / "trials").iterdir())
+    bank = {k: load_controller(done / "bank" / f"quadruped-{k}.npz") for k in (5, 0)}
+    rows = [row for row in collect(done) if row.case == 1]
+
+    assert [path.name for path in logs] == [
+        *("00-before.mcap", "01-before.mcap", "02-after.mcap", "03-after.mcap"),
+    ]
+    driven = [read_log(path).trial.plan.controller for path in logs]
+    assert driven == [bank[5], bank[0], bank[5], bank[0]]  # gaits s, s + 1, ... modulo six
+    assert [read_truth(path) for path in logs] == ["intact"] * 2 + ["break:front_left_knee"] * 2
+    assert [row.trials for row in rows] == [1, 2]
+    assert [row.evaluations for row in rows] == [9, 18]
+    assert {row.truth for row in rows} == {"break:front_left_knee"}
+    assert all(row.intact_distance >= row.distance >= 0 for row in rows)
+
+
+def test_the_rows_do_not_depend_on_the_number_of_workers_or_on_how_runs_are_shared_out(
+    done: Path, tmp_path: Path
+):
+    for i in (1, 2):
+        run(small(tmp_path / "shared"), only=(i, 2))
+
+    assert timeless(collect(tmp_path / "shared")) == timeless(collect(done))
+
+
+def test_one_more_comparator_diagnoses_from_the_same_logs_and_nothing_is_done_again(
+    done: Path, tmp_path: Path
+):
+    extended = tmp_path / "extended"
+    run(small(extended, bank=done / "bank"))
+    kept = {path: path.read_bytes() for path in extended.rglob("*") if path.is_file()}
+    events: list[GridBegins | PartEnds] = []
+    same = "their_comparators:SAME"
+    both = small(extended, bank=done / "bank", comparators=[PAPERS, same])
+    ablate(both, workers=1, watch=events.append)
+
+    assert events[0] == GridBegins(total=4, finished=2)
+    assert [event.part for event in events[1:]] == [same, same]
+    assert all(path.read_bytes() == data for path, data in kept.items())
+    rows = timeless(collect(extended))
+    papers = [row for row in rows if row.comparator == PAPERS]
+    theirs = [row for row in rows if row.comparator == same]
+    # Paired: the same arithmetic on the same trials with the same seeds finds the same.
+    assert [dataclasses.replace(row, comparator=PAPERS) for row in theirs] == papers
+
+
+def test_what_fails_is_told_and_stops_nothing(done: Path, tmp_path: Path):
+    picky = "their_comparators:PICKY"
+    ablation = small(tmp_path / "out", bank=done / "bank", comparators=[picky, PAPERS])
+    failed = run(ablation)
+
+    assert {(one.part, one.error) for one in failed} == {
+        (picky, "this trial does not please; this trial does not please")
+    }
+    assert len(failed) == 2
+    assert timeless(collect(ablation.folder)) == timeless(collect(done))
+
+
+def test_a_command_with_a_failure_ends_with_status_one_and_prints_one_object(
+    done: Path, tmp_path: Path
+):
+    told = selfmodel(
+        *("ablate", "--robots", "quadruped", "--cases", "3", "--population", "4"),
+        *("--comparators", f"{PAPERS},their_comparators:PICKY", "--generations", "1"),
+        *("--trials", "1", "--bank", str(done / "bank"), "--seed", "5", "--out", "out", "--json"),
+        cwd=tmp_path,
+        PYTHONPATH=os.pathsep.join([str(tmp_path / "theirs"), os.environ.get("PYTHONPATH", "")]),
+    )
+    assert told.stdout, told.stderr
+    found = json.loads(told.stdout)
+
+    assert told.returncode == 1
+    assert [row["comparator"] for row in found["rows"]] == [PAPERS]
+    assert found["failures"] == [
+        {
+            "run": "quadruped-case03-gap0.0-seed005",
+            "part": "their_comparators:PICKY",
+            "error": "this trial does not please",
+        }
+    ]
+    assert "1 failed, the first of them quadruped-case03" in told.stderr
+    assert "Traceback" not in told.stderr
+
+
+def test_the_csv_says_what_the_json_says(done: Path):
+    results = write_results(done)
+    with (done / "results.csv").open(newline="") as file:
+        table = list(csv.DictReader(file))
+    objects = json.loads((done / "results.json").read_text())["rows"]
+
+    assert len(table) == len(objects) == len(results.rows) == 4
+    for line, values in zip(table, objects, strict=True):
+        assert list(line) == list(values)
+        for name, cell in line.items():
+            text = values[name] is not None and isinstance(values[name], str)
+            assert (cell if text else json.loads(cell or "null")) == values[name]
+    for path in results.files[2:]:
+        assert path.read_bytes().startswith(b"\x89PNG")
+
+
+def test_repairs_are_tried_and_their_way_is_told(done: Path, tmp_path: Path):
+    ablation = small(tmp_path / "out", cases=[1], bank=done / "bank", next_trial="repair")
+    assert run(ablation) == ()
+    first, last = collect(ablation.folder)
+    (score,) = (s for s in summarise([first, last]) if s.trials == 2)
+
+    assert (first.trials, first.recovered) == (1, None)
+    assert last.trials == 2
+    assert isinstance(last.recovered, float)
+    assert first.before == last.before
+    assert (score.recovery is None) == (last.before <= 0)
+    assert len(list(ablation.folder.glob("runs/*/forward-displacement/trials/*.mcap"))) == 3
+
+
+def test_a_killed_ablation_goes_on_and_finds_what_an_unbroken_one_finds(done: Path, tmp_path: Path):
+    out = tmp_path / "out"
+    script = tmp_path / "script.py"
+    script.write_text(
+        "from pathlib import Path\n"
+        "from tests.test_ablate import run, small\n"
+        f"if __name__ == '__main__':\n    run(small(Path({str(out)!r})))\n"
+    )
+    root = str(Path(__file__).parents[1])
+    process = subprocess.Popen([sys.executable, script], env={**os.environ, "PYTHONPATH": root})
+    while not list(out.glob("runs/*/trials/*.mcap*")):
+        assert process.poll() is None
+        time.sleep(0.005)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    assert len(collect(out)) < 4
+    for folder in out.glob("runs/*"):  # wherever the kill came, a trial may be unfinished
+        (folder / "trials").mkdir(exist_ok=True)
+        left = folder / "trials" / "03-after.mcap"
+        if not left.exists():
+            left.with_name("03-after.mcap.part").write_bytes(b"half a log")
+
+    assert run(small(out)) == ()
+    assert timeless(collect(out)) == timeless(collect(done))
+
+
+def test_a_folder_with_another_ablation_is_refused(done: Path):
+    other = Settings(steps=60, generations=3, trials=2).scaled(6)
+
+    with pytest.raises(InputError, match=r"settings.generations is 2 there, asked is 3"):
+        run(small(done, cases=[2], settings=other))
+    assert not list(done.glob("runs/*case02*"))
+
+
+def test_a_bank_without_a_gait_is_refused_before_anything_is_run(done: Path, tmp_path: Path):
+    with pytest.raises(InputError, match=r"quadruped-1.npz: expected a controller file"):
+        run(small(tmp_path / "out", seeds=[0], bank=done / "bank"))
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "sentence"),
+    [
+        ("--robots", "quadrupde", "unknown robot 'quadrupde': did you mean quadruped?"),
+        ("--robots", "quadruped,,hexapod", "--robots needs a list with commas"),
+        ("--cases", "1,11", "unknown case of quadruped '11'"),
+        ("--cases", "1,two", "--cases needs whole numbers"),
+        ("--comparators", "forward-displacment", "did you mean forward-displacement?"),
+        ("--gaps", "0,big", "--gaps needs numbers with commas between them"),
+        ("--gaps", "-0.1", "a gap is a number of at least 0"),
+        ("--gaps", "nan", "a gap is a number of at least 0"),
+        ("--next-trial", "repairs", "did you mean repair?"),
+        ("--only", "3/2", "--only needs i/n"),
+        ("--only", "0/2", "--only needs i/n"),
+    ],
+)
+def test_a_bad_list_is_refused_in_a_sentence_before_anything_is_run(
+    tmp_path: Path, option: str, value: str, sentence: str
+):
+    out = tmp_path / "out"
+    arguments = ["ablate", "--robots", "quadruped", option, value, "--out", str(out)]
+    told = CliRunner().invoke(app, arguments)
+
+    assert isinstance(told.exception, InputError)
+    assert sentence in str(told.exception)
+    assert not out.exists()
+
+
+@given(st.lists(st.text("abc:._", min_size=1), min_size=1))
+def test_a_list_is_what_stands_between_the_commas_each_once(items: list[str]):
+    assert lists.texts("--any", " , ".join(items)) == tuple(dict.fromkeys(items))
+
+
+@given(st.integers(1, 7), st.integers(1, 5), st.integers(1, 9))
+def test_the_shares_of_a_cluster_are_the_whole_and_nothing_twice(seeds: int, gaps: int, n: int):
+    ablation = small(Path("nowhere"), seeds=range(seeds), gaps=[float(gap) for gap in range(gaps)])
+    shares = [cells(ablation, (i, n)) for i in range(1, n + 1)]
+
+    assert sorted(map(str, itertools.chain(*shares))) == sorted(map(str, cells(ablation)))
+    assert max(map(len, shares)) - min(map(len, shares)) <= 1
+
+
+def scored(comparator: str, case: int, seconds: float, *, correct: bool) -> Row:
+    return Row(
+        **dict.fromkeys(field.name for field in dataclasses.fields(Row))
+        | {"robot": "quadruped", "gap": 0.05, "seed": 0, "trials": 1, "best": "intact"}
+        | {"comparator": comparator, "case": case, "seconds": seconds, "correct": correct}
+    )
+
+
+def test_time_is_compared_on_the_runs_that_both_have():
+    rows = [scored(PAPERS, case, 2.0, correct=case > 7) for case in range(10)]
+    rows += [scored("other", case, 3.0, correct=True) for case in range(5, 15)]
+    ours, other = summarise(rows)
+
+    assert (ours.right, ours.runs, ours.correct.estimate) == (2, 10, 0.2)
+    assert ours.correct.low == pytest.approx(0.0567, abs=1e-4)
+    assert ours.time.estimate == 1
+    assert other.time.estimate == other.time.low == 1.5
+
+
+def test_a_figure_is_drawn_for_any_subset_of_a_grid():
+    rows = [
+        dataclasses.replace(scored(name, case, 1.0, correct=True), gap=gap, robot=robot)
+        for name, case, gap, robot in itertools.product(
+            ("a", "b"), (1, 3), (0.0, 0.05, 0.1), ("quadruped", "hexapod")
+        )
+        if (name, robot) != ("b", "hexapod")
+    ]
+
+    names = [name for name, _ in draw(rows, summarise(rows))]
+    assert names == ["gap.png", "cases-hexapod-1.png", "cases-quadruped-1.png"]
+    assert list(draw([], [])) == []
