@@ -25,7 +25,7 @@ COMPARATORS: Mapping[str, Comparator] = {
 }
 """Every comparator that comes with selfmodel."""
 
-DEFAULT = FORWARD_DISPLACEMENT.name
+DEFAULT = SEGMENT_PREDICTION.name
 
 __all__ = [
     "COMPARATORS",

@@ -17,6 +17,7 @@ from selfmodel.comparator import Segments
 from selfmodel.embodiment import embody
 from selfmodel.errors import InputError
 from selfmodel.estimate import STATE, estimated_states
+from selfmodel.events import Calibrated
 from selfmodel.hypothesis import INTACT
 from selfmodel.parameters import Parameters, edited_model, from_factors, nominal, with_parameters
 from selfmodel.prediction import predict
@@ -77,6 +78,11 @@ class Calibration:
     deviations: FloatArray
     error_before: float
     error: float
+
+    @property
+    def summary(self) -> Calibrated:
+        """What is told of it."""
+        return Calibrated(self.error_before, self.error, self.parameters.delay)
 
 
 def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibration:

@@ -85,6 +85,14 @@ class Diagnose:
             test=TEST if self.evidence.in_pieces else EQUAL,
         )
 
+    def check(self, trials: Sequence[Trial]) -> None:
+        """Checks that the comparator can judge all trials, before any search.
+
+        Raises:
+            InputError: It cannot; the sentence names every trial that it cannot judge, and why.
+        """
+        self.evidence.check([*self._intact, *trials])
+
     def _evolved(
         self,
         trials: Sequence[Trial],

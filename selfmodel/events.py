@@ -21,5 +21,20 @@ class SearchBegins:
     hypothesis: Hypothesis | None = None
 
 
-Event = SearchBegins | Generation | Trial | Diagnosis
-"""Of a search that goes on, of a trial that ended, of a diagnosis that was made."""
+@dataclass(frozen=True)
+class Calibrated:
+    """The self-model was fitted to trials of the intact robot.
+
+    Attributes:
+        error_before: How badly it predicted them, in units of ``calibrate.SCALES``.
+        error: How badly it predicts them now.
+        delay: Control steps from a command to its effect.
+    """
+
+    error_before: float
+    error: float
+    delay: int
+
+
+Event = SearchBegins | Generation | Calibrated | Trial | Diagnosis
+"""Of a search that goes on, of a calibration, a trial that ended, a diagnosis that was made."""

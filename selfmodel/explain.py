@@ -33,7 +33,7 @@ def explain(
     """
     if not trials:
         raise InputError("expected at least one trial to explain, got none")
-    diagnose.evidence.check(trials)
+    diagnose.check(trials)
     known = Database()
     for number in range(1, len(trials) + 1):
         watch(SearchBegins("diagnostic"))

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from selfmodel.calibrate import Calibration
 from selfmodel.comparator import Comparator
 from selfmodel.controller import Controller
 from selfmodel.database import Journal
@@ -30,6 +31,7 @@ class Recovery:
         repair_evaluations: Controllers that the repair EA asked about.
         diagnostic_evaluations: Hypotheses that the diagnostic EA asked about.
         distinct_hypotheses: How many of those differ.
+        calibration: How the self-model was fitted to the trials before the failure, if it was.
     """
 
     trials: tuple[Trial, ...]
@@ -38,6 +40,7 @@ class Recovery:
     repair_evaluations: int
     diagnostic_evaluations: int
     distinct_hypotheses: int
+    calibration: Calibration | None = None
 
     @property
     def before(self) -> float:
@@ -67,6 +70,7 @@ def recover(
     watch: Callable[[Event], None],
     gait: Controller | None = None,
     kinds: Sequence[Kind] = PAPER_KINDS,
+    calibrate: Callable[[Sequence[Trial]], Calibration] | None = None,
 ) -> Recovery:
     """Lets a robot walk until it fails, then finds out what is wrong and how it walks again.
 
@@ -82,12 +86,13 @@ def recover(
         gait: How the robot walks before it fails; evolved if there is none. The rest of the
             recovery is the same whether a gait was evolved here, or earlier from the same seed.
         kinds: What a diagnosis considers.
+        calibrate: Fits the self-model to the trials before the failure; without it, the self-model
+            stays as it is.
 
     Returns:
         What the journal says at the end.
     """
     repair = Repair(simulator, settings)
-    diagnose = Diagnose(simulator, comparator, settings, kinds)
     tried: list[Hypothesis] = []
 
     def evolve_controller(hypothesis: Hypothesis) -> Controller:
@@ -113,6 +118,14 @@ def recover(
     if gait is None:
         gait = evolve_controller(INTACT)
     act(healthy, "before", INTACT, gait)
+    intact = journal.read().trials
+    calibration = calibrate(intact) if calibrate else None
+    if calibration is not None:
+        watch(calibration.summary)
+        if calibration.robot is not simulator.robot:
+            simulator = Simulator(calibration.robot, simulator.threads, simulator.tally)
+            repair = Repair(simulator, settings, repair.evaluations)
+    diagnose = Diagnose(simulator, comparator, settings, kinds, intact=intact)
     act(damaged, "after", INTACT, gait)
     for _ in range(settings.trials):
         believed = explain().best
@@ -126,4 +139,5 @@ def recover(
         repair_evaluations=repair.evaluations,
         diagnostic_evaluations=diagnose.evaluations,
         distinct_hypotheses=diagnose.evidence.distinct_hypotheses,
+        calibration=calibration,
     )

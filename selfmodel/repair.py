@@ -22,13 +22,14 @@ class Repair:
     Args:
         simulator: The self-model.
         settings: The numbers of the search.
+        evaluations: Controllers that were asked about before.
     """
 
-    def __init__(self, simulator: Simulator, settings: Settings) -> None:
+    def __init__(self, simulator: Simulator, settings: Settings, evaluations: int = 0) -> None:
         self._simulator = simulator
         self._settings = settings
         self._fitness: Memo[Run] = Memo()
-        self.evaluations = 0
+        self.evaluations = evaluations
 
     def __call__(
         self,

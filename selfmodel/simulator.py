@@ -32,12 +32,13 @@ class Simulator:
     Args:
         robot: The robot with nothing wrong.
         threads: Threads that MuJoCo steps on, the caller's included.
+        tally: Is told what was simulated; a new one if none is given.
     """
 
-    def __init__(self, robot: Robot, threads: int) -> None:
+    def __init__(self, robot: Robot, threads: int, tally: Tally | None = None) -> None:
         self.robot = robot
         self.threads = threads
-        self.tally = Tally()
+        self.tally = Tally() if tally is None else tally
         self._embodiment = lru_cache(REMEMBERED_EMBODIMENTS)(robot.build)
         self._members = lru_cache(partial(perturbed_models, robot))
 

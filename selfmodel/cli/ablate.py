@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from selfmodel.cli.options import Json
+from selfmodel.cli.options import DEFAULT_KINDS, Json, KindNames, Structural
 
 if TYPE_CHECKING:
     from selfmodel.cli.ablation import Results
@@ -24,12 +24,17 @@ def ablate(
     ],
     robots: Annotated[str, typer.Option(metavar="A,B|all", help="Robots.")] = "all",
     cases: Annotated[
-        str, typer.Option(metavar="1,7|all", help="Failures of the paper's Table I.")
+        str, typer.Option(metavar="1,7|all|none", help="Failures of the paper's Table I.")
     ] = "all",
+    damages: Annotated[
+        str, typer.Option(metavar="NOTATION,...", help="Further failures, in notation.")
+    ] = "",
+    kinds: KindNames = DEFAULT_KINDS,
     comparators: Annotated[
         str, typer.Option(metavar="A,B|all", help="Names, or package.module:object.")
     ] = "all",
     gaps: Annotated[str, typer.Option(metavar="0,0.05", help="Levels of the reality gap.")] = "0",
+    structure: Structural = False,
     seeds: Annotated[int, typer.Option(min=1, help="Runs of each robot, case and gap.")] = 1,
     seed: Annotated[int, typer.Option(min=0, help="The first of their seeds.")] = 0,
     next_trial: Annotated[
@@ -73,7 +78,10 @@ def ablate(
     every_case = sorted({case for name in names for case in resolve.robot_entry(name).cases})
     ablation = Ablation(
         robots=names,
-        cases=lists.whole_numbers("--cases", cases, every_case),
+        cases=[] if cases == "none" else lists.whole_numbers("--cases", cases, every_case),
+        damages=[damage.strip() for damage in damages.split(",") if damage.strip()],
+        kinds=kinds,
+        structure=structure,
         comparators=lists.texts("--comparators", comparators, COMPARATORS),
         gaps=lists.numbers("--gaps", gaps),
         seeds=range(seed, seed + seeds),

@@ -9,6 +9,7 @@ import typer
 
 from selfmodel.cli.options import (
     DEFAULT_KINDS,
+    Calibrated,
     ComparatorName,
     Json,
     KindNames,
@@ -28,6 +29,7 @@ def diagnose(
     robot: RobotOrModel = None,
     comparator: ComparatorName = DEFAULT,
     kinds: KindNames = DEFAULT_KINDS,
+    calibrate: Calibrated = True,
     seed: Annotated[
         int | None,
         typer.Option(
@@ -39,13 +41,14 @@ def diagnose(
 ) -> None:
     """Rank what may be wrong with a robot by how well it explains logs, with no robot at hand.
 
-    Give the logs in the order in which the trials were run. Trials from before the failure explain
-    nothing and are passed over, unless all are.
+    Give the logs in the order in which the trials were run. Trials from before the failure show
+    how the robot moves with nothing wrong: the self-model is fitted to them.
     """
     # Whatever brings MuJoCo waits until the command runs.
+    from selfmodel.calibrate import calibrate as fitted  # noqa: PLC0415
     from selfmodel.cli import resolve  # noqa: PLC0415
     from selfmodel.cli.display import display  # noqa: PLC0415
-    from selfmodel.cli.ranking import as_values  # noqa: PLC0415
+    from selfmodel.cli.ranking import as_values, calibration_values, sureness  # noqa: PLC0415
     from selfmodel.diagnose import Diagnose  # noqa: PLC0415
     from selfmodel.explain import explain  # noqa: PLC0415
     from selfmodel.simulator import Simulator  # noqa: PLC0415
@@ -58,11 +61,15 @@ def diagnose(
     used = _since_the_failure(logs)
     first = used[0]
     chosen = first.trial.plan.seed if seed is None else seed
-    simulator = Simulator(model, resolve.threads(threads))
-    search = Diagnose(simulator, judge, first.settings, considered)
+    intact = [log.trial for log in logs if log not in used]
+    fit = fitted(model, intact, resolve.threads(threads)) if calibrate and intact else None
+    simulator = Simulator(fit.robot if fit else model, resolve.threads(threads))
+    search = Diagnose(simulator, judge, first.settings, considered, intact=intact)
     for note in _notes(used):
         typer.echo(f"note: {note}", err=True)
     with display() as watch:
+        if fit:
+            watch(fit.summary)
         diagnosis = explain([log.trial for log in used], search, chosen, watch)
     result = {
         "robot": model.name,
@@ -72,8 +79,10 @@ def diagnose(
         "settings_from": first.trial.path,
         "logs": [log.trial.path for log in used],
         "played_back": [log.trial.path for log in used if _is_played_back(log)],
-        "passed_over": [log.trial.path for log in logs if log not in used],
+        "intact": [trial.path for trial in intact],
+        "calibration": calibration_values(fit),
         "diagnosis": as_values(diagnosis.ranked),
+        **sureness(diagnosis),
         "evaluations": search.evaluations,
         "distinct_hypotheses": search.evidence.distinct_hypotheses,
         "seconds": perf_counter() - start,
@@ -114,7 +123,7 @@ def _print(result: dict[str, Any]) -> None:
     from rich.console import Console  # noqa: PLC0415  # only where a table is drawn
 
     from selfmodel.cli.plain import plain  # noqa: PLC0415  # the same
-    from selfmodel.cli.ranking import ranking_table  # noqa: PLC0415  # the same
+    from selfmodel.cli.ranking import in_words, ranking_table  # noqa: PLC0415  # the same
 
     Console(markup=False).print(ranking_table(result["diagnosis"]))
     count = len(result["logs"])
@@ -123,5 +132,6 @@ def _print(result: dict[str, Any]) -> None:
         f"{result['comparator']}: {result['evaluations']} evaluations of "
         f"{result['distinct_hypotheses']} distinct hypotheses in {result['seconds']:.1f} s."
     )
-    for path in result["passed_over"]:
-        typer.echo(f"passed over, from before the failure: {Path(path)}")
+    typer.echo(in_words(result))
+    for path in result["intact"]:
+        typer.echo(f"from before the failure, not to be explained: {Path(path)}")

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn
 
 from selfmodel.diagnosis import Diagnosis
-from selfmodel.events import Event, SearchBegins
+from selfmodel.events import Calibrated, Event, SearchBegins
 from selfmodel.evolution import Generation
 from selfmodel.trial import Trial
 
@@ -53,13 +53,18 @@ class _Lines:
                     f"{self._search}: {event.number} generations, {event.evaluations} "
                     f"evaluations, {_rate(event)}/s, best {event.best:.4f}"
                 )
+            case Calibrated():
+                self._say(
+                    f"calibration: error {event.error_before:.3f} before, {event.error:.3f} after; "
+                    f"delay {event.delay} {'step' if event.delay == 1 else 'steps'}"
+                )
             case Trial():
                 self._say(f"trial {event.plan.name}: {event.displacement:.3f} m forward")
             case Diagnosis():
                 best, trials = event.ranked[0], event.trials
                 self._say(
                     f"diagnosis from {trials} {'trial' if trials == 1 else 'trials'}: "
-                    f"{best.hypothesis} (distance {best.distance:.4f})"
+                    f"{best.hypothesis} (distance {best.distance:.4f}), {event.verdict}"
                 )
 
     def _say(self, line: str) -> None:

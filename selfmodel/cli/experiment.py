@@ -2,9 +2,11 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 
+from selfmodel.calibrate import calibrate
 from selfmodel.cli.reality import draw_reality
 from selfmodel.comparator import Comparator
 from selfmodel.controller import Controller
@@ -37,6 +39,7 @@ class Experiment:
         gap: How far the physical robot is from its model, a level.
         structure: Whether it is built differently, too.
         kinds: What a diagnosis considers.
+        calibrated: Whether the self-model is fitted to the trials before the failure.
     """
 
     robot: Robot
@@ -51,6 +54,7 @@ class Experiment:
     gap: float = 0.0
     structure: bool = False
     kinds: tuple[Kind, ...] = PAPER_KINDS
+    calibrated: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +98,9 @@ def run(experiment: Experiment, watch: Callable[[Event], None]) -> Outcome:
         watch=watch,
         gait=experiment.gait,
         kinds=experiment.kinds,
+        calibrate=partial(calibrate, robot, threads=experiment.threads)
+        if experiment.calibrated
+        else None,
     )
     return Outcome(
         recovery=recovery,

@@ -56,6 +56,13 @@ ComparatorName = Annotated[
         help="How a simulation is compared with a logged trial.",
     ),
 ]
+Calibrated = Annotated[
+    bool,
+    typer.Option(
+        "--calibrate/--no-calibrate",
+        help="Fit the self-model to the trials before the failure, if there are any.",
+    ),
+]
 KindNames = Annotated[
     str,
     typer.Option(

@@ -1,12 +1,14 @@
 """A diagnosis as plain values and as a table."""
 
+import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rich.table import Table
 
-from selfmodel.diagnosis import Candidate
+from selfmodel.calibrate import Calibration
+from selfmodel.diagnosis import Candidate, Diagnosis
 
 
 def as_values(ranked: Sequence[Candidate]) -> list[dict[str, Any]]:
@@ -18,6 +20,45 @@ def as_values(ranked: Sequence[Candidate]) -> list[dict[str, Any]]:
         }
         for candidate in ranked
     ]
+
+
+def sureness(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Returns how sure a diagnosis is, as JSON has it."""
+    intact = diagnosis.intact_distance
+    return {
+        "verdict": diagnosis.verdict,
+        "rivals": [str(rival) for rival in diagnosis.rivals],
+        "test": diagnosis.test,
+        "intact_distance": intact if math.isfinite(intact) else None,
+    }
+
+
+def in_words(sure: Mapping[str, Any]) -> str:
+    """Returns what ``sureness`` says, as a sentence."""
+    best = sure["diagnosis"][0]["hypothesis"]
+    match sure["verdict"]:
+        case "explained":
+            return f"Explained: {best} predicts the trials, and nothing else as well."
+        case "ambiguous":
+            rivals = ", ".join(sure["rivals"])
+            return f"Ambiguous: the trials cannot tell {best} from {rivals} ({sure['test']})."
+    return (
+        f"Unexplained: even {best} predicts the trials significantly worse than the self-model "
+        f"predicts the intact robot; something else is wrong, or what is wrong is of a kind that "
+        f"was not considered (--kinds)."
+    )
+
+
+def calibration_values(fit: Calibration | None) -> dict[str, Any] | None:
+    """Returns a calibration as JSON has it; None where there was none."""
+    if fit is None:
+        return None
+    return {
+        **dataclasses.asdict(fit.parameters),
+        "deviations": [float(deviation) for deviation in fit.deviations],
+        "error_before": fit.error_before,
+        "error": fit.error,
+    }
 
 
 def ranking_table(values: Sequence[dict[str, Any]], truth: str | None = None) -> Table:

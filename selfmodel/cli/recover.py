@@ -7,6 +7,7 @@ import typer
 
 from selfmodel.cli.options import (
     DEFAULT_KINDS,
+    Calibrated,
     ComparatorName,
     Damage,
     GapLevel,
@@ -28,6 +29,7 @@ def recover(
     ] = None,
     damage: Damage = None,
     comparator: ComparatorName = DEFAULT,
+    calibrate: Calibrated = True,
     gap: GapLevel = 0.0,
     structure: Structural = False,
     kinds: KindNames = DEFAULT_KINDS,
@@ -71,6 +73,7 @@ def recover(
         truth=parse(damaged, made.anatomy, known(considered)),
         comparator=resolve.comparator(comparator),
         kinds=considered,
+        calibrated=calibrate,
         settings=Settings(trials=trials, generations=generations).scaled(population),
         seed=seed,
         threads=resolve.threads(threads),

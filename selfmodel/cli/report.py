@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from selfmodel.cli.experiment import Experiment, Outcome
-from selfmodel.cli.ranking import as_values, ranking_table
+from selfmodel.cli.ranking import as_values, calibration_values, in_words, ranking_table, sureness
 
 
 def as_object(experiment: Experiment, outcome: Outcome) -> str:
@@ -31,6 +31,7 @@ def print_report(experiment: Experiment, outcome: Outcome) -> None:
     # Not through rich: a folder's name may look like markup, and must not be folded.
     typer.echo(
         f"truth: {found['truth']}{_reality(found)}; the diagnosis is {verdict}.\n"
+        f"{in_words(found)}\n"
         f"The robot went {found['displacement']['before']:.2f} m before, "
         f"{found['displacement']['after']:.2f} m after the failure, and "
         f"{found['displacement']['recovered']:.2f} m at best in "
@@ -69,6 +70,8 @@ def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
             for trial, tried in zip(recovery.trials, recovery.tried, strict=True)
         ],
         "diagnosis": as_values(recovery.diagnosis.ranked),
+        **sureness(recovery.diagnosis),
+        "calibration": calibration_values(recovery.calibration),
         "correct": outcome.correct,
         "displacement": {
             "before": recovery.before,

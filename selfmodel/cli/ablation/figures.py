@@ -102,7 +102,7 @@ def _line(axes: Axes, line: dict[float, Interval], label: str, marker: str, shif
 def _by_case(robot: str, trials: int, rows: Sequence[Row]) -> Figure:
     """A panel a gap: how often each comparator is right about each case."""
     gaps = sorted({row.gap for row in rows})
-    cases = sorted({row.case for row in rows})
+    cases = sorted({row.failure for row in rows})
     comparators = sorted({row.comparator for row in rows})
     across = min(2, len(gaps))
     down = math.ceil(len(gaps) / across)
@@ -120,13 +120,13 @@ def _by_case(robot: str, trials: int, rows: Sequence[Row]) -> Figure:
                 right = [
                     row.correct
                     for row in rows
-                    if (row.gap, row.comparator, row.case) == (gap, comparator, case)
+                    if (row.gap, row.comparator, row.failure) == (gap, comparator, case)
                 ]
                 if right:
                     shares[i, j] = np.mean(right)
                     _write(axes, j, i, shares[i, j])
         axes.imshow(shares, vmin=0, vmax=1, cmap="viridis", aspect="auto")
-        axes.set_xticks(range(len(cases)), [str(case) for case in cases])
+        axes.set_xticks(range(len(cases)), cases)
         axes.set_yticks(range(len(comparators)), comparators)
         axes.set_title(f"gap {gap:g}", fontsize=10)
         axes.set_xlabel("case")

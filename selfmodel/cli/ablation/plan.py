@@ -8,11 +8,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 from selfmodel import __version__
 from selfmodel.cli import resolve
 from selfmodel.errors import InputError, unknown_name
+from selfmodel.faults import PAPER_KINDS
 from selfmodel.grid import Job, difference, parameters_of, runs
+from selfmodel.notation import parse
 from selfmodel.settings import Settings
 
 NEXT_TRIAL = ("bank", "repair")
@@ -38,6 +41,9 @@ class Ablation:
         seeds: A run for each.
         folder: Where all of it is kept.
         settings: The paper's numbers; ``trials`` is how many trials of the damaged robot there are.
+        damages: Further failures, in notation.
+        kinds: What a diagnosis considers, as ``--kinds`` takes it.
+        structure: Whether the robots are built differently from their models.
         next_trial: One of ``NEXT_TRIAL``.
         bank: A folder of gaits, ``ROBOT-K.npz``; without one they are evolved.
     """
@@ -49,6 +55,9 @@ class Ablation:
     seeds: Sequence[int]
     folder: Path
     settings: Settings = Settings()  # noqa: RUF009  # it is frozen
+    damages: Sequence[str] = ()
+    kinds: str = ",".join(kind.name for kind in PAPER_KINDS)
+    structure: bool = False
     next_trial: str = "bank"
     bank: Path | None = None
 
@@ -59,13 +68,15 @@ class Cell:
 
     Attributes:
         robot: The robot's name.
-        case: The failure's number.
+        case: The failure's number in Table I, if it has one.
+        truth: The failure, in notation.
         gap: The level of the reality gap.
         seed: Every random choice comes from it.
     """
 
     robot: str
-    case: int
+    case: int | None
+    truth: str
     gap: float
     seed: int
 
@@ -80,14 +91,16 @@ class Spec:
 
     Attributes:
         cell: Which run it is.
-        truth: What goes wrong with the robot, in notation.
         settings: The paper's numbers.
+        kinds: What a diagnosis considers.
+        structure: Whether the robot is built differently from its model.
         next_trial: How the trials' controllers are chosen.
     """
 
     cell: Cell
-    truth: str
     settings: Settings
+    kinds: str
+    structure: bool
     next_trial: str
 
 
@@ -97,9 +110,11 @@ def check(ablation: Ablation) -> None:
     Raises:
         InputError: Something is, and which.
     """
-    for name in ("robots", "cases", "comparators", "gaps", "seeds"):
+    for name in ("robots", "comparators", "gaps", "seeds"):
         if not getattr(ablation, name):
             raise InputError(f"an ablation needs at least one of its {name}, got none")
+    if not (ablation.cases or ablation.damages):
+        raise InputError("an ablation needs at least one case or one damage, got neither")
     _check_names(ablation)
     for gap in ablation.gaps:
         if not (math.isfinite(gap) and gap >= 0):
@@ -120,10 +135,10 @@ def cells(ablation: Ablation, only: tuple[int, int] = (1, 1)) -> list[Cell]:
         only: ``(i, n)``: of every n runs the i-th, from 1.
     """
     found = [
-        Cell(robot, case, gap, seed)
-        for seed, robot, case, gap in itertools.product(
-            ablation.seeds, ablation.robots, ablation.cases, ablation.gaps
-        )
+        Cell(robot, case, truth, gap, seed)
+        for seed, robot in itertools.product(ablation.seeds, ablation.robots)
+        for case, truth in _failures(ablation, robot)
+        for gap in ablation.gaps
     ]
     part, parts = only
     return found[part - 1 :: parts]
@@ -137,14 +152,14 @@ def job(ablation: Ablation, cell: Cell, gaits: Sequence[str]) -> Job:
         cell: Which one.
         gaits: A digest of each gait that it takes from the bank.
     """
-    entry = resolve.robot_entry(cell.robot)
+    failure = f"case{cell.case:02d}" if cell.case is not None else quote(cell.truth, safe="=")
     return Job(
-        key=f"{cell.robot}-case{cell.case:02d}-gap{cell.gap!r}-seed{cell.seed:03d}",
+        key=f"{cell.robot}-{failure}-gap{cell.gap!r}-seed{cell.seed:03d}",
         parameters={
             "robot": cell.robot,
             "model": model_digest(cell.robot),
             "case": cell.case,
-            "truth": entry.cases[cell.case],
+            "truth": cell.truth,
             "gap": cell.gap,
             "gaits": list(gaits),
             "shared": _shared(ablation),
@@ -158,11 +173,18 @@ def spec(of: Job) -> Spec:
     """Returns what a run of the grid says of itself."""
     said = of.parameters
     return Spec(
-        cell=Cell(said["robot"], said["case"], said["gap"], of.seed),
-        truth=said["truth"],
+        cell=Cell(said["robot"], said["case"], said["truth"], said["gap"], of.seed),
         settings=Settings(**said["shared"]["settings"]),
+        kinds=said["shared"]["kinds"],
+        structure=said["shared"]["structure"],
         next_trial=said["shared"]["next_trial"],
     )
+
+
+def _failures(ablation: Ablation, robot: str) -> list[tuple[int | None, str]]:
+    known, anatomy = resolve.robot_entry(robot).cases, resolve.robot_entry(robot).robot().anatomy
+    cases: list[tuple[int | None, str]] = [(case, known[case]) for case in ablation.cases]
+    return cases + [(None, str(parse(damage, anatomy))) for damage in ablation.damages]
 
 
 def model_digest(robot: str) -> str:
@@ -172,10 +194,14 @@ def model_digest(robot: str) -> str:
 
 def _check_names(ablation: Ablation) -> None:
     for robot in ablation.robots:
-        known = resolve.robot_entry(robot).cases
+        entry = resolve.robot_entry(robot)
         for case in ablation.cases:
-            if case not in known:
-                raise unknown_name(f"case of {robot}", str(case), map(str, known))
+            if case not in entry.cases:
+                raise unknown_name(f"case of {robot}", str(case), map(str, entry.cases))
+        anatomy = entry.robot().anatomy
+        for damage in ablation.damages:
+            parse(damage, anatomy)
+    resolve.kinds(ablation.kinds)
     for comparator in ablation.comparators:
         resolve.comparator(comparator)
     if ablation.next_trial not in NEXT_TRIAL:
@@ -197,5 +223,7 @@ def _shared(ablation: Ablation) -> dict[str, Any]:
     return {
         "selfmodel": __version__,
         "settings": dataclasses.asdict(ablation.settings),
+        "kinds": ablation.kinds,
+        "structure": ablation.structure,
         "next_trial": ablation.next_trial,
     }

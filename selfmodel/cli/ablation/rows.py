@@ -14,7 +14,7 @@ class Row:
 
     Attributes:
         robot: The robot.
-        case: Which failure of Table I.
+        case: Which failure of Table I, if it is one.
         truth: What it is, in notation.
         gap: The level of the reality gap.
         seed: The seed of the run.
@@ -26,6 +26,7 @@ class Row:
         distance: Of the best hypothesis, in the comparator's unit.
         intact_distance: Of "nothing changed".
         verdict: What the diagnosis says of itself.
+        rivals: How many other hypotheses it cannot tell from the best, ten at most.
         evaluations: Hypotheses that were asked about since the first trial.
         distinct_hypotheses: How many of those differ.
         seconds: Wall time of the diagnoses since the first trial, on one thread.
@@ -35,7 +36,7 @@ class Row:
     """
 
     robot: str
-    case: int
+    case: int | None
     truth: str
     gap: float
     seed: int
@@ -47,6 +48,7 @@ class Row:
     distance: float | None
     intact_distance: float | None
     verdict: str | None
+    rivals: int | None
     evaluations: int | None
     distinct_hypotheses: int | None
     seconds: float
@@ -55,9 +57,14 @@ class Row:
     recovered: float | None
 
     @property
-    def run(self) -> tuple[str, int, float, int]:
-        """What is the same for all comparators: robot, case, gap, seed."""
-        return self.robot, self.case, self.gap, self.seed
+    def run(self) -> tuple[str, str, float, int]:
+        """What is the same for all comparators: robot, truth, gap, seed."""
+        return self.robot, self.truth, self.gap, self.seed
+
+    @property
+    def failure(self) -> str:
+        """What the failure is called: its number in Table I, or its notation."""
+        return self.truth if self.case is None else f"{self.case:2d}"
 
 
 COLUMNS = tuple(field.name for field in dataclasses.fields(Row))

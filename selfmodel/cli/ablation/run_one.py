@@ -9,18 +9,18 @@ from pathlib import Path
 from time import perf_counter
 from urllib.parse import quote
 
+from selfmodel.calibrate import calibrate
 from selfmodel.cli import resolve
 from selfmodel.cli.ablation import bank
 from selfmodel.cli.ablation.plan import Spec
 from selfmodel.cli.ablation.rows import Row
-from selfmodel.cli.ablation.trials import Setting, physical_robot, physical_trials
+from selfmodel.cli.ablation.trials import Setting, physical_trials
 from selfmodel.cli.experiment import Experiment, run
 from selfmodel.diagnose import Diagnose
 from selfmodel.diagnosis import Diagnosis
 from selfmodel.events import Event, SearchBegins
 from selfmodel.evolution import Generation
 from selfmodel.explain import explain
-from selfmodel.hypothesis import INTACT
 from selfmodel.judge import is_correct
 from selfmodel.notation import parse
 from selfmodel.simulator import Simulator
@@ -46,7 +46,7 @@ def run_one(spec: Spec, comparator: str, folder: Path, gaits: Path) -> list[Row]
         comparator=resolve.comparator(comparator),
         name=comparator,
         robot=robot,
-        truth=parse(spec.truth, robot.anatomy),
+        truth=parse(spec.cell.truth, robot.anatomy),
         gaits=tuple(
             bank.gait(gaits, spec.cell.robot, number) for number in spec.cell.gaits(spec.settings)
         ),
@@ -57,24 +57,26 @@ def run_one(spec: Spec, comparator: str, folder: Path, gaits: Path) -> list[Row]
 
 def _from_the_bank(setting: Setting) -> list[Row]:
     """The trials are the same for every comparator, and so are their logs."""
-    _, trials = physical_trials(setting)
-    simulator = Simulator(setting.robot, threads=1)
-    search = Diagnose(simulator, setting.comparator, setting.spec.settings)
-    # Another one asks what no search asked, so that the counts stay those of the search.
-    beside = Diagnose(simulator, setting.comparator, setting.spec.settings)
+    intact, trials = physical_trials(setting)
+    simulator = Simulator(calibrate(setting.robot, intact, threads=1).robot, threads=1)
+    search = Diagnose(
+        simulator,
+        setting.comparator,
+        setting.spec.settings,
+        resolve.kinds(setting.spec.kinds),
+        intact=intact,
+    )
     rows: list[Row] = []
     clock = _Clock()
 
     def watch(event: Event) -> None:
         clock(event)
         if isinstance(event, Diagnosis):
-            explained = trials[: event.trials]
-            (intact,) = beside.distances([INTACT], explained)
             rows.append(
                 dataclasses.replace(
-                    _row(setting, event, explained, clock),
-                    distinct_hypotheses=search.distinct_hypotheses,
-                    intact_distance=_finite(intact),
+                    _row(setting, event, trials[: event.trials], clock),
+                    evaluations=search.evaluations,
+                    distinct_hypotheses=search.evidence.distinct_hypotheses,
                 )
             )
 
@@ -87,7 +89,6 @@ def _by_repair(setting: Setting) -> list[Row]:
     folder = setting.folder / quote(setting.name, safe="")
     shutil.rmtree(folder, ignore_errors=True)  # what is left of a run that was killed
     settings, cell = setting.spec.settings, setting.spec.cell
-    physical_robot(setting, setting.truth)  # refuses a gap, which an experiment does not know
     rows: list[Row] = []
     trials: list[Trial] = []
     clock = _Clock()
@@ -118,6 +119,9 @@ def _by_repair(setting: Setting) -> list[Row]:
         threads=1,
         folder=folder,
         gait=setting.gaits[0],
+        gap=cell.gap,
+        structure=setting.spec.structure,
+        kinds=resolve.kinds(setting.spec.kinds),
     )
     outcome = run(experiment, watch)
     rows[-1] = dataclasses.replace(
@@ -169,8 +173,9 @@ def _row(setting: Setting, diagnosis: Diagnosis, trials: list[Trial], clock: _Cl
         best=str(best.hypothesis),
         correct=is_correct(best.hypothesis, setting.truth, trials, judge),
         distance=_finite(best.distance),
-        intact_distance=None,
-        verdict=None,
+        intact_distance=_finite(diagnosis.intact_distance),
+        verdict=diagnosis.verdict,
+        rivals=len(diagnosis.rivals),
         evaluations=clock.evaluations,
         distinct_hypotheses=None,
         seconds=clock.seconds,

@@ -5,13 +5,12 @@ from pathlib import Path
 
 from selfmodel.atomic import part_of
 from selfmodel.cli.ablation.plan import HEALTHY_TRIALS, Spec
+from selfmodel.cli.reality import draw_reality
 from selfmodel.comparator import Comparator
 from selfmodel.controller import Controller
-from selfmodel.errors import InputError
 from selfmodel.hypothesis import INTACT, Hypothesis
 from selfmodel.logs.reader import read_log
 from selfmodel.logs.writer import write_trial
-from selfmodel.physical import PhysicalRobot, SimulatedRobot
 from selfmodel.robot import Robot
 from selfmodel.trial import Plan, Stage, Trial
 
@@ -39,13 +38,6 @@ class Setting:
     folder: Path
 
 
-def physical_robot(setting: Setting, hidden: Hypothesis) -> PhysicalRobot:
-    """Returns the physical robot of a run, intact or damaged: the same but for what is hidden."""
-    if setting.spec.cell.gap:
-        raise InputError(f"simulated robots have no reality gap, got {setting.spec.cell.gap}")
-    return SimulatedRobot(setting.robot, hidden)
-
-
 def physical_trials(setting: Setting) -> tuple[list[Trial], list[Trial]]:
     """Returns the trials before and after the failure, as their logs say; runs those missing."""
     settings = setting.spec.settings
@@ -69,8 +61,16 @@ def _trial(setting: Setting, number: int, stage: Stage, gait: Controller) -> Tri
         path.parent.mkdir(exist_ok=True)
         part_of(path).unlink(missing_ok=True)  # of a run that was killed
         hidden = INTACT if stage == "before" else setting.truth
-        samples = physical_robot(setting, hidden).run(plan.controller, plan.steps)
+        cell, robot = setting.spec.cell, setting.robot
+        reality = draw_reality(robot, cell.seed, cell.gap, structure=setting.spec.structure)
         write_trial(
-            path, setting.robot, plan, samples, settings=setting.spec.settings, hidden=str(hidden)
+            path,
+            robot,
+            plan,
+            # Each trial has noise of its own, the same for every comparator.
+            reality.robot(robot, hidden, stream=number).run(plan.controller, plan.steps),
+            settings=setting.spec.settings,
+            hidden=str(hidden),
+            gap=reality.text,
         )
     return read_log(path).trial
