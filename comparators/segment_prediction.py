@@ -22,7 +22,7 @@ LEAD = 5
 FEWEST = 4
 """Segments without which nothing can be said."""
 
-LOOKS = 5
+LOOKS = 4
 """How many times within a segment prediction and log are compared, the last at its end."""
 
 SCALES: Mapping[Signal, float] = MappingProxyType(
@@ -60,7 +60,7 @@ class SegmentPrediction:
     Limits: it needs the state, so encoders and the base's pose and velocity; ``segment-prediction-
     onboard`` does without the base's position and linear velocity, and carries them on from one
     segment to the next, which makes it less sharp. What acts slowly, such as a light wind, hardly
-    shows within a quarter of a second. The network is taken to be known: without one (a recording
+    shows within an eighth of a second. The network is taken to be known: without one (a recording
     of other software) its arithmetic is not judged.
 
     Attributes:
@@ -72,8 +72,8 @@ class SegmentPrediction:
 
     name: str
     state: tuple[Signal, ...] = STATE
-    horizon: int = 25
-    most: int = 40
+    horizon: int = 12
+    most: int = 80
 
     def request(self, trial: Trial) -> Segments:
         """Returns the segments, and that all of their state and the readings are looked at.
@@ -125,13 +125,13 @@ class _Cut:
 def _cut(comparator: SegmentPrediction, trial: Trial) -> _Cut:
     behaviour, horizon = trial.behaviour, comparator.horizon
     states = estimated_states(behaviour, comparator.state)
-    if behaviour.steps < LEAD + FEWEST * horizon + 1:
+    if behaviour.steps < FEWEST * horizon + 1:
         raise InputError(
-            f"{trial.path}: {comparator.name} needs {LEAD + FEWEST * horizon + 1} steps or more, "
+            f"{trial.path}: {comparator.name} needs {FEWEST * horizon + 1} steps or more, "
             f"and the trial has {behaviour.steps}: leave this log out"
         )
-    count = min(comparator.most, (behaviour.steps - 1 - LEAD) // horizon)
-    starts = np.linspace(LEAD, behaviour.steps - 1 - horizon, count).round().astype(np.intp)
+    count = min(comparator.most, (behaviour.steps - 1) // horizon)
+    starts = np.linspace(0, behaviour.steps - 1 - horizon, count).round().astype(np.intp)
     known: dict[Signal, BoolArray] = {
         signal: np.asarray(np.isfinite(states[signal][starts]).all(axis=1))
         for signal in comparator.state

@@ -39,7 +39,7 @@ when a foot comes down, and that shows as noise between near values."""
 DELAYS = range(6)
 """Control delays that are tried."""
 
-SEGMENTS, HORIZON, LEAD = 80, 10, max(DELAYS)
+SEGMENTS, HORIZON, LEAD = 40, 10, max(DELAYS)
 """Segments of a trial, their length, and the commands from before each that a delay may need."""
 
 SCALES: dict[Signal, float] = {
@@ -53,9 +53,9 @@ SCALES: dict[Signal, float] = {
 """Errors beyond these count by their size, smaller ones by their square: an impact that is missed
 by a step is no statement about masses."""
 
-ITERATIONS = 5
+ITERATIONS = 3
 
-EXACT = 1e-6
+EXACT = 0.01
 """The root mean square error, in ``SCALES``, below which the model is taken to be the robot."""
 
 

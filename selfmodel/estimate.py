@@ -17,15 +17,15 @@ BASE: tuple[Signal, ...] = ("base_position", "base_linear_velocity")
 STATE: tuple[Signal, ...] = JOINTS + IMU + BASE
 """The signals that make up the state."""
 
-_SMOOTHED: tuple[tuple[Signal, Signal, int, float], ...] = (
-    ("joint_positions", "joint_velocities", 3, 3e-3),
-    ("base_position", "base_linear_velocity", 6, 5e-4),
-)
-"""Which positions move by which velocities, over how many steps to either side they are averaged,
-and from which noise on, in their unit: below it, averaging adds more error than it takes."""
+STILL = 1e-6
+"""What moves by less, rad or m, in a control step is at rest, and tells nothing of the noise."""
 
-_TENTH = 0.1257
-"""The tenth percentile of the magnitude of a normal variable of deviation 1."""
+_SMOOTHED: tuple[tuple[Signal, Signal, int], ...] = (
+    ("joint_positions", "joint_velocities", 3),
+    ("base_position", "base_linear_velocity", 6),
+)
+"""Which positions move by which velocities, and over how many steps to either side they are
+averaged."""
 
 
 def estimated_states(
@@ -38,16 +38,16 @@ def estimated_states(
         signals: The parts of the state that are to be estimated.
 
     Returns:
-        Each signal, ``(steps, width)``. Where the noise is small it is what was logged, to the
-        bit; NaN where something that it would be estimated from was not observed.
+        Each signal, ``(steps, width)``. Where no noise shows it is what was logged, to the bit;
+        NaN where something that it would be estimated from was not observed.
     """
     states = {signal: behaviour[signal] for signal in signals}
     timestep = float(behaviour.time[1] - behaviour.time[0]) if behaviour.steps > 1 else 0.0
-    for position, velocity, reach, threshold in _SMOOTHED:
+    for position, velocity, reach in _SMOOTHED:
         if position in states:
             values = behaviour[position]
             moved = np.diff(values, axis=0) - _steps_along(behaviour[velocity], timestep)
-            if _noise(moved) > threshold:
+            if _is_noise(moved):
                 states[position] = _averaged(values, behaviour[velocity], timestep, reach)
     return states
 
@@ -57,14 +57,16 @@ def _steps_along(velocities: FloatArray, timestep: float) -> FloatArray:
     return np.asarray((velocities[1:] + velocities[:-1]) / 2 * timestep)
 
 
-def _noise(moved: FloatArray) -> float:
-    """The deviation of a position's noise, from what its velocity does not explain.
+def _is_noise(moved: FloatArray) -> bool:
+    """Whether what the velocities do not explain is mostly noise.
 
-    At impacts the velocity explains little even without noise. In the quietest tenth of the steps
-    it explains almost everything.
+    Noise that puts a position too high at one step makes the move to it too long and the one from
+    it too short, so it has successive moves contradict each other, two times in three where it is
+    all there is. What impacts and the length of a step leave unexplained rather persists.
     """
-    known = np.abs(moved[np.isfinite(moved)])
-    return float(np.quantile(known, 0.1)) / _TENTH / np.sqrt(2) if len(known) else 0.0
+    at_all = np.abs(moved) > STILL
+    product = (moved[1:] * moved[:-1])[at_all[1:] & at_all[:-1]]
+    return bool(np.sum(product < 0) > np.sum(product > 0))
 
 
 def _averaged(

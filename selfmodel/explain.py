@@ -1,6 +1,6 @@
 """Diagnosis from logged trials alone, as a recovery makes it trial by trial."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 from selfmodel.database import Database
 from selfmodel.diagnose import Diagnose
@@ -16,6 +16,7 @@ def explain(
     diagnose: Diagnose,
     seed: int,
     watch: Callable[[Event], None],
+    after: Collection[int] | None = None,
 ) -> Diagnosis:
     """Returns the hypotheses that explain all trials, ranked.
 
@@ -27,6 +28,8 @@ def explain(
         diagnose: The diagnostic EA.
         seed: Every random choice comes from it.
         watch: Is told what happens.
+        after: After how many trials a diagnosis is made, the last one included; after each, if none
+            are given.
 
     Raises:
         InputError: There are no trials, or the comparator cannot judge one.
@@ -35,7 +38,7 @@ def explain(
         raise InputError("expected at least one trial to explain, got none")
     diagnose.check(trials)
     known = Database()
-    for number in range(1, len(trials) + 1):
+    for number in range(1, len(trials) + 1) if after is None else sorted(after):
         watch(SearchBegins("diagnostic"))
         diagnosis = diagnose(
             trials[:number], known.hypotheses, diagnosis_stream(seed, number), watch

@@ -9,12 +9,11 @@ from pathlib import Path
 from time import perf_counter
 from urllib.parse import quote
 
-from selfmodel.calibrate import calibrate
 from selfmodel.cli import resolve
 from selfmodel.cli.ablation import bank
 from selfmodel.cli.ablation.plan import Spec
 from selfmodel.cli.ablation.rows import Row
-from selfmodel.cli.ablation.trials import Setting, physical_trials
+from selfmodel.cli.ablation.trials import Setting, calibrated_robot, physical_trials
 from selfmodel.cli.experiment import Experiment, run
 from selfmodel.diagnose import Diagnose
 from selfmodel.diagnosis import Diagnosis
@@ -58,7 +57,7 @@ def run_one(spec: Spec, comparator: str, folder: Path, gaits: Path) -> list[Row]
 def _from_the_bank(setting: Setting) -> list[Row]:
     """The trials are the same for every comparator, and so are their logs."""
     intact, trials = physical_trials(setting)
-    simulator = Simulator(calibrate(setting.robot, intact, threads=1).robot, threads=1)
+    simulator = Simulator(calibrated_robot(setting, intact), threads=1)
     search = Diagnose(
         simulator,
         setting.comparator,
@@ -80,7 +79,7 @@ def _from_the_bank(setting: Setting) -> list[Row]:
                 )
             )
 
-    explain(trials, search, setting.spec.cell.seed, watch)
+    explain(trials, search, setting.spec.cell.seed, watch, after={1, len(trials)})
     return rows
 
 

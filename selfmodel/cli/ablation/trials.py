@@ -1,9 +1,12 @@
 """The physical trials of a run: made once, and known from their logs."""
 
+import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from selfmodel.atomic import part_of
+from selfmodel.atomic import part_of, put
+from selfmodel.calibrate import calibrate
 from selfmodel.cli.ablation.plan import HEALTHY_TRIALS, Spec
 from selfmodel.cli.reality import draw_reality
 from selfmodel.comparator import Comparator
@@ -50,6 +53,17 @@ def physical_trials(setting: Setting) -> tuple[list[Trial], list[Trial]]:
         for number, gait in enumerate(setting.gaits[: settings.trials], start=HEALTHY_TRIALS)
     ]
     return before, after
+
+
+def calibrated_robot(setting: Setting, intact: Sequence[Trial]) -> Robot:
+    """Returns the self-model fitted to the trials before the failure, the same for all comparators.
+
+    It is kept beside the trials.
+    """
+    path, robot = setting.folder / "calibrated.xml", setting.robot
+    if not path.exists():
+        put(path, calibrate(robot, intact, threads=1).robot.mjcf.encode())
+    return dataclasses.replace(robot, mjcf=path.read_text(encoding="utf-8"))
 
 
 def _trial(setting: Setting, number: int, stage: Stage, gait: Controller) -> Trial:
