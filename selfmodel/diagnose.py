@@ -107,7 +107,7 @@ class Diagnose:
     @property
     def distinct_hypotheses(self) -> int:
         """How many hypotheses were ever simulated."""
-        return len(self.evidence.distinct_hypotheses | self._screen.distinct_hypotheses)
+        return len(self.evidence.hypotheses | self._screen.hypotheses)
 
     def _evolved(
         self,
@@ -151,8 +151,9 @@ class Diagnose:
     def _rivals(
         self, best: Hypothesis, others: Sequence[Hypothesis], trials: Sequence[Trial]
     ) -> tuple[Hypothesis, ...]:
-        """Those that cannot be told from the best, but for those that only say more."""
-        candidates = [other for other in others if not set(best.faults) < set(other.faults)]
+        """Those that cannot be told from the best, but for those that only say more of the same."""
+        said = _without_degrees(best)
+        candidates = [other for other in others if not said <= _without_degrees(other)]
         mine, *theirs = self.evidence.losses([best, *candidates], trials)
         if self.evidence.in_pieces:
             told = [is_better(mine, losses) for losses in theirs]
@@ -169,6 +170,10 @@ class Diagnose:
             if is_worse_than_ever(mine, usual):
                 return "unexplained"
         return "ambiguous" if rivals else "explained"
+
+
+def _without_degrees(hypothesis: Hypothesis) -> set[tuple[Kind, str]]:
+    return {(fault.kind, fault.part) for fault in hypothesis.faults}
 
 
 def _ranked(totals: dict[Hypothesis, float]) -> list[Hypothesis]:

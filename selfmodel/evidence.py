@@ -35,7 +35,7 @@ class Evidence:
         return isinstance(self._comparator, Piecewise)
 
     @property
-    def distinct_hypotheses(self) -> set[Hypothesis]:
+    def hypotheses(self) -> set[Hypothesis]:
         """The hypotheses that were ever simulated."""
         return {hypothesis for memo in self._losses.values() for hypothesis in memo}
 
