@@ -117,12 +117,12 @@ class _Search:
     def settled(self, start: Hypothesis) -> Hypothesis:
         """Where a search ends: no change helps, and no fault can be spared."""
         current = self._descended(start, self._neighbours)
+        seen = {current}
         while True:
-            spared = self.spared(current)
-            again = self._descended(spared, self._others_in_place)
-            if again in (current, spared):
-                return self.spared(again)
-            current = again
+            current = self._descended(self.spared(current), self._others_in_place)
+            if current in seen:
+                return self.spared(current)
+            seen.add(current)
 
     def with_one_more(self, hypothesis: Hypothesis) -> list[Hypothesis]:
         return self._distinct(hypothesis, [(*hypothesis.faults, fault) for fault in self._faults])
@@ -135,7 +135,8 @@ class _Search:
             best = self.closest(neighbours(current))
             if not best or self.total(best[0]) >= self.total(current):
                 return current
-            current = self.fitted(best[0])
+            # The screen fits degrees; what it likes need not be better when looked at closely.
+            current = min(best[0], self.fitted(best[0]), key=self.total)
 
     def spared(self, hypothesis: Hypothesis) -> Hypothesis:
         """Without the faults that make the prediction no better, the least useful first."""
