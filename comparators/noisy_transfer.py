@@ -87,24 +87,22 @@ class NoisyTransfer:
 
     def losses(self, simulated: Behaviour, trial: Trial) -> FloatArray:
         """Returns the loss of each window of which anything was observed, ``(n, windows)``."""
-        total, judged = 0.0, 0.0
-        for signal in self._observed(trial):
+        signals = self._observed(trial)
+        windows = -(-trial.behaviour.steps // WINDOW)
+        total = np.zeros((len(simulated[signals[0]]), windows))
+        judged = np.zeros(windows)
+        for signal in signals:
             logged = _columns(signal, trial.behaviour[signal])
             seen = np.isfinite(logged)
-            shown = _features(logged[np.newaxis], seen)
-            known = _in_windows(seen).any(axis=1)
-            # One hypothesis after the other: it fits in the cache, and none can touch another.
-            losses = np.stack(
-                [
-                    _shortfall(_features(_columns(signal, runs), seen) - shown, FLOORS[signal])
-                    for runs in simulated[signal]
-                ]
-            )
-            share = np.concatenate([known, known], axis=1) / (2 * known.shape[1])
-            total = total + (losses * share).sum(axis=2)
-            judged = judged + share.sum(axis=1)
-        # In C order, so that a mean adds the same way for any number of hypotheses.
+            shown, floor = _features(logged[np.newaxis], seen), FLOORS[signal]
+            known = np.tile(_in_windows(seen).any(axis=1), 2) / (2 * seen.shape[1])
+            # One hypothesis at a time: its members fit in the cache, and none touches another.
+            for one, runs in enumerate(simulated[signal]):
+                difference = _features(_columns(signal, runs), seen) - shown
+                total[one] += (_shortfall(difference, floor) * known).sum(axis=1)
+            judged += known.sum(axis=1)
         some = judged > 0
+        # In C order, because the order in memory decides the order in which a mean adds.
         return np.ascontiguousarray(total[:, some] / judged[some])
 
     def _observed(self, trial: Trial) -> tuple[Signal, ...]:
@@ -142,7 +140,7 @@ def _features(values: FloatArray, seen: BoolArray) -> FloatArray:
     return np.concatenate([mean, spread], axis=-1)
 
 
-def _in_windows(values: FloatArray) -> FloatArray:
+def _in_windows(values: FloatArray | BoolArray) -> FloatArray:
     """Cuts the steps into windows, ``(..., windows, WINDOW, columns)``, the last filled with 0."""
     *before, steps, columns = values.shape
     windows = -(-steps // WINDOW)
