@@ -109,9 +109,24 @@ def test_a_piece_is_a_window_of_the_trial():
 
 
 def test_motion_about_the_same_mean_is_told_from_stillness():
-    still, walking = gait(swing=0), gait(swing=0.4)
+    # Whole strides to a window.
+    walking = gait(frequency=100 / WINDOW)
+    still = changed(walking, joint_positions=np.zeros_like(walking["joint_positions"]))
 
-    assert distances([changed(walking, joint_positions=still["joint_positions"])] * MEMBERS) > 0.1
+    assert NOISY_TRANSFER.distances(ensembles([still] * MEMBERS), logged(walking))[0] > 0.1
+
+
+def test_what_was_observed_now_and_then_counts_as_what_was_observed_throughout():
+    still = gait(swing=0)
+    glimpsed = still["joint_positions"].copy()
+    glimpsed[::3] = np.nan
+    runs = ensembles(turned(still, *np.linspace(0.2, 0.4, MEMBERS)))
+    throughout, now_and_then = (
+        NOISY_TRANSFER.distances(runs, logged(changed(still, joint_positions=joints)))
+        for joints in (still["joint_positions"], glimpsed)
+    )
+
+    np.testing.assert_allclose(now_and_then, throughout, rtol=1e-9)
 
 
 def test_a_base_that_was_logged_with_the_other_sign_is_the_same():
