@@ -8,6 +8,7 @@ import os
 from collections.abc import Callable
 from statistics import median
 from time import perf_counter
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,7 +19,6 @@ from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT
 from selfmodel.controller import Controller, draw_weights
 from selfmodel.diagnose import Diagnose
 from selfmodel.evidence import simulate
-from selfmodel.evolution import Generation
 from selfmodel.faults import PAPER_KINDS
 from selfmodel.genome import VALUES, decode
 from selfmodel.notation import parse
@@ -28,6 +28,9 @@ from selfmodel.settings import Settings
 from selfmodel.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 from selfmodel.trial import Plan, Trial
+
+if TYPE_CHECKING:
+    from selfmodel.evolution import Generation
 
 ROUNDS = 3
 """Rounds of every comparison, in which the comparators take turns; the medians are compared."""
