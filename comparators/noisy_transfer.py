@@ -57,11 +57,12 @@ class NoisyTransfer:
     Windows, features and floors are choices made here.
 
     Limits: the level of the gap is assumed, not measured: a robot that is further from its model
-    makes every hypothesis unlikely, and one that is closer is told apart less sharply than it
-    could be. Delay, instruments and structure are not drawn. It costs as many simulations as there
-    are members, six for every one of the other comparators, and six tell a deviation only roughly.
-    Beyond the moment from which the members disagree, a trial says little. Features are judged as
-    if they were independent.
+    makes every hypothesis unlikely, and one that is closer is told apart less sharply than it could
+    be; as no member is the model itself, not even the truth is at 0 where there is no gap. Delay,
+    instruments and structure are not drawn. It costs as many simulations as there are members, six
+    for every one of the other comparators, and six tell a deviation only roughly. Beyond the moment
+    from which the members disagree, a trial says little. Features are judged as if they were
+    independent.
 
     Attributes:
         name: What it is called.
