@@ -1,7 +1,8 @@
 """``make bench``: speed, memory and their growth, measured in one run and kept as JSON.
 
-Every figure is a median of at least five rounds, after one that warms up. Ratios compare things
-that took turns in one process, with the same model, threads, starts and motor targets.
+Every figure is a median of at least five rounds, after one that warms up; those of the comparators,
+of which a round takes minutes, of three. Ratios compare things that took turns in one process, with
+the same model, threads, starts and motor targets.
 """
 
 import json
@@ -16,7 +17,8 @@ from statistics import median
 import mujoco
 import numpy as np
 
-from benchmarks import recovery, simulation, trial_log
+from benchmarks import comparators, recovery, simulation, trial_log
+from selfmodel.settings import Settings
 from selfmodel.tasks import ROBOTS
 
 RESULTS = Path(__file__).with_name("results.json")
@@ -48,6 +50,7 @@ def main() -> None:
         "help_cpu_seconds": help_cpu_seconds(),
         "closed_loop": loops,
         "growth": simulation.growth(robots, threads),
+        "comparators": comparators.measure(threads, Settings()),
     }
     text = json.dumps(results, indent=2)
     RESULTS.write_text(text + "\n", encoding="utf-8")

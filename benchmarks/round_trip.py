@@ -76,7 +76,7 @@ def judged(log: TrialLog, truth: Hypothesis) -> str:
     simulator = Simulator(robot_of(log), os.cpu_count() or 1)
     search = Diagnose(simulator, FORWARD_DISPLACEMENT, log.settings)
     best = explain([log.trial], search, SEED, lambda _: None).best
-    distance = 1000 * float(search.distances([truth], [log.trial])[0])
+    distance = 1000 * float(search.evidence.distances([truth], [log.trial])[0])
     said = "right" if best == truth else f"`{best}`"
     return f"{said}, {distance:.2f} mm"
 

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from selfmodel.comparator import Comparator
 from selfmodel.comparators.forward_displacement import FORWARD_DISPLACEMENT
 from selfmodel.comparators.gait_pattern import GAIT_PATTERN
+from selfmodel.comparators.noisy_transfer import NOISY_TRANSFER
 from selfmodel.comparators.paper_sensors import PAPER_SENSORS
 from selfmodel.comparators.segment_prediction import (
     SEGMENT_PREDICTION,
@@ -19,6 +20,7 @@ COMPARATORS: Mapping[str, Comparator] = {
         PAPER_SENSORS,
         SENSOR_SERIES,
         GAIT_PATTERN,
+        NOISY_TRANSFER,
         SEGMENT_PREDICTION,
         SEGMENT_PREDICTION_ONBOARD,
     )
@@ -32,6 +34,7 @@ __all__ = [
     "DEFAULT",
     "FORWARD_DISPLACEMENT",
     "GAIT_PATTERN",
+    "NOISY_TRANSFER",
     "PAPER_SENSORS",
     "SEGMENT_PREDICTION",
     "SEGMENT_PREDICTION_ONBOARD",

@@ -9,6 +9,7 @@ from selfmodel.behaviour import Behaviour, Signal
 from selfmodel.comparator import ClosedLoop
 from selfmodel.comparators.bounded import bounded
 from selfmodel.errors import InputError
+from selfmodel.rotation import directions
 from selfmodel.trial import Trial
 
 BLOCK = 5
@@ -115,12 +116,7 @@ class SensorSeries:
 
 def _columns(signal: Signal, values: FloatArray) -> FloatArray:
     """What of a signal is compared, ``(..., steps, columns)``."""
-    if signal != "base_orientation":
-        return values
-    w, x, y, z = np.moveaxis(values, -1, 0)
-    forward = (1 - 2 * (y * y + z * z), 2 * (x * y + w * z))
-    upward = (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y))
-    return np.stack([*forward, *upward], axis=-1)
+    return directions(values) if signal == "base_orientation" else values
 
 
 def _blocks(difference: FloatArray, seen: BoolArray) -> FloatArray:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 from selfmodel.arrays import FloatArray
-from selfmodel.behaviour import Behaviour, Signal
+from selfmodel.behaviour import SIGNALS, Behaviour, Signal
 from selfmodel.trial import Trial
 
 
@@ -32,7 +32,7 @@ class Segments:
             commands take effect late.
         lead: Rows of ``commands`` from before the segment.
         record: The signals that the comparator looks at, ``(n, segments, horizon + 1, width)``
-            each; row 0 is the beginning.
+            each; row 0 is the beginning. Any but ``commands``, which are given.
     """
 
     states: Mapping[Signal, FloatArray]
@@ -67,6 +67,16 @@ Request = ClosedLoop | Segments | Ensemble
 """What may be simulated to judge a trial."""
 
 
+def recordable(request: Request) -> tuple[Signal, ...]:
+    """Returns the signals that what was requested can record.
+
+    A segment is given its commands, so there is nothing to record of them.
+    """
+    if isinstance(request, Segments):
+        return tuple(signal for signal in SIGNALS if signal != "commands")
+    return SIGNALS
+
+
 @runtime_checkable
 class Comparator(Protocol):
     """Judges how far the behaviour that hypotheses predict is from what a trial showed.
@@ -98,8 +108,8 @@ class Comparator(Protocol):
             trial: The logged trial, ``(steps, width)`` for each signal.
 
         Returns:
-            ``(n,)`` finite numbers of at least 0, smaller is closer; 0 for a simulation that did
-            what the trial shows.
+            ``(n,)`` finite numbers of at least 0, smaller is closer; exactly 0 for a simulation
+            that did what the trial shows, as ``selfmodel.contract.shown`` does.
         """
         ...
 

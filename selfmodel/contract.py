@@ -2,9 +2,17 @@
 
 import numpy as np
 
-from selfmodel.arrays import FloatArray
-from selfmodel.behaviour import SIGNALS, Behaviour
-from selfmodel.comparator import ClosedLoop, Comparator, Ensemble, Piecewise, Request, Segments
+from selfmodel.arrays import FloatArray, IndexArray
+from selfmodel.behaviour import Behaviour
+from selfmodel.comparator import (
+    ClosedLoop,
+    Comparator,
+    Ensemble,
+    Piecewise,
+    Request,
+    Segments,
+    recordable,
+)
 from selfmodel.trial import Trial
 
 CROWDED = (
@@ -20,8 +28,9 @@ def check_comparator(comparator: Comparator, trial: Trial, simulated: Behaviour)
         comparator: The one to check.
         trial: A logged trial.
         simulated: What ``comparator.request(trial)`` asks to simulate, for at least two
-            hypotheses, of which the first did what the trial shows. Signals that it did not ask
-            for do no harm: all signals, ``(n, steps, width)``, serve every ``ClosedLoop`` request.
+            hypotheses, of which the first did what the trial shows, to the bit: ``shown`` makes
+            such a one. Signals that it did not ask for do no harm: all signals, ``(n, steps,
+            width)``, serve every ``ClosedLoop`` request.
 
     Raises:
         ValueError: It breaks its contract, or ``simulated`` is not what it asked for; the message
@@ -53,14 +62,65 @@ def check_comparator(comparator: Comparator, trial: Trial, simulated: Behaviour)
         raise ValueError("a comparator must not change what it is given")
 
 
+def shown(request: Request, trial: Trial) -> Behaviour:
+    """Returns what a simulation would give that does exactly what a trial shows.
+
+    No simulation of segments does so to the bit, not even one of the truth, because the solver of
+    the contacts starts from other guesses there than in one long run: some 1e-9 is left.
+
+    Args:
+        request: What a comparator asked for.
+        trial: A logged trial; for segments, one without noise, in which the states that they begin
+            with are found as they were logged.
+
+    Returns:
+        The signals that were asked for, with a leading axis of one run.
+
+    Raises:
+        ValueError: The trial does not show what a segment begins with.
+    """
+    behaviour, time = trial.behaviour, trial.behaviour.time
+    rows: IndexArray = np.arange(behaviour.steps)
+    if isinstance(request, Segments):
+        rows = _starts(request, behaviour)[:, np.newaxis] + np.arange(request.horizon + 1)
+        time = time[: request.horizon + 1]
+    elif isinstance(request, Ensemble):
+        rows = np.tile(rows, (request.members, 1))
+    signals = {signal: behaviour[signal][rows][np.newaxis] for signal in request.record}
+    return Behaviour(behaviour.names, time, signals)
+
+
+def _starts(request: Segments, behaviour: Behaviour) -> IndexArray:
+    """The step of the trial at which each segment begins."""
+    horizon = request.horizon
+    steps = np.arange(behaviour.steps - horizon)
+    fits = np.ones((len(request.commands), len(steps)), dtype=bool)
+    for signal, values in request.states.items():
+        fits &= (values[:, np.newaxis] == behaviour[signal][steps]).all(axis=2)
+    ahead = behaviour["commands"][steps[:, np.newaxis] + np.arange(horizon)]
+    for segment, commands in enumerate(request.commands[:, request.lead :]):
+        fits[segment] &= (ahead == commands).all(axis=(1, 2))
+    if not fits.any(axis=1).all():
+        raise ValueError(
+            f"the trial shows no step at which segment {int(np.argmin(fits.any(axis=1)))} could "
+            f"begin, with its states, its commands and {horizon} steps to go: a trial without "
+            f"noise does, if the segments are cut from it"
+        )
+    return np.asarray(fits.argmax(axis=1))
+
+
 def _check_request(request: Request, trial: Trial) -> None:
     """Checks that a request can be met."""
     if not isinstance(request, ClosedLoop | Segments | Ensemble):
         raise ValueError(  # noqa: TRY004  # every breach of the contract is a ValueError
             f"a request must be a ClosedLoop, Segments or an Ensemble, got {request!r}"
         )
-    if not request.record or not set(request.record) <= set(SIGNALS):
-        raise ValueError(f"a request must record some of {SIGNALS}, got {request.record}")
+    possible = recordable(request)
+    if not request.record or not set(request.record) <= set(possible):
+        raise ValueError(
+            f"a request of {type(request).__name__} must record some of {possible}, got "
+            f"{request.record}"
+        )
     if isinstance(request, Ensemble) and not (request.members >= 1 and request.level >= 0):
         raise ValueError(
             f"an ensemble needs at least one member and a level of at least 0, got "

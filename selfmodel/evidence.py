@@ -6,8 +6,15 @@ from functools import partial
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.behaviour import SIGNALS
-from selfmodel.comparator import ClosedLoop, Comparator, Ensemble, Piecewise, Segments
+from selfmodel.comparator import (
+    ClosedLoop,
+    Comparator,
+    Ensemble,
+    Piecewise,
+    Request,
+    Segments,
+    recordable,
+)
 from selfmodel.errors import InputError
 from selfmodel.hypothesis import Hypothesis
 from selfmodel.memo import Memo
@@ -100,21 +107,38 @@ class Evidence:
         return np.where(outcome.diverged[:, np.newaxis], np.inf, losses)
 
     def _simulated(self, trial: Trial, hypotheses: list[Hypothesis]) -> Simulated:
-        request, simulator = self._comparator.request(trial), self._simulator
-        if not request.record or not set(request.record) <= set(SIGNALS):
-            raise self._broken(f"asked for the signals {request.record!r}, of {', '.join(SIGNALS)}")
-        driver, steps = trial.plan.controller, trial.behaviour.steps
-        match request:
-            case ClosedLoop():
-                runs = [(hypothesis, driver) for hypothesis in hypotheses]
-                return simulator.run(runs, steps, request.record)
-            case Segments():
-                return simulator.predict(hypotheses, request)
-            case Ensemble():
-                return simulator.run_ensemble(hypotheses, driver, steps, request)
+        request = self._comparator.request(trial)
+        possible = recordable(request)
+        if not request.record or not set(request.record) <= set(possible):
+            raise self._broken(
+                f"asked for the signals {request.record!r}, of {', '.join(possible)}"
+            )
+        return simulate(self._simulator, request, trial, hypotheses)
 
     def _broken(self, what: str) -> InputError:
         return InputError(
             f"the comparator {self._comparator.name!r} {what}: run "
             f"selfmodel.contract.check_comparator on it"
         )
+
+
+def simulate(
+    simulator: Simulator, request: Request, trial: Trial, hypotheses: Sequence[Hypothesis]
+) -> Simulated:
+    """Simulates what a comparator requested to judge a trial.
+
+    Args:
+        simulator: The self-model.
+        request: What the comparator asked for.
+        trial: The trial that it asked about.
+        hypotheses: At least one; each is a row of the signals.
+    """
+    driver, steps = trial.plan.controller, trial.behaviour.steps
+    match request:
+        case ClosedLoop():
+            runs = [(hypothesis, driver) for hypothesis in hypotheses]
+            return simulator.run(runs, steps, request.record)
+        case Segments():
+            return simulator.predict(hypotheses, request)
+        case Ensemble():
+            return simulator.run_ensemble(hypotheses, driver, steps, request)

@@ -20,3 +20,21 @@ def rotation_between(to: FloatArray, start: FloatArray) -> FloatArray:
     scalar = (to * start).sum(axis=-1, keepdims=True)
     vector = w * to[..., 1:] - to[..., :1] * v - np.cross(v, to[..., 1:])
     return np.asarray(2 * vector * np.where(scalar < 0, -1.0, 1.0))
+
+
+def directions(orientation: FloatArray) -> FloatArray:
+    """Returns where the axes of a body point that say how it lies and where it heads.
+
+    Unlike a quaternion, they do not change when its sign does.
+
+    Args:
+        orientation: ``(..., 4)``.
+
+    Returns:
+        ``(..., 5)``: the horizontal part of where its x axis points in the world, then the
+        world's upward direction in the body's frame.
+    """
+    w, x, y, z = np.moveaxis(orientation, -1, 0)
+    forward = (1 - 2 * (y * y + z * z), 2 * (x * y + w * z))
+    upward = (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y))
+    return np.stack([*forward, *upward], axis=-1)
