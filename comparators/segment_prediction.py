@@ -167,7 +167,7 @@ def _readings(predicted: FloatArray, logged: FloatArray, starts: IndexArray) -> 
     """How badly the readings are predicted, ``(n, segments)``.
 
     The first row of a segment follows from the state alone: there an angle's reading is sure, and
-    a touch is not, because millimetres decide.
+    a touch is not, because millimetres decide. Only at the start of the trial the robot stands.
     """
     rows = starts[:, np.newaxis] + np.arange(predicted.shape[2])
     told = logged[rows]
@@ -177,7 +177,7 @@ def _readings(predicted: FloatArray, logged: FloatArray, starts: IndexArray) -> 
     never = np.asarray(switches & ~predicted.any(axis=(1, 2)))
     graded = np.log1p(np.square((predicted - told) / SCALES["sensors"]))
     switched = np.abs(predicted - told) * np.where(never, CONTRADICTION, 1.0)[:, None, None]
-    switched[:, :, 0] = 0.0
+    switched[:, starts > 0, 0] = 0.0
     return _mean(np.where(switches[:, None, None], switched, graded))
 
 
