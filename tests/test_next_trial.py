@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -169,6 +169,7 @@ def test_a_base_has_fallen_when_it_leans_by_more_than_sixty_degrees_whatever_its
         assert falls == (1 if lean > np.pi / 3 else 2)
 
 
+@settings(deadline=None)
 @given(seed=st.integers(0, 2**32), hypotheses=st.integers(1, 4), size=st.floats(0, 10))
 def test_disagreement_is_a_part_of_one_and_knows_no_order_of_the_hypotheses(
     seed: int, hypotheses: int, size: float
@@ -209,6 +210,7 @@ def test_a_hypothesis_that_diverges_is_not_in_the_running(quadruped: Robot):
     assert in_the_running(dataclasses.replace(found, ranked=(found.ranked[0], apart))) == (INTACT,)
 
 
+@settings(deadline=None)
 @given(
     seed=st.integers(0, 2**32),
     known=st.integers(1, 4),
@@ -218,18 +220,18 @@ def test_the_controller_that_was_run_last_is_no_candidate_and_the_others_are(
     quadruped: Robot, seed: int, known: int, mutation: float
 ):
     tried = random_controllers(quadruped, known, seed % 97)
-    settings = dataclasses.replace(SMALL, mutation=mutation, crossovers=0)
-    pool = candidates(tried, settings, np.random.default_rng(seed))
+    numbers = dataclasses.replace(SMALL, mutation=mutation, crossovers=0)
+    pool = candidates(tried, numbers, np.random.default_rng(seed))
 
     assert tried[0] not in pool
     assert pool[: known - 1] == tried[1:]
-    assert 1 <= len(pool) == len(set(pool)) <= max(1, known - 1 + settings.population)
+    assert 1 <= len(pool) == len(set(pool)) <= max(1, known - 1 + numbers.population)
 
 
 def test_offspring_is_bred_of_every_controller_that_was_tried(quadruped: Robot):
     tried = random_controllers(quadruped, 3)
-    settings = dataclasses.replace(SMALL, mutation=0.05, crossovers=0)
-    pool = candidates(tried, settings, np.random.default_rng(0))
+    numbers = dataclasses.replace(SMALL, mutation=0.05, crossovers=0)
+    pool = candidates(tried, numbers, np.random.default_rng(0))
     kin = [[np.mean(child.genome == parent.genome) > 0.8 for parent in tried] for child in pool[2:]]
 
     assert np.all(np.sum(kin, axis=1) == 1)
