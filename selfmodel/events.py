@@ -36,5 +36,17 @@ class Calibrated:
     delay: int
 
 
-Event = SearchBegins | Generation | Calibrated | Trial | Diagnosis
-"""Of a search that goes on, of a calibration, a trial that ended, a diagnosis that was made."""
+@dataclass(frozen=True)
+class Question:
+    """The next trial is to tell hypotheses apart.
+
+    Attributes:
+        hypotheses: Those that are still in the running, the best first.
+    """
+
+    hypotheses: tuple[Hypothesis, ...]
+
+
+Event = SearchBegins | Generation | Calibrated | Question | Trial | Diagnosis
+"""Of a search that goes on, of a calibration, of what the next trial is for, a trial that ended, a
+diagnosis that was made."""

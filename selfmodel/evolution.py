@@ -107,16 +107,29 @@ class Evolution:
         count = settings.population - settings.survivors
         # Survivors are sorted, so the winner of a tournament is its lowest index.
         entrants = rng.integers(len(self._genomes), size=(count, settings.tournament))
-        children = self._genomes[entrants.min(axis=1)]
-        mutated = rng.random(children.shape) < settings.mutation
-        children = np.where(mutated, self._draw(rng, children.shape), children)
-        for pair in rng.permutation(count // 2)[: settings.crossovers]:
-            first, second = 2 * pair, 2 * pair + 1
-            point = rng.integers(1, children.shape[1])
-            tail = children[first, point:].copy()
-            children[first, point:] = children[second, point:]
-            children[second, point:] = tail
-        return children
+        return varied(self._genomes[entrants.min(axis=1)], self._draw, settings, rng)
+
+
+def varied(
+    parents: FloatArray, draw: Draw, settings: Settings, rng: np.random.Generator
+) -> FloatArray:
+    """Returns a child of each genome: mutated, and some of the pairs of neighbours then crossed.
+
+    Args:
+        parents: ``(n, length)``; they are not changed.
+        draw: Draws values for mutations.
+        settings: How often a value mutates and how many pairs cross.
+        rng: Every random choice comes from it.
+    """
+    mutated = rng.random(parents.shape) < settings.mutation
+    children = np.where(mutated, draw(rng, parents.shape), parents)
+    for pair in rng.permutation(len(children) // 2)[: settings.crossovers]:
+        first, second = 2 * pair, 2 * pair + 1
+        point = rng.integers(1, children.shape[1])
+        tail = children[first, point:].copy()
+        children[first, point:] = children[second, point:]
+        children[second, point:] = tail
+    return children
 
 
 def evolve(

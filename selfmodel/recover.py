@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from selfmodel.calibrate import Calibration
 from selfmodel.comparator import Comparator
@@ -12,11 +13,12 @@ from selfmodel.diagnosis import Diagnosis
 from selfmodel.events import Event, SearchBegins
 from selfmodel.faults import PAPER_KINDS, Kind
 from selfmodel.hypothesis import INTACT, Hypothesis
+from selfmodel.next_trial import NextTrial, Situation, by_repair
 from selfmodel.physical import PhysicalRobot
 from selfmodel.repair import Repair
 from selfmodel.settings import Settings
 from selfmodel.simulator import Simulator
-from selfmodel.streams import diagnosis_stream, repair_stream
+from selfmodel.streams import choice_stream, diagnosis_stream, repair_stream
 from selfmodel.trial import Plan, Stage, Trial
 
 
@@ -26,7 +28,7 @@ class Recovery:
 
     Attributes:
         trials: Every physical trial, in order: ``before``, ``after``, then the recoveries.
-        tried: The hypothesis that each trial's controller was evolved for.
+        tried: The best hypothesis when each trial's controller was chosen.
         diagnosis: The last one, which explains all trials.
         repair_evaluations: Controllers that the repair EA asked about.
         diagnostic_evaluations: Hypotheses that the diagnostic EA asked about.
@@ -71,6 +73,7 @@ def recover(
     gait: Controller | None = None,
     kinds: Sequence[Kind] = PAPER_KINDS,
     calibrate: Callable[[Sequence[Trial]], Calibration] | None = None,
+    next_trial: NextTrial = by_repair,
 ) -> Recovery:
     """Lets a robot walk until it fails, then finds out what is wrong and how it walks again.
 
@@ -88,6 +91,7 @@ def recover(
         kinds: What a diagnosis considers.
         calibrate: Fits the self-model to the trials before the failure; without it, the self-model
             stays as it is.
+        next_trial: Chooses the controller of each trial after the failing one.
 
     Returns:
         What the journal says at the end.
@@ -127,9 +131,19 @@ def recover(
             repair = Repair(simulator, settings, repair.evaluations)
     diagnose = Diagnose(simulator, comparator, settings, kinds, intact=intact)
     act(damaged, "after", INTACT, gait)
-    for _ in range(settings.trials):
+    for trials_left in range(settings.trials, 0, -1):
         believed = explain().best
-        act(damaged, "recovery", believed, evolve_controller(believed))
+        known = journal.read()
+        situation = Situation(
+            known=known,
+            trials_left=trials_left,
+            simulator=simulator,
+            settings=settings,
+            rng=choice_stream(seed, len(known.diagnoses)),
+            repaired=partial(evolve_controller, believed),
+            watch=watch,
+        )
+        act(damaged, "recovery", believed, next_trial(situation))
     diagnosis = explain()
 
     return Recovery(

@@ -17,6 +17,11 @@ def diagnosis_stream(seed: int, number: int) -> np.random.Generator:
     return _stream(seed, 2 * number - 1)
 
 
+def choice_stream(seed: int, number: int) -> np.random.Generator:
+    """Returns the stream of a recovery's choices of trials: 1 follows the first diagnosis."""
+    return _stream(seed, _CHOICES + number)
+
+
 def gap_stream(seed: int) -> np.random.Generator:
     """Returns the stream that the physical robot's reality gap is drawn from."""
     return _stream(seed, _PHYSICAL)
@@ -26,6 +31,9 @@ def structure_stream(seed: int) -> np.random.Generator:
     """Returns the stream that the physical robot's mismatches of structure are drawn from."""
     return _stream(seed, _PHYSICAL + 1)
 
+
+_CHOICES = 2**30
+"""The first key of the choices' streams: no recovery has so many searches."""
 
 _PHYSICAL = 2**31
 """The first key of the physical robot's streams: no recovery has so many searches."""

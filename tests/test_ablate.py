@@ -197,6 +197,43 @@ def test_repairs_are_tried_and_their_way_is_told(done: Path, tmp_path: Path):
     assert len(list(ablation.folder.glob("runs/*/forward-displacement/trials/*.mcap"))) == 3
 
 
+def test_trials_chosen_by_disagreement_are_a_comparators_own_and_none_is_repeated_at_once(
+    tmp_path: Path,
+):
+    ablation = small(
+        tmp_path / "out",
+        cases=[1],
+        next_trial="disagreement",
+        comparators=[PAPERS, "their_comparators:SAME"],
+        settings=Settings(steps=60, generations=2, trials=3).scaled(6),
+    )
+    assert run(ablation) == ()
+    (folder,) = ablation.folder.glob("runs/*")
+    (first,) = (folder / "trials").glob("*after*")
+    own = sorted((folder / PAPERS / "trials").iterdir())
+    drivers = [read_log(path).trial.plan.controller for path in (first, *own)]
+    rows = timeless(collect(ablation.folder))
+    papers, theirs = rows[:3], rows[3:]
+
+    assert [path.name for path in own] == ["03-after.mcap", "04-after.mcap"]
+    assert drivers[0] == load_controller(ablation.folder / "bank" / "quadruped-5.npz")
+    assert all(one != other for one, other in itertools.pairwise(drivers))
+    assert {read_truth(path) for path in own} == {"break:front_left_knee"}
+    assert [row.trials for row in papers] == [1, 2, 3]
+    assert {row.next_trial for row in papers} == {"disagreement"}
+    assert all(row.verdict and row.correct is not None for row in papers)
+    # The same arithmetic leads to the same trials, in whatever folder they are.
+    assert [dataclasses.replace(row, comparator=PAPERS) for row in theirs] == papers
+
+
+@pytest.mark.parametrize("way", ["repair", "disagreement"])
+def test_a_way_to_choose_needs_a_trial_to_choose(tmp_path: Path, way: str):
+    settings = Settings(steps=60, generations=2, trials=1).scaled(6)
+
+    with pytest.raises(InputError, match=f"with --next-trial {way} there are at least 2 trials"):
+        run(small(tmp_path / "out", next_trial=way, settings=settings))
+
+
 def test_a_killed_ablation_goes_on_and_finds_what_an_unbroken_one_finds(done: Path, tmp_path: Path):
     out = tmp_path / "out"
     script = tmp_path / "script.py"

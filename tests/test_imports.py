@@ -76,9 +76,12 @@ LAYERS = (
     (
         *("embodiment", "robot", "places", "noise", "senses", "batches", "tally", "prediction"),
         *("gap", "instruments", "start", "debris", "structure", "contract_kind"),
-        *("simulator", "physical", "judge", "replay", "parameters"),
+        *("simulator", "physical", "judge", "replay", "parameters", "disagreement"),
     ),
-    ("database", "evidence", "refine", "degrees", "diagnose", "repair", "calibrate"),
+    (
+        *("database", "evidence", "refine", "degrees", "diagnose", "repair", "calibrate"),
+        "next_trial",
+    ),
     ("recover", "explain"),
 )
 

@@ -3,6 +3,7 @@
 import dataclasses
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from selfmodel.genome import encode
 from selfmodel.hypothesis import INTACT, Hypothesis
 from selfmodel.logs import read_truth
 from selfmodel.logs.journal import open_journal
+from selfmodel.next_trial import NextTrial, Situation, by_repair, telling_apart
 from selfmodel.notation import parse
 from selfmodel.physical import SimulatedRobot
 from selfmodel.recover import Recovery, recover
@@ -28,6 +30,7 @@ from selfmodel.settings import Settings
 from selfmodel.simulator import Run, Simulator
 from selfmodel.tally import Simulated
 from selfmodel.trial import Trial
+from tests.conftest import random_controllers
 from tests.memory import MemoryJournal
 
 SMALL = dataclasses.replace(Settings().scaled(20), generations=5, steps=200)
@@ -74,6 +77,7 @@ def recovery(
     seed: int = 5,
     trials: int = 3,
     gait: Controller | None = None,
+    next_trial: NextTrial = by_repair,
 ) -> Recovery:
     """A small recovery from a failure."""
     physical = SimulatedRobot(robot), SimulatedRobot(robot, truth)
@@ -88,6 +92,7 @@ def recovery(
         seed=seed,
         watch=events.append,
         gait=gait,
+        next_trial=next_trial,
     )
 
 
@@ -283,3 +288,52 @@ def test_a_journal_of_files_shows_the_algorithm_no_more_than_its_three_methods(
     assert outcomes[0].diagnosis == outcomes[1].diagnosis
     assert read_truth(tmp_path / "told" / "trials" / "01-after.mcap") == str(truth)
     assert read_truth(tmp_path / "not-told" / "trials" / "01-after.mcap") is None
+
+
+def test_the_way_to_choose_is_asked_before_each_trial_and_obeyed(quadruped: Robot):
+    met: list[Situation] = []
+    given = random_controllers(quadruped, 3)
+
+    def choose(situation: Situation) -> Controller:
+        met.append(situation)
+        return given[len(met) - 1]
+
+    truth = parse("break:back_left_knee", quadruped.anatomy)
+    events: list[Event] = []
+    outcome = recovery(quadruped, truth, Simulator(quadruped, 2), events, next_trial=choose)
+
+    assert [trial.plan.controller for trial in outcome.trials[2:]] == given
+    assert [situation.trials_left for situation in met] == [3, 2, 1]
+    assert [len(situation.known.diagnoses) for situation in met] == [1, 2, 3]
+    assert [len(situation.known.evidence) for situation in met] == [1, 2, 3]
+    assert len({situation.rng.random() for situation in met}) == 3
+    assert not [e for e in events if isinstance(e, SearchBegins) and e.kind == "repair"][1:]
+
+
+def test_trials_that_tell_apart_differ_from_the_one_before_and_are_the_same_at_any_threads(
+    quadruped: Robot,
+):
+    def ask(situation: Situation) -> Controller:
+        diagnosis = situation.known.diagnoses[-1]
+        return telling_apart(
+            diagnosis,
+            situation.known.controllers,
+            situation.simulator,
+            situation.settings,
+            situation.rng,
+        )
+
+    truth = parse("sensor:front_left_touch", quadruped.anatomy)
+    gait = random_controllers(quadruped, 1)[0]
+    drivers = [
+        [
+            trial.plan.controller
+            for trial in recovery(
+                quadruped, truth, Simulator(quadruped, n), [], trials=2, gait=gait, next_trial=ask
+            ).trials[1:]
+        ]
+        for n in (1, 2)
+    ]
+
+    assert drivers[0] == drivers[1]
+    assert all(one != other for one, other in pairwise(drivers[0]))

@@ -38,7 +38,10 @@ def ablate(
     seeds: Annotated[int, typer.Option(min=1, help="Runs of each robot, case and gap.")] = 1,
     seed: Annotated[int, typer.Option(min=0, help="The first of their seeds.")] = 0,
     next_trial: Annotated[
-        str, typer.Option(metavar="bank|repair", help="How the trials' controllers are chosen.")
+        str,
+        typer.Option(
+            metavar="bank|repair|disagreement", help="How the trials' controllers are chosen."
+        ),
     ] = "bank",
     trials: Annotated[
         int, typer.Option(min=1, max=99, help="Physical trials of the damaged robot.")

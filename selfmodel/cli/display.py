@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn
 
 from selfmodel.diagnosis import Diagnosis
-from selfmodel.events import Calibrated, Event, SearchBegins
+from selfmodel.events import Calibrated, Event, Question, SearchBegins
 from selfmodel.evolution import Generation
 from selfmodel.trial import Trial
 
@@ -58,6 +58,9 @@ class _Lines:
                     f"calibration: error {event.error_before:.3f} before, {event.error:.3f} after; "
                     f"delay {event.delay} {'step' if event.delay == 1 else 'steps'}"
                 )
+            case Question():
+                apart = ", ".join(map(str, event.hypotheses))
+                self._say(f"the next trial is to tell apart: {apart}")
             case Trial():
                 self._say(f"trial {event.plan.name}: {event.displacement:.3f} m forward")
             case Diagnosis():

@@ -8,6 +8,7 @@ from time import perf_counter
 
 from selfmodel.calibrate import calibrate
 from selfmodel.cli.reality import draw_reality
+from selfmodel.cli.resolve import NEXT_TRIAL
 from selfmodel.comparator import Comparator
 from selfmodel.controller import Controller
 from selfmodel.events import Event
@@ -40,6 +41,7 @@ class Experiment:
         structure: Whether it is built differently, too.
         kinds: What a diagnosis considers.
         calibrated: Whether the self-model is fitted to the trials before the failure.
+        next_trial: How each trial after the failing one is chosen, one of ``NEXT_TRIAL``.
     """
 
     robot: Robot
@@ -55,6 +57,7 @@ class Experiment:
     structure: bool = False
     kinds: tuple[Kind, ...] = PAPER_KINDS
     calibrated: bool = True
+    next_trial: str = "repair"
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +104,7 @@ def run(experiment: Experiment, watch: Callable[[Event], None]) -> Outcome:
         calibrate=partial(calibrate, robot, threads=experiment.threads)
         if experiment.calibrated
         else None,
+        next_trial=NEXT_TRIAL[experiment.next_trial],
     )
     return Outcome(
         recovery=recovery,

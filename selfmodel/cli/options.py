@@ -73,6 +73,14 @@ KindNames = Annotated[
     ),
 ]
 DEFAULT_KINDS = ",".join(kind.name for kind in PAPER_KINDS)
+NextTrialName = Annotated[
+    str,
+    typer.Option(
+        metavar="repair|disagreement",
+        help="How the next trial is chosen: to restore the function, or, as long as hypotheses "
+        "cannot be told apart, to tell them apart.",
+    ),
+]
 LogFiles = Annotated[list[Path], typer.Argument(metavar="FILE...", help="Trial logs, NAME.mcap.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 

@@ -13,6 +13,7 @@ from selfmodel.cli.options import (
     GapLevel,
     Json,
     KindNames,
+    NextTrialName,
     RobotName,
     Seed,
     Structural,
@@ -33,6 +34,7 @@ def recover(
     gap: GapLevel = 0.0,
     structure: Structural = False,
     kinds: KindNames = DEFAULT_KINDS,
+    next_trial: NextTrialName = "repair",
     seed: Seed = 0,
     trials: Annotated[
         int, typer.Option(min=1, max=99, help="Physical trials after the failing one.")
@@ -80,6 +82,7 @@ def recover(
         folder=out or _new_folder(robot),
         gap=gap,
         structure=structure,
+        next_trial=resolve.next_trial(next_trial),
     )
     try:
         with display() as watch:

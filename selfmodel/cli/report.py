@@ -20,7 +20,7 @@ def print_report(experiment: Experiment, outcome: Outcome) -> None:
     """Prints the trials, and the diagnosis beside the truth."""
     found = facts(experiment, outcome)
     console = Console()
-    trials = Table("trial", "controller evolved for", "forward, m", title="physical trials")
+    trials = Table("trial", "what was then believed", "forward, m", title="physical trials")
     trials.columns[1].overflow = "fold"
     trials.columns[2].justify = "right"
     for trial in found["trials"]:
@@ -59,6 +59,7 @@ def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
         "kinds": [kind.name for kind in experiment.kinds],
         "gap": experiment.gap,
         "structure": experiment.structure,
+        "next_trial": experiment.next_trial,
         "seed": experiment.seed,
         "trials": [
             {

@@ -3,8 +3,9 @@
 import hashlib
 import importlib
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 from selfmodel.comparator import Comparator
 from selfmodel.comparators import COMPARATORS
@@ -14,8 +15,14 @@ from selfmodel.faults import ALL_KINDS, KINDS, Kind
 from selfmodel.logs import LogError, TrialLog, load_controller, read_log
 from selfmodel.logs.files import read_bounded
 from selfmodel.logs.robots import described_difference, the_robot_of
+from selfmodel.next_trial import NextTrial, by_disagreement, by_repair
 from selfmodel.robot import Robot
 from selfmodel.tasks import ROBOTS, Entry
+
+NEXT_TRIAL: Mapping[str, NextTrial] = MappingProxyType(
+    {"repair": by_repair, "disagreement": by_disagreement}
+)
+"""The ways to choose the next trial of a recovery."""
 
 LARGEST_MODEL = 64 * 2**20
 """Bytes that an MJCF file may have."""
@@ -66,6 +73,17 @@ def comparator(name: str) -> Comparator:
             f"selfmodel.comparator.Comparator, got {found!r}"
         )
     return found
+
+
+def next_trial(name: str) -> str:
+    """Returns the name of a way to choose the next trial, checked.
+
+    Raises:
+        InputError: There is none; the message names the nearest.
+    """
+    if name not in NEXT_TRIAL:
+        raise unknown_name("way to choose the next trial", name, NEXT_TRIAL)
+    return name
 
 
 def kinds(names: str) -> tuple[Kind, ...]:

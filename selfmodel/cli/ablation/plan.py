@@ -18,9 +18,10 @@ from selfmodel.grid import Job, difference, parameters_of, runs
 from selfmodel.notation import parse
 from selfmodel.settings import Settings
 
-NEXT_TRIAL = ("bank", "repair")
+NEXT_TRIAL = ("bank", "repair", "disagreement")
 """How the controllers of the trials are chosen: gaits from the bank, the same for every comparator;
-or, after the first trial, what the repair EA evolves for the diagnosis so far."""
+or, after the first trial, what the repair EA evolves for the diagnosis so far; or what the
+hypotheses of the diagnosis so far disagree on most."""
 
 GAITS = 6
 """Gaits of a robot in the bank."""
@@ -119,10 +120,10 @@ def check(ablation: Ablation) -> None:
     for gap in ablation.gaps:
         if not (math.isfinite(gap) and gap >= 0):
             raise InputError(f"a gap is a number of at least 0, such as 0.05, got {gap}")
-    if ablation.next_trial == "repair" and ablation.settings.trials < 2:
+    if ablation.next_trial != "bank" and ablation.settings.trials < 2:
         raise InputError(
-            "a repair follows the first diagnosis: with --next-trial repair there are at least 2 "
-            "trials, got 1"
+            f"a trial is chosen by the first diagnosis: with --next-trial {ablation.next_trial} "
+            f"there are at least 2 trials, got 1"
         )
     _check_folder(ablation)
 

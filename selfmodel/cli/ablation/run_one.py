@@ -1,28 +1,32 @@
 """One run: physical trials, logged once, and what one comparator makes of them."""
 
 import dataclasses
-import math
 import shutil
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from time import perf_counter
 from urllib.parse import quote
 
 from selfmodel.cli import resolve
 from selfmodel.cli.ablation import bank
 from selfmodel.cli.ablation.plan import Spec
 from selfmodel.cli.ablation.rows import Row
-from selfmodel.cli.ablation.trials import Setting, calibrated_robot, physical_trials
+from selfmodel.cli.ablation.score_one import Clock, row_of
+from selfmodel.cli.ablation.trials import (
+    Setting,
+    after_failure,
+    before_failure,
+    calibrated_robot,
+)
 from selfmodel.cli.experiment import Experiment, run
+from selfmodel.database import Database
 from selfmodel.diagnose import Diagnose
 from selfmodel.diagnosis import Diagnosis
 from selfmodel.events import Event, SearchBegins
-from selfmodel.evolution import Generation
 from selfmodel.explain import explain
-from selfmodel.judge import is_correct
+from selfmodel.next_trial import telling_apart
 from selfmodel.notation import parse
 from selfmodel.simulator import Simulator
+from selfmodel.streams import choice_stream, diagnosis_stream
 from selfmodel.trial import Trial
 
 
@@ -56,28 +60,21 @@ def run_one(spec: Spec, comparator: str, folder: Path, gaits: Path) -> list[Row]
 
 def _from_the_bank(setting: Setting) -> list[Row]:
     """The trials are the same for every comparator, and so are their logs."""
-    intact, trials = physical_trials(setting)
+    intact = before_failure(setting)
+    trials = [
+        after_failure(setting, number, gait)
+        for number, gait in enumerate(setting.gaits[: setting.spec.settings.trials])
+    ]
     simulator = Simulator(calibrated_robot(setting, intact), threads=1)
-    search = Diagnose(
-        simulator,
-        setting.comparator,
-        setting.spec.settings,
-        resolve.kinds(setting.spec.kinds),
-        intact=intact,
-    )
+    search = _search(setting, simulator, intact)
     rows: list[Row] = []
-    clock = _Clock()
+    clock = Clock()
 
     def watch(event: Event) -> None:
         clock(event)
         if isinstance(event, Diagnosis):
-            rows.append(
-                dataclasses.replace(
-                    _row(setting, event, trials[: event.trials], clock),
-                    evaluations=search.evaluations,
-                    distinct_hypotheses=search.distinct_hypotheses,
-                )
-            )
+            row = row_of(setting, event, trials[: event.trials], clock)
+            rows.append(_counted(row, search))
 
     explain(trials, search, setting.spec.cell.seed, watch, after={1, len(trials)})
     return rows
@@ -90,7 +87,7 @@ def _by_repair(setting: Setting) -> list[Row]:
     settings, cell = setting.spec.settings, setting.spec.cell
     rows: list[Row] = []
     trials: list[Trial] = []
-    clock = _Clock()
+    clock = Clock()
 
     def watch(event: Event) -> None:
         clock(event)
@@ -100,7 +97,7 @@ def _by_repair(setting: Setting) -> list[Row]:
             ways = [trial.displacement for trial in trials]
             rows.append(
                 dataclasses.replace(
-                    _row(setting, event, trials[1:], clock),
+                    row_of(setting, event, trials[1:], clock),
                     before=ways[0],
                     after=ways[1],
                     recovered=max(ways[2:], default=None),
@@ -129,60 +126,56 @@ def _by_repair(setting: Setting) -> list[Row]:
     return rows
 
 
-_WAYS: Mapping[str, Callable[[Setting], list[Row]]] = {
-    "bank": _from_the_bank,
-    "repair": _by_repair,
-}
+def _by_disagreement(setting: Setting) -> list[Row]:
+    """After the first, every comparator has trials of its own: what its hypotheses disagree on.
+
+    Nothing is repaired, whatever the verdict, so that the trials tell how soon one is right.
+    """
+    folder = setting.folder / quote(setting.name, safe="")
+    shutil.rmtree(folder, ignore_errors=True)  # what is left of a run that was killed
+    own = dataclasses.replace(setting, folder=folder)
+    settings, seed = setting.spec.settings, setting.spec.cell.seed
+    intact = before_failure(setting)
+    trials = [after_failure(setting, 0, setting.gaits[0])]
+    simulator = Simulator(calibrated_robot(setting, intact), threads=1)
+    search = _search(setting, simulator, intact)
+    rows: list[Row] = []
+    known = Database(trials=(*intact, *trials))
+    clock = Clock()
+    for number in range(1, settings.trials + 1):
+        clock(SearchBegins("diagnostic"))
+        diagnosis = search(trials, known.hypotheses, diagnosis_stream(seed, number), clock)
+        clock(diagnosis)
+        rows.append(_counted(row_of(setting, diagnosis, trials, clock), search))
+        if number < settings.trials:
+            chosen = telling_apart(
+                diagnosis, known.controllers, simulator, settings, choice_stream(seed, number)
+            )
+            trials.append(after_failure(own, number, chosen))
+        known = Database((*intact, *trials), (*known.diagnoses, diagnosis))
+    return rows
 
 
-@dataclass(eq=False)
-class _Clock:
-    """Counts what diagnoses cost, and nothing between them."""
-
-    evaluations: int = 0
-    seconds: float = 0.0
-    _start: float = field(default_factory=perf_counter)
-    _diagnosing: bool = False
-
-    def __call__(self, event: Event) -> None:
-        match event:
-            case SearchBegins(kind):
-                self._diagnosing = kind == "diagnostic"
-                self._start = perf_counter()
-            case Generation() if self._diagnosing and event.number == event.total:
-                self.evaluations += event.evaluations
-            case Diagnosis():
-                self.seconds += perf_counter() - self._start
-
-
-def _row(setting: Setting, diagnosis: Diagnosis, trials: list[Trial], clock: _Clock) -> Row:
-    cell = setting.spec.cell
-    best = diagnosis.ranked[0]
-    # A simulator of its own: judging is no part of what the diagnosis cost.
-    judge = Simulator(setting.robot, threads=1)
-    return Row(
-        robot=cell.robot,
-        case=cell.case,
-        truth=str(setting.truth),
-        gap=cell.gap,
-        seed=cell.seed,
-        next_trial=setting.spec.next_trial,
-        comparator=setting.name,
-        trials=diagnosis.trials,
-        best=str(best.hypothesis),
-        correct=is_correct(best.hypothesis, setting.truth, trials, judge),
-        distance=_finite(best.distance),
-        intact_distance=_finite(diagnosis.intact_distance),
-        verdict=diagnosis.verdict,
-        rivals=len(diagnosis.rivals),
-        evaluations=clock.evaluations,
-        distinct_hypotheses=None,
-        seconds=clock.seconds,
-        before=None,
-        after=None,
-        recovered=None,
+def _search(setting: Setting, simulator: Simulator, intact: Sequence[Trial]) -> Diagnose:
+    return Diagnose(
+        simulator,
+        setting.comparator,
+        setting.spec.settings,
+        resolve.kinds(setting.spec.kinds),
+        intact=intact,
     )
 
 
-def _finite(distance: float) -> float | None:
-    return float(distance) if math.isfinite(distance) else None
+def _counted(row: Row, search: Diagnose) -> Row:
+    return dataclasses.replace(
+        row,
+        evaluations=search.evaluations,
+        distinct_hypotheses=search.distinct_hypotheses,
+    )
+
+
+_WAYS: Mapping[str, Callable[[Setting], list[Row]]] = {
+    "bank": _from_the_bank,
+    "repair": _by_repair,
+    "disagreement": _by_disagreement,
+}

@@ -41,18 +41,17 @@ class Setting:
     folder: Path
 
 
-def physical_trials(setting: Setting) -> tuple[list[Trial], list[Trial]]:
-    """Returns the trials before and after the failure, as their logs say; runs those missing."""
-    settings = setting.spec.settings
-    before = [
+def before_failure(setting: Setting) -> list[Trial]:
+    """Returns the trials of the healthy robot, as their logs say; runs those missing."""
+    return [
         _trial(setting, number, "before", gait)
         for number, gait in enumerate(setting.gaits[:HEALTHY_TRIALS])
     ]
-    after = [
-        _trial(setting, number, "after", gait)
-        for number, gait in enumerate(setting.gaits[: settings.trials], start=HEALTHY_TRIALS)
-    ]
-    return before, after
+
+
+def after_failure(setting: Setting, number: int, controller: Controller) -> Trial:
+    """Returns the trial of that number, from 0, of the damaged robot; see ``before_failure``."""
+    return _trial(setting, HEALTHY_TRIALS + number, "after", controller)
 
 
 def calibrated_robot(setting: Setting, intact: Sequence[Trial]) -> Robot:
@@ -72,7 +71,7 @@ def _trial(setting: Setting, number: int, stage: Stage, gait: Controller) -> Tri
     plan = Plan(f"{number:02d}-{stage}", stage, gait, steps, seed)
     path = setting.folder / "trials" / f"{plan.name}.mcap"
     if not path.exists():
-        path.parent.mkdir(exist_ok=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
         part_of(path).unlink(missing_ok=True)  # of a run that was killed
         hidden = INTACT if stage == "before" else setting.truth
         cell, robot = setting.spec.cell, setting.robot

@@ -1,0 +1,128 @@
+"""How the next physical trial is chosen: to restore the function, or to tell hypotheses apart."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from selfmodel.controller import Controller, draw_weights
+from selfmodel.database import Database
+from selfmodel.diagnosis import Diagnosis
+from selfmodel.disagreement import most_disputed
+from selfmodel.events import Event, Question
+from selfmodel.evolution import varied
+from selfmodel.hypothesis import Hypothesis
+from selfmodel.settings import Settings
+from selfmodel.simulator import Simulator
+
+MOST = 5
+"""Hypotheses that a trial is to tell apart at most: the time grows with their number."""
+
+
+@dataclass(frozen=True, eq=False)
+class Situation:
+    """What a choice of the next trial is made from.
+
+    Attributes:
+        known: The trials and diagnoses so far, the last of them of all trials.
+        trials_left: How many trials may still be run, this one included.
+        simulator: The self-model.
+        settings: The paper's numbers.
+        rng: Every random choice comes from it.
+        repaired: Evolves the controller that compensates for what the last diagnosis says.
+        watch: Is told what happens.
+    """
+
+    known: Database
+    trials_left: int
+    simulator: Simulator
+    settings: Settings
+    rng: np.random.Generator
+    repaired: Callable[[], Controller]
+    watch: Callable[[Event], None]
+
+
+NextTrial = Callable[[Situation], Controller]
+"""A way to choose the controller of the next physical trial."""
+
+
+def by_repair(situation: Situation) -> Controller:
+    """Chooses the controller that compensates for the best hypothesis, as the paper does."""
+    return situation.repaired()
+
+
+def by_disagreement(situation: Situation) -> Controller:
+    """Chooses the controller on which hypotheses disagree, and a repair when that is over.
+
+    It is over once a diagnosis is ``explained``, or when only one trial is left: the trials are
+    spent to bring the robot back, and what is never tried restores nothing.
+    """
+    diagnosis = situation.known.diagnoses[-1]
+    if diagnosis.verdict == "explained" or situation.trials_left == 1:
+        return situation.repaired()
+    situation.watch(Question(in_the_running(diagnosis)))
+    return telling_apart(
+        diagnosis,
+        situation.known.controllers,
+        situation.simulator,
+        situation.settings,
+        situation.rng,
+    )
+
+
+def telling_apart(
+    diagnosis: Diagnosis,
+    known: Sequence[Controller],
+    simulator: Simulator,
+    settings: Settings,
+    rng: np.random.Generator,
+) -> Controller:
+    """Returns the controller on which the hypotheses that are in the running disagree most.
+
+    Args:
+        diagnosis: What is known of them.
+        known: Controllers that were tried, the newest first; the newest is not tried again.
+        simulator: The self-model.
+        settings: The paper's numbers.
+        rng: Every random choice comes from it.
+    """
+    return most_disputed(
+        in_the_running(diagnosis),
+        candidates(known, settings, rng),
+        simulator,
+        settings.steps,
+    )
+
+
+def in_the_running(diagnosis: Diagnosis) -> tuple[Hypothesis, ...]:
+    """Returns the best hypothesis and those that a trial should tell from it, five at most.
+
+    They are its rivals; where it has none, those that follow it in the ranking.
+    """
+    followers = diagnosis.rivals or tuple(
+        one.hypothesis for one in diagnosis.ranked[1:] if math.isfinite(one.distance)
+    )
+    return (diagnosis.best, *followers)[:MOST]
+
+
+def candidates(
+    known: Sequence[Controller], settings: Settings, rng: np.random.Generator
+) -> list[Controller]:
+    """Returns the controllers that a choice is made from, each once, the tried ones first.
+
+    Args:
+        known: Controllers that were tried, the newest first. They are candidates, but for the
+            newest; and so are their offspring, as many as an EA has genomes.
+        settings: How offspring is bred.
+        rng: Every random choice comes from it.
+    """
+    newest = known[0]
+    genomes = np.array([controller.genome for controller in known])
+    parents = np.resize(genomes, (settings.population, genomes.shape[1]))  # each in turn
+    children = varied(parents, draw_weights, settings, rng)
+    bred = [Controller(newest.network, genome) for genome in children]
+    found = [one for one in dict.fromkeys([*known, *bred]) if one != newest]
+    if not found:  # no child is another than its parent, as where nothing mutates
+        found = [Controller(newest.network, draw_weights(rng, newest.genome.shape))]
+    return found

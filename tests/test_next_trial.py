@@ -1,0 +1,286 @@
+"""Promises of choosing the next trial: it tells hypotheses apart, and no robot is made to fall."""
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from selfmodel.behaviour import Behaviour, Names, Signal
+from selfmodel.controller import Controller, Network
+from selfmodel.database import Database
+from selfmodel.diagnosis import Candidate, Diagnosis, Verdict
+from selfmodel.disagreement import EARLY, SCALES, disagreements, first_falls, most_disputed
+from selfmodel.events import Event, Question
+from selfmodel.hypothesis import INTACT, Hypothesis
+from selfmodel.next_trial import (
+    Situation,
+    by_disagreement,
+    by_repair,
+    candidates,
+    in_the_running,
+    telling_apart,
+)
+from selfmodel.notation import parse
+from selfmodel.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.simulator import Run, Simulator
+from selfmodel.tally import Simulated
+from selfmodel.trial import Plan, Trial
+from tests.conftest import random_controllers
+
+SMALL = dataclasses.replace(Settings().scaled(12), steps=150)
+NAMES = Names(sensors=("touch",), motors=("motor",), hinges=("hinge",))
+HEIGHT = 0.3
+
+
+@dataclass(frozen=True)
+class Fate:
+    """What is predicted of a controller.
+
+    Attributes:
+        spread: How far the joint's positions under the two hypotheses are apart, rad.
+        falls: The step at which the robot falls under the second hypothesis, if it does.
+        diverges: Whether the simulation of the second hypothesis does.
+        late: Whether they part only after what is read off.
+    """
+
+    spread: float
+    falls: int | None = None
+    diverges: bool = False
+    late: bool = False
+
+
+class Oracle:
+    """A simulator that knows the fate of each controller."""
+
+    robot = SimpleNamespace(standing_height=HEIGHT)
+
+    def __init__(self, fates: Sequence[Fate]) -> None:
+        network = Network(NAMES.sensors, NAMES.motors)
+        weights = np.arange(len(fates)) / 100
+        self.controllers = [
+            Controller(network, np.full(network.weights, weight)) for weight in weights
+        ]
+        self._fates = dict(zip(self.controllers, fates, strict=True))
+
+    def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> Simulated:
+        """Predicts what the fates say; only the second hypothesis is not uneventful."""
+        shapes = {signal: (len(runs), steps, NAMES.width(signal)) for signal in record}
+        signals = {signal: np.zeros(shape) for signal, shape in shapes.items()}
+        signals["base_position"][..., 2] = HEIGHT
+        signals["base_orientation"][..., 0] = 1
+        diverged = np.zeros(len(runs), dtype=bool)
+        for row, (hypothesis, controller) in enumerate(runs):
+            fate = self._fates[controller]
+            if hypothesis == INTACT:
+                continue
+            signals["joint_positions"][row, EARLY if fate.late else 0 :] = fate.spread
+            if fate.falls is not None:
+                signals["base_position"][row, fate.falls :, 2] = 0.4 * HEIGHT
+            if fate.diverges:
+                diverged[row] = True
+                signals["joint_positions"][row, -1] = np.nan
+        time = np.arange(steps) * 0.01
+        return Simulated(Behaviour(NAMES, time, signals), diverged)
+
+
+def chosen(quadruped: Robot, fates: Sequence[Fate], steps: int = 400) -> int:
+    """Which of the controllers with these fates is chosen."""
+    oracle = Oracle(fates)
+    hypotheses = [INTACT, parse("break:front_left_knee", quadruped.anatomy)]
+    one = most_disputed(hypotheses, oracle.controllers, oracle, steps)
+    return oracle.controllers.index(one)
+
+
+def moving(robot: Robot, motor: str) -> Controller:
+    """A controller that turns one joint and leaves the others where they are."""
+    network, genome = robot.network, np.zeros(robot.network.weights)
+    to_motors = genome[-len(network.motors) * (network.hidden + 1) :]
+    to_motors.reshape(len(network.motors), -1)[network.motors.index(motor), -1] = 1.0
+    return Controller(network, genome)
+
+
+def diagnosis(*texts: str, robot: Robot, rivals: int = 0, verdict: Verdict) -> Diagnosis:
+    """A diagnosis with these hypotheses, best first; the first few after the best are rivals."""
+    found = [parse(text, robot.anatomy) for text in texts]
+    return Diagnosis(
+        ranked=tuple(Candidate(one, float(rank)) for rank, one in enumerate(found)),
+        trials=1,
+        intact_distance=9.0,
+        rivals=tuple(found[1 : 1 + rivals]),
+        verdict=verdict,
+        test="by decree",
+    )
+
+
+def test_the_controller_that_makes_two_hypotheses_differ_is_chosen(quadruped: Robot):
+    hypotheses = [INTACT, parse("jam:front_left_knee", quadruped.anatomy)]
+    motors = ("back_left_knee", "back_right_knee", "front_left_knee", "front_right_knee")
+    pool = [moving(quadruped, motor) for motor in motors]
+
+    one = most_disputed(hypotheses, pool, Simulator(quadruped, 2), 120)
+    assert one == moving(quadruped, "front_left_knee")
+
+
+def test_what_differs_most_is_chosen_and_of_equals_the_first(quadruped: Robot):
+    assert chosen(quadruped, [Fate(0.1), Fate(0.2), Fate(0.2), Fate(0.15)]) == 1
+
+
+def test_what_differs_only_later_counts_for_nothing(quadruped: Robot):
+    assert chosen(quadruped, [Fate(0.01), Fate(0.3, late=True)]) == 0
+
+
+@pytest.mark.parametrize("step", [0, EARLY - 1, EARLY, 399])
+def test_a_controller_with_which_the_robot_falls_at_any_time_is_out(quadruped: Robot, step: int):
+    assert chosen(quadruped, [Fate(0.05), Fate(0.2, falls=step), Fate(0.1)]) == 2
+
+
+def test_a_controller_whose_simulation_diverges_is_out(quadruped: Robot):
+    assert chosen(quadruped, [Fate(0.2, diverges=True), Fate(0.1)]) == 1
+
+
+@pytest.mark.parametrize("steps", [(5, 50, 30), (150, 399, 200), (20, 300, 7)])
+def test_where_the_robot_always_falls_the_latest_fall_is_chosen(
+    quadruped: Robot, steps: tuple[int, ...]
+):
+    fates = [Fate(0.3 - 0.1 * k, falls=step) for k, step in enumerate(steps)]
+
+    assert chosen(quadruped, [Fate(0.3, diverges=True), *fates]) == 2
+
+
+@given(lean=st.floats(0, np.pi), heading=st.floats(-np.pi, np.pi), about=st.floats(-np.pi, np.pi))
+def test_a_base_has_fallen_when_it_leans_by_more_than_sixty_degrees_whatever_its_heading(
+    lean: float, heading: float, about: float
+):
+    axis = np.array([np.cos(about), np.sin(about), 0])
+    turned = Rotation.from_rotvec(lean * axis) * Rotation.from_euler("z", heading)
+    x, y, z, w = turned.as_quat()
+    orientation = np.array([[1, 0, 0, 0], [w, x, y, z]])
+    signals = {"base_position": np.full((2, 3), HEIGHT), "base_orientation": orientation}
+    falls = first_falls(Behaviour(NAMES, np.array([0, 0.01]), signals), HEIGHT)
+
+    if abs(lean - np.pi / 3) > 1e-6:
+        assert falls == (1 if lean > np.pi / 3 else 2)
+
+
+@settings(deadline=None)
+@given(seed=st.integers(0, 2**32), hypotheses=st.integers(1, 4), size=st.floats(0, 10))
+def test_disagreement_is_a_part_of_one_and_knows_no_order_of_the_hypotheses(
+    seed: int, hypotheses: int, size: float
+):
+    rng = np.random.default_rng(seed)
+    shape = (2, hypotheses, 7)
+    signals = {signal: size * rng.normal(size=(*shape, NAMES.width(signal))) for signal in SCALES}
+    turned = Rotation.from_rotvec(size * rng.normal(size=(np.prod(shape), 3)))
+    signals["base_orientation"] = turned.as_quat(scalar_first=True).reshape(*shape, 4)
+    order = rng.permutation(hypotheses)
+    time = np.arange(7) * 0.01
+    found = disagreements(Behaviour(NAMES, time, signals))
+    shuffled = {signal: values[:, order] for signal, values in signals.items()}
+
+    assert np.all((found >= 0) & (found <= 1))
+    assert disagreements(Behaviour(NAMES, time, shuffled)) == pytest.approx(found, abs=1e-12)
+    if hypotheses == 1 or size == 0:
+        assert np.all(found == 0)
+
+
+def test_the_rivals_are_in_the_running_and_without_any_those_that_follow(quadruped: Robot):
+    texts = [f"break:{joint.name}" for joint in quadruped.anatomy.joints]
+    known = [parse(text, quadruped.anatomy) for text in texts]
+
+    def running(rivals: int) -> tuple[Hypothesis, ...]:
+        return in_the_running(
+            diagnosis(*texts, robot=quadruped, rivals=rivals, verdict="ambiguous")
+        )
+
+    assert running(1) == tuple(known[:2])
+    assert running(7) == running(0) == tuple(known[:5])
+
+
+def test_a_hypothesis_that_diverges_is_not_in_the_running(quadruped: Robot):
+    found = diagnosis("intact", "break:front_left_knee", robot=quadruped, verdict="explained")
+    apart = dataclasses.replace(found.ranked[1], distance=float("inf"))
+
+    assert in_the_running(dataclasses.replace(found, ranked=(found.ranked[0], apart))) == (INTACT,)
+
+
+@settings(deadline=None)
+@given(
+    seed=st.integers(0, 2**32),
+    known=st.integers(1, 4),
+    mutation=st.sampled_from([0.0, 0.01, 1.0]),
+)
+def test_the_controller_that_was_run_last_is_no_candidate_and_the_others_are(
+    quadruped: Robot, seed: int, known: int, mutation: float
+):
+    tried = random_controllers(quadruped, known, seed % 97)
+    numbers = dataclasses.replace(SMALL, mutation=mutation, crossovers=0)
+    pool = candidates(tried, numbers, np.random.default_rng(seed))
+
+    assert tried[0] not in pool
+    assert pool[: known - 1] == tried[1:]
+    assert 1 <= len(pool) == len(set(pool)) <= max(1, known - 1 + numbers.population)
+
+
+def test_offspring_is_bred_of_every_controller_that_was_tried(quadruped: Robot):
+    tried = random_controllers(quadruped, 3)
+    numbers = dataclasses.replace(SMALL, mutation=0.05, crossovers=0)
+    pool = candidates(tried, numbers, np.random.default_rng(0))
+    kin = [[np.mean(child.genome == parent.genome) > 0.8 for parent in tried] for child in pool[2:]]
+
+    assert np.all(np.sum(kin, axis=1) == 1)
+    assert np.all(np.any(kin, axis=0))
+
+
+def test_the_same_stream_chooses_the_same_at_any_number_of_threads(quadruped: Robot):
+    found = diagnosis(
+        *("jam:front_left_knee", "jam:front_left_shoulder"),
+        robot=quadruped,
+        rivals=1,
+        verdict="ambiguous",
+    )
+    tried = random_controllers(quadruped, 2)
+    one, other = (
+        telling_apart(found, tried, Simulator(quadruped, n), SMALL, np.random.default_rng(3))
+        for n in (1, 2)
+    )
+
+    assert one == other != tried[0]
+
+
+@pytest.mark.parametrize(
+    ("verdict", "trials_left", "asks"),
+    [
+        ("ambiguous", 2, True),
+        ("unexplained", 2, True),
+        ("explained", 2, False),
+        ("ambiguous", 1, False),
+    ],
+)
+def test_hypotheses_are_told_apart_until_one_explains_or_one_trial_is_left(
+    quadruped: Robot, verdict: Verdict, trials_left: int, *, asks: bool
+):
+    gait, compensating = random_controllers(quadruped, 2)
+    found = diagnosis("jam:front_left_knee", "intact", robot=quadruped, verdict=verdict)
+    empty = Behaviour(quadruped.anatomy.names, np.zeros(1), {})
+    tried = Trial(Plan("01-after", "after", gait, 1, 0), "quadruped", empty, "01-after")
+    events: list[Event] = []
+    situation = Situation(
+        known=Database((tried,), (found,)),
+        trials_left=trials_left,
+        simulator=Simulator(quadruped, 1),
+        settings=SMALL,
+        rng=np.random.default_rng(0),
+        repaired=lambda: compensating,
+        watch=events.append,
+    )
+
+    assert by_repair(situation) == compensating
+    assert (by_disagreement(situation) != compensating) == asks
+    assert events == ([Question(in_the_running(found))] if asks else [])
