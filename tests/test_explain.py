@@ -90,7 +90,7 @@ def test_a_trial_that_other_software_drove_is_explained_by_its_commands(
     played = dataclasses.replace(trial, plan=plan)
     search = Diagnose(Simulator(quadruped, 2), FORWARD_DISPLACEMENT, SMALL)
     hypotheses = [parse(text, quadruped.anatomy) for text in ("break:back_left_shoulder", "intact")]
-    distances = search.distances(hypotheses, [played])
+    distances = search.evidence.distances(hypotheses, [played])
 
     assert distances[0] == 0 < distances[1]
 

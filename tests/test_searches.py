@@ -54,7 +54,7 @@ def test_a_diverging_hypothesis_is_infinitely_far_and_a_diverging_gait_is_worst(
     trial = logged(quadruped, "break:front_left_knee", controller)
     diagnose = Diagnose(simulator, FORWARD_DISPLACEMENT, SMALL)
 
-    distances = diagnose.distances([bad, INTACT], [trial])
+    distances = diagnose.evidence.distances([bad, INTACT], [trial])
     assert distances[0] == np.inf
     assert np.isfinite(distances[1])
     ways = Repair(simulator, SMALL)._simulate([(bad, controller), (INTACT, controller)])
@@ -94,10 +94,10 @@ def test_the_distance_to_several_trials_is_the_sum_of_the_distances(quadruped: R
     trials = [dataclasses.replace(t, path=str(i)) for i, t in enumerate(trials)]
     hypotheses = [INTACT, parse("jam:back_left_knee", quadruped.anatomy)]
     diagnose = Diagnose(Simulator(quadruped, 2), FORWARD_DISPLACEMENT, SMALL)
-    alone = [diagnose.distances(hypotheses, [trial]) for trial in trials]
+    alone = [diagnose.evidence.distances(hypotheses, [trial]) for trial in trials]
 
     assert np.all(np.array(alone) > 0)
-    np.testing.assert_allclose(diagnose.distances(hypotheses, trials), sum(alone), rtol=1e-12)
+    np.testing.assert_allclose(diagnose.evidence.distances(hypotheses, trials), sum(alone), rtol=1e-12)
 
 
 class Indifferent:
@@ -148,4 +148,4 @@ def test_a_comparator_that_breaks_its_contract_is_named(
     both = [INTACT, parse("jam:back_left_knee", quadruped.anatomy)]
 
     with pytest.raises(InputError, match=f"the comparator 'indifferent' {said}"):
-        diagnose.distances(both, [trial])
+        diagnose.evidence.distances(both, [trial])
