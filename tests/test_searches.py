@@ -97,7 +97,9 @@ def test_the_distance_to_several_trials_is_the_sum_of_the_distances(quadruped: R
     alone = [diagnose.evidence.distances(hypotheses, [trial]) for trial in trials]
 
     assert np.all(np.array(alone) > 0)
-    np.testing.assert_allclose(diagnose.evidence.distances(hypotheses, trials), sum(alone), rtol=1e-12)
+    np.testing.assert_allclose(
+        diagnose.evidence.distances(hypotheses, trials), sum(alone), rtol=1e-12
+    )
 
 
 class Indifferent:

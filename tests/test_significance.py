@@ -1,4 +1,4 @@
-"""Promises of the tests between hypotheses: paired, a floor under rounding, infinity no surprise."""
+"""Promises of the tests between hypotheses: paired, above rounding, and at ease with infinity."""
 
 import numpy as np
 import pytest
