@@ -81,7 +81,7 @@ class Evidence:
         comparator = self._comparator
         if isinstance(comparator, Piecewise):
             losses = np.asarray(comparator.losses(outcome.behaviour, trial))
-            if losses.ndim != 2 or len(losses) != len(hypotheses):
+            if losses.ndim != 2 or len(losses) != len(hypotheses) or not losses.shape[1]:
                 raise self._broken(f"gave losses {losses.shape} for {len(hypotheses)} simulations")
         else:
             distances = np.asarray(comparator.distances(outcome.behaviour, trial))
