@@ -79,8 +79,9 @@ class SimulatedRobot:
         """Runs a controller; see ``PhysicalRobot``.
 
         Without a gap, the same bits as the ``Simulator``'s, unless something about the fault is
-        random, such as the bumps of a terrain: those are this robot's own. With one, each run takes the next
-        stream of noise: two runs differ, and the n-th of the same seed is the same to the bit.
+        random, such as the bumps of a terrain: those are this robot's own. With one, each run takes
+        the next stream of noise: two runs differ, and the n-th of the same seed is the same to the
+        bit.
 
         Raises:
             TrialError: The simulation diverged.

@@ -1,4 +1,4 @@
-"""Promises of the check of a controller's own arithmetic: exact, and silent where nothing is known."""
+"""Promises of the check of a controller's arithmetic: exact, silent where nothing is known."""
 
 import dataclasses
 
