@@ -1,5 +1,6 @@
 """From each of many logged states: how well are the next tenths of a second predicted?"""
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -74,6 +75,11 @@ class SegmentPrediction:
     state: tuple[Signal, ...] = STATE
     horizon: int = 12
     most: int = 80
+
+    @property
+    def screen(self) -> "SegmentPrediction":
+        """The same, of a third of the segments."""
+        return dataclasses.replace(self, most=max(self.most // 3, FEWEST))
 
     def request(self, trial: Trial) -> Segments:
         """Returns the segments, and that all of their state and the readings are looked at.

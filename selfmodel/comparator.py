@@ -105,6 +105,16 @@ class Comparator(Protocol):
 
 
 @runtime_checkable
+class Screened(Comparator, Protocol):
+    """A comparator that knows a cheaper one, which tells what is far from what is near."""
+
+    @property
+    def screen(self) -> Comparator:
+        """A comparator of the same kind that needs less to be simulated; piecewise as this is."""
+        ...
+
+
+@runtime_checkable
 class Piecewise(Comparator, Protocol):
     """A comparator whose distance is the mean over pieces of the trial, such as windows of it.
 

@@ -1,11 +1,13 @@
 """The diagnostic EA: evolves hypotheses that explain all trials."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.comparator import Comparator
+from selfmodel.comparator import Comparator, Screened
+from selfmodel.degrees import coarse_candidates
 from selfmodel.diagnosis import Candidate, Diagnosis, Verdict
 from selfmodel.evidence import Evidence
 from selfmodel.evolution import Evolution, Observe, evolve
@@ -17,6 +19,9 @@ from selfmodel.settings import Settings
 from selfmodel.significance import TEST, is_better, is_worse_than_ever
 from selfmodel.simulator import Simulator
 from selfmodel.trial import Trial
+
+KNOWN = 2
+"""Of what the EA found closest, how much is refined."""
 
 EQUAL = "equal distances"
 """The test of a comparator that gives one number for a trial."""
@@ -51,6 +56,11 @@ class Diagnose:
         self._kinds = tuple(kinds)
         self._intact = tuple(intact)
         self.evidence = Evidence(simulator, comparator)
+        self._screen = (
+            Evidence(simulator, comparator.screen)
+            if isinstance(comparator, Screened)
+            else self.evidence
+        )
         self.evaluations = 0
 
     def __call__(
@@ -68,16 +78,17 @@ class Diagnose:
             rng: Every random choice comes from it.
             observe: Is told of every generation.
         """
-        totals = self._evolved(trials, seeds, rng, observe)
-        kept = self._settings.kept
-        best = _ranked(totals)[0]
+        found = self._evolved(trials, seeds, rng, observe)
+        best = found[0]
         if self.evidence.in_pieces:
-            best = self._refined(trials, _ranked(totals)[:2], totals)
-        totals.setdefault(INTACT, float(self.evidence.distances([INTACT], trials)[0]))
-        ranked = [best, *(other for other in _ranked(totals) if other != best)]
-        rivals = self._rivals(best, ranked[1:], trials)
+            best = self._refined(trials, found[:KNOWN])
+        judged = list(self.evidence.judged(trials) | {best, INTACT})
+        totals = dict(zip(judged, map(float, self.evidence.distances(judged, trials)), strict=True))
+        others = [one for one in _ranked(totals) if one != best]
+        rivals = self._rivals(best, others, trials)
+        kept = self._settings.kept
         return Diagnosis(
-            ranked=tuple(Candidate(known, totals[known]) for known in ranked[:kept]),
+            ranked=tuple(Candidate(one, totals[one]) for one in [best, *others][:kept]),
             trials=len(trials),
             intact_distance=totals[INTACT],
             rivals=rivals[:kept],
@@ -93,20 +104,25 @@ class Diagnose:
         """
         self.evidence.check([*self._intact, *trials])
 
+    @property
+    def distinct_hypotheses(self) -> int:
+        """How many hypotheses were ever simulated."""
+        return len(self.evidence.distinct_hypotheses | self._screen.distinct_hypotheses)
+
     def _evolved(
         self,
         trials: Sequence[Trial],
         seeds: Sequence[Hypothesis],
         rng: np.random.Generator,
         observe: Observe,
-    ) -> dict[Hypothesis, float]:
-        """The distance of every hypothesis that the EA looked at."""
+    ) -> list[Hypothesis]:
+        """The hypotheses that the EA looked at, closest first."""
         genes, anatomy = self._settings.genes, self._anatomy
         totals: dict[Hypothesis, float] = {}
 
         def fitness(genomes: FloatArray) -> FloatArray:
             hypotheses = [decode(genome, anatomy, self._kinds) for genome in genomes]
-            distances = self.evidence.distances(hypotheses, trials)
+            distances = self._screen.distances(hypotheses, trials)
             totals.update(zip(hypotheses, map(float, distances), strict=True))
             return 0.0 - distances  # not -distances: a perfect fitness reads 0, not -0
 
@@ -119,24 +135,18 @@ class Diagnose:
         )
         evolve(search, fitness, observe)
         self.evaluations += search.evaluations
-        return totals
+        return _ranked(totals)
 
-    def _refined(
-        self, trials: Sequence[Trial], known: Sequence[Hypothesis], totals: dict[Hypothesis, float]
-    ) -> Hypothesis:
-        """The best hypothesis around those known; whatever was looked at is noted in ``totals``."""
-
-        def losses(hypotheses: Sequence[Hypothesis]) -> FloatArray:
-            new = [one for one in dict.fromkeys(hypotheses) if one not in totals]
-            if new:
-                totals.update(
-                    zip(new, map(float, self.evidence.distances(new, trials)), strict=True)
-                )
-                self.evaluations += len(new)
-            return self.evidence.losses(hypotheses, trials)
-
-        faults = [fault for kind in self._kinds for fault in kind.candidates(self._anatomy)]
-        return refined(known, faults, self._settings.genes, losses, self._anatomy)
+    def _refined(self, trials: Sequence[Trial], known: Sequence[Hypothesis]) -> Hypothesis:
+        """The best hypothesis around those known."""
+        return refined(
+            known,
+            coarse_candidates(self._kinds, self._anatomy),
+            self._settings.genes,
+            partial(self.evidence.losses, trials=trials),
+            self._anatomy,
+            screen=partial(self._screen.losses, trials=trials),
+        )
 
     def _rivals(
         self, best: Hypothesis, others: Sequence[Hypothesis], trials: Sequence[Trial]

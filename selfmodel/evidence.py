@@ -36,9 +36,14 @@ class Evidence:
         return isinstance(self._comparator, Piecewise)
 
     @property
-    def distinct_hypotheses(self) -> int:
-        """How many hypotheses were ever simulated."""
-        return len({hypothesis for memo in self._losses.values() for hypothesis in memo})
+    def distinct_hypotheses(self) -> set[Hypothesis]:
+        """The hypotheses that were ever simulated."""
+        return {hypothesis for memo in self._losses.values() for hypothesis in memo}
+
+    def judged(self, trials: Sequence[Trial]) -> set[Hypothesis]:
+        """Returns the hypotheses that were simulated for every one of some trials."""
+        memos = [self._losses.get(trial.path, Memo()) for trial in trials]
+        return set.intersection(*(set(memo) for memo in memos))
 
     def check(self, trials: Sequence[Trial]) -> None:
         """Checks that the comparator can judge all trials, before any search.

@@ -26,6 +26,11 @@ class Hypothesis:
     def __len__(self) -> int:
         return len(self.faults)
 
+    @property
+    def motion(self) -> "Hypothesis":
+        """What of it changes how the robot moves under given commands."""
+        return Hypothesis(tuple(fault for fault in self.faults if fault.kind.moves))
+
 
 INTACT = Hypothesis()
 """Nothing changed."""

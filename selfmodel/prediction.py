@@ -22,6 +22,7 @@ def predict(
     embodiments: Sequence[Embodiment],
     segments: Segments,
     *,
+    moves_as: Sequence[int] | None = None,
     threads: int,
     tally: Tally,
     delay: int | None = None,
@@ -38,6 +39,9 @@ def predict(
         robot: The robot with nothing wrong.
         embodiments: At least one, of the robot's layout.
         segments: Where to begin and what was commanded.
+        moves_as: For each embodiment the number of the first one that moves as it does under the
+            same commands, though its sensors may tell another story: only that one is simulated.
+            Without it, all are.
         threads: Threads that MuJoCo steps on, the caller's included.
         tally: Is told what was simulated.
         delay: Control steps from a command to its effect; that of the robot if none is given.
@@ -47,22 +51,27 @@ def predict(
         has.
     """
     n, count, horizon = len(embodiments), len(segments.commands), segments.horizon
+    simulated, source_of = np.unique(
+        np.arange(n) if moves_as is None else np.asarray(moves_as), return_inverse=True
+    )
+    moving = [embodiments[i] for i in simulated]
     whole = "base_position" in segments.states
     stages: list[IndexArray] = np.split(np.arange(count), 1 if whole else count)
     together = len(stages[0])
-    rows = [embodiment for embodiment in embodiments for _ in range(together)]
-    batch = new_batch(robot.model, rows, threads)
+    batch = new_batch(robot.model, _repeated(moving, together), threads)
     qpos, sensordata = batch.bind("qpos"), batch.bind("sensordata")
-    senses = Senses(robot.model, robot.anatomy, rows)
-    readings = np.empty((len(rows), len(robot.anatomy.sensors)))
-    live = live_signals(robot, batch, segments.record) | {"sensors": (readings, slice(None))}
+    senses = Senses(robot.model, robot.anatomy, _repeated(embodiments, together))
+    readings = np.empty((n * together, len(robot.anatomy.sensors)))
+    # Where in the batch each row of the result is found.
+    place = (source_of[:, np.newaxis] * together + np.arange(together)).ravel()
+    live = live_signals(robot, batch, segments.record)
     kept = {
         signal: np.empty(
             (n, count, horizon + 1, robot.anatomy.names.width(signal)), dtype=np.float64
         )
         for signal in segments.record
     }
-    start = _Start(robot, batch, embodiments)
+    start = _Start(robot, batch, moving)
     batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE)
     alive = Alive(batch)
     first = segments.lead - (robot.control_delay if delay is None else delay)
@@ -74,21 +83,25 @@ def predict(
             tally.physics_seconds += perf_counter() - clock
             for k in range(horizon + 1):
                 if "sensors" in kept:
-                    senses.read(sensordata, qpos, readings)
-                for signal, values in kept.items():
-                    source, chosen = live[signal]
-                    values[:, stage, k] = source[:, chosen].reshape(n, together, -1)
+                    senses.read(sensordata[place], qpos[place], readings)
+                    kept["sensors"][:, stage, k] = readings.reshape(n, together, -1)
+                for signal, (source, chosen) in live.items():
+                    kept[signal][:, stage, k] = source[:, chosen][place].reshape(n, together, -1)
                 if k < horizon:
                     start.command(segments.commands[stage, first + k])
                     clock = perf_counter()
                     alive.step(robot.substeps)
                     tally.physics_seconds += perf_counter() - clock
-    diverged: BoolArray = np.any(alive.diverged().reshape(n, together), axis=1)
+    diverged: BoolArray = np.any(alive.diverged()[place].reshape(n, together), axis=1)
     tally.runs += n
-    tally.steps += n * count * horizon
+    tally.steps += len(moving) * count * horizon
     tally.diverged += int(diverged.sum())
     time = np.arange(horizon + 1, dtype=np.float64) * robot.control_timestep
     return Simulated(Behaviour(robot.anatomy.names, time, kept), diverged)
+
+
+def _repeated(embodiments: Sequence[Embodiment], times: int) -> list[Embodiment]:
+    return [embodiment for embodiment in embodiments for _ in range(times)]
 
 
 class _Start:

@@ -138,6 +138,6 @@ def recover(
         diagnosis=diagnosis,
         repair_evaluations=repair.evaluations,
         diagnostic_evaluations=diagnose.evaluations,
-        distinct_hypotheses=diagnose.evidence.distinct_hypotheses,
+        distinct_hypotheses=diagnose.distinct_hypotheses,
         calibration=calibration,
     )

@@ -4,18 +4,23 @@ An EA finds the neighbourhood; here the neighbours are looked at one by one, and
 be worth its while.
 """
 
+import dataclasses
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
 from selfmodel.anatomy import Anatomy
 from selfmodel.arrays import FloatArray
-from selfmodel.faults import Fault
+from selfmodel.degrees import with_fitted_degrees
+from selfmodel.faults import Fault, Kind
 from selfmodel.hypothesis import INTACT, Hypothesis, canonical
 from selfmodel.significance import is_better
 
 Losses = Callable[[Sequence[Hypothesis]], FloatArray]
 """How badly hypotheses predict each piece of the trials, ``(n, pieces)``."""
+
+SHORTLIST = 8
+"""Hypotheses of many that are looked at closely."""
 
 STARTS = 3
 """From how many of the best single faults a search begins, beside what is known already."""
@@ -27,12 +32,15 @@ def refined(
     most: int,
     losses: Losses,
     anatomy: Anatomy,
+    *,
+    screen: Losses | None = None,
 ) -> Hypothesis:
     """Returns the hypothesis with the fewest faults that no other predicts better than.
 
     From each start, the best change of one fault (one more, one less, another in its place) is
-    made until none helps, then faults go that are not worth their while. Of what the starts lead
-    to, a hypothesis with more faults wins only where it is significantly better.
+    made, and its degrees fitted, until none helps; then faults go that are not worth it. Of
+    what the starts lead to, a hypothesis with more faults wins only where it is significantly
+    better.
 
     Args:
         known: Hypotheses to start from, beside the best single faults and ``INTACT``.
@@ -40,46 +48,80 @@ def refined(
         most: Faults that a hypothesis may have.
         losses: How badly hypotheses predict the trials.
         anatomy: The robot's parts.
+        screen: The same, from fewer pieces and cheaper: of many hypotheses those are looked at
+            that it finds closest. Without it, all are.
     """
-    search = _Search(faults, most, losses, anatomy)
-    singles = search.with_one_more(INTACT)
-    starts = dict.fromkeys([*known, INTACT, *search.closest(singles, STARTS)])
-    found = {search.settled(start) for start in starts}
+    search = _Search(faults, most, losses, screen or losses, anatomy)
+    starts = dict.fromkeys([*known, INTACT, *_closest_parts(search)[:STARTS]])
+    found = {search.settled(search.fitted(start)) for start in starts}
+    finest = {search.spared(search.fitted_finely(one)) for one in found}
     best = INTACT
-    for hypothesis in sorted(found, key=lambda one: (len(one), search.total(one), one)):
+    for hypothesis in sorted(finest, key=lambda one: (len(one), search.total(one), one)):
         if search.is_better(hypothesis, best):
             best = hypothesis
     return best
+
+
+def _closest_parts(search: "_Search") -> list[Hypothesis]:
+    """The single faults, closest first, each kind at each part at its best degree only."""
+    singles = search.with_one_more(INTACT)
+    parts: dict[tuple[Kind, str], Hypothesis] = {}
+    for single in search.ordered(singles):
+        (fault,) = single.faults
+        parts.setdefault((fault.kind, fault.part), single)
+    return list(parts.values())
+
+
+def _ordered(hypotheses: Sequence[Hypothesis], losses: Losses) -> list[Hypothesis]:
+    if not hypotheses:
+        return []
+    order = np.argsort(losses(hypotheses).sum(axis=1), kind="stable")
+    return [hypotheses[i] for i in order]
 
 
 class _Search:
     """Changes of one fault, and what they bring."""
 
     def __init__(
-        self, faults: Sequence[Fault], most: int, losses: Losses, anatomy: Anatomy
+        self,
+        faults: Sequence[Fault],
+        most: int,
+        losses: Losses,
+        screen: Losses,
+        anatomy: Anatomy,
     ) -> None:
-        self._faults, self._most, self._losses, self._anatomy = faults, most, losses, anatomy
+        self._faults, self._most, self._anatomy = faults, most, anatomy
+        self._losses, self._screen = losses, screen
 
     def total(self, hypothesis: Hypothesis) -> float:
         return float(self._losses([hypothesis])[0].sum())
 
+    def fitted(self, hypothesis: Hypothesis) -> Hypothesis:
+        return with_fitted_degrees(hypothesis, self._screen, self._anatomy)
+
+    def fitted_finely(self, hypothesis: Hypothesis) -> Hypothesis:
+        return with_fitted_degrees(hypothesis, self._losses, self._anatomy)
+
     def is_better(self, one: Hypothesis, other: Hypothesis) -> bool:
         return is_better(*self._losses([one, other]))
 
-    def closest(self, hypotheses: Sequence[Hypothesis], count: int) -> list[Hypothesis]:
-        if not hypotheses:
-            return []
-        order = np.argsort(self._losses(hypotheses).sum(axis=1), kind="stable")
-        return [hypotheses[i] for i in order[:count]]
+    def ordered(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """The closest first, as the screen has it."""
+        return _ordered(hypotheses, self._screen)
+
+    def closest(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Those that the screen lets through, the closest first."""
+        few = hypotheses if len(hypotheses) <= SHORTLIST else self.ordered(hypotheses)[:SHORTLIST]
+        return _ordered(few, self._losses)
 
     def settled(self, start: Hypothesis) -> Hypothesis:
         """Where a search ends: no change helps, and no fault can be spared."""
         current = self._descended(start, self._neighbours)
         while True:
-            spared = self._spared(current)
+            spared = self.spared(current)
             again = self._descended(spared, self._others_in_place)
             if again in (current, spared):
-                return self._spared(again)
+                return self.spared(again)
             current = again
 
     def with_one_more(self, hypothesis: Hypothesis) -> list[Hypothesis]:
@@ -90,18 +132,18 @@ class _Search:
     ) -> Hypothesis:
         current = start
         while True:
-            best = self.closest(neighbours(current), 1)
+            best = self.closest(neighbours(current))
             if not best or self.total(best[0]) >= self.total(current):
                 return current
-            current = best[0]
+            current = self.fitted(best[0])
 
-    def _spared(self, hypothesis: Hypothesis) -> Hypothesis:
+    def spared(self, hypothesis: Hypothesis) -> Hypothesis:
         """Without the faults that make the prediction no better, the least useful first."""
         current = hypothesis
         while True:
             spared = [
                 fewer
-                for fewer in self.closest(self._with_one_less(current), self._most)
+                for fewer in self.closest(self._with_one_less(current))
                 if not self.is_better(current, fewer)
             ]
             if not spared:
@@ -126,10 +168,15 @@ class _Search:
         )
 
     def _with_one_less(self, hypothesis: Hypothesis) -> list[Hypothesis]:
+        """Without one of the faults, or with a simpler one in its place, such as no angle."""
         faults = hypothesis.faults
-        return self._distinct(
-            hypothesis, [faults[:i] + faults[i + 1 :] for i in range(len(hypothesis))]
-        )
+        fewer = [faults[:i] + faults[i + 1 :] for i in range(len(hypothesis))]
+        simpler = [
+            (*faults[:i], dataclasses.replace(fault, degree=special), *faults[i + 1 :])
+            for i, fault in enumerate(faults)
+            for special in fault.kind.special
+        ]
+        return self._distinct(hypothesis, [*fewer, *simpler])
 
     def _distinct(
         self, hypothesis: Hypothesis, changed: Iterable[tuple[Fault, ...]]

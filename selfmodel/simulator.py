@@ -56,7 +56,15 @@ class Simulator:
     def predict(self, hypotheses: Sequence[Hypothesis], segments: Segments) -> Simulated:
         """Predicts segments of a trial under each hypothesis; see ``prediction.predict``."""
         embodiments = [self._embodiment(hypothesis) for hypothesis in hypotheses]
-        return predict(self.robot, embodiments, segments, threads=self.threads, tally=self.tally)
+        motions = [hypothesis.motion for hypothesis in hypotheses]
+        return predict(
+            self.robot,
+            embodiments,
+            segments,
+            moves_as=[motions.index(motion) for motion in motions],
+            threads=self.threads,
+            tally=self.tally,
+        )
 
     def run_ensemble(
         self,

@@ -78,7 +78,7 @@ LAYERS = (
         *("gap", "instruments", "start", "debris", "structure", "contract_kind"),
         *("simulator", "physical", "judge", "replay", "parameters"),
     ),
-    ("database", "evidence", "refine", "diagnose", "repair", "calibrate"),
+    ("database", "evidence", "refine", "degrees", "diagnose", "repair", "calibrate"),
     ("recover", "explain"),
 )
 

@@ -84,7 +84,7 @@ def diagnose(
         "diagnosis": as_values(diagnosis.ranked),
         **sureness(diagnosis),
         "evaluations": search.evaluations,
-        "distinct_hypotheses": search.evidence.distinct_hypotheses,
+        "distinct_hypotheses": search.distinct_hypotheses,
         "seconds": perf_counter() - start,
     }
     if as_json:

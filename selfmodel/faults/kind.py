@@ -68,6 +68,8 @@ class Kind:
             None, which is nothing at all.
         prefix: Letters in front of the degree's number in notation.
         unit: The unit of the degree.
+        moves: Whether it changes how a robot moves under given commands; if not, it changes
+            readings only, and needs no simulation of its own where the commands are given.
         hypothesised: Whether a diagnosis may propose it; otherwise only a physical robot has it.
     """
 
@@ -92,6 +94,7 @@ class Kind:
     special: Mapping[float, "Kind | None"] = field(default_factory=dict, compare=False, repr=False)
     prefix: str = field(default="", compare=False, repr=False)
     unit: str = field(default="", compare=False, repr=False)
+    moves: bool = field(default=True, compare=False, repr=False)
     hypothesised: bool = field(default=True, compare=False, repr=False)
 
     def candidates(self, anatomy: Anatomy) -> tuple["Fault", ...]:

@@ -47,7 +47,9 @@ def _silences(fault: Fault, other: Fault, _anatomy: Anatomy) -> bool:
     return other.part == fault.part and other.kind in (SENSOR_GAIN, SENSOR_BIAS, SENSOR_NOISE)
 
 
-FAILED_SENSOR = Kind(name="sensor", word="sensor", parts=_sensors, strike=_fail, absorbs=_silences)
+FAILED_SENSOR = Kind(
+    name="sensor", word="sensor", parts=_sensors, strike=_fail, absorbs=_silences, moves=False
+)
 
 SENSOR_GAIN = Kind(
     name="sensor-gain",
@@ -55,6 +57,7 @@ SENSOR_GAIN = Kind(
     prefix="gain",
     parts=_sensors,
     strike=_scale,
+    moves=False,
     degrees=between(0.0, 2.0),
     levels=grid(0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.2, 1.4, 1.6, 1.8, 2.0),
     # A gain of 0 is not a failed sensor: it may have a bias.
@@ -68,6 +71,7 @@ SENSOR_BIAS = Kind(
     prefix="bias",
     parts=_sensors,
     strike=_shift,
+    moves=False,
     degrees=between(-1.0, 1.0),
     levels=grid(-0.9, -0.7, -0.5, -0.35, -0.2, -0.1, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9),
     special={0.0: None},
@@ -80,6 +84,7 @@ SENSOR_NOISE = Kind(
     prefix="noise",
     parts=_angle_sensors,
     strike=_blur,
+    moves=False,
     degrees=between(0.0, 1.0),
     levels=grid(0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8),
     special={0.0: None},

@@ -75,7 +75,7 @@ def _from_the_bank(setting: Setting) -> list[Row]:
                 dataclasses.replace(
                     _row(setting, event, trials[: event.trials], clock),
                     evaluations=search.evaluations,
-                    distinct_hypotheses=search.evidence.distinct_hypotheses,
+                    distinct_hypotheses=search.distinct_hypotheses,
                 )
             )
 
