@@ -1,22 +1,23 @@
-"""Promises of a diagnosis about itself: what it explains, what it cannot tell apart, what it cannot.
+"""Promises of a diagnosis about itself: what it explains, what it cannot tell, what it cannot say.
 
 At no reality gap, so that whatever is left unexplained is unexplained by the hypotheses.
 """
 
 import dataclasses
+import itertools
 from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
 
-from selfmodel.behaviour import Behaviour
+from selfmodel.behaviour import Behaviour, forward_displacement
 from selfmodel.comparator import ClosedLoop, Comparator
 from selfmodel.comparators import FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
 from selfmodel.controller import Controller
 from selfmodel.diagnose import EQUAL, Diagnose
 from selfmodel.diagnosis import Diagnosis
-from selfmodel.faults import FRICTION, JAMMED, PAPER_KINDS, Kind
-from selfmodel.hypothesis import INTACT, Hypothesis
+from selfmodel.faults import BROKEN, FRICTION, JAMMED, PAPER_KINDS, Kind
+from selfmodel.hypothesis import INTACT, Hypothesis, canonical
 from selfmodel.notation import parse
 from selfmodel.physical import SimulatedRobot
 from selfmodel.robot import Robot
@@ -30,8 +31,8 @@ from tests.memory import MemoryJournal
 
 SMALL = dataclasses.replace(Settings().scaled(12), generations=2, steps=300)
 CASES = ROBOTS["quadruped"].cases
-SEEDS = [1, 2]
-"""Of random controllers: some under which every failure below shows."""
+GAIT = 4
+"""The number of a random controller under which every failure below shows."""
 
 
 def trial(robot: Robot, truth: str, controller: Controller, stage: Stage = "after") -> Trial:
@@ -57,9 +58,6 @@ def diagnosed(
 @pytest.fixture(scope="module")
 def gait(quadruped: Robot) -> Controller:
     return random_controllers(quadruped, 5)[GAIT]
-
-
-GAIT = 4
 
 
 @pytest.fixture(scope="module")
@@ -111,82 +109,100 @@ def test_without_a_trial_of_the_intact_robot_nothing_is_unexplained(
     assert found.verdict in {"explained", "ambiguous"}
 
 
-def deaf(robot: Robot, sensor: int) -> Controller:
-    """A gait that does not listen to one of its sensors."""
-    (gait,) = random_controllers(robot, 1, seed=1)
-    genome = gait.genome.copy()
-    inputs = len(robot.anatomy.sensors) + 1
-    genome[sensor : robot.network.hidden * inputs : inputs] = 0
-    return Controller(robot.network, genome)
-
-
 @dataclasses.dataclass(frozen=True)
-class Indifferent:
-    """A comparator to which some hypotheses are as good as the best; it judges in one piece."""
+class Coarse:
+    """The paper's comparator with a coarse ruler, m."""
 
-    gives: Callable[[int], np.ndarray]
-    name: str = "indifferent"
+    ruler: float
+    name: str = "coarse"
 
     def request(self, _trial: Trial) -> ClosedLoop:
         """Asks for the way of the root body."""
         return ClosedLoop(record=("base_position",))
 
-    def distances(self, simulated: Behaviour, _trial: Trial) -> np.ndarray:
-        """Looks at how many there are."""
-        return self.gives(len(simulated["base_position"]))
+    def distances(self, simulated: Behaviour, trial: Trial) -> np.ndarray:
+        """Counts rulers."""
+        return np.floor(np.abs(forward_displacement(simulated) - trial.displacement) / self.ruler)
 
 
-def test_hypotheses_that_no_trial_tells_apart_are_rivals(quadruped: Robot):
-    # A controller that does nothing holds every joint where a jam would hold it... almost; one
-    # that is deaf to a sensor moves as if it had failed, to the bit.
-    sensor = quadruped.anatomy.sensors[1].name
-    controller = deaf(quadruped, 1)
-    pair = [
-        parse(f"break:back_left_knee+sensor:{name}", quadruped.anatomy)
-        for name in (sensor, quadruped.anatomy.sensors[0].name)
+@dataclasses.dataclass(frozen=True)
+class CoarseInPieces(Coarse):
+    """The same of every one of five pieces."""
+
+    def losses(self, simulated: Behaviour, trial: Trial) -> np.ndarray:
+        """The same for each."""
+        return np.repeat(self.distances(simulated, trial)[:, np.newaxis], 5, axis=1)
+
+
+@pytest.mark.parametrize(("make", "test"), [(Coarse, EQUAL), (CoarseInPieces, TEST)])
+def test_hypotheses_that_no_trial_tells_apart_are_rivals(
+    quadruped: Robot, gait: Controller, make: Callable[[float], Comparator], test: str
+):
+    anatomy = quadruped.anatomy
+    singles = [
+        canonical([fault], anatomy)
+        for kind in (BROKEN, JAMMED)
+        for fault in kind.candidates(anatomy)
     ]
+    runs = [(one, gait) for one in (INTACT, *singles)]
+    outcome = Simulator(quadruped, 1).run(runs, SMALL.steps, ["base_position"])
+    intact, *ways = forward_displacement(outcome.behaviour)
+    apart, one, other = min(
+        (abs(ways[i] - ways[k]), singles[i], singles[k])
+        for i, k in itertools.combinations(range(len(singles)), 2)
+        if min(abs(ways[i] - intact), abs(ways[k] - intact)) > 3 * abs(ways[i] - ways[k])
+    )
     found = diagnosed(
         quadruped,
-        [trial(quadruped, "break:back_left_knee", controller)],
-        [trial(quadruped, "intact", controller, "before")],
-        comparator=FORWARD_DISPLACEMENT,
-        seeds=pair,
+        [trial(quadruped, str(one), gait)],
+        comparator=make(1.01 * apart),
+        seeds=[one, other],
     )
+    distances = {candidate.hypothesis: candidate.distance for candidate in found.ranked}
 
-    # What only says more is no rival.
-    assert str(found.best) == "break:back_left_knee"
-    assert found.verdict == "explained"
-    assert pair[0] not in found.rivals
-    assert pair[0] in [candidate.hypothesis for candidate in found.ranked[:3]]
-
-
-def test_equally_close_hypotheses_of_the_same_size_make_a_diagnosis_ambiguous(quadruped: Robot):
-    controller = deaf(quadruped, 1)
-    still = Controller(quadruped.network, np.zeros(quadruped.network.weights))
-    del controller
-    truth = "break:back_left_knee"
-    # Of a robot that only lies there, displacement tells little: two jams are as good as none.
-    found = diagnosed(
-        quadruped,
-        [trial(quadruped, truth, still)],
-        comparator=Indifferent(lambda n: np.zeros(n)),
-        seeds=[parse(text, quadruped.anatomy) for text in (truth, "jam:back_left_knee")],
-    )
-
-    assert found.best == INTACT  # the fewest faults
-    assert found.verdict == "explained"  # all others only say more
-    assert found.test == EQUAL
+    assert found.verdict == "ambiguous"
+    assert found.test == test
+    assert {one, other} <= {found.best, *found.rivals}
+    assert found.best not in found.rivals
+    assert len(found.rivals) <= SMALL.kept
+    assert {distances.get(rival, 0.0) for rival in found.rivals} == {0.0}
+    assert found.intact_distance > 0
 
 
-def test_fewer_faults_win(quadruped: Robot, gait: Controller, before: list[Trial]):
+def deaf(robot: Robot, gait: Controller, sensor: str) -> Controller:
+    """The same gait, which does not listen to one of its sensors."""
+    number = robot.anatomy.names.sensors.index(sensor)
+    genome = gait.genome.copy()
+    inputs = len(robot.anatomy.sensors) + 1
+    genome[number : robot.network.hidden * inputs : inputs] = 0
+    return Controller(robot.network, genome)
+
+
+def test_fewer_faults_win_and_what_only_says_more_is_no_rival(quadruped: Robot, gait: Controller):
+    # To a controller that is deaf to a sensor it makes no difference, to the bit, if it fails.
     truth = parse("break:front_left_knee", quadruped.anatomy)
     more = parse("break:front_left_knee+sensor:back_left_touch", quadruped.anatomy)
-    muted = deaf(quadruped, [s.name for s in quadruped.anatomy.sensors].index("back_left_touch"))
-    for comparator in (FORWARD_DISPLACEMENT, SEGMENT_PREDICTION):
-        found = diagnosed(
-            quadruped,
-            [trial(quadruped, str(truth), muted)],
-            comparator=comparator,
-            seeds=[more, truth],
-        )
-        assert found.best == truth
+    one = trial(quadruped, str(truth), deaf(quadruped, gait, "back_left_touch"))
+    found = diagnosed(quadruped, [one], comparator=FORWARD_DISPLACEMENT, seeds=[more])
+
+    assert [candidate.hypothesis for candidate in found.ranked[:2]] == [truth, more]
+    assert [candidate.distance for candidate in found.ranked[:2]] == [0, 0]
+    assert found.verdict == "explained"
+    assert found.rivals == ()
+
+
+def test_a_fault_that_the_trial_does_not_need_is_not_diagnosed(quadruped: Robot, gait: Controller):
+    more = parse("break:front_left_knee+sensor:back_left_angle", quadruped.anatomy)
+    one = trial(quadruped, "break:front_left_knee", gait)
+    found = diagnosed(quadruped, [one], seeds=[more])
+
+    assert str(found.best) == "break:front_left_knee"
+
+
+def test_intact_is_always_judged_whatever_the_search_looked_at(quadruped: Robot, gait: Controller):
+    one = trial(quadruped, "break:front_left_shoulder", gait)
+    search = Diagnose(Simulator(quadruped, 1), FORWARD_DISPLACEMENT, SMALL)
+    found = search([one], [], np.random.default_rng(3), lambda _: None)
+    (expected,) = search.evidence.distances([INTACT], [one])
+
+    assert found.intact_distance == expected > 0
