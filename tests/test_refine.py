@@ -163,26 +163,31 @@ def test_a_swap_is_found_where_neither_more_nor_less_helps():
     assert find(losses, wrong) == right
 
 
-def test_once_a_fault_is_spared_another_may_be_the_better_one_in_place_of_what_is_left():
-    # Of the pair a fault can be spared; of the singles, the other one is the best.
-    pair = "jam:front_left_knee+sensor:front_left_angle"
-    left, better = "jam:front_left_knee", "jam:front_right_knee"
-    rng = np.random.default_rng(0)
+def test_once_a_fault_is_spared_another_may_be_the_better_one_beside_what_is_left():
+    three, left, better = (
+        said(f"jam:back_left_knee+{others}")
+        for others in (
+            "jam:back_right_knee+sensor:front_left_angle",
+            "jam:back_right_knee",
+            "jam:front_right_knee",
+        )
+    )
     ripple = np.linspace(-0.01, 0.01, PIECES)
-    known = {
-        said(pair): 1.0 + ripple,
-        said(left): 1.2 + 2 * centred(rng),
-        said(better): 1.1 - ripple,
+    # Searches that begin from nothing end at one of these.
+    dead_ends = [canonical([fault], ANATOMY) for fault in FAULTS[:3]]
+    known = dict.fromkeys(dead_ends, 2.9 - ripple) | {
+        three: 1.0 + ripple,
+        left: 1.2 + 2 * centred(np.random.default_rng(0)),
+        better: 1.1 - ripple,
     }
 
     def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
         return np.array([known.get(one, 3.0 + 2 * ripple) for one in hypotheses])
 
-    assert is_better(*losses([said(pair), said(better)]))
-    assert not is_better(*losses([said(pair), said(left)]))
-    # With no fault of its own to propose, nothing but the pair is searched from.
-    allowed = [*said(pair).faults, *said(better).faults]
-    assert find(losses, said(pair), faults=allowed) == said(better)
+    assert is_better(*losses([three, better]))
+    assert not is_better(*losses([three, left]))
+    assert find(losses) in dead_ends
+    assert find(losses, three) == better
 
 
 @pytest.mark.parametrize("most", [1, 2, 3])
@@ -394,8 +399,11 @@ def test_the_screen_says_what_is_looked_at_and_the_losses_what_is_found():
 
 
 def test_a_screen_that_prefers_what_is_wrong_does_not_decide():
-    right, wrong = "jam:front_left_knee", "jam:front_right_knee"
-    losses = counted({right: 0.1, wrong: 0.9, "intact": 1.0}, otherwise=2.0)
-    screen = counted({right: 0.5, wrong: 0.1, "intact": 1.0}, otherwise=2.0)
+    one, right, wrong = (
+        f"jam:front_left_knee{other}"
+        for other in ("", "+sensor:front_right_touch", "+sensor:back_right_angle")
+    )
+    losses = counted({"intact": 1.5, one: 1.0, right: 0.1}, otherwise=2.0)
+    screen = counted({"intact": 1.5, one: 1.0, right: 0.5, wrong: 0.1}, otherwise=2.0)
 
     assert refined([], FAULTS, MOST, losses, ANATOMY, screen=screen) == said(right)
