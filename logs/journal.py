@@ -202,7 +202,7 @@ def _read_diagnoses(folder: Path, anatomy: Anatomy, kinds: Sequence[Kind]) -> tu
                 ),
                 trials=int(item["trials"]),
                 intact_distance=_read_finite(item["intact_distance"]),
-                rivals=tuple(parse(rival, anatomy) for rival in item["rivals"]),
+                rivals=tuple(parse(rival, anatomy, kinds) for rival in item["rivals"]),
                 verdict=_read_verdict(item["verdict"]),
                 test=str(item["test"]),
             )

@@ -2,10 +2,12 @@
 
 from collections.abc import Sequence
 from functools import partial
+from typing import Literal
 
 import numpy as np
 
 from selfmodel.arrays import FloatArray
+from selfmodel.behaviour import Behaviour
 from selfmodel.comparator import (
     ClosedLoop,
     Comparator,
@@ -90,21 +92,27 @@ class Evidence:
 
     def _simulate(self, trial: Trial, hypotheses: list[Hypothesis]) -> FloatArray:
         outcome = self._simulated(trial, hypotheses)
+        broken_down = outcome.diverged[:, np.newaxis]
+        # What a comparator makes of a simulation that broke down does not matter.
+        warnings: Literal["ignore"] | None = "ignore" if broken_down.any() else None
+        with np.errstate(over=warnings, invalid=warnings, divide=warnings):
+            losses = self._judged(outcome.behaviour, trial, len(hypotheses))
+        wrong = losses[~((losses >= 0) | broken_down)]
+        if len(wrong):
+            raise self._broken(f"gave a distance that is not a number of at least 0: {wrong[0]}")
+        return np.where(broken_down, np.inf, losses)
+
+    def _judged(self, simulated: Behaviour, trial: Trial, count: int) -> FloatArray:
         comparator = self._comparator
         if isinstance(comparator, Piecewise):
-            losses = np.asarray(comparator.losses(outcome.behaviour, trial))
-            if losses.ndim != 2 or len(losses) != len(hypotheses):
-                raise self._broken(f"gave losses {losses.shape} for {len(hypotheses)} simulations")
-        else:
-            distances = np.asarray(comparator.distances(outcome.behaviour, trial))
-            if distances.shape != (len(hypotheses),):
-                raise self._broken(
-                    f"gave {distances.shape} distances for {len(hypotheses)} simulations"
-                )
-            losses = distances[:, np.newaxis]
-        if not np.all((losses >= 0) | outcome.diverged[:, np.newaxis]):
-            raise self._broken(f"gave a distance that is not a number of at least 0: {losses}")
-        return np.where(outcome.diverged[:, np.newaxis], np.inf, losses)
+            losses = np.asarray(comparator.losses(simulated, trial))
+            if losses.ndim != 2 or len(losses) != count or not losses.shape[1]:
+                raise self._broken(f"gave losses {losses.shape} for {count} simulations")
+            return losses
+        distances = np.asarray(comparator.distances(simulated, trial))
+        if distances.shape != (count,):
+            raise self._broken(f"gave {distances.shape} distances for {count} simulations")
+        return np.asarray(distances[:, np.newaxis])
 
     def _simulated(self, trial: Trial, hypotheses: list[Hypothesis]) -> Simulated:
         request = self._comparator.request(trial)

@@ -31,7 +31,7 @@ class Job:
     """One run.
 
     Attributes:
-        key: Names it and its folder: letters, digits, ``.``, ``_`` and ``-``.
+        key: Names it and its folder: letters, digits, ``.``, ``_``, ``-``, ``=`` and ``%``.
         parameters: Everything that its results depend on beside the seed, as JSON has it.
         seed: Every random choice comes from it.
         parts: What is to be done, in this order; a later call may ask for others.
@@ -43,7 +43,7 @@ class Job:
     parts: tuple[str, ...] = ("result",)
 
     def __post_init__(self) -> None:
-        if not re.fullmatch(r"\w[\w.-]*", self.key, re.ASCII):
+        if not re.fullmatch(r"\w[\w.=%-]*", self.key, re.ASCII):
             raise ValueError(f"the key of a run must be able to name a folder, got {self.key!r}")
 
 

@@ -78,8 +78,10 @@ class SimulatedRobot:
     def run(self, controller: Driver, steps: int) -> Iterator[Sample]:
         """Runs a controller; see ``PhysicalRobot``.
 
-        Without a gap, the same bits as the ``Simulator``'s. With one, each run takes the next
-        stream of noise: two runs differ, and the n-th of the same seed is the same to the bit.
+        Without a gap, the same bits as the ``Simulator``'s, unless something about the fault is
+        random, such as the bumps of a terrain: those are this robot's own. With one, each run takes
+        the next stream of noise: two runs differ, and the n-th of the same seed is the same to the
+        bit.
 
         Raises:
             TrialError: The simulation diverged.

@@ -14,12 +14,12 @@ Z = 3.0
 that were proposed beside the truth, across gaps of 0.1 and 0.2, none reached 2."""
 
 WORSE = 5.0
-"""How many standard errors a loss must be above the usual one: other trials, other gaits, and so
-more than for two hypotheses on the same pieces."""
+"""How many standard errors a mean loss must be above the usual one: other trials, other gaits, and
+so more than for two hypotheses on the same pieces."""
 
 RATIO = 3.0
-"""How many times as large a loss counts as larger whatever the errors: where prediction is all but
-perfect, a few pieces that tell are proof."""
+"""How many times as large a mean loss counts as larger whatever the errors: where prediction is all
+but perfect, a few pieces that tell are proof."""
 
 NEGLIGIBLE = 1e-6
 """A mean loss below this is none: what is left where the model is the robot is the rounding of its
@@ -34,15 +34,21 @@ def is_better(one: FloatArray, other: FloatArray) -> bool:
 
     Args:
         one: Its losses, ``(pieces,)``.
-        other: The losses of the other on the same pieces, ``(pieces,)``.
+        other: The losses of the other on the same pieces, ``(pieces,)``. Either is infinite where
+            a simulation diverged; then it is not the better one.
     """
+    if not np.isfinite(one).all():
+        return False
     if not np.isfinite(other).all():
-        return bool(np.isfinite(one).all())
+        return True
     return bool(paired_z(other, one) >= Z or other.mean() > RATIO * one.mean() + NEGLIGIBLE)
 
 
 def paired_z(larger: FloatArray, smaller: FloatArray) -> float:
-    """Returns the mean difference over its standard error; 0 for less than two pieces."""
+    """Returns the mean difference of finite losses over its standard error.
+
+    It is 0 for less than two pieces, and where all pieces differ by the same.
+    """
     difference = larger - smaller
     error = difference.std(ddof=1) / np.sqrt(len(difference)) if len(difference) > 1 else 0.0
     return float(difference.mean() / error) if error > 0 else 0.0
@@ -54,10 +60,10 @@ def is_worse_than_ever(losses: FloatArray, usual: FloatArray) -> bool:
     Args:
         losses: ``(pieces,)``.
         usual: ``(pieces,)`` of other trials, so the two are not paired (Welch). Where either has
-            one piece only, nothing but the ratio can tell.
+            one piece only, or diverged, nothing but the ratio can tell.
     """
     larger = bool(losses.mean() > RATIO * usual.mean() + NEGLIGIBLE)
-    if min(len(losses), len(usual)) < 2:
+    if min(len(losses), len(usual)) < 2 or not np.isfinite([losses.mean(), usual.mean()]).all():
         return larger
     variance = losses.var(ddof=1) / len(losses) + usual.var(ddof=1) / len(usual)
     difference = losses.mean() - usual.mean()

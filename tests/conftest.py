@@ -9,6 +9,7 @@ os.environ["MUJOCO_GL"] = "disable"
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from selfmodel.controller import Controller, draw_weights
 from selfmodel.hypothesis import Hypothesis
@@ -17,6 +18,9 @@ from selfmodel.robot import Robot
 from selfmodel.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 from tests.command import SMALL, selfmodel
+
+settings.register_profile("unhurried", deadline=None)  # a busy machine is no bug
+settings.load_profile("unhurried")
 
 
 @pytest.fixture(scope="session", params=sorted(ROBOTS))

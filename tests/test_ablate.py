@@ -24,11 +24,12 @@ from selfmodel.cli.ablation.plan import cells
 from selfmodel.cli.ablation.scores import summarise
 from selfmodel.errors import InputError
 from selfmodel.grid import GridBegins, PartEnds
-from selfmodel.logs import load_controller, read_log, read_truth
+from selfmodel.logs import load_controller, read_gap, read_log, read_truth
 from selfmodel.settings import Settings
 from tests.command import selfmodel
 
 PAPERS = "forward-displacement"
+DAMAGES = ("break:back_left_knee+friction=0.4", "motor:front_left_knee=0.5")
 THEIRS = """
 from dataclasses import dataclass
 from selfmodel.comparators.forward_displacement import ForwardDisplacement
@@ -135,7 +136,7 @@ def test_what_fails_is_told_and_stops_nothing(done: Path, tmp_path: Path):
     failed = run(ablation)
 
     assert {(one.part, one.error) for one in failed} == {
-        (picky, "this trial does not please; this trial does not please")
+        (picky, "; ".join(["this trial does not please"] * 4))  # two before the failure, two after
     }
     assert len(failed) == 2
     assert timeless(collect(ablation.folder)) == timeless(collect(done))
@@ -160,7 +161,7 @@ def test_a_command_with_a_failure_ends_with_status_one_and_prints_one_object(
         {
             "run": "quadruped-case03-gap0.0-seed005",
             "part": "their_comparators:PICKY",
-            "error": "this trial does not please",
+            "error": "; ".join(["this trial does not please"] * 3),
         }
     ]
     assert "1 failed, the first of them quadruped-case03" in told.stderr
@@ -274,6 +275,76 @@ def test_a_bank_without_a_gait_is_refused_before_anything_is_run(done: Path, tmp
     assert not (tmp_path / "out").exists()
 
 
+@pytest.fixture(scope="module")
+def otherwise(tmp_path_factory: pytest.TempPathFactory, done: Path) -> Path:
+    """The folder of an ablation of damages that have no number, on a robot built differently."""
+    folder = tmp_path_factory.mktemp("otherwise") / "ablation"
+    ablation = small(
+        folder,
+        bank=done / "bank",
+        cases=[9],
+        damages=["friction=0.4+break:back_left_knee", "motor:front_left_knee=0.5"],
+        kinds="break,friction",
+        structure=True,
+        settings=Settings(steps=60, generations=2, trials=2).scaled(6),
+        comparators=["segment-prediction"],
+    )
+    assert run(ablation) == ()
+    return folder
+
+
+def test_a_damage_without_a_number_has_rows_like_a_case(otherwise: Path):
+    rows = collect(otherwise)
+
+    assert {(row.case, row.truth, row.failure) for row in rows} == {
+        (9, "intact", " 9"),
+        (None, DAMAGES[0], DAMAGES[0]),
+        (None, DAMAGES[1], DAMAGES[1]),
+    }
+    assert [row.trials for row in rows] == [1, 2] * 3
+    (score,) = (score for score in write_results(otherwise).scores if score.trials == 2)
+    assert score.runs == 3
+    assert len({folder.name for folder in (otherwise / "runs").iterdir()}) == 3
+
+
+def test_a_diagnosis_of_an_ablation_considers_the_kinds_that_were_chosen(otherwise: Path):
+    words = {
+        term.partition("=")[0].partition(":")[0]
+        for row in collect(otherwise)
+        for term in row.best.split("+")
+    }
+
+    assert words <= {"break", "friction", "intact"}
+
+
+def test_rows_say_how_sure_each_diagnosis_is(otherwise: Path, done: Path):
+    rows = [*collect(otherwise), *collect(done)]
+
+    assert {row.verdict for row in rows} <= {"explained", "ambiguous", "unexplained"}
+    assert all(0 <= row.rivals <= 10 for row in rows)
+    for row in rows:
+        if row.verdict == "ambiguous":
+            assert row.rivals
+        if row.verdict == "explained":
+            assert not row.rivals
+
+
+def test_every_trial_of_a_robot_built_differently_hides_how(otherwise: Path, done: Path):
+    logs = sorted(otherwise.glob("runs/*/trials/*.mcap"))
+
+    assert len(logs) == 3 * 4
+    assert all(read_gap(log)["structure"] for log in logs)
+    assert all(read_gap(log) is None for log in done.glob("runs/*/trials/*.mcap"))
+
+
+@pytest.mark.parametrize(
+    "changes", [{"structure": True}, {"kinds": "break,jam"}], ids=["structure", "kinds"]
+)
+def test_what_is_not_of_one_table_does_not_go_into_one_folder(done: Path, changes: dict):
+    with pytest.raises(InputError, match="holds an ablation that was made otherwise"):
+        run(small(done, cases=[2], **changes))
+
+
 @pytest.mark.parametrize(
     ("option", "value", "sentence"),
     [
@@ -288,6 +359,10 @@ def test_a_bank_without_a_gait_is_refused_before_anything_is_run(done: Path, tmp
         ("--next-trial", "repairs", "did you mean repair?"),
         ("--only", "3/2", "--only needs i/n"),
         ("--only", "0/2", "--only needs i/n"),
+        ("--damages", "break:nose", "unknown part in the term 'break:nose'"),
+        ("--damages", "brek:front_left_knee", "did you mean break?"),
+        ("--kinds", "break,frction", "unknown kind 'frction': did you mean friction?"),
+        ("--cases", "none", "needs at least one case or one damage, got neither"),
     ],
 )
 def test_a_bad_list_is_refused_in_a_sentence_before_anything_is_run(
@@ -321,12 +396,14 @@ def scored(comparator: str, case: int, seconds: float, *, correct: bool) -> Row:
         **dict.fromkeys(field.name for field in dataclasses.fields(Row))
         | {"robot": "quadruped", "gap": 0.05, "seed": 0, "trials": 1, "best": "intact"}
         | {"comparator": comparator, "case": case, "seconds": seconds, "correct": correct}
+        | {"truth": f"the failure of case {case}"}
     )
 
 
 def test_time_is_compared_on_the_runs_that_both_have():
     rows = [scored(PAPERS, case, 2.0, correct=case > 7) for case in range(10)]
     rows += [scored("other", case, 3.0, correct=True) for case in range(5, 15)]
+    rows += [scored("other", 20, 1000.0, correct=True)]
     ours, other = summarise(rows)
 
     assert (ours.right, ours.runs, ours.correct.estimate) == (2, 10, 0.2)

@@ -24,12 +24,15 @@ def test_recover_prints_one_json_object_with_everything_promised(recovered: tupl
 
     assert set(told) == {
         *("robot", "case", "truth", "comparator", "kinds", "gap", "structure", "seed", "trials"),
-        *("diagnosis", "correct", "displacement", "recovery", "physical_trials"),
-        *("evaluations", "seconds"),
+        *("diagnosis", "verdict", "rivals", "test", "intact_distance", "calibration", "correct"),
+        *("displacement", "recovery", "physical_trials", "evaluations", "seconds"),
     }
     assert (told["robot"], told["case"], told["seed"], told["gap"]) == ("quadruped", 4, 0, 0)
     assert told["truth"] == "break:front_left_shoulder+sensor:front_right_touch"
-    assert told["comparator"] == "forward-displacement"
+    assert told["comparator"] == "segment-prediction"
+    assert told["verdict"] in {"explained", "ambiguous", "unexplained"}
+    assert set(told["calibration"]) >= {"deviations", "error_before", "error"}
+    assert told["intact_distance"] >= told["diagnosis"][0]["distance"] >= 0
     stages = [trial["stage"] for trial in told["trials"]]
     assert stages == ["before", "after", "recovery", "recovery", "recovery"]
     assert told["physical_trials"] == 3
@@ -138,13 +141,18 @@ def test_progress_goes_to_standard_error_in_plain_lines_when_piped(tmp_path: Pat
     assert "\x1b" not in done.stderr + done.stdout
     lines = done.stderr.splitlines()
     begins = [
-        *("repair EA for intact:", "trial 00-before:", "trial 01-after:", "diagnostic EA:"),
+        *("repair EA for intact:", "trial 00-before:", "calibration: error ", "trial 01-after:"),
+        "diagnostic EA:",
         *("diagnosis from 1 trial:", "repair EA for ", "trial 02-recovery:", "diagnostic EA:"),
         "diagnosis from 2 trials:",
     ]
     assert len(lines) == len(begins)
     assert all(line.startswith(begin) for line, begin in zip(lines, begins, strict=True))
     assert "truth: intact; the diagnosis is" in done.stdout
+    assert any(
+        line.startswith(("Explained: ", "Ambiguous: ", "Unexplained: "))
+        for line in done.stdout.splitlines()
+    )
     assert len(list((tmp_path / "runs").iterdir())) == 1
 
 
@@ -201,7 +209,10 @@ def test_a_trial_without_a_controller_draws_one_from_its_seed(tmp_path: Path):
 
 def test_an_interrupted_recovery_keeps_its_finished_trials(tmp_path: Path):
     running = subprocess.Popen(
-        [sys.executable, "-m", "selfmodel", "recover", "quadruped", "--case", "1", "--out", "run"],
+        [
+            *(sys.executable, "-m", "selfmodel", "recover", "quadruped", "--case", "1"),
+            *(*SMALL, "--trials", "90", "--out", "run"),
+        ],
         cwd=tmp_path,
         stderr=subprocess.PIPE,
         text=True,

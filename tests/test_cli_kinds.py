@@ -75,12 +75,12 @@ def test_an_unknown_kind_is_one_sentence_and_status_2(command: list[str], tmp_pa
 
 
 def test_a_trial_takes_an_environment_beside_a_fault_and_replays(tmp_path: Path):
-    damage = "break:front_left_knee+roughness=0.02+friction=0.4"
+    damage = "break:front_left_knee+slope=0.1+friction=0.4"
     done = selfmodel(
         *("trial", "quadruped", "--damage", damage, "--out", "a.mcap", "--json"), cwd=tmp_path
     )
     truth = json.loads(done.stdout)["truth"]
     again = selfmodel("replay", "a.mcap", "--hypothesis", truth, "--json", cwd=tmp_path)
 
-    assert truth == "break:front_left_knee+friction=0.4+roughness=0.02"
+    assert truth == "break:front_left_knee+friction=0.4+slope=0.1"
     assert json.loads(again.stdout)["identical"]

@@ -11,7 +11,9 @@ import mujoco
 import pytest
 
 from selfmodel.logs import read_log
-from tests.command import selfmodel
+from tests.command import SMALL, selfmodel
+
+PAPERS = ("--comparator", "forward-displacement", "--no-calibrate")
 
 BLOCKED = """
 import sys
@@ -204,21 +206,52 @@ def test_replay_with_another_mujoco_compares_with_a_tolerance_and_says_so(
     assert "this is 3.99.0" in said
 
 
-def test_diagnosis_from_logs_alone_ranks_as_the_run_that_wrote_them(
-    recovered: tuple[Path, dict],
+@pytest.fixture(scope="module")
+def recovered_as_the_paper_did(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
+    """A folder in which a small recovery by displacement alone ran, and what it printed."""
+    folder = tmp_path_factory.mktemp("paper")
+    done = selfmodel(
+        *("recover", "quadruped", "--case", "1", *SMALL, "--out", "run", "--json", *PAPERS),
+        cwd=folder,
+    )
+    assert done.returncode == 0, done.stderr
+    return folder, json.loads(done.stdout)
+
+
+@pytest.mark.parametrize(
+    ("run", "options"),
+    [("recovered", ()), ("recovered_as_the_paper_did", PAPERS)],
+    ids=["default", "forward-displacement"],
+)
+def test_diagnosis_from_logs_alone_says_what_the_run_said_that_wrote_them(
+    run: str, options: tuple[str, ...], request: pytest.FixtureRequest
 ):
-    run, told = recovered
+    folder, told = request.getfixturevalue(run)
     logs = [trial["log"] for trial in told["trials"]]
-    done = selfmodel("diagnose", *logs, "--json", cwd=run)
+    done = selfmodel("diagnose", *logs, *options, "--json", cwd=folder)
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
 
-    assert found["diagnosis"] == told["diagnosis"]
+    for said in ("diagnosis", "verdict", "rivals", "test", "intact_distance", "calibration"):
+        assert found[said] == told[said], said
     assert found["logs"] == logs[1:]
-    assert found["passed_over"] == logs[:1]
+    assert found["intact"] == logs[:1]
     assert found["evaluations"] == told["evaluations"]["diagnostic"]
     assert found["distinct_hypotheses"] == told["evaluations"]["distinct_hypotheses"]
     assert found["seconds"] > 0
+
+
+def test_the_papers_way_is_the_ea_alone_ranked_by_distance_from_a_model_as_it_is(
+    recovered_as_the_paper_did: tuple[Path, dict],
+):
+    _, told = recovered_as_the_paper_did
+    ranked = [one["distance"] for one in told["diagnosis"]]
+
+    assert told["calibration"] is None
+    assert told["test"] == "equal distances"
+    assert told["evaluations"]["diagnostic"] == 4 * (8 + 4)
+    assert told["evaluations"]["distinct_hypotheses"] <= 4 * (8 + 4) + 1
+    assert ranked == sorted(ranked)
 
 
 def test_diagnosis_shows_its_ranking_and_takes_another_self_model(
@@ -234,7 +267,7 @@ def test_diagnosis_shows_its_ranking_and_takes_another_self_model(
     assert named.returncode == 0, named.stderr
     best = json.loads(own.stdout)["diagnosis"][0]["hypothesis"]
     assert best in named.stdout
-    assert "1 log, forward-displacement" in named.stdout
+    assert "1 log, segment-prediction" in named.stdout
     assert "diagnosis from 1 trial" in named.stderr
 
 

@@ -130,9 +130,10 @@ def test_nothing_is_simulated_twice(quadruped: Robot):
     trials = Counter(trial.plan.controller for trial in outcome.trials[1:])
 
     # Once for its fitness in a repair; a controller that was tried, once more for each trial that
-    # a diagnosis compares it with.
-    for (_, controller, _), times in simulator.seen.items():
-        assert times <= 1 + trials[controller]
+    # a diagnosis compares it with; and intact, for the trial that shows how well it is predicted.
+    before = INTACT, outcome.trials[0].plan.controller
+    for (hypothesis, controller, _), times in simulator.seen.items():
+        assert times <= 1 + trials[controller] + ((hypothesis, controller) == before)
     asked = outcome.repair_evaluations + outcome.diagnostic_evaluations
     assert len(simulator.seen) < asked
 

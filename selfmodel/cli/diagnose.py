@@ -129,8 +129,8 @@ def _print(result: dict[str, Any]) -> None:
     count = len(result["logs"])
     typer.echo(
         f"{plain(result['robot'])}, {count} {'log' if count == 1 else 'logs'}, "
-        f"{result['comparator']}: {result['evaluations']} evaluations of "
-        f"{result['distinct_hypotheses']} distinct hypotheses in {result['seconds']:.1f} s."
+        f"{result['comparator']}: {result['evaluations']} evaluations by the EA, "
+        f"{result['distinct_hypotheses']} distinct hypotheses, {result['seconds']:.1f} s."
     )
     typer.echo(in_words(result))
     for path in result["intact"]:

@@ -33,15 +33,19 @@ def sureness(diagnosis: Diagnosis) -> dict[str, Any]:
     }
 
 
-def in_words(sure: Mapping[str, Any]) -> str:
-    """Returns what ``sureness`` says, as a sentence."""
-    best = sure["diagnosis"][0]["hypothesis"]
-    match sure["verdict"]:
+def in_words(found: Mapping[str, Any]) -> str:
+    """Returns how sure a diagnosis is, as a sentence.
+
+    Args:
+        found: What ``sureness`` says, and under ``diagnosis`` what ``as_values`` does.
+    """
+    best = found["diagnosis"][0]["hypothesis"]
+    match found["verdict"]:
         case "explained":
             return f"Explained: {best} predicts the trials, and nothing else as well."
         case "ambiguous":
-            rivals = ", ".join(sure["rivals"])
-            return f"Ambiguous: the trials cannot tell {best} from {rivals} ({sure['test']})."
+            rivals = ", ".join(found["rivals"])
+            return f"Ambiguous: the trials cannot tell {best} from {rivals} ({found['test']})."
     return (
         f"Unexplained: even {best} predicts the trials significantly worse than the self-model "
         f"predicts the intact robot; something else is wrong, or what is wrong is of a kind that "

@@ -1,3 +1,4 @@
+import dataclasses
 import json
 import math
 from collections.abc import Iterator
@@ -9,7 +10,8 @@ from selfmodel.behaviour import Sample
 from selfmodel.controller import Controller
 from selfmodel.diagnosis import Candidate, Diagnosis
 from selfmodel.errors import InputError
-from selfmodel.hypothesis import INTACT
+from selfmodel.faults import WORLD, Fault, Kind, known
+from selfmodel.hypothesis import INTACT, canonical
 from selfmodel.logs import CorruptError, LogError, SchemaMismatchError, read_truth
 from selfmodel.logs.journal import FolderJournal, open_journal, read_database
 from selfmodel.notation import parse
@@ -17,6 +19,9 @@ from selfmodel.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trial import Plan
 from tests.logs.conftest import made_up, plan_of
+
+HEAD = '[{"trials": 1, "ranked": [{"hypothesis": "intact", "distance": 1}], "intact_distance": 1, '
+"""The beginning of a diagnosis of which nothing is wrong so far."""
 
 
 class MadeUpRobot:
@@ -40,21 +45,29 @@ def journal(biped: Robot, tmp_path: Path) -> FolderJournal:
 def diagnosis(robot: Robot) -> Diagnosis:
     worse = parse("break:left_hip", robot.anatomy)
     ranked = (Candidate(INTACT, 0.1 + 0.2), Candidate(worse, math.inf))
-    return Diagnosis(ranked, trials=3)
+    return Diagnosis(
+        ranked,
+        trials=3,
+        intact_distance=0.1 + 0.2,
+        rivals=(worse, parse("jam:left_hip", robot.anatomy)),
+        verdict="ambiguous",
+        test="by eye",
+    )
 
 
 def test_a_journal_reads_what_it_recorded(journal: FolderJournal, biped: Robot):
     trials = [
         journal.record(MadeUpRobot(biped), plan_of(biped, 30, f"{k:02d}-before")) for k in range(3)
     ]
-    journal.note(diagnosis(biped))
-    journal.note(Diagnosis(diagnosis(biped).ranked[:1], trials=4))
+    first = diagnosis(biped)
+    second = dataclasses.replace(
+        first, ranked=first.ranked[1:], trials=4, intact_distance=math.inf, rivals=()
+    )
+    journal.note(first)
+    journal.note(second)
     for database in (journal.read(), read_database(journal.folder, biped.anatomy)):
         assert [trial.plan for trial in database.trials] == [trial.plan for trial in trials]
-        assert database.diagnoses == (
-            diagnosis(biped),
-            Diagnosis(diagnosis(biped).ranked[:1], trials=4),
-        )
+        assert database.diagnoses == (first, second)
     assert sorted(path.name for path in (journal.folder / "trials").iterdir()) == [
         "00-before.mcap",
         "01-before.mcap",
@@ -141,6 +154,11 @@ def test_a_folder_without_a_run_is_said_so(biped: Robot, tmp_path: Path):
         '[{"trials": 1}]',
         '[{"trials": 1, "ranked": [{"hypothesis": "break:nose", "distance": 1}]}]',
         '[{"trials": 1, "ranked": [{"hypothesis": 3, "distance": 1}]}]',
+        HEAD + '"rivals": ["break:nose"], "verdict": "explained", "test": ""}]',
+        HEAD + '"rivals": 3, "verdict": "explained", "test": ""}]',
+        HEAD + '"rivals": [], "verdict": "certain", "test": ""}]',
+        HEAD + '"rivals": [], "verdict": ["explained"], "test": ""}]',
+        HEAD + '"rivals": [], "test": ""}]',
         "[" * 100_000,
         "\xff",
     ],
@@ -158,4 +176,17 @@ def test_diagnoses_are_json_without_surprises(journal: FolderJournal, biped: Rob
         {"hypothesis": "intact", "distance": 0.1 + 0.2},
         {"hypothesis": "break:left_hip", "distance": None},
     ]
+    assert (item["verdict"], item["test"]) == ("ambiguous", "by eye")
+    assert item["rivals"] == ["break:left_hip", "jam:left_hip"]
+    assert item["intact_distance"] == 0.1 + 0.2
     assert not list(journal.folder.glob("*.part"))
+
+
+def test_rivals_of_a_third_party_s_kind_are_read_back(biped: Robot, tmp_path: Path):
+    load = Kind(name="load", word="load", strike=lambda *_: None)
+    loaded = canonical([Fault(load, WORLD)], biped.anatomy)
+    journal = open_journal(tmp_path / "run", biped, Settings(), {}, kinds=known([load]))
+    told = dataclasses.replace(diagnosis(biped), rivals=(loaded,))
+    journal.note(told)
+
+    assert journal.read().diagnoses == (told,)

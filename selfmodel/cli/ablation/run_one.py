@@ -31,7 +31,7 @@ from selfmodel.trial import Trial
 
 
 def run_one(spec: Spec, comparator: str, folder: Path, gaits: Path) -> list[Row]:
-    """Returns a row for the diagnosis after each trial.
+    """Returns a row for each diagnosis: after the first trial and the last, or after each repair.
 
     Args:
         spec: What to run.

@@ -1,0 +1,97 @@
+"""Promises of the check of a controller's arithmetic: exact, silent where nothing is known."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from selfmodel.behaviour import SIGNALS, Behaviour
+from selfmodel.comparators.arithmetic import command_errors
+from selfmodel.notation import parse
+from selfmodel.physical import SimulatedRobot
+from selfmodel.playback import Playback
+from selfmodel.robot import Robot
+from selfmodel.trial import Plan, Trial
+from tests.conftest import random_controllers
+from tests.memory import MemoryJournal
+
+STEPS = 60
+
+
+def trial(robot: Robot, truth: str = "intact", number: int = 0) -> Trial:
+    controller = random_controllers(robot, number + 1)[number]
+    physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
+    return MemoryJournal(robot).record(physical, Plan("t", "after", controller, STEPS, 0))
+
+
+def with_signals(one: Trial, **signals: np.ndarray) -> Trial:
+    behaviour = one.behaviour
+    changed = {**{signal: behaviour[signal] for signal in SIGNALS}, **signals}
+    return dataclasses.replace(one, behaviour=Behaviour(behaviour.names, behaviour.time, changed))
+
+
+@pytest.mark.parametrize("truth", ["intact", "break:front_left_knee", "sensor:front_left_angle"])
+def test_a_controller_that_works_errs_by_exactly_nothing_whatever_else_is_wrong(
+    robot: Robot, truth: str
+):
+    one = trial(robot, truth.replace("front_left_knee", robot.anatomy.joints[0].name))
+
+    assert np.array_equal(command_errors(one), np.zeros((STEPS, len(robot.anatomy.motors))))
+
+
+@pytest.mark.parametrize("neuron", [0, 1, 2])
+def test_a_silent_neuron_shows_from_the_first_step_in_every_motor(robot: Robot, neuron: int):
+    errors = command_errors(trial(robot, f"neuron:{neuron}"))
+
+    assert np.abs(errors[0]).max() > 0.01
+    assert np.all(np.abs(errors).max(axis=0) > 0.01)
+
+
+def test_a_wrong_command_shows_at_its_step_in_its_motor_by_how_much_it_is_wrong(quadruped: Robot):
+    one = trial(quadruped)
+    commands = one.behaviour["commands"].copy()
+    commands[20, 3] += 0.25
+    errors = command_errors(with_signals(one, commands=commands))
+
+    assert errors[20, 3] == pytest.approx(0.25)
+    errors[20, 3] = 0
+    assert not errors.any()
+
+
+def test_a_network_that_is_fed_with_other_readings_gives_other_commands(quadruped: Robot):
+    one = trial(quadruped)
+    readings = one.behaviour["sensors"].copy()
+    readings[30, 5] += 0.5
+    errors = command_errors(with_signals(one, sensors=readings))
+
+    assert not errors[:30].any()
+    assert errors[30].any()
+    assert errors[31].any()  # its neurons remember
+
+
+def test_from_the_first_unknown_reading_on_nothing_is_known(quadruped: Robot):
+    one = trial(quadruped)
+    readings = one.behaviour["sensors"].copy()
+    readings[25, 2] = np.nan
+    errors = command_errors(with_signals(one, sensors=readings))
+
+    assert np.array_equal(errors[:25], np.zeros((25, len(quadruped.anatomy.motors))))
+    assert np.isnan(errors[25:]).all()
+
+
+def test_of_a_command_that_was_not_observed_alone_nothing_is_known(quadruped: Robot):
+    one = trial(quadruped)
+    commands = one.behaviour["commands"].copy()
+    commands[10] = np.nan
+    errors = command_errors(with_signals(one, commands=commands))
+
+    assert np.isnan(errors[10]).all()
+    assert not np.delete(errors, 10, axis=0).any()
+
+
+def test_of_what_other_software_commanded_nothing_is_held_against_it(quadruped: Robot):
+    one = trial(quadruped, "neuron:0")
+    driver = Playback(quadruped.anatomy.motors, one.behaviour["commands"])
+    played = dataclasses.replace(one, plan=dataclasses.replace(one.plan, controller=driver))
+
+    assert np.array_equal(command_errors(played), np.zeros((STEPS, len(driver.motors))))

@@ -1,0 +1,208 @@
+"""Promises of a diagnosis about itself: what it explains, what it cannot tell, what it cannot say.
+
+At no reality gap, so that whatever is left unexplained is unexplained by the hypotheses.
+"""
+
+import dataclasses
+import itertools
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+
+from selfmodel.behaviour import Behaviour, forward_displacement
+from selfmodel.comparator import ClosedLoop, Comparator
+from selfmodel.comparators import FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
+from selfmodel.controller import Controller
+from selfmodel.diagnose import EQUAL, Diagnose
+from selfmodel.diagnosis import Diagnosis
+from selfmodel.faults import BROKEN, FRICTION, JAMMED, PAPER_KINDS, Kind
+from selfmodel.hypothesis import INTACT, Hypothesis, canonical
+from selfmodel.notation import parse
+from selfmodel.physical import SimulatedRobot
+from selfmodel.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.significance import TEST
+from selfmodel.simulator import Simulator
+from selfmodel.tasks import ROBOTS
+from selfmodel.trial import Plan, Stage, Trial
+from tests.conftest import random_controllers
+from tests.memory import MemoryJournal
+
+SMALL = dataclasses.replace(Settings().scaled(12), generations=2, steps=300)
+CASES = ROBOTS["quadruped"].cases
+GAIT = 4
+"""The number of a random controller under which every failure below shows."""
+
+
+def trial(robot: Robot, truth: str, controller: Controller, stage: Stage = "after") -> Trial:
+    """A trial of a robot with something wrong."""
+    physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
+    plan = Plan(f"{stage}-{truth}-{hash(controller)}", stage, controller, SMALL.steps, 0)
+    return MemoryJournal(robot).record(physical, plan)
+
+
+def diagnosed(
+    robot: Robot,
+    trials: Sequence[Trial],
+    intact: Sequence[Trial] = (),
+    *,
+    comparator: Comparator = SEGMENT_PREDICTION,
+    kinds: Sequence[Kind] = PAPER_KINDS,
+    seeds: Sequence[Hypothesis] = (),
+) -> Diagnosis:
+    search = Diagnose(Simulator(robot, 1), comparator, SMALL, kinds, intact=intact)
+    return search(trials, seeds, np.random.default_rng(0), lambda _: None)
+
+
+@pytest.fixture(scope="module")
+def gait(quadruped: Robot) -> Controller:
+    return random_controllers(quadruped, 5)[GAIT]
+
+
+@pytest.fixture(scope="module")
+def before(quadruped: Robot, gait: Controller) -> list[Trial]:
+    return [trial(quadruped, "intact", gait, "before")]
+
+
+@pytest.mark.parametrize("case", [1, 2, 3, 6, 9])
+def test_a_failure_of_table_one_is_found_and_explained(
+    quadruped: Robot, gait: Controller, before: list[Trial], case: int
+):
+    found = diagnosed(quadruped, [trial(quadruped, CASES[case], gait)], before)
+
+    assert str(found.best) == CASES[case]
+    assert found.verdict == "explained"
+    assert found.rivals == ()
+    assert found.test == TEST
+    assert found.ranked[0].distance < 1e-9
+    assert (found.intact_distance > 1e-4) == (case != 9)
+
+
+def test_a_hidden_neuron_is_unexplained(quadruped: Robot, gait: Controller, before: list[Trial]):
+    found = diagnosed(quadruped, [trial(quadruped, CASES[10], gait)], before)
+
+    assert found.verdict == "unexplained"
+
+
+@pytest.mark.parametrize(
+    ("truth", "kinds"),
+    [
+        ("friction=0.3", PAPER_KINDS),
+        ("motor:front_left_knee=0.2", PAPER_KINDS),
+        ("break:front_left_shoulder", [JAMMED, FRICTION]),
+    ],
+)
+def test_what_is_of_no_kind_that_is_considered_is_not_explained(
+    quadruped: Robot, gait: Controller, before: list[Trial], truth: str, kinds: list[Kind]
+):
+    found = diagnosed(quadruped, [trial(quadruped, truth, gait)], before, kinds=kinds)
+
+    assert found.verdict == "unexplained"
+
+
+def test_without_a_trial_of_the_intact_robot_nothing_is_unexplained(
+    quadruped: Robot, gait: Controller
+):
+    found = diagnosed(quadruped, [trial(quadruped, CASES[10], gait)])
+
+    assert found.verdict in {"explained", "ambiguous"}
+
+
+@dataclasses.dataclass(frozen=True)
+class Coarse:
+    """The paper's comparator with a coarse ruler, m."""
+
+    ruler: float
+    name: str = "coarse"
+
+    def request(self, _trial: Trial) -> ClosedLoop:
+        """Asks for the way of the root body."""
+        return ClosedLoop(record=("base_position",))
+
+    def distances(self, simulated: Behaviour, trial: Trial) -> np.ndarray:
+        """Counts rulers."""
+        return np.floor(np.abs(forward_displacement(simulated) - trial.displacement) / self.ruler)
+
+
+@dataclasses.dataclass(frozen=True)
+class CoarseInPieces(Coarse):
+    """The same of every one of five pieces."""
+
+    def losses(self, simulated: Behaviour, trial: Trial) -> np.ndarray:
+        """The same for each."""
+        return np.repeat(self.distances(simulated, trial)[:, np.newaxis], 5, axis=1)
+
+
+@pytest.mark.parametrize(("make", "test"), [(Coarse, EQUAL), (CoarseInPieces, TEST)])
+def test_hypotheses_that_no_trial_tells_apart_are_rivals(
+    quadruped: Robot, gait: Controller, make: Callable[[float], Comparator], test: str
+):
+    anatomy = quadruped.anatomy
+    singles = [
+        canonical([fault], anatomy)
+        for kind in (BROKEN, JAMMED)
+        for fault in kind.candidates(anatomy)
+    ]
+    runs = [(one, gait) for one in (INTACT, *singles)]
+    outcome = Simulator(quadruped, 1).run(runs, SMALL.steps, ["base_position"])
+    intact, *ways = forward_displacement(outcome.behaviour)
+    apart, one, other = min(
+        (abs(ways[i] - ways[k]), singles[i], singles[k])
+        for i, k in itertools.combinations(range(len(singles)), 2)
+        if min(abs(ways[i] - intact), abs(ways[k] - intact)) > 3 * abs(ways[i] - ways[k])
+    )
+    found = diagnosed(
+        quadruped,
+        [trial(quadruped, str(one), gait)],
+        comparator=make(1.01 * apart),
+        seeds=[one, other],
+    )
+    distances = {candidate.hypothesis: candidate.distance for candidate in found.ranked}
+
+    assert found.verdict == "ambiguous"
+    assert found.test == test
+    assert {one, other} <= {found.best, *found.rivals}
+    assert found.best not in found.rivals
+    assert len(found.rivals) <= SMALL.kept
+    assert {distances.get(rival, 0.0) for rival in found.rivals} == {0.0}
+    assert found.intact_distance > 0
+
+
+def deaf(robot: Robot, gait: Controller, sensor: str) -> Controller:
+    """The same gait, which does not listen to one of its sensors."""
+    number = robot.anatomy.names.sensors.index(sensor)
+    genome = gait.genome.copy()
+    inputs = len(robot.anatomy.sensors) + 1
+    genome[number : robot.network.hidden * inputs : inputs] = 0
+    return Controller(robot.network, genome)
+
+
+def test_fewer_faults_win_and_what_only_says_more_is_no_rival(quadruped: Robot, gait: Controller):
+    # To a controller that is deaf to a sensor it makes no difference, to the bit, if it fails.
+    truth = parse("break:front_left_knee", quadruped.anatomy)
+    more = parse("break:front_left_knee+sensor:back_left_touch", quadruped.anatomy)
+    one = trial(quadruped, str(truth), deaf(quadruped, gait, "back_left_touch"))
+    found = diagnosed(quadruped, [one], comparator=FORWARD_DISPLACEMENT, seeds=[more])
+
+    assert [candidate.hypothesis for candidate in found.ranked[:2]] == [truth, more]
+    assert [candidate.distance for candidate in found.ranked[:2]] == [0, 0]
+    assert found.verdict == "explained"
+    assert found.rivals == ()
+
+
+def test_a_fault_that_the_trial_does_not_need_is_not_diagnosed(quadruped: Robot, gait: Controller):
+    more = parse("break:front_left_knee+sensor:back_left_angle", quadruped.anatomy)
+    one = trial(quadruped, "break:front_left_knee", gait)
+    found = diagnosed(quadruped, [one], seeds=[more])
+
+    assert str(found.best) == "break:front_left_knee"
+
+
+def test_intact_is_always_judged_whatever_the_search_looked_at(quadruped: Robot, gait: Controller):
+    one = trial(quadruped, "break:front_left_shoulder", gait)
+    search = Diagnose(Simulator(quadruped, 1), FORWARD_DISPLACEMENT, SMALL)
+    found = search([one], [], np.random.default_rng(3), lambda _: None)
+    (expected,) = search.evidence.distances([INTACT], [one])
+
+    assert found.intact_distance == expected > 0

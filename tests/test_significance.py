@@ -1,0 +1,142 @@
+"""Promises of the tests between hypotheses: paired, above rounding, and at ease with infinity."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy import stats
+
+from selfmodel.significance import (
+    NEGLIGIBLE,
+    RATIO,
+    WORSE,
+    Z,
+    is_better,
+    is_worse_than_ever,
+    paired_z,
+)
+
+LOSSES = st.one_of(st.just(np.inf), st.floats(0, 1e6))
+DIVERGED = np.full(5, np.inf)
+
+
+def of_mean_and_error(mean: float, error: float, pieces: int = 100) -> np.ndarray:
+    """Losses of exactly this mean and this standard error of the mean."""
+    swing = np.tile([-1.0, 1.0], pieces // 2)
+    return mean + swing / swing.std(ddof=1) * error * np.sqrt(pieces)
+
+
+def test_the_paired_z_is_the_statistic_of_the_paired_t_test():
+    rng = np.random.default_rng(0)
+    one, other = rng.gamma(2, size=(2, 37))
+
+    assert paired_z(one, other) == pytest.approx(stats.ttest_rel(one, other).statistic)
+
+
+def test_the_paired_z_by_hand():
+    # Differences of 1, 2, 3: mean 2, standard deviation 1, error 1 / sqrt(3).
+    larger, smaller = np.array([2.0, 4.0, 6.0]), np.array([1.0, 2.0, 3.0])
+
+    assert paired_z(larger, smaller) == pytest.approx(2 * np.sqrt(3))
+    assert paired_z(smaller, larger) == pytest.approx(-2 * np.sqrt(3))
+
+
+def test_what_makes_a_piece_hard_for_both_does_not_count():
+    hard = np.linspace(0, 1e3, 100)
+    by_two_percent = of_mean_and_error(0.02, 0.001)
+
+    assert is_better(hard + 1, hard + 1 + by_two_percent)
+    assert not is_better(hard + 1, np.roll(hard, 50) + 1 + by_two_percent)
+
+
+@pytest.mark.parametrize(("errors", "told"), [(Z * 1.01, True), (Z * 0.99, False)])
+def test_a_difference_counts_from_three_standard_errors_on(errors: float, told: bool):  # noqa: FBT001  # what is expected
+    one = np.full(100, 10.0)
+
+    assert is_better(one, one + of_mean_and_error(errors * 0.1, 0.1)) == told
+
+
+@pytest.mark.parametrize(("times", "told"), [(RATIO * 1.01, True), (RATIO * 0.99, False)])
+def test_three_times_the_loss_counts_whatever_the_errors(times: float, told: bool):  # noqa: FBT001  # what is expected
+    # All of the difference is in one piece of a hundred: z is 1.
+    one = np.full(100, 0.01)
+    other = one.copy()
+    other[7] += (times - 1) * one.sum()
+
+    assert paired_z(other, one) == pytest.approx(1)
+    assert is_better(one, other) == told
+    assert is_worse_than_ever(other, one) == told
+
+
+def test_the_rounding_of_arithmetic_is_no_reason():
+    perfect, rounded = np.zeros(2), np.array([0.0, 1.9 * NEGLIGIBLE])
+
+    assert not is_better(perfect, rounded)
+    assert not is_worse_than_ever(rounded, perfect)
+    assert is_better(perfect, 2 * rounded)
+    assert is_worse_than_ever(np.full(50, 1.01 * NEGLIGIBLE), np.zeros(50))
+    assert not is_worse_than_ever(np.full(50, 0.99 * NEGLIGIBLE), np.zeros(50))
+
+
+def test_of_a_single_piece_nothing_but_the_ratio_can_tell():
+    small, twice, four_times = np.array([[1.0], [2.0], [4.0]])
+
+    assert paired_z(twice, small) == 0
+    assert not is_better(small, twice)
+    assert is_better(small, four_times)
+    assert not is_worse_than_ever(twice, small)
+    assert is_worse_than_ever(four_times, small)
+
+
+def test_losses_of_one_trial_and_one_piece_of_another_are_told_by_the_ratio():
+    usual = np.full(50, 1.0)
+
+    assert not is_worse_than_ever(np.array([2.9]), usual)
+    assert is_worse_than_ever(np.array([3.1]), usual)
+
+
+def test_whatever_predicts_at_all_is_better_than_what_diverged():
+    finite = np.full(5, 1e9)
+
+    assert is_better(finite, DIVERGED)
+    assert not is_better(DIVERGED, finite)
+    assert not is_better(DIVERGED, DIVERGED)
+
+
+def test_a_hypothesis_that_diverged_in_one_trial_is_worse_than_ever():
+    mixed = np.array([0.0, 0.0, np.inf])
+
+    assert is_worse_than_ever(mixed, np.ones(3))
+    assert is_worse_than_ever(DIVERGED, np.ones(3))
+    assert not is_worse_than_ever(np.ones(3), DIVERGED)
+    assert not is_worse_than_ever(DIVERGED, DIVERGED)
+    assert is_better(np.full(3, 1e9), mixed)
+
+
+def test_losses_of_other_trials_are_compared_as_welch_did():
+    rng = np.random.default_rng(1)
+    usual, losses = rng.normal(10, 1, 40), rng.normal(11, 3, 80)
+    z = stats.ttest_ind(losses, usual, equal_var=False).statistic
+    lift = (WORSE - z) * (losses.mean() - usual.mean()) / z
+
+    assert not is_worse_than_ever(losses + 0.99 * lift, usual)
+    assert is_worse_than_ever(losses + 1.01 * lift, usual)
+    assert not is_worse_than_ever(losses - 5, usual)
+
+
+@given(arrays(float, (2, 6), elements=LOSSES))
+def test_of_two_at_most_one_is_better(pair: np.ndarray):
+    one, other = pair
+
+    assert not (is_better(one, other) and is_better(other, one))
+    assert not is_better(one, one)
+    assert not is_worse_than_ever(one, one)
+
+
+@given(arrays(float, (2, 6), elements=LOSSES), st.permutations(range(6)))
+def test_the_order_of_the_pieces_does_not_matter(pair: np.ndarray, order: list[int]):
+    one, other = pair
+    z = paired_z(other, one) if np.isfinite(pair).all() else 0.0
+    if abs(z - Z) > 1e-6:  # where rounding does not decide
+        assert is_better(one[order], other[order]) == is_better(one, other)
