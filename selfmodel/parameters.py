@@ -38,6 +38,12 @@ class Parameters:
         return np.array([*shared, *self.motor_gains])
 
 
+def factor_names(robot: Robot) -> tuple[str, ...]:
+    """Returns what each factor is of, in the order of ``Parameters.factors``."""
+    shared = ("mass of the root", "mass of the limbs", "friction", "damping")
+    return (*shared, *(f"motor {motor}" for motor in robot.anatomy.motors))
+
+
 def nominal(robot: Robot) -> Parameters:
     """Returns the parameters of a robot as its model describes it."""
     return Parameters(1.0, 1.0, 1.0, 1.0, (1.0,) * robot.model.nu, robot.control_delay)
@@ -71,12 +77,7 @@ def with_parameters(robot: Robot, parameters: Parameters) -> Robot:
     million.
     """
     spec = robot.specification()
-    model = edited_model(robot, parameters)
-    for body in spec.bodies[1:]:
-        compiled = model.body(body.name)
-        body.explicitinertial = True
-        body.mass, body.inertia = float(compiled.mass[0]), compiled.inertia
-        body.ipos, body.iquat = compiled.ipos, compiled.iquat
+    _say_inertia(spec, edited_model(robot, parameters))
     for geom in spec.geoms:
         geom.friction = geom.friction * np.array([parameters.friction, 1.0, 1.0])
     for joint in spec.joints:
@@ -89,6 +90,25 @@ def with_parameters(robot: Robot, parameters: Parameters) -> Robot:
             numeric.delete()
     spec.add_numeric(name=CONTROL_DELAY, data=[float(parameters.delay)])
     return dataclasses.replace(robot, mjcf=spec.to_xml())
+
+
+def _say_inertia(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
+    """Has a specification say the masses of a model of the same layout, and nothing else.
+
+    What would change them again as it is compiled, such as a total mass, is taken out.
+    """
+    spec.compile()  # until then its bodies have no numbers
+    compiler = spec.compiler
+    compiler.settotalmass, compiler.inertiafromgeom = -1.0, _SAID_OR_FROM_GEOMS
+    compiler.boundmass = compiler.boundinertia = 0.0
+    for body in spec.bodies[1:]:
+        body.explicitinertial = True
+        body.fullinertia = np.full(6, np.nan)
+        body.mass, body.inertia = model.body_mass[body.id], model.body_inertia[body.id]
+        body.ipos, body.iquat = model.body_ipos[body.id], model.body_iquat[body.id]
+
+
+_SAID_OR_FROM_GEOMS = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
 
 
 def _mass_factors(robot: Robot, parameters: Parameters) -> FloatArray:
