@@ -155,6 +155,24 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
     )
 
 
+def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> float:
+    """Returns how badly a self-model predicts the motion in trials.
+
+    Args:
+        robot: The self-model.
+        trials: At least one, each with the whole state.
+        threads: Threads for the physics.
+
+    Returns:
+        The root mean square error over all segments, steps and columns, in units of ``SCALES``.
+
+    Raises:
+        InputError: A trial was not observed well enough.
+    """
+    data = [_stretches(trial) for trial in trials]
+    return float(np.sqrt(np.mean(_errors(robot, [nominal(robot)], data, threads) ** 2)))
+
+
 @dataclass(frozen=True, eq=False)
 class _Stretches:
     """A trial cut into segments, and what was observed in each, ``(segments, horizon, width)``."""

@@ -63,6 +63,7 @@ def edited_model(robot: Robot, parameters: Parameters) -> mujoco.MjModel:
     model.body_inertia *= masses[:, np.newaxis]
     model.geom_friction[:, 0] *= parameters.friction
     model.dof_damping *= parameters.damping
+    model.dof_dampingpoly *= parameters.damping
     motors = np.array(parameters.motor_gains)[:, np.newaxis]
     model.actuator_gainprm *= motors
     model.actuator_biasprm *= motors
@@ -76,29 +77,21 @@ def with_parameters(robot: Robot, parameters: Parameters) -> Robot:
     Numbers in an MJCF have six digits, so its model is that of ``edited_model`` to one part in a
     million.
     """
-    spec = robot.specification()
-    _say_inertia(spec, edited_model(robot, parameters))
-    for geom in spec.geoms:
-        geom.friction = geom.friction * np.array([parameters.friction, 1.0, 1.0])
-    for joint in spec.joints:
-        joint.damping = joint.damping * parameters.damping
-    for motor, factor in zip(spec.actuators, parameters.motor_gains, strict=True):
-        motor.gainprm = motor.gainprm * factor
-        motor.biasprm = motor.biasprm * factor
-    for numeric in spec.numerics:
-        if numeric.name == CONTROL_DELAY:
-            numeric.delete()
-    spec.add_numeric(name=CONTROL_DELAY, data=[float(parameters.delay)])
-    return dataclasses.replace(robot, mjcf=spec.to_xml())
+    return with_model(robot, edited_model(robot, parameters), parameters.delay)
 
 
-def _say_inertia(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
-    """Has a specification say the masses of a model of the same layout, and nothing else.
+def with_model(robot: Robot, model: mujoco.MjModel, delay: int) -> Robot:
+    """Returns a robot whose MJCF says what an edited copy of its compiled model does.
 
-    What would change them again as it is compiled, such as a total mass, is taken out.
+    Args:
+        robot: The robot that the copy is of.
+        model: The copy, with other masses, friction, damping or motor gains.
+        delay: Control steps from a command to its effect.
     """
-    spec.compile()  # until then its bodies have no numbers
+    spec = robot.specification()
+    spec.compile()  # until then its parts have no numbers
     compiler = spec.compiler
+    # What would change the masses again as the text is compiled.
     compiler.settotalmass, compiler.inertiafromgeom = -1.0, _SAID_OR_FROM_GEOMS
     compiler.boundmass = compiler.boundinertia = 0.0
     for body in spec.bodies[1:]:
@@ -106,6 +99,19 @@ def _say_inertia(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
         body.fullinertia = np.full(6, np.nan)
         body.mass, body.inertia = model.body_mass[body.id], model.body_inertia[body.id]
         body.ipos, body.iquat = model.body_ipos[body.id], model.body_iquat[body.id]
+    for geom in spec.geoms:
+        geom.friction = model.geom_friction[geom.id]
+    for joint in spec.joints:
+        dof = model.jnt_dofadr[joint.id]
+        joint.damping = [model.dof_damping[dof], *model.dof_dampingpoly[dof]]
+    for motor in spec.actuators:
+        motor.gainprm = model.actuator_gainprm[motor.id]
+        motor.biasprm = model.actuator_biasprm[motor.id]
+    for numeric in spec.numerics:
+        if numeric.name == CONTROL_DELAY:
+            spec.delete(numeric)
+    spec.add_numeric(name=CONTROL_DELAY, data=[float(delay)])
+    return dataclasses.replace(robot, mjcf=spec.to_xml())
 
 
 _SAID_OR_FROM_GEOMS = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO

@@ -90,13 +90,13 @@ def _print(result: dict[str, Any]) -> None:
         for one in result["parameters"]
     ]
     show(("factor of", "before", "fitted", "uncertainty"), rows)
-    typer.echo(f"delay: {result['delay']} control steps, {result['delay_before']} before")
+    typer.echo(f"delay, control steps: {result['delay']} ({result['delay_before']} before)")
+    typer.echo(
+        f"error of predicted motion: {result['error']:.3f} ({result['error_before']:.3f} before), "
+        f"the root mean square over 10 steps, in the units of docs/calibration.md"
+    )
     if result["as_it_was"]:
         typer.echo("The model predicts the logs exactly already: it is left as it was.")
-    typer.echo(
-        f"error of predicted motion: {result['error']:.3f}, {result['error_before']:.3f} before "
-        f"(root mean square, each signal in its unit of docs/calibration.md)"
-    )
     count = len(result["logs"])
     typer.echo(
         plain(
