@@ -119,9 +119,7 @@ def _compare(
     return [*rows, row("the robot's own model", true)]
 
 
-def _against_truth(
-    robot: Robot, gap: Gap, found: Parameters, deviations: Sequence[float]
-) -> Facts:
+def _against_truth(robot: Robot, gap: Gap, found: Parameters, deviations: Sequence[float]) -> Facts:
     """How far the logarithms of the factors are from the truth, all and over their deviations.
 
     The limbs differ by a factor each, so there is no true one: their mass is left out.

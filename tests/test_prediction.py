@@ -59,9 +59,7 @@ def furthest(predicted: Behaviour, run: Behaviour, starts: Sequence[int]) -> flo
     for signal in STATE:
         logged = np.stack([run[signal][k : k + HORIZON + 1] for k in starts])
         made = predicted[signal][0]
-        apart = (
-            rotation_between(made, logged) if signal == "base_orientation" else made - logged
-        )
+        apart = rotation_between(made, logged) if signal == "base_orientation" else made - logged
         worst = max(worst, float(np.abs(apart).max()))
     return worst
 
