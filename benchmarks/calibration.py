@@ -1,8 +1,8 @@
 """How much better a calibrated self-model predicts trials that it has not seen, and at what cost.
 
 ``python -m benchmarks.calibration [--bank DIR]`` prints a table and writes it down as
-``benchmarks/calibration.json``. With ``mujoco.sysid``'s packages (requirements-sysid.txt beside this
-file) it calibrates from the same trials too. Without ``--bank``, three gaits a robot are evolved
+``benchmarks/calibration.json``. With ``mujoco.sysid``'s packages (requirements-sysid.txt beside
+this file) it calibrates from the same trials too. Without ``--bank``, three gaits a robot are evolved
 first, in about two minutes.
 """
 

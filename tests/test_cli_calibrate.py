@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from selfmodel.behaviour import Sample, Signal
-from selfmodel.driver import Driver
 from selfmodel.gap import draw_gap
 from selfmodel.logs.writer import write_trial
 from selfmodel.parameters import nominal, with_parameters
@@ -34,7 +33,7 @@ def write(
     lost: tuple[Signal, ...] = (),
 ) -> Path:
     """Logs a trial in which every joint moves."""
-    driver: Driver = played_back(robot.anatomy.motors, random_motion(robot, STEPS))
+    driver = played_back(robot.anatomy.motors, random_motion(robot, STEPS))
     gap = draw_gap(robot, level, np.random.default_rng(2))
     samples = (
         Sample(
