@@ -2,8 +2,8 @@
 
 ``python -m benchmarks.calibration [--bank DIR]`` prints a table and writes it down as
 ``benchmarks/calibration.json``. With ``mujoco.sysid``'s packages (requirements-sysid.txt beside
-this file) it calibrates from the same trials too. Without ``--bank``, three gaits a robot are evolved
-first, in about two minutes.
+this file) it calibrates from the same trials too. Without ``--bank``, three gaits a robot are
+evolved first, in about two minutes.
 """
 
 import argparse

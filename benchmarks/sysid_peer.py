@@ -8,12 +8,12 @@ large errors count by their square.
 import io
 from collections.abc import Sequence
 from functools import lru_cache
+from importlib import import_module
 from typing import Any
 
 import mujoco
 import numpy as np
 from absl import logging
-from mujoco import sysid
 
 from selfmodel.arrays import FloatArray
 from selfmodel.behaviour import Signal
@@ -24,6 +24,12 @@ from selfmodel.places import places
 from selfmodel.robot import Robot
 from selfmodel.rotation import rotation_between
 from selfmodel.trial import Trial
+
+Theirs = Any
+"""What mujoco.sysid makes or asks for."""
+
+# Imported so, because it says that it is typed, and MuJoCo itself is not.
+sysid: Theirs = import_module("mujoco.sysid")
 
 States = dict[Signal, FloatArray]
 
@@ -36,7 +42,7 @@ def sysid_parameters(robot: Robot, trials: Sequence[Trial]) -> Parameters:
         {name: sysid.Parameter(name, 0.0, -BOUND, BOUND) for name in names}
     )
 
-    def residual_at(delay: int) -> Any:  # noqa: ANN401  # sysid's own protocol
+    def residual_at(delay: int) -> Theirs:
         return sysid.build_residual_fn(
             models_sequences=[_sequences(robot, trials, delay)],
             build_model=_builder(robot),
@@ -55,7 +61,7 @@ def sysid_parameters(robot: Robot, trials: Sequence[Trial]) -> Parameters:
     return from_factors(np.exp(found.as_vector()), delay)
 
 
-def _builder(robot: Robot) -> Any:  # noqa: ANN401  # the same
+def _builder(robot: Robot) -> Theirs:
     """Builds models from logarithms; it is asked for the same one once a segment."""
 
     @lru_cache(64)
@@ -65,7 +71,7 @@ def _builder(robot: Robot) -> Any:  # noqa: ANN401  # the same
     return lambda parameters, _spec: build(tuple(parameters.as_vector().tolist()))
 
 
-def _sequences(robot: Robot, trials: Sequence[Trial], delay: int) -> sysid.ModelSequences:
+def _sequences(robot: Robot, trials: Sequence[Trial], delay: int) -> Theirs:
     """Every segment as a sequence of its own: from a logged state, under the delayed commands."""
     states, controls, observed = [], [], []
     for trial in trials:
@@ -100,7 +106,7 @@ def _sequences(robot: Robot, trials: Sequence[Trial], delay: int) -> sysid.Model
     )
 
 
-def _vectors(robot: Robot, states: Any) -> FloatArray:  # noqa: ANN401  # a mapping by signal
+def _vectors(robot: Robot, states: Theirs) -> FloatArray:
     """The state as MuJoCo orders it, ``(steps, nq + nv)``."""
     model, where = robot.model, places(robot)
     fields = {"qpos": np.zeros((len(states[STATE[0]]), model.nq))}
@@ -119,15 +125,15 @@ class _Residual:
 
     def __call__(
         self,
-        _parameters: sysid.ParameterDict,
-        _predicted: sysid.TimeSeries,
-        observed: sysid.TimeSeries,
+        _parameters: Theirs,
+        _predicted: Theirs,
+        observed: Theirs,
         _model: mujoco.MjModel,
         _all: bool,  # noqa: FBT001  # sysid's protocol
         *,
         state: FloatArray,
         **_rest: object,
-    ) -> tuple[FloatArray, sysid.TimeSeries, sysid.TimeSeries]:
+    ) -> tuple[FloatArray, Theirs, Theirs]:
         substeps = self._robot.substeps
         made = self._signals(state[substeps - 1 :: substeps, 1:])  # column 0 is the time
         seen = self._signals(observed.data)
