@@ -103,14 +103,14 @@ def publish(file: IO[bytes], path: Path) -> None:
         os.link(part_of(path), path)  # unlike a rename, this never replaces a file
     except FileExistsError:
         raise InputError(
-            f"{path} has come to exist meanwhile, and is not overwritten; the finished log is "
+            f"{path} has come to exist meanwhile, and is not overwritten; the finished file is "
             f"{part_of(path)}: give it another name"
         ) from None
     except OSError as error:
         if error.errno not in (errno.EPERM, errno.ENOTSUP):
             raise
         raise InputError(
-            f"{path}: this file system has no hard links ({error.strerror}); the finished log is "
+            f"{path}: this file system has no hard links ({error.strerror}); the finished file is "
             f"{part_of(path)}: rename it, and choose another folder for the next"
         ) from error
     part_of(path).unlink()

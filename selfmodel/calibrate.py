@@ -5,7 +5,7 @@ states (``mujoco.minimize``), with a prior that keeps what the trials do not sho
 delay, which is a whole number, is tried out.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import mujoco.minimize
@@ -28,6 +28,11 @@ from selfmodel.trial import Trial
 
 PRIOR = 0.15
 """How far a parameter may be expected from nominal, as a deviation of its logarithm."""
+
+SHARE = 0.05
+"""The weight of the prior beside the data: all errors together count as 1 / SHARE**2 independent
+ones, however many there are, because those of neighbouring steps and columns say the same thing
+again and again."""
 
 BOUND = 1.2
 """How far the logarithm of a parameter may be from nominal: a factor of 0.3 to 3.3."""
@@ -150,9 +155,22 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
     )
 
 
-SHARE = 0.05
-"""The weight of the prior beside the data: errors of neighbouring steps and columns say the same
-thing again and again."""
+def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> float:
+    """Returns how badly a self-model predicts the motion in trials.
+
+    Args:
+        robot: The self-model.
+        trials: At least one, each with the whole state.
+        threads: Threads for the physics.
+
+    Returns:
+        The root mean square error over all segments, steps and columns, in units of ``SCALES``.
+
+    Raises:
+        InputError: A trial was not observed well enough.
+    """
+    data = [_stretches(trial) for trial in trials]
+    return float(np.sqrt(np.mean(_errors(robot, [nominal(robot)], data, threads) ** 2)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,15 +186,17 @@ def _stretches(trial: Trial) -> _Stretches:
     states, commands = estimated_states(behaviour), behaviour["commands"]
     last = behaviour.steps - 1 - HORIZON
     evenly = np.unique(np.linspace(LEAD, max(last, LEAD), SEGMENTS).round().astype(int))
-    whole = np.concatenate([*(states[signal] for signal in STATE), commands], axis=1)
-    starts = [
-        int(k) for k in evenly if k <= last and np.isfinite(whole[k - LEAD : k + HORIZON + 1]).all()
-    ]
+    known = {signal: np.isfinite(states[signal]).all(axis=1) for signal in STATE}
+    known["commands"] = np.isfinite(commands).all(axis=1)
+
+    def usable(signals: Iterable[Signal]) -> list[int]:
+        """Where segments can begin in which these are known all along."""
+        whole = np.logical_and.reduce([known[signal] for signal in signals])
+        return [k for k in evenly.tolist() if k <= last and whole[k - LEAD : k + HORIZON + 1].all()]
+
+    starts = usable(known)
     if not starts:
-        raise InputError(
-            f"{trial.path}: calibration needs {LEAD + HORIZON + 1} steps or more with the whole "
-            f"state ({', '.join(STATE)}) and the commands, and the log has none: leave it out"
-        )
+        raise InputError(_useless(trial, [signal for signal in known if not usable([signal])]))
     return _Stretches(
         Segments(
             states={signal: states[signal][starts] for signal in STATE},
@@ -188,6 +208,21 @@ def _stretches(trial: Trial) -> _Stretches:
             signal: np.stack([states[signal][k + 1 : k + HORIZON + 1] for k in starts])
             for signal in STATE
         },
+    )
+
+
+def _useless(trial: Trial, lacking: Sequence[Signal]) -> str:
+    """The sentence for a trial in which no segment can begin."""
+    length = LEAD + HORIZON + 1
+    if trial.behaviour.steps < length:
+        has = f"the trial has {trial.behaviour.steps}"
+    elif lacking:
+        has = f"the log never has {', '.join(lacking)} for so long"
+    else:
+        has = "the log has no such stretch with all of them"
+    return (
+        f"{trial.path}: calibration needs stretches of {length} steps or more with the whole state "
+        f"({', '.join(STATE)}) and the commands, and {has}: leave this log out"
     )
 
 

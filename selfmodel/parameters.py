@@ -38,6 +38,12 @@ class Parameters:
         return np.array([*shared, *self.motor_gains])
 
 
+def factor_names(robot: Robot) -> tuple[str, ...]:
+    """Returns what each factor is of, in the order of ``Parameters.factors``."""
+    shared = ("mass of the root", "mass of the limbs", "friction", "damping")
+    return (*shared, *(f"motor {motor}" for motor in robot.anatomy.motors))
+
+
 def nominal(robot: Robot) -> Parameters:
     """Returns the parameters of a robot as its model describes it."""
     return Parameters(1.0, 1.0, 1.0, 1.0, (1.0,) * robot.model.nu, robot.control_delay)
@@ -57,6 +63,7 @@ def edited_model(robot: Robot, parameters: Parameters) -> mujoco.MjModel:
     model.body_inertia *= masses[:, np.newaxis]
     model.geom_friction[:, 0] *= parameters.friction
     model.dof_damping *= parameters.damping
+    model.dof_dampingpoly *= parameters.damping
     motors = np.array(parameters.motor_gains)[:, np.newaxis]
     model.actuator_gainprm *= motors
     model.actuator_biasprm *= motors
@@ -70,25 +77,44 @@ def with_parameters(robot: Robot, parameters: Parameters) -> Robot:
     Numbers in an MJCF have six digits, so its model is that of ``edited_model`` to one part in a
     million.
     """
+    return with_model(robot, edited_model(robot, parameters), parameters.delay)
+
+
+def with_model(robot: Robot, model: mujoco.MjModel, delay: int) -> Robot:
+    """Returns a robot whose MJCF says what an edited copy of its compiled model does.
+
+    Args:
+        robot: The robot that the copy is of.
+        model: The copy, with other masses, friction, damping or motor gains.
+        delay: Control steps from a command to its effect.
+    """
     spec = robot.specification()
-    model = edited_model(robot, parameters)
+    spec.compile()  # until then its parts have no numbers
+    compiler = spec.compiler
+    # What would change the masses again as the text is compiled.
+    compiler.settotalmass, compiler.inertiafromgeom = -1.0, _SAID_OR_FROM_GEOMS
+    compiler.boundmass = compiler.boundinertia = 0.0
     for body in spec.bodies[1:]:
-        compiled = model.body(body.name)
         body.explicitinertial = True
-        body.mass, body.inertia = float(compiled.mass[0]), compiled.inertia
-        body.ipos, body.iquat = compiled.ipos, compiled.iquat
+        body.fullinertia = np.full(6, np.nan)
+        body.mass, body.inertia = model.body_mass[body.id], model.body_inertia[body.id]
+        body.ipos, body.iquat = model.body_ipos[body.id], model.body_iquat[body.id]
     for geom in spec.geoms:
-        geom.friction = geom.friction * np.array([parameters.friction, 1.0, 1.0])
+        geom.friction = model.geom_friction[geom.id]
     for joint in spec.joints:
-        joint.damping = joint.damping * parameters.damping
-    for motor, factor in zip(spec.actuators, parameters.motor_gains, strict=True):
-        motor.gainprm = motor.gainprm * factor
-        motor.biasprm = motor.biasprm * factor
+        dof = model.jnt_dofadr[joint.id]
+        joint.damping = [model.dof_damping[dof], *model.dof_dampingpoly[dof]]
+    for motor in spec.actuators:
+        motor.gainprm = model.actuator_gainprm[motor.id]
+        motor.biasprm = model.actuator_biasprm[motor.id]
     for numeric in spec.numerics:
         if numeric.name == CONTROL_DELAY:
-            numeric.delete()
-    spec.add_numeric(name=CONTROL_DELAY, data=[float(parameters.delay)])
+            spec.delete(numeric)
+    spec.add_numeric(name=CONTROL_DELAY, data=[float(delay)])
     return dataclasses.replace(robot, mjcf=spec.to_xml())
+
+
+_SAID_OR_FROM_GEOMS = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
 
 
 def _mass_factors(robot: Robot, parameters: Parameters) -> FloatArray:

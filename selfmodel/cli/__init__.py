@@ -6,6 +6,7 @@ import typer
 
 from selfmodel.cli import logs
 from selfmodel.cli.ablate import ablate
+from selfmodel.cli.calibrate import calibrate
 from selfmodel.cli.diagnose import diagnose
 from selfmodel.cli.plain import plain
 from selfmodel.cli.recover import recover
@@ -25,6 +26,7 @@ app = typer.Typer(
 app.command()(robots)
 app.command()(recover)
 app.command()(trial)
+app.command()(calibrate)
 app.command()(diagnose)
 app.command()(replay)
 app.command()(ablate)

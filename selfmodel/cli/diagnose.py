@@ -45,10 +45,10 @@ def diagnose(
     how the robot moves with nothing wrong: the self-model is fitted to them.
     """
     # Whatever brings MuJoCo waits until the command runs.
-    from selfmodel.calibrate import calibrate as fitted  # noqa: PLC0415
     from selfmodel.cli import resolve  # noqa: PLC0415
     from selfmodel.cli.display import display  # noqa: PLC0415
-    from selfmodel.cli.ranking import as_values, calibration_values, sureness  # noqa: PLC0415
+    from selfmodel.cli.fitting import calibration_values, fitted  # noqa: PLC0415
+    from selfmodel.cli.ranking import as_values, sureness  # noqa: PLC0415
     from selfmodel.diagnose import Diagnose  # noqa: PLC0415
     from selfmodel.explain import explain  # noqa: PLC0415
     from selfmodel.simulator import Simulator  # noqa: PLC0415

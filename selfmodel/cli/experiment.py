@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from time import perf_counter
 
-from selfmodel.calibrate import calibrate
+from selfmodel.cli.fitting import fitted
 from selfmodel.cli.reality import draw_reality
 from selfmodel.cli.resolve import NEXT_TRIAL
 from selfmodel.comparator import Comparator
@@ -101,7 +101,7 @@ def run(experiment: Experiment, watch: Callable[[Event], None]) -> Outcome:
         watch=watch,
         gait=experiment.gait,
         kinds=experiment.kinds,
-        calibrate=partial(calibrate, robot, threads=experiment.threads)
+        calibrate=partial(fitted, robot, threads=experiment.threads)
         if experiment.calibrated
         else None,
         next_trial=NEXT_TRIAL[experiment.next_trial],

@@ -1,13 +1,11 @@
 """A diagnosis as plain values and as a table."""
 
-import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rich.table import Table
 
-from selfmodel.calibrate import Calibration
 from selfmodel.diagnosis import Candidate, Diagnosis
 
 
@@ -51,18 +49,6 @@ def in_words(found: Mapping[str, Any]) -> str:
         f"predicts the intact robot; something else is wrong, or what is wrong is of a kind that "
         f"was not considered (--kinds)."
     )
-
-
-def calibration_values(fit: Calibration | None) -> dict[str, Any] | None:
-    """Returns a calibration as JSON has it; None where there was none."""
-    if fit is None:
-        return None
-    return {
-        **dataclasses.asdict(fit.parameters),
-        "deviations": [float(deviation) for deviation in fit.deviations],
-        "error_before": fit.error_before,
-        "error": fit.error,
-    }
 
 
 def ranking_table(values: Sequence[dict[str, Any]], truth: str | None = None) -> Table:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from selfmodel.cli.options import Json, Threads
+from selfmodel.cli.options import Json, RobotOrModel, Threads
 
 if TYPE_CHECKING:
     from selfmodel.behaviour import Signal
@@ -39,6 +39,7 @@ def replay(
             metavar="NOTATION", help="What is taken to be wrong, such as break:front_left_knee."
         ),
     ] = "intact",
+    model: RobotOrModel = None,
     out: Annotated[
         Path | None,
         typer.Option("--out", "-o", metavar="FIGURE.png|svg|pdf", help="Draw the error over time."),
@@ -60,7 +61,7 @@ def replay(
     if out is not None:
         check_figure(out)
     (log,) = resolve.logs([file])
-    robot = resolve.robot_of_logs([log], None)
+    robot = resolve.robot_of_logs([log], model)
     assumed = parse(hypothesis, robot.anatomy)
     logged = log.software.get("mujoco", "unknown")
     exact = logged == mujoco.__version__ and not log.imported
@@ -70,6 +71,7 @@ def replay(
     result = {
         "log": str(file),
         "robot": robot.name,
+        "model": model,
         "hypothesis": str(assumed),
         "steps": log.trial.behaviour.steps,
         "identical": found.identical,

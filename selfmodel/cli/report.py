@@ -8,7 +8,8 @@ from rich.console import Console
 from rich.table import Table
 
 from selfmodel.cli.experiment import Experiment, Outcome
-from selfmodel.cli.ranking import as_values, calibration_values, in_words, ranking_table, sureness
+from selfmodel.cli.fitting import calibration_values
+from selfmodel.cli.ranking import as_values, in_words, ranking_table, sureness
 
 
 def as_object(experiment: Experiment, outcome: Outcome) -> str:

@@ -153,7 +153,7 @@ def test_a_file_that_comes_to_exist_meanwhile_is_not_overwritten(biped: Robot, t
                 path.write_text("precious")
             yield sample
 
-    with pytest.raises(InputError, match=r"the finished log is .*a\.mcap\.part"):
+    with pytest.raises(InputError, match=r"the finished file is .*a\.mcap\.part"):
         write_trial(path, biped, plan_of(biped, STEPS), intruding(), settings=Settings())
     assert path.read_text() == "precious"
     assert read_log(tmp_path / "a.mcap.part").status == "finished"

@@ -1,0 +1,167 @@
+"""How much better a calibrated self-model predicts trials that it has not seen, and at what cost.
+
+``python -m benchmarks.calibration [--bank DIR]`` prints a table and writes it down as
+``benchmarks/calibration.json``. With ``mujoco.sysid``'s packages (requirements-sysid.txt beside
+this file) it calibrates from the same trials too. Without ``--bank``, three gaits a robot are
+evolved first, in about two minutes.
+"""
+
+import argparse
+import dataclasses
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from statistics import mean
+from time import process_time
+from typing import Any
+
+import numpy as np
+
+from selfmodel.behaviour import collect
+from selfmodel.calibrate import calibrate, prediction_error
+from selfmodel.cli.ablation.bank import gait
+from selfmodel.controller import Controller
+from selfmodel.gap import Gap, draw_gap, perturbed
+from selfmodel.hypothesis import INTACT
+from selfmodel.parameters import Parameters, with_model, with_parameters
+from selfmodel.physical import SimulatedRobot
+from selfmodel.repair import Repair
+from selfmodel.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.simulator import Simulator
+from selfmodel.streams import gap_stream, repair_stream
+from selfmodel.tasks import ROBOTS
+from selfmodel.trial import Plan, Trial
+
+RESULTS = Path(__file__).with_suffix(".json")
+NO_NOISE = 1e-12
+"""A level at which the gap's noise and the jitter of the start are nothing."""
+SEEN, UNSEEN = 2, 2
+"""Trials that are calibrated from, and the number of the gait that is not."""
+
+Facts = dict[str, Any]
+
+
+def main() -> None:
+    """Measures, prints and writes."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--bank", type=Path, help="a folder with ROBOT-N.npz, N from 0 to 2")
+    parser.add_argument("--robots", default=",".join(ROBOTS))
+    parser.add_argument("--gap", type=float, default=0.05)
+    parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--out", type=Path, default=RESULTS)
+    options = parser.parse_args()
+    ways = {"selfmodel": _own, **_peer()}
+    rows: list[Facts] = []
+    for name in options.robots.split(","):
+        robot = ROBOTS[name].robot()
+        gaits = [_gait(robot, number, options.bank) for number in range(SEEN + 1)]
+        for seed in range(options.seeds):
+            rows += _compare(robot, gaits, draw_gap(robot, options.gap, gap_stream(seed)), ways)
+            print(json.dumps(rows[-len(ways) - 3 :]), flush=True)
+    text = json.dumps({"gap": options.gap, "rows": rows}, indent=1)
+    options.out.write_text(text + "\n", encoding="utf-8")
+    print(table(rows))
+
+
+def _own(robot: Robot, trials: Sequence[Trial]) -> tuple[Parameters, list[float]]:
+    found = calibrate(robot, trials, threads=1)
+    return found.parameters, found.deviations.tolist()
+
+
+Way = Callable[[Robot, Sequence[Trial]], tuple[Parameters, list[float]]]
+
+
+def _peer() -> dict[str, Way]:
+    """``mujoco.sysid``, where it is installed."""
+    try:
+        from benchmarks.sysid_peer import sysid_parameters  # noqa: PLC0415
+    except ImportError as error:
+        print(f"without mujoco.sysid: {error}")
+        return {}
+    return {"mujoco.sysid": lambda robot, trials: (sysid_parameters(robot, trials), [])}
+
+
+def _compare(
+    robot: Robot, gaits: Sequence[Controller], gap: Gap, ways: dict[str, Way]
+) -> list[Facts]:
+    """A row a way, one of the nominal model, one of the physical robot's own model."""
+    noisy = SimulatedRobot(robot, gap=gap)
+    trials = [_trial(robot, noisy, gaits[number]) for number in range(SEEN)]
+    quiet = SimulatedRobot(robot, gap=dataclasses.replace(gap, level=NO_NOISE))
+    unseen = {
+        "log": _trial(robot, noisy, gaits[UNSEEN]),
+        "truth": _trial(robot, quiet, gaits[UNSEEN]),
+    }
+
+    def row(way: str, model: Robot, **more: object) -> Facts:
+        errors = {what: prediction_error(model, [trial], 1) for what, trial in unseen.items()}
+        return {"robot": robot.name, "way": way, **errors, "delay": model.control_delay, **more}
+
+    rows = [
+        row("nominal", robot),
+        row("nominal with the true delay", with_model(robot, robot.model, gap.delay)),
+    ]
+    for way, fit in ways.items():
+        start = process_time()
+        found, deviations = fit(robot, trials)
+        seconds = process_time() - start
+        rows.append(
+            row(
+                way,
+                with_parameters(robot, found),
+                seconds=seconds,
+                delay_right=found.delay == gap.delay,
+                **_against_truth(robot, gap, found, deviations),
+            )
+        )
+    true = with_model(robot, perturbed(robot.model, gap), gap.delay)
+    return [*rows, row("the robot's own model", true)]
+
+
+def _against_truth(robot: Robot, gap: Gap, found: Parameters, deviations: Sequence[float]) -> Facts:
+    """How far the logarithms of the factors are from the truth, all and over their deviations.
+
+    The limbs differ by a factor each, so there is no true one: their mass is left out.
+    """
+    motors = [gap.motors[name] for name in robot.anatomy.motors]
+    true = np.array([gap.mass[robot.root], np.nan, gap.friction, gap.damping, *motors])
+    off = np.log(found.factors) - np.log(true)
+    over = np.abs(off / deviations) if len(deviations) else None
+    return {
+        "rms_log_error": float(np.sqrt(np.nanmean(off**2))),
+        "rms_log_truth": float(np.sqrt(np.nanmean(np.log(true) ** 2))),
+        "over_deviations": None if over is None else over[~np.isnan(over)].tolist(),
+    }
+
+
+def _trial(robot: Robot, physical: SimulatedRobot, driver: Controller) -> Trial:
+    steps = Settings().steps
+    behaviour = collect(robot.anatomy.names, physical.run(driver, steps))
+    return Trial(Plan("trial", "before", driver, steps, 0), robot.name, behaviour, "a trial")
+
+
+def _gait(robot: Robot, number: int, bank: Path | None) -> Controller:
+    if bank is not None:
+        return gait(bank, robot.name, number)
+    repair = Repair(Simulator(robot, threads=1), Settings())
+    return repair(INTACT, (), repair_stream(number, 0), lambda _generation: None)
+
+
+def table(rows: Sequence[Facts]) -> str:
+    """Returns the means over the seeds, as Markdown."""
+    lines = [
+        "| robot | model | error, unseen log | error, unseen truth | processor seconds |",
+        "|---|---|---|---|---|",
+    ]
+    for robot in dict.fromkeys(row["robot"] for row in rows):
+        for way in dict.fromkeys(row["way"] for row in rows):
+            same = [row for row in rows if (row["robot"], row["way"]) == (robot, way)]
+            log, truth = (mean(row[what] for row in same) for what in ("log", "truth"))
+            seconds = f"{mean(row['seconds'] for row in same):.1f}" if "seconds" in same[0] else "-"
+            lines.append(f"| {robot} | {way} | {log:.3f} | {truth:.3f} | {seconds} |")
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    main()

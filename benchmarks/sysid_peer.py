@@ -1,0 +1,156 @@
+"""The same calibration as ``mujoco.sysid`` does it: same segments, parameters, bounds and scales.
+
+``mujoco.sysid`` knows no delay of the commands, so each delay is tried around it, as ``calibrate``
+does. Its solver, stopping rule and finite differences are its own defaults; it has no prior, and
+large errors count by their square.
+"""
+
+import io
+from collections.abc import Sequence
+from functools import lru_cache
+from importlib import import_module
+from typing import Any
+
+import mujoco
+import numpy as np
+from absl import logging
+
+from selfmodel.arrays import FloatArray
+from selfmodel.behaviour import Signal
+from selfmodel.calibrate import BOUND, DELAYS, HORIZON, LEAD, SCALES, SEGMENTS
+from selfmodel.estimate import STATE, estimated_states
+from selfmodel.parameters import Parameters, edited_model, factor_names, from_factors
+from selfmodel.places import places
+from selfmodel.robot import Robot
+from selfmodel.rotation import rotation_between
+from selfmodel.trial import Trial
+
+Theirs = Any
+"""What mujoco.sysid makes or asks for."""
+
+# Imported so, because it says that it is typed, and MuJoCo itself is not.
+sysid: Theirs = import_module("mujoco.sysid")
+
+States = dict[Signal, FloatArray]
+
+
+def sysid_parameters(robot: Robot, trials: Sequence[Trial]) -> Parameters:
+    """Returns what ``mujoco.sysid`` makes of trials of the intact robot, on one thread."""
+    logging.set_verbosity(logging.ERROR)  # it misses the sensors, which are not compared
+    names = factor_names(robot)
+    parameters = sysid.ParameterDict(
+        {name: sysid.Parameter(name, 0.0, -BOUND, BOUND) for name in names}
+    )
+
+    def residual_at(delay: int) -> Theirs:
+        return sysid.build_residual_fn(
+            models_sequences=[_sequences(robot, trials, delay)],
+            build_model=_builder(robot),
+            modify_residual=_Residual(robot),
+            resample_true=False,
+            n_threads=1,
+        )
+
+    def cost(delay: int) -> float:
+        residuals, _, _ = residual_at(delay)(np.zeros(len(names)), parameters)
+        return float(np.sum(np.square(np.concatenate(residuals))))
+
+    delay = min(DELAYS, key=cost)
+    progress = io.StringIO()  # it has no way to be silent
+    found, _ = sysid.optimize(parameters, residual_at(delay), verbose=False, output=progress)
+    return from_factors(np.exp(found.as_vector()), delay)
+
+
+def _builder(robot: Robot) -> Theirs:
+    """Builds models from logarithms; it is asked for the same one once a segment."""
+
+    @lru_cache(64)
+    def build(row: tuple[float, ...]) -> mujoco.MjModel:
+        return edited_model(robot, from_factors(np.exp(np.array(row)), 0))
+
+    return lambda parameters, _spec: build(tuple(parameters.as_vector().tolist()))
+
+
+def _sequences(robot: Robot, trials: Sequence[Trial], delay: int) -> Theirs:
+    """Every segment as a sequence of its own: from a logged state, under the delayed commands."""
+    states, controls, observed = [], [], []
+    for trial in trials:
+        estimated = estimated_states(trial.behaviour)
+        vectors = _vectors(robot, estimated)
+        last = trial.behaviour.steps - 1 - HORIZON
+        for k in np.unique(np.linspace(LEAD, last, SEGMENTS).round().astype(int)):
+            commands = trial.behaviour["commands"][k - delay : k - delay + HORIZON]
+            # A last row that sysid drops.
+            rows = np.concatenate([np.repeat(commands, robot.substeps, axis=0), commands[-1:]])
+            states.append(
+                sysid.create_initial_state(
+                    robot.model, vectors[k, : robot.model.nq], vectors[k, robot.model.nq :]
+                )
+            )
+            times = np.arange(len(rows)) * float(robot.model.opt.timestep)
+            controls.append(sysid.TimeSeries(times, rows))
+            observed.append(
+                sysid.TimeSeries(
+                    np.arange(1, HORIZON + 1) * robot.control_timestep,
+                    vectors[k + 1 : k + HORIZON + 1],
+                )
+            )
+    return sysid.ModelSequences(
+        robot.name,
+        robot.specification(),
+        [str(number) for number in range(len(states))],
+        states,
+        controls,
+        observed,
+        allow_missing_sensors=True,
+    )
+
+
+def _vectors(robot: Robot, states: Theirs) -> FloatArray:
+    """The state as MuJoCo orders it, ``(steps, nq + nv)``."""
+    model, where = robot.model, places(robot)
+    fields = {"qpos": np.zeros((len(states[STATE[0]]), model.nq))}
+    fields["qvel"] = np.zeros((len(fields["qpos"]), model.nv))
+    for signal in STATE:
+        fields[where[signal].field][:, where[signal].columns] = states[signal]
+    return np.concatenate([fields["qpos"], fields["qvel"]], axis=1)
+
+
+class _Residual:
+    """The errors of a segment in units of ``SCALES``, as sysid asks for them."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._where = places(robot)
+
+    def __call__(
+        self,
+        _parameters: Theirs,
+        _predicted: Theirs,
+        observed: Theirs,
+        _model: mujoco.MjModel,
+        _all: bool,  # noqa: FBT001  # sysid's protocol
+        *,
+        state: FloatArray,
+        **_rest: object,
+    ) -> tuple[FloatArray, Theirs, Theirs]:
+        substeps = self._robot.substeps
+        made = self._signals(state[substeps - 1 :: substeps, 1:])  # column 0 is the time
+        seen = self._signals(observed.data)
+        rows = []
+        for signal, scale in SCALES.items():
+            error = (
+                rotation_between(made[signal], seen[signal])
+                if signal == "base_orientation"
+                else made[signal] - seen[signal]
+            )
+            rows.append((error / scale).ravel())
+        return np.concatenate(rows), observed, observed
+
+    def _signals(self, rows: FloatArray) -> States:
+        nq = self._robot.model.nq
+        fields = {"qpos": rows[:, :nq], "qvel": rows[:, nq:]}
+        return {
+            signal: fields[self._where[signal].field][:, self._where[signal].columns]
+            for signal in SCALES
+        }

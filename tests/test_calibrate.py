@@ -1,0 +1,158 @@
+"""Promises of calibration: it finds what a robot has, and leaves alone what is right."""
+
+import dataclasses
+from functools import cache
+
+import numpy as np
+import pytest
+
+from selfmodel.behaviour import SIGNALS, Behaviour, collect
+from selfmodel.calibrate import BOUND, PRIOR, Calibration, calibrate, prediction_error
+from selfmodel.errors import InputError
+from selfmodel.gap import draw_gap
+from selfmodel.parameters import Parameters, factor_names, nominal, with_parameters
+from selfmodel.physical import SimulatedRobot
+from selfmodel.playback import played_back
+from selfmodel.robot import Robot
+from selfmodel.tasks import ROBOTS
+from selfmodel.trial import Plan, Trial
+from tests.conftest import random_motion
+
+STEPS = 400
+QUADRUPED = ROBOTS["quadruped"].robot()
+TRUE = Parameters(1.25, 0.9, 0.8, 1.3, (1.2, 1.0, 0.85, 1.0, 1.0, 0.8, 1.0, 1.15), delay=2)
+
+
+def trial(robot: Robot, physical: SimulatedRobot, seed: int, steps: int = STEPS) -> Trial:
+    """A trial in which every joint moves."""
+    driver = played_back(robot.anatomy.motors, random_motion(robot, steps, seed))
+    behaviour = collect(robot.anatomy.names, physical.run(driver, steps))
+    return Trial(Plan("made-up", "before", driver, steps, 0), robot.name, behaviour, f"{seed}.mcap")
+
+
+def trials(robot: Robot, count: int = 2) -> list[Trial]:
+    """Trials of a physical robot that is as that model says."""
+    return [trial(robot, SimulatedRobot(robot), seed) for seed in range(count)]
+
+
+@cache
+def fitted() -> Calibration:
+    """The quadruped, calibrated from trials of one that has ``TRUE``."""
+    return calibrate(QUADRUPED, trials(with_parameters(QUADRUPED, TRUE)), threads=1)
+
+
+def test_the_delay_is_found_exactly():
+    assert fitted().parameters.delay == TRUE.delay
+    assert fitted().robot.control_delay == TRUE.delay
+
+
+def test_the_factors_go_from_nominal_towards_the_truth():
+    found, true = np.log(fitted().parameters.factors), np.log(TRUE.factors)
+
+    assert found @ true / (np.linalg.norm(found) * np.linalg.norm(true)) > 0.5
+    assert np.linalg.norm(found - true) < 0.9 * np.linalg.norm(true)
+
+
+def test_with_a_weak_prior_the_factors_of_a_robot_without_noise_are_found(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """As calibration is set, the prior keeps factors near nominal, for the sake of noisy logs."""
+    monkeypatch.setattr("selfmodel.calibrate.SHARE", 0.005)
+    monkeypatch.setattr("selfmodel.calibrate.ITERATIONS", 20)
+    found = calibrate(QUADRUPED, trials(with_parameters(QUADRUPED, TRUE)), threads=2)
+    off = np.abs(np.log(found.parameters.factors) - np.log(TRUE.factors))
+
+    assert off.max() < 0.05, dict(zip(factor_names(QUADRUPED), off, strict=True))
+
+
+def test_what_is_found_predicts_a_trial_that_was_not_seen():
+    real = with_parameters(QUADRUPED, TRUE)
+    unseen = [trial(real, SimulatedRobot(real), 7)]
+
+    before, after = (prediction_error(r, unseen, 1) for r in (QUADRUPED, fitted().robot))
+    assert after < 0.7 * before
+    assert prediction_error(real, unseen, 1) < 1e-4
+
+
+def test_the_errors_told_are_those_of_the_models():
+    seen = trials(with_parameters(QUADRUPED, TRUE))
+
+    assert fitted().error_before == pytest.approx(prediction_error(QUADRUPED, seen, 1))
+    assert fitted().error == pytest.approx(prediction_error(fitted().robot, seen, 1), rel=0.02)
+    assert (fitted().summary.error, fitted().summary.delay) == (fitted().error, 2)
+
+
+def test_a_model_that_is_exact_is_left_as_it_is_to_the_bit(robot: Robot):
+    found = calibrate(robot, trials(robot), threads=1)
+
+    assert found.robot is robot
+    assert found.parameters == nominal(robot)
+    assert set(found.deviations) == {PRIOR}
+
+
+def test_the_number_of_threads_does_not_matter():
+    again = calibrate(QUADRUPED, trials(with_parameters(QUADRUPED, TRUE)), threads=3)
+
+    assert again.robot.mjcf == fitted().robot.mjcf
+    assert again.parameters == fitted().parameters
+    assert again.deviations.tobytes() == fitted().deviations.tobytes()
+
+
+def test_under_noise_factors_stay_near_nominal_and_within_bounds():
+    gap = draw_gap(QUADRUPED, 0.1, np.random.default_rng(1))
+    physical = SimulatedRobot(QUADRUPED, gap=gap)
+    found = calibrate(QUADRUPED, [trial(QUADRUPED, physical, 0)], threads=1)
+
+    assert found.parameters.delay == gap.delay
+    assert np.abs(np.log(found.parameters.factors)).max() <= BOUND
+    assert found.error < found.error_before
+    assert ((found.deviations > 0) & (found.deviations <= PRIOR)).all()
+
+
+def without(found: Trial, **changes: np.ndarray) -> Trial:
+    run = found.behaviour
+    return dataclasses.replace(
+        found, behaviour=Behaviour(run.names, run.time, {**run.signals, **changes})
+    )
+
+
+def test_a_trial_that_lacks_part_of_the_state_is_refused_by_what_it_lacks():
+    (whole,) = trials(QUADRUPED, 1)
+    unknown = np.full((STEPS, 3), np.nan)
+    blind = without(whole, base_position=unknown, base_linear_velocity=unknown)
+    expected = (
+        r"0\.mcap: calibration needs stretches of 16 steps or more .* and the log never has "
+        r"base_position, base_linear_velocity for so long: leave this log out"
+    )
+    with pytest.raises(InputError, match=expected):
+        calibrate(QUADRUPED, [whole, blind], 1)
+
+
+def test_a_trial_with_no_stretch_of_all_of_it_is_refused():
+    (whole,) = trials(QUADRUPED, 1)
+    early, late = (whole.behaviour[s].copy() for s in ("base_position", "joint_velocities"))
+    early[: STEPS // 2], late[STEPS // 2 - 1 :] = np.nan, np.nan
+
+    with pytest.raises(InputError, match="has no such stretch with all of them"):
+        calibrate(QUADRUPED, [without(whole, base_position=early, joint_velocities=late)], 1)
+
+
+def test_a_trial_that_is_too_short_is_refused():
+    short = trial(QUADRUPED, SimulatedRobot(QUADRUPED), 0, steps=15)
+
+    with pytest.raises(InputError, match=r"16 steps or more .* and the trial has 15"):
+        calibrate(QUADRUPED, [short], 1)
+
+
+def test_no_trials_are_refused():
+    with pytest.raises(InputError, match="at least one trial of the intact robot, got none"):
+        calibrate(QUADRUPED, [], 1)
+
+
+def test_moments_that_were_not_observed_are_passed_over():
+    (whole,) = trials(QUADRUPED, 1)
+    gaps = whole.behaviour["base_position"].copy()
+    gaps[100:200] = np.nan
+
+    assert set(whole.behaviour.signals) == set(SIGNALS)
+    assert prediction_error(QUADRUPED, [without(whole, base_position=gaps)], 1) < 1e-4
