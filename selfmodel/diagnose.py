@@ -103,6 +103,7 @@ class Diagnose:
             InputError: It cannot; the sentence names every trial that it cannot judge, and why.
         """
         self.evidence.check([*self._intact, *trials])
+        self._screen.check(trials)
 
     @property
     def distinct_hypotheses(self) -> int:

@@ -8,7 +8,8 @@ from selfmodel.hypothesis import Hypothesis
 Verdict = Literal["explained", "ambiguous", "unexplained"]
 """``explained``: the best hypothesis predicts the trials about as well as the self-model predicts
 the intact robot, and no other does. ``ambiguous``: others cannot be told from it.
-``unexplained``: it predicts significantly worse, so something is wrong that it does not say."""
+``unexplained``: it predicts significantly worse, so something is wrong that it does not say; only
+where a trial of the intact robot is known."""
 
 
 @dataclass(frozen=True)

@@ -191,11 +191,11 @@ def test_a_memo_computes_every_key_once():
 
     def compute(keys: list[str]) -> np.ndarray:
         computed.extend(keys)
-        return np.array([float(len(key)) for key in keys])
+        return np.array([[len(key), -len(key)] for key in keys])
 
     memo: Memo[str] = Memo()
 
-    assert memo.values(["a", "bb", "a"], compute).tolist() == [1, 2, 1]
-    assert memo.values(["bb", "ccc"], compute).tolist() == [2, 3]
-    assert computed == ["a", "bb", "ccc"]
+    assert np.array_equal(memo.values(["a", "bb", "a"], compute), [[1, -1], [2, -2], [1, -1]])
+    assert np.array_equal(memo.values(["bb", "ccc"], compute), [[2, -2], [3, -3]])
+    assert list(memo) == computed == ["a", "bb", "ccc"]
     assert len(memo) == 3

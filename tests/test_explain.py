@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from selfmodel.behaviour import Behaviour
-from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT
+from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
 from selfmodel.diagnose import Diagnose
 from selfmodel.diagnosis import Diagnosis
 from selfmodel.errors import InputError
@@ -23,6 +23,7 @@ from selfmodel.settings import Settings
 from selfmodel.simulator import Simulator
 from selfmodel.trial import Plan, Trial
 from tests.conftest import random_controllers
+from tests.gaits import changed, gait, logged
 
 SMALL = dataclasses.replace(Settings().scaled(20), generations=4, steps=200)
 
@@ -100,3 +101,18 @@ def test_a_comparator_says_what_a_trial_lacks(name: str, quadruped: Robot, tmp_p
     (trial,) = trials(quadruped, tmp_path, "intact", 1)
     with pytest.raises(InputError, match=r"0\.mcap: .* needs \w+"):
         COMPARATORS[name].request(unobserved(trial))
+
+
+def test_what_only_the_screen_cannot_judge_is_said_before_any_search(quadruped: Robot):
+    run = gait()
+    # Seen at four of the moments that are looked at closely, none of which the screen looks at.
+    seen = np.zeros(run.steps, dtype=bool)
+    starts = np.linspace(0, run.steps - 1 - SEGMENT_PREDICTION.horizon, 80).round().astype(int)
+    seen[starts[[1, 2, 4, 5]]] = True
+    angles = np.where(seen[:, np.newaxis], run["joint_positions"], np.nan)
+    trial = logged(changed(run, joint_positions=angles))
+    search = Diagnose(Simulator(quadruped, 1), SEGMENT_PREDICTION, SMALL)
+    search.evidence.check([trial])
+
+    with pytest.raises(InputError, match="needs joint_positions at 4 or more of 26 moments"):
+        search.check([trial])

@@ -1,0 +1,67 @@
+"""Promises of the fit of degrees: found between the levels, never worse, nothing that is not."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pytest
+
+from selfmodel.degrees import COARSE, coarse_candidates, with_fitted_degrees
+from selfmodel.faults import FRICTION, KINDS, PAPER_KINDS, WORLD, Fault
+from selfmodel.hypothesis import Hypothesis
+from selfmodel.refine import Losses
+from tests.test_refine import ANATOMY, FAULTS, PIECES, find
+
+WEAK_MOTOR = KINDS["motor"]
+
+
+def bowl(truth: Mapping[str, float], floor: float = 0.01) -> Losses:
+    """A world in which a motor and the ground have degrees; losses grow with the distance to them.
+
+    Args:
+        truth: The degree of each term that the truth has.
+        floor: What is left at the truth.
+    """
+    ripple = np.linspace(0.9, 1.1, PIECES)
+
+    def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        rows = []
+        for hypothesis in hypotheses:
+            said_ = {f"{f.kind.name} {f.part}": f.degree for f in hypothesis.faults}
+            off = sum(
+                (said_.get(term, 1.0) - truth.get(term, 1.0)) ** 2 for term in {*said_, *truth}
+            )
+            rows.append((floor + off) * ripple)
+        return np.array(rows)
+
+    return losses
+
+
+DEGREES = coarse_candidates([WEAK_MOTOR, FRICTION], ANATOMY)
+BOTH = {"motor front_left_knee": 0.37, "friction ": 0.62}
+
+
+def test_degrees_are_found_between_those_that_are_proposed():
+    found = find(bowl(BOTH, floor=1e-4), faults=DEGREES, most=2)
+    degrees = {f"{fault.kind.name} {fault.part}": fault.degree for fault in found.faults}
+
+    assert degrees == pytest.approx(BOTH, abs=0.02)
+    assert not set(degrees.values()) & {fault.degree for fault in DEGREES}
+
+
+def test_every_part_is_proposed_at_few_degrees_of_the_whole_range():
+    proposed = {fault.degree for fault in DEGREES if fault.part == "front_left_knee"}
+    levels = WEAK_MOTOR.levels(ANATOMY, "front_left_knee")
+
+    assert len(proposed) <= COARSE
+    assert {min(levels), max(levels)} <= proposed <= set(levels)
+    assert coarse_candidates(PAPER_KINDS, ANATOMY) == list(FAULTS)
+
+
+def test_a_fit_of_degrees_never_makes_it_worse_and_a_degree_that_is_nothing_goes():
+    losses = bowl({"friction ": 0.62})
+    useless = Hypothesis((Fault(FRICTION, WORLD, 0.9), Fault(WEAK_MOTOR, "back_left_knee", 0.9)))
+    fitted = with_fitted_degrees(useless, losses, ANATOMY)
+
+    assert losses([fitted]).sum() < losses([useless]).sum()
+    assert find(losses, useless, faults=DEGREES) == find(losses, faults=DEGREES)
+    assert [fault.kind for fault in find(losses, useless, faults=DEGREES).faults] == [FRICTION]
