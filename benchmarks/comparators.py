@@ -149,7 +149,7 @@ def _diagnosis(
         "diagnosis_evaluations": diagnose.evaluations,
         "search_seconds": generations[-1].seconds,
         "search_evaluations": generations[-1].evaluations,
-        "distinct_hypotheses": diagnose.evidence.hypotheses,
+        "distinct_hypotheses": diagnose.distinct_hypotheses,
     }
 
 

@@ -127,7 +127,7 @@ class _Cut:
     arithmetic: FloatArray
 
 
-@lru_cache(maxsize=16)  # a trial is judged once a generation
+@lru_cache(maxsize=64)  # a trial is judged once a generation
 def _cut(comparator: SegmentPrediction, trial: Trial) -> _Cut:
     behaviour, horizon = trial.behaviour, comparator.horizon
     states = estimated_states(behaviour, comparator.state)
@@ -149,8 +149,8 @@ def _cut(comparator: SegmentPrediction, trial: Trial) -> _Cut:
         raise InputError(
             f"{trial.path}: {comparator.name} needs {', '.join(lacking or comparator.state)} at "
             f"{FEWEST} or more of {count} moments of the trial, and the log does not have it: give "
-            f"another comparator, such as segment-prediction-onboard, which needs no position of "
-            f"the base, or leave this log out"
+            f"a comparator that needs less (docs/how-it-works.md lists what each needs), or leave "
+            f"this log out"
         )
     starts = starts[usable]
     wrong = command_errors(trial) / SCALES["commands"]

@@ -21,12 +21,12 @@ MOSTLY = 0.58
 """From which share of contradicting moves on there is noise. Where it is all there is, two in three
 contradict each other; without noise fewer than a half do, but for joints that tremble."""
 
-_SMOOTHED: tuple[tuple[Signal, Signal, int], ...] = (
-    ("joint_positions", "joint_velocities", 3),
-    ("base_position", "base_linear_velocity", 6),
+_SMOOTHED: tuple[tuple[Signal, Signal, int, float], ...] = (
+    ("joint_positions", "joint_velocities", 3, 1e-3),
+    ("base_position", "base_linear_velocity", 6, 1e-4),
 )
-"""Which positions move by which velocities, and over how many steps to either side they are
-averaged."""
+"""Which positions move by which velocities, over how many steps to either side they are averaged,
+and what noise, in their unit, is not worth it."""
 
 
 def estimated_states(
@@ -44,11 +44,11 @@ def estimated_states(
     """
     states = {signal: behaviour[signal] for signal in signals}
     timestep = float(behaviour.time[1] - behaviour.time[0]) if behaviour.steps > 1 else 0.0
-    for position, velocity, reach in _SMOOTHED:
+    for position, velocity, reach, little in _SMOOTHED:
         if position in states:
             values = behaviour[position]
             moved = np.diff(values, axis=0) - _steps_along(behaviour[velocity], timestep)
-            if _is_noise(moved):
+            if _is_noise(moved, little):
                 states[position] = _averaged(values, behaviour[velocity], timestep, reach)
     return states
 
@@ -62,8 +62,8 @@ def _steps_along(velocities: FloatArray, timestep: float) -> FloatArray:
     return np.asarray((velocities[:-1] + 3 * velocities[1:]) / 4 * timestep)
 
 
-def _is_noise(moved: FloatArray) -> bool:
-    """Whether what the velocities do not explain is mostly noise, in every column.
+def _is_noise(moved: FloatArray, little: float) -> bool:
+    """Whether what the velocities do not explain is mostly noise, in every column, and not little.
 
     Noise that puts a position too high at one step makes the move to it too long and the one from
     it too short, so it has successive moves contradict each other, two times in three where it is
@@ -73,7 +73,12 @@ def _is_noise(moved: FloatArray) -> bool:
     product = moved[1:] * moved[:-1]
     known = np.isfinite(product)
     contradicting = np.sum(known & (product < 0), axis=0)
-    return bool(np.all(contradicting > MOSTLY * np.maximum(known.sum(axis=0), 1)))
+    enough = np.abs(moved[np.isfinite(moved)])
+    return bool(
+        np.all(contradicting > MOSTLY * np.maximum(known.sum(axis=0), 1))
+        and len(enough)
+        and np.median(enough) > little
+    )
 
 
 def _averaged(

@@ -41,6 +41,8 @@ def is_better(one: FloatArray, other: FloatArray) -> bool:
         return False
     if not np.isfinite(other).all():
         return True
+    if not other.mean() > one.mean() + NEGLIGIBLE:
+        return False
     return bool(paired_z(other, one) >= Z or other.mean() > RATIO * one.mean() + NEGLIGIBLE)
 
 

@@ -15,9 +15,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from typer.testing import CliRunner
 
-from selfmodel.cli import app, lists
 from selfmodel.cli.ablation import Ablation, Row, ablate, collect, write_results
 from selfmodel.cli.ablation.figures import draw
 from selfmodel.cli.ablation.plan import cells
@@ -343,43 +341,6 @@ def test_every_trial_of_a_robot_built_differently_hides_how(otherwise: Path, don
 def test_what_is_not_of_one_table_does_not_go_into_one_folder(done: Path, changes: dict):
     with pytest.raises(InputError, match="holds an ablation that was made otherwise"):
         run(small(done, cases=[2], **changes))
-
-
-@pytest.mark.parametrize(
-    ("option", "value", "sentence"),
-    [
-        ("--robots", "quadrupde", "unknown robot 'quadrupde': did you mean quadruped?"),
-        ("--robots", "quadruped,,hexapod", "--robots needs a list with commas"),
-        ("--cases", "1,11", "unknown case of quadruped '11'"),
-        ("--cases", "1,two", "--cases needs whole numbers"),
-        ("--comparators", "forward-displacment", "did you mean forward-displacement?"),
-        ("--gaps", "0,big", "--gaps needs numbers with commas between them"),
-        ("--gaps", "-0.1", "a gap is a number of at least 0"),
-        ("--gaps", "nan", "a gap is a number of at least 0"),
-        ("--next-trial", "repairs", "did you mean repair?"),
-        ("--only", "3/2", "--only needs i/n"),
-        ("--only", "0/2", "--only needs i/n"),
-        ("--damages", "break:nose", "unknown part in the term 'break:nose'"),
-        ("--damages", "brek:front_left_knee", "did you mean break?"),
-        ("--kinds", "break,frction", "unknown kind 'frction': did you mean friction?"),
-        ("--cases", "none", "needs at least one case or one damage, got neither"),
-    ],
-)
-def test_a_bad_list_is_refused_in_a_sentence_before_anything_is_run(
-    tmp_path: Path, option: str, value: str, sentence: str
-):
-    out = tmp_path / "out"
-    arguments = ["ablate", "--robots", "quadruped", option, value, "--out", str(out)]
-    told = CliRunner().invoke(app, arguments)
-
-    assert isinstance(told.exception, InputError)
-    assert sentence in str(told.exception)
-    assert not out.exists()
-
-
-@given(st.lists(st.text("abc:._", min_size=1), min_size=1))
-def test_a_list_is_what_stands_between_the_commas_each_once(items: list[str]):
-    assert lists.texts("--any", " , ".join(items)) == tuple(dict.fromkeys(items))
 
 
 @given(st.integers(1, 7), st.integers(1, 5), st.integers(1, 9))

@@ -25,7 +25,7 @@ def test_recover_prints_one_json_object_with_everything_promised(recovered: tupl
     assert set(told) == {
         *("robot", "case", "truth", "comparator", "kinds", "gap", "structure", "seed", "trials"),
         *("diagnosis", "verdict", "rivals", "test", "intact_distance", "calibration", "correct"),
-        *("displacement", "recovery", "physical_trials", "evaluations", "seconds"),
+        *("displacement", "recovery", "physical_trials", "evaluations", "seconds", "next_trial"),
     }
     assert (told["robot"], told["case"], told["seed"], told["gap"]) == ("quadruped", 4, 0, 0)
     assert told["truth"] == "break:front_left_shoulder+sensor:front_right_touch"

@@ -53,9 +53,6 @@ def test_without_noise_the_state_is_what_was_logged_to_the_bit(robot: Robot, tex
         assert is_as_logged(run)
 
 
-@pytest.mark.xfail(
-    strict=True, reason="moves that contradict each other pass for noise under a jerky controller"
-)
 def test_without_noise_a_jerky_run_is_what_was_logged_too():
     drivers = random_controllers(QUADRUPED, 12)
 

@@ -115,7 +115,7 @@ def test_nothing_is_simulated_twice(
 
     assert set(simulator.times.values()) == {1}
     assert len(simulator.times) == len(three) * len(trials)
-    assert evidence.distinct_hypotheses == set(three)
+    assert evidence.hypotheses == set(three)
 
 
 @pytest.mark.parametrize("comparator", REQUESTS)

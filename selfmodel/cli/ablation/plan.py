@@ -13,7 +13,7 @@ from urllib.parse import quote
 from selfmodel import __version__
 from selfmodel.cli import resolve
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.faults import PAPER_KINDS
+from selfmodel.faults import PAPER_KINDS, Kind, known
 from selfmodel.grid import Job, difference, parameters_of, runs
 from selfmodel.notation import parse
 from selfmodel.settings import Settings
@@ -183,9 +183,17 @@ def spec(of: Job) -> Spec:
 
 
 def _failures(ablation: Ablation, robot: str) -> list[tuple[int | None, str]]:
-    known, anatomy = resolve.robot_entry(robot).cases, resolve.robot_entry(robot).robot().anatomy
-    cases: list[tuple[int | None, str]] = [(case, known[case]) for case in ablation.cases]
-    return cases + [(None, str(parse(damage, anatomy))) for damage in ablation.damages]
+    entry = resolve.robot_entry(robot)
+    anatomy = entry.robot().anatomy
+    cases: list[tuple[int | None, str]] = [(case, entry.cases[case]) for case in ablation.cases]
+    return cases + [
+        (None, str(parse(damage, anatomy, _named(ablation)))) for damage in ablation.damages
+    ]
+
+
+def _named(ablation: Ablation) -> tuple[Kind, ...]:
+    """What notation may name: also a third party's kinds, where they are considered."""
+    return known(resolve.kinds(ablation.kinds))
 
 
 def model_digest(robot: str) -> str:
@@ -201,7 +209,7 @@ def _check_names(ablation: Ablation) -> None:
                 raise unknown_name(f"case of {robot}", str(case), map(str, entry.cases))
         anatomy = entry.robot().anatomy
         for damage in ablation.damages:
-            parse(damage, anatomy)
+            parse(damage, anatomy, _named(ablation))
     resolve.kinds(ablation.kinds)
     for comparator in ablation.comparators:
         resolve.comparator(comparator)

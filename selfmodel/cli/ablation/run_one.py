@@ -23,6 +23,7 @@ from selfmodel.diagnose import Diagnose
 from selfmodel.diagnosis import Diagnosis
 from selfmodel.events import Event, SearchBegins
 from selfmodel.explain import explain
+from selfmodel.faults import known
 from selfmodel.next_trial import telling_apart
 from selfmodel.notation import parse
 from selfmodel.simulator import Simulator
@@ -49,7 +50,7 @@ def run_one(spec: Spec, comparator: str, folder: Path, gaits: Path) -> list[Row]
         comparator=resolve.comparator(comparator),
         name=comparator,
         robot=robot,
-        truth=parse(spec.cell.truth, robot.anatomy),
+        truth=parse(spec.cell.truth, robot.anatomy, known(resolve.kinds(spec.kinds))),
         gaits=tuple(
             bank.gait(gaits, spec.cell.robot, number) for number in spec.cell.gaits(spec.settings)
         ),

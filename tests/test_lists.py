@@ -1,0 +1,48 @@
+"""Promises of the lists on the command line of an ablation."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from selfmodel.cli import app, lists
+from selfmodel.errors import InputError
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "sentence"),
+    [
+        ("--robots", "quadrupde", "unknown robot 'quadrupde': did you mean quadruped?"),
+        ("--robots", "quadruped,,hexapod", "--robots needs a list with commas"),
+        ("--cases", "1,11", "unknown case of quadruped '11'"),
+        ("--cases", "1,two", "--cases needs whole numbers"),
+        ("--comparators", "forward-displacment", "did you mean forward-displacement?"),
+        ("--gaps", "0,big", "--gaps needs numbers with commas between them"),
+        ("--gaps", "-0.1", "a gap is a number of at least 0"),
+        ("--gaps", "nan", "a gap is a number of at least 0"),
+        ("--next-trial", "repairs", "did you mean repair?"),
+        ("--only", "3/2", "--only needs i/n"),
+        ("--only", "0/2", "--only needs i/n"),
+        ("--damages", "break:nose", "unknown part in the term 'break:nose'"),
+        ("--damages", "brek:front_left_knee", "did you mean break?"),
+        ("--kinds", "break,frction", "unknown kind 'frction': did you mean friction?"),
+        ("--cases", "none", "needs at least one case or one damage, got neither"),
+    ],
+)
+def test_a_bad_list_is_refused_in_a_sentence_before_anything_is_run(
+    tmp_path: Path, option: str, value: str, sentence: str
+):
+    out = tmp_path / "out"
+    arguments = ["ablate", "--robots", "quadruped", option, value, "--out", str(out)]
+    told = CliRunner().invoke(app, arguments)
+
+    assert isinstance(told.exception, InputError)
+    assert sentence in str(told.exception)
+    assert not out.exists()
+
+
+@given(st.lists(st.text("abc:._", min_size=1), min_size=1))
+def test_a_list_is_what_stands_between_the_commas_each_once(items: list[str]):
+    assert lists.texts("--any", " , ".join(items)) == tuple(dict.fromkeys(items))
