@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 from pathlib import Path
 
 # dm_control looks for a display as it is imported; nothing here is drawn.
@@ -21,6 +22,9 @@ from tests.command import SMALL, selfmodel
 
 settings.register_profile("unhurried", deadline=None)  # a busy machine is no bug
 settings.load_profile("unhurried")
+
+# A shell's background job ignores Ctrl-C, and hands that on to the commands that are tested.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session", params=sorted(ROBOTS))
