@@ -17,9 +17,10 @@ BASE: tuple[Signal, ...] = ("base_position", "base_linear_velocity")
 STATE: tuple[Signal, ...] = JOINTS + IMU + BASE
 """The signals that make up the state."""
 
-MOSTLY = 0.58
-"""From which share of contradicting moves on there is noise. Where it is all there is, two in three
-contradict each other; without noise fewer than a half do, but for joints that tremble."""
+MOSTLY, HALF = 0.6, 0.5
+"""From which share of contradicting moves on there is noise, in the mean of the columns and in
+each. Where it is all there is, two in three contradict each other; without noise fewer than a half
+do, but for joints that tremble."""
 
 _SMOOTHED: tuple[tuple[Signal, Signal, int, float], ...] = (
     ("joint_positions", "joint_velocities", 3, 1e-3),
@@ -73,11 +74,13 @@ def _is_noise(moved: FloatArray, little: float) -> bool:
     product = moved[1:] * moved[:-1]
     known = np.isfinite(product)
     contradicting = np.sum(known & (product < 0), axis=0)
+    shares = contradicting / np.maximum(known.sum(axis=0), 1)
     enough = np.abs(moved[np.isfinite(moved)])
     return bool(
-        np.all(contradicting > MOSTLY * np.maximum(known.sum(axis=0), 1))
-        and len(enough)
+        len(enough)
         and np.median(enough) > little
+        and shares.mean() > MOSTLY
+        and np.all(shares > HALF)
     )
 
 
