@@ -9,7 +9,7 @@ from selfmodel.behaviour import Behaviour, Signal
 from selfmodel.comparator import ClosedLoop
 from selfmodel.comparators.bounded import bounded
 from selfmodel.comparators.gait_features import GROUPS, Gait, differences, observed
-from selfmodel.errors import InputError
+from selfmodel.comparators.observed import observed_signals
 from selfmodel.trial import Trial
 
 SIGNALS: tuple[Signal, ...] = ("sensors", "joint_positions")
@@ -63,7 +63,7 @@ class GaitPattern:
         Raises:
             InputError: The trial has neither.
         """
-        return ClosedLoop(record=self._observed(trial))
+        return ClosedLoop(record=observed_signals(trial, SIGNALS, self.name))
 
     def distances(self, simulated: Behaviour, trial: Trial) -> FloatArray:
         """Returns the distance of each simulation, ``(n,)``, from 0 to 1."""
@@ -75,7 +75,7 @@ class GaitPattern:
         Returns:
             ``(n, windows * groups)``; their mean is the distance.
         """
-        signals = self._observed(trial)
+        signals = observed_signals(trial, SIGNALS, self.name)
         logged = np.concatenate([trial.behaviour[signal] for signal in signals], axis=-1)
         moved = np.concatenate([simulated[signal] for signal in signals], axis=-1)
         readings = trial.behaviour["sensors"].shape[-1] if "sensors" in signals else 0
@@ -93,15 +93,6 @@ class GaitPattern:
         )
         judged = np.stack([known[group].any(axis=-1) for group in GROUPS], axis=-1)
         return np.asarray((pieces / judged.mean()).reshape(len(moved), -1))
-
-    def _observed(self, trial: Trial) -> tuple[Signal, ...]:
-        found = tuple(s for s in SIGNALS if np.isfinite(trial.behaviour[s]).any())
-        if not found:
-            raise InputError(
-                f"{trial.path}: {self.name} needs {' or '.join(SIGNALS)}, and the log has neither: "
-                f"leave this log out, or give another comparator"
-            )
-        return found
 
 
 def _timestep(time: FloatArray) -> float:

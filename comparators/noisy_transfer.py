@@ -9,8 +9,8 @@ import numpy as np
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.behaviour import Behaviour, Signal
 from selfmodel.comparator import Ensemble
-from selfmodel.errors import InputError
-from selfmodel.rotation import directions
+from selfmodel.comparators.observed import observed_signals
+from selfmodel.differences import comparable
 from selfmodel.trial import Trial
 
 WINDOW = 25
@@ -80,7 +80,7 @@ class NoisyTransfer:
         Raises:
             InputError: The trial has none of them.
         """
-        return Ensemble(self._observed(trial), self.members, self.level)
+        return Ensemble(observed_signals(trial, FLOORS, self.name), self.members, self.level)
 
     def distances(self, simulated: Behaviour, trial: Trial) -> FloatArray:
         """Returns the mean loss of the windows, ``(n,)``."""
@@ -88,37 +88,23 @@ class NoisyTransfer:
 
     def losses(self, simulated: Behaviour, trial: Trial) -> FloatArray:
         """Returns the loss of each window of which anything was observed, ``(n, windows)``."""
-        signals = self._observed(trial)
+        signals = observed_signals(trial, FLOORS, self.name)
         windows = -(-trial.behaviour.steps // WINDOW)
         total = np.zeros((len(simulated[signals[0]]), windows))
         judged = np.zeros(windows)
         for signal in signals:
-            logged = _columns(signal, trial.behaviour[signal])
+            logged = comparable(signal, trial.behaviour[signal])
             seen = np.isfinite(logged)
             shown, floor = _features(logged[np.newaxis], seen), FLOORS[signal]
             known = np.tile(_in_windows(seen).any(axis=1), 2) / (2 * seen.shape[1])
             # One hypothesis at a time: its members fit in the cache, and none touches another.
             for one, runs in enumerate(simulated[signal]):
-                difference = _features(_columns(signal, runs), seen) - shown
+                difference = _features(comparable(signal, runs), seen) - shown
                 total[one] += (_shortfall(difference, floor) * known).sum(axis=1)
             judged += known.sum(axis=1)
         some = judged > 0
         # In C order, because the order in memory decides the order in which a mean adds.
         return np.ascontiguousarray(total[:, some] / judged[some])
-
-    def _observed(self, trial: Trial) -> tuple[Signal, ...]:
-        found = tuple(s for s in FLOORS if np.isfinite(trial.behaviour[s]).any())
-        if not found:
-            raise InputError(
-                f"{trial.path}: {self.name} needs one at least of {', '.join(FLOORS)}, and the log "
-                f"has none of them: leave this log out, or give another comparator"
-            )
-        return found
-
-
-def _columns(signal: Signal, values: FloatArray) -> FloatArray:
-    """What of a signal is compared, ``(..., steps, columns)``."""
-    return directions(values) if signal == "base_orientation" else values
 
 
 def _features(values: FloatArray, seen: BoolArray) -> FloatArray:

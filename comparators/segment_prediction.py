@@ -12,9 +12,9 @@ from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.behaviour import Behaviour, Signal
 from selfmodel.comparator import Segments
 from selfmodel.comparators.arithmetic import command_errors
+from selfmodel.differences import difference
 from selfmodel.errors import InputError
 from selfmodel.estimate import IMU, JOINTS, STATE, estimated_states
-from selfmodel.rotation import rotation_between
 from selfmodel.trial import Trial
 
 LEAD = 5
@@ -105,12 +105,8 @@ class SegmentPrediction:
         total = np.zeros(simulated["sensors"].shape[:2]) + cut.arithmetic
         for signal in self.state:
             logged, predicted = cut.states[signal][rows], simulated[signal][:, :, looks]
-            error = (
-                rotation_between(predicted, logged)
-                if signal == "base_orientation"
-                else predicted - logged
-            )
-            total += _mean(np.log1p(np.square(error / SCALES[signal])))
+            error = difference(signal, predicted, logged) / SCALES[signal]
+            total += _mean(np.log1p(np.square(error)))
         return total + _readings(simulated["sensors"], trial.behaviour["sensors"], cut.starts)
 
     def distances(self, simulated: Behaviour, trial: Trial) -> FloatArray:

@@ -8,8 +8,8 @@ from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.behaviour import Behaviour, Signal
 from selfmodel.comparator import ClosedLoop
 from selfmodel.comparators.bounded import bounded
-from selfmodel.errors import InputError
-from selfmodel.rotation import directions
+from selfmodel.comparators.observed import observed_signals
+from selfmodel.differences import comparable
 from selfmodel.trial import Trial
 
 BLOCK = 5
@@ -67,7 +67,7 @@ class SensorSeries:
         Raises:
             InputError: The trial has none of them.
         """
-        return ClosedLoop(record=self._observed(trial))
+        return ClosedLoop(record=observed_signals(trial, self.signals, self.name))
 
     def distances(self, simulated: Behaviour, trial: Trial) -> FloatArray:
         """Returns the distance of each simulation, ``(n,)``, from 0 to 1."""
@@ -81,16 +81,16 @@ class SensorSeries:
         """
         steps = trial.behaviour.steps
         windows = -(-steps // (BLOCK * BLOCKS))
-        signals = self._observed(trial)
+        signals = observed_signals(trial, self.signals, self.name)
         late = np.clip(np.arange(steps) + np.array(LAGS)[:, np.newaxis], 0, steps - 1)
         loss = np.zeros((len(LAGS), len(simulated[signals[0]]), windows))
         weight = np.zeros(windows)
         for signal in signals:
-            logged = _columns(signal, trial.behaviour[signal])
+            logged = comparable(signal, trial.behaviour[signal])
             seen = np.isfinite(logged)
             counted, share = _shares(seen, windows)
             scale = counted * _spread(logged, seen, FLOORS[signal])
-            moved = _columns(signal, simulated[signal])
+            moved = comparable(signal, simulated[signal])
             for lag, rows in enumerate(late):
                 blocks = _blocks(moved[:, rows] - logged, seen)
                 terms = bounded(blocks / scale).reshape(len(moved), windows, -1)
@@ -101,22 +101,6 @@ class SensorSeries:
         fading = np.exp(-np.maximum(age, 0) * (BLOCK * BLOCKS / FADE)) * (weight > 0)
         weight = np.where(weight > 0, weight, 1)
         return np.asarray(loss.min(axis=0) / weight * (fading / fading.mean()))
-
-    def _observed(self, trial: Trial) -> tuple[Signal, ...]:
-        found = tuple(
-            signal for signal in self.signals if np.isfinite(trial.behaviour[signal]).any()
-        )
-        if not found:
-            raise InputError(
-                f"{trial.path}: {self.name} needs one at least of {', '.join(self.signals)}, and "
-                f"the log has none of them: leave this log out, or give another comparator"
-            )
-        return found
-
-
-def _columns(signal: Signal, values: FloatArray) -> FloatArray:
-    """What of a signal is compared, ``(..., steps, columns)``."""
-    return directions(values) if signal == "base_orientation" else values
 
 
 def _blocks(difference: FloatArray, seen: BoolArray) -> FloatArray:

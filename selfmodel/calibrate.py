@@ -14,6 +14,7 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.behaviour import Signal
 from selfmodel.comparator import Segments
+from selfmodel.differences import difference
 from selfmodel.embodiment import embody
 from selfmodel.errors import InputError
 from selfmodel.estimate import STATE, estimated_states
@@ -22,7 +23,6 @@ from selfmodel.hypothesis import INTACT
 from selfmodel.parameters import Parameters, edited_model, from_factors, nominal, with_parameters
 from selfmodel.prediction import predict
 from selfmodel.robot import Robot
-from selfmodel.rotation import rotation_between
 from selfmodel.tally import Tally
 from selfmodel.trial import Trial
 
@@ -245,11 +245,7 @@ def _errors(
         )
         for signal, scale in SCALES.items():
             made = outcome.behaviour[signal][:, :, 1:]
-            error = (
-                rotation_between(made, stretches.observed[signal])
-                if signal == "base_orientation"
-                else made - stretches.observed[signal]
-            )
+            error = difference(signal, made, stretches.observed[signal])
             rows.append((error / scale).reshape(len(models), -1))
     return np.concatenate(rows, axis=1).T
 

@@ -13,9 +13,9 @@ import numpy as np
 from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.behaviour import Behaviour, Signal
 from selfmodel.controller import Controller
+from selfmodel.differences import difference
 from selfmodel.hypothesis import Hypothesis
 from selfmodel.robot import Robot
-from selfmodel.rotation import rotation_between
 from selfmodel.simulator import Simulator
 from selfmodel.tally import Simulated
 
@@ -82,10 +82,7 @@ def _predicted(
     """Each candidate under each hypothesis, ``(candidates, hypotheses, steps, width)``."""
     runs = [(hypothesis, one) for one in candidates for hypothesis in hypotheses]
     outcome = simulator.run(runs, steps, tuple(SCALES))
-    shape = (len(candidates), len(hypotheses))
-    flat = outcome.behaviour
-    signals = {name: flat[name].reshape(*shape, steps, -1) for name in SCALES}
-    return Simulated(Behaviour(flat.names, flat.time, signals), outcome.diverged.reshape(shape))
+    return outcome.grouped(len(candidates), len(hypotheses))
 
 
 def _first_of_any(simulated: Simulated, robot: Robot) -> IndexArray:
@@ -112,12 +109,8 @@ def disagreements(behaviour: Behaviour) -> FloatArray:
     for name, scale in SCALES.items():
         values = behaviour[name][:, :, :EARLY]
         for one, other in pairs:
-            difference = (
-                rotation_between(values[:, one], values[:, other])
-                if name == "base_orientation"
-                else values[:, one] - values[:, other]
-            )
-            total += np.minimum(np.abs(difference) / scale, 1).mean(axis=(1, 2))
+            apart = difference(name, values[:, one], values[:, other])
+            total += np.minimum(np.abs(apart) / scale, 1).mean(axis=(1, 2))
     return total / max(len(pairs), 1) / len(SCALES)
 
 

@@ -56,12 +56,15 @@ class Simulator:
     def predict(self, hypotheses: Sequence[Hypothesis], segments: Segments) -> Simulated:
         """Predicts segments of a trial under each hypothesis; see ``prediction.predict``."""
         embodiments = [self._embodiment(hypothesis) for hypothesis in hypotheses]
-        motions = [hypothesis.motion for hypothesis in hypotheses]
+        first: dict[Hypothesis, int] = {}
+        moves_as = [
+            first.setdefault(hypothesis.motion, i) for i, hypothesis in enumerate(hypotheses)
+        ]
         return predict(
             self.robot,
             embodiments,
             segments,
-            moves_as=[motions.index(motion) for motion in motions],
+            moves_as=moves_as,
             threads=self.threads,
             tally=self.tally,
         )
@@ -90,14 +93,9 @@ class Simulator:
             for hypothesis in hypotheses
             for model in models
         ]
-        outcome = self._run(embodiments, [driver] * len(embodiments), steps, ensemble.record)
-        shape = (len(hypotheses), len(models))
-        flat = outcome.behaviour
-        signals = {signal: flat[signal].reshape(*shape, steps, -1) for signal in ensemble.record}
-        return Simulated(
-            Behaviour(flat.names, flat.time, signals),
-            np.asarray(outcome.diverged.reshape(shape).any(axis=1)),
-        )
+        flat = self._run(embodiments, [driver] * len(embodiments), steps, ensemble.record)
+        outcome = flat.grouped(len(hypotheses), len(models))
+        return Simulated(outcome.behaviour, np.asarray(outcome.diverged.any(axis=1)))
 
     def _run(
         self,

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from selfmodel.arrays import BoolArray
 from selfmodel.behaviour import Behaviour
 
@@ -34,3 +36,14 @@ class Simulated:
 
     behaviour: Behaviour
     diverged: BoolArray
+
+    def grouped(self, *shape: int) -> "Simulated":
+        """Returns the same with the runs ``(n,)`` as an array of that shape, row by row."""
+        flat = self.behaviour
+        signals = {
+            signal: values.reshape(*shape, *values.shape[1:])
+            for signal, values in flat.signals.items()
+        }
+        return Simulated(
+            Behaviour(flat.names, flat.time, signals), np.asarray(self.diverged.reshape(shape))
+        )

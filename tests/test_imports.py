@@ -56,7 +56,16 @@ def test_dependencies_point_one_way(module: str):
 LAYERS = (
     # Plain data and plain algorithms; then MuJoCo; then what takes a comparator; then the story.
     (
-        *("atomic", "errors", "arrays", "rotation", "behaviour", "anatomy", "controller"),
+        *(
+            "atomic",
+            "errors",
+            "arrays",
+            "rotation",
+            "differences",
+            "behaviour",
+            "anatomy",
+            "controller",
+        ),
         *("settings", "memo", "evolution", "playback", "driver", "streams", "intervals"),
         *("workers", "grid"),
     ),

@@ -6,7 +6,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from selfmodel.cli.options import DEFAULT_KINDS, Json, KindNames, Structural
+from selfmodel.cli.options import (
+    DEFAULT_KINDS,
+    Generations,
+    Json,
+    KindNames,
+    Population,
+    Structural,
+)
 
 if TYPE_CHECKING:
     from selfmodel.cli.ablation import Results
@@ -52,12 +59,8 @@ def ablate(
             metavar="DIR", help="Gaits, ROBOT-0.npz to ROBOT-5.npz.", show_default="evolved"
         ),
     ] = None,
-    population: Annotated[
-        int, typer.Option(min=2, max=10_000, help="Genomes in a generation.")
-    ] = 100,
-    generations: Annotated[
-        int, typer.Option(min=1, max=10_000, help="Generations of each EA.")
-    ] = 30,
+    population: Population = 100,
+    generations: Generations = 30,
     workers: Annotated[
         int, typer.Option(min=0, max=1024, help="Processes; 0 means one for each processor.")
     ] = 0,

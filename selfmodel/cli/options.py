@@ -63,6 +63,8 @@ Calibrated = Annotated[
         help="Fit the self-model to the trials before the failure, if there are any.",
     ),
 ]
+Population = Annotated[int, typer.Option(min=2, max=10_000, help="Genomes in a generation.")]
+Generations = Annotated[int, typer.Option(min=1, max=10_000, help="Generations of each EA.")]
 KindNames = Annotated[
     str,
     typer.Option(

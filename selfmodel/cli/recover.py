@@ -11,9 +11,11 @@ from selfmodel.cli.options import (
     ComparatorName,
     Damage,
     GapLevel,
+    Generations,
     Json,
     KindNames,
     NextTrialName,
+    Population,
     RobotName,
     Seed,
     Structural,
@@ -39,12 +41,8 @@ def recover(
     trials: Annotated[
         int, typer.Option(min=1, max=99, help="Physical trials after the failing one.")
     ] = 3,
-    population: Annotated[
-        int, typer.Option(min=2, max=10_000, help="Genomes in a generation.")
-    ] = 100,
-    generations: Annotated[
-        int, typer.Option(min=1, max=10_000, help="Generations of each EA.")
-    ] = 30,
+    population: Population = 100,
+    generations: Generations = 30,
     out: Annotated[
         Path | None,
         typer.Option(
