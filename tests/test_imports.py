@@ -83,6 +83,7 @@ LAYERS = (
         "events",
     ),
     (
+        *("transmission", "couplings", "roots", "carried", "dissection", "activations"),
         *("embodiment", "robot", "places", "noise", "senses", "batches", "tally", "prediction"),
         *("gap", "instruments", "start", "debris", "structure", "contract_kind"),
         *("simulator", "physical", "judge", "replay", "parameters", "disagreement"),
