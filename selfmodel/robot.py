@@ -8,10 +8,13 @@ import numpy as np
 
 from selfmodel.anatomy import Anatomy
 from selfmodel.carried import check_carried
+from selfmodel.commands import command_ranges
 from selfmodel.controller import Network
 from selfmodel.dissection import driven_joints, read_anatomy
 from selfmodel.embodiment import Embodiment, embody
 from selfmodel.hypothesis import INTACT, Hypothesis
+from selfmodel.neurons import hidden_neurons
+from selfmodel.oscillators import Cpg
 from selfmodel.roots import find_root
 
 CONTROL_DELAY = "selfmodel_control_delay"
@@ -50,7 +53,7 @@ class Robot:
         root = find_root(model, driven_joints(model))
         check_carried(model, root)
         object.__setattr__(self, "model", model)
-        object.__setattr__(self, "anatomy", read_anatomy(model, root))
+        object.__setattr__(self, "anatomy", read_anatomy(model, root, hidden_neurons(model)))
         object.__setattr__(self, "root", str(model.body(root).name))
         if not np.isclose(self.substeps * model.opt.timestep, self.control_timestep, rtol=1e-9):
             raise ValueError(
@@ -72,9 +75,23 @@ class Robot:
 
     @property
     def network(self) -> Network:
-        """The network that controls it."""
-        names = self.anatomy.names
-        return Network(names.sensors, names.motors, self.anatomy.neurons)
+        """The network that controls it.
+
+        Raises:
+            InputError: A motor does not say what it may be commanded.
+        """
+        names, ranges = self.anatomy.names, command_ranges(self.model)
+        return Network(names.sensors, names.motors, self.anatomy.neurons, ranges)
+
+    @property
+    def cpg(self) -> Cpg:
+        """The oscillators that can control it in the network's place.
+
+        Raises:
+            InputError: A motor does not say what it may be commanded.
+        """
+        names, ranges = self.anatomy.names, command_ranges(self.model)
+        return Cpg(names.sensors, names.motors, self.control_timestep, ranges)
 
     @property
     def standing_height(self) -> float:

@@ -71,7 +71,7 @@ class Walk(base.Task):
         self._start = self._end = self._forward(physics)
 
     def before_step(self, action: FloatArray, physics: mujoco.Physics) -> None:
-        """Takes the motor targets, rad."""
+        """Takes the commands of the motors."""
         self._start = self._forward(physics)
         super().before_step(action, physics)
 
