@@ -48,7 +48,6 @@ def test_our_own_robots_span_the_paper_s_range_to_the_bit(robot: Robot):
         ('<motor name="m" joint="hip" ctrlrange="0 2"/>', 0, 2),
         ('<position name="m" joint="hip" kp="10" ctrlrange="-1.5 -.5"/>', -1.5, -0.5),
         ('<velocity name="m" joint="hip" kv="1" ctrlrange="-3 5"/>', -3, 5),
-        ('<muscle name="m" joint="hip" ctrlrange="0 1" lengthrange=".1 1"/>', 0, 1),
         # A position servo: where it holds the ends of the joint's range.
         ('<position name="m" joint="hip" kp="10"/>', -0.5, 0.5),
         ('<position name="m" joint="hip" kp="10" gear="2" forcerange="-3 3"/>', -1, 1),

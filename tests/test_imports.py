@@ -92,6 +92,7 @@ LAYERS = (
         "events",
     ),
     (
+        *("transmission", "couplings", "roots", "carried", "dissection", "activations"),
         *("commands", "neurons"),
         *("embodiment", "robot", "places", "noise", "senses", "batches", "tally", "prediction"),
         *("gap", "instruments", "start", "debris", "structure", "contract_kind"),
