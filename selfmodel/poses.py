@@ -50,10 +50,10 @@ def poses_of(robot: Robot, model: mujoco.MjModel, behaviour: Behaviour) -> Poses
         if signal != "joint_positions":
             # A part of a position or of a quaternion is none.
             seen[:] = seen.all(axis=1, keepdims=True)
-        known = seen.any(axis=0)
+        known: BoolArray = np.any(seen, axis=0)
         held |= (~seen & known).any(axis=1)
         names = behaviour.names.columns(signal) if signal == "joint_positions" else (signal,)
-        missing += [name for name, known_one in zip(names, known, strict=False) if not known_one]
+        missing += [name for column, name in enumerate(names) if not known[column]]
         columns = np.arange(model.nq)[where[signal].columns][known]
         qpos[:, columns] = _filled(values[:, known], seen[:, known])
     return Poses(qpos, held, tuple(missing))

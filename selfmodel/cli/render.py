@@ -1,7 +1,6 @@
 """``selfmodel render``: a trial as a film or a strip of pictures, from its log."""
 
 import json
-from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,6 +10,8 @@ from selfmodel.cli.options import Json, RobotOrModel, Threads
 from selfmodel.errors import InputError, WorkError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
     import numpy as np
     from numpy.typing import NDArray
 

@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 from selfmodel.arrays import FloatArray
 from selfmodel.cli.rendering.captions import captioned
 from selfmodel.cli.rendering.film import Film
-from selfmodel.cli.rendering.view import AZIMUTH, ELEVATION, gaze, size
+from selfmodel.cli.rendering.view import ELEVATION, azimuth, gaze, size
 
 WIDTH, HEIGHT = 480, 360
 """Pixels of each motion's picture."""
 
-FAR = 3.2
+FAR = 2.7
 """How far away the camera is, in sizes of the robot."""
 
-GHOST = (0.75, 0.80, 0.85, 0.22)
+GHOST = (1.0, 1.0, 1.0, 0.4)
 """What is left of the colour of a body that fell off: red, green, blue, opacity."""
 
 JAMMED = (0.85, 0.15, 0.15, 1.0)
@@ -33,7 +33,7 @@ def filmed(film: Film) -> Iterator[NDArray[np.uint8]]:
     model = _painted(film)
     data = mujoco.MjData(model)
     camera = mujoco.MjvCamera()
-    camera.azimuth, camera.elevation = AZIMUTH, ELEVATION
+    camera.azimuth, camera.elevation = azimuth(film), ELEVATION
     camera.distance = FAR * size(film)
     ways = [gaze(film, shot) for shot in film.shots]
     with mujoco.Renderer(model, HEIGHT, WIDTH) as renderer:
@@ -58,6 +58,8 @@ def _stand(model: mujoco.MjModel, data: mujoco.MjData, qpos: FloatArray) -> None
 def _painted(film: Film) -> mujoco.MjModel:
     """The model in the colours of what is wrong with it."""
     model = copy.copy(film.model)
+    # On wide ground, shadows are grainy at any size that a program that draws can afford.
+    model.light_castshadow[:] = 0
     model.vis.global_.offwidth = max(model.vis.global_.offwidth, WIDTH)
     model.vis.global_.offheight = max(model.vis.global_.offheight, HEIGHT)
     for bodies, colour in ((film.jammed, JAMMED), (film.lost, GHOST)):

@@ -33,7 +33,9 @@ def captioned(picture: NDArray[np.uint8], film: Film, shot: Shot, frame: int) ->
 def told(film: Film, shot: Shot, frame: int) -> str:
     """Returns when it is, and how far the base has come."""
     forward = shot.forward[frame]
-    way = f"{forward + 0.0:.2f} m forward" if np.isfinite(forward) else "base not observed"
+    way = (
+        f"{round(forward, 2) + 0.0:.2f} m forward" if np.isfinite(forward) else "base not observed"
+    )
     return f"{film.time[frame]:.2f} s   {way}"
 
 

@@ -73,7 +73,8 @@ def film_of(
     time = motions[0][1].time
     # A moment that is a step but for rounding is that step.
     steps = np.searchsorted(time, moments + 1e-9, side="right") - 1
-    shots, missing = [], []
+    shots: list[Shot] = []
+    missing: list[str] = []
     for title, behaviour in motions:
         poses = poses_of(robot, model, behaviour)
         x = behaviour["base_position"][:, 0]

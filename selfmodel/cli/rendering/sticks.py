@@ -9,7 +9,7 @@ from matplotlib.collections import LineCollection
 
 from selfmodel.arrays import FloatArray
 from selfmodel.cli.rendering.film import Film
-from selfmodel.cli.rendering.view import axes as view_axes
+from selfmodel.cli.rendering.view import axes as axes_of_view
 
 LONG = (mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_CYLINDER)
 FLAT = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
@@ -34,13 +34,19 @@ class Lines:
     bodies: FloatArray
 
 
-def lines_of(film: Film, data: mujoco.MjData, centre: FloatArray) -> Lines:
+def plane_of(film: Film) -> FloatArray:
+    """Returns ``(3, 2)`` what turns a point in the world into one in the plane of a picture."""
+    return np.stack(axes_of_view(film), axis=1)
+
+
+def lines_of(film: Film, data: mujoco.MjData, centre: FloatArray, plane: FloatArray) -> Lines:
     """Returns a robot as lines: the axes of what is long, the edges of the rest.
 
     Args:
         film: Whose body it is.
         data: Where its parts are.
         centre: ``(3,)`` what stands at 0 in the plane.
+        plane: ``plane_of`` the film.
     """
     model = film.model
     ends: list[FloatArray] = []
@@ -48,7 +54,7 @@ def lines_of(film: Film, data: mujoco.MjData, centre: FloatArray) -> Lines:
     for geom in np.flatnonzero(
         model.body_rootid[model.geom_bodyid] == model.body_rootid[film.root]
     ):
-        kind = model.geom_type[geom]
+        kind = mujoco.mjtGeom(int(model.geom_type[geom]))
         if kind in FLAT:
             continue
         turned = data.geom_xmat[geom].reshape(3, 3)
@@ -61,12 +67,7 @@ def lines_of(film: Film, data: mujoco.MjData, centre: FloatArray) -> Lines:
             found = [corners[[i, j]] for i, j in EDGES]
         ends += found
         bodies += [int(model.geom_bodyid[geom])] * len(found)
-    return Lines(projected(np.array(ends).reshape(-1, 2, 3) - centre), np.array(bodies))
-
-
-def projected(points: FloatArray) -> FloatArray:
-    """Returns where points are in a picture, ``(..., 2)``, of ``(..., 3)`` in the world."""
-    return np.asarray(points @ np.stack(view_axes(), axis=1))
+    return Lines((np.array(ends).reshape(-1, 2, 3) - centre) @ plane, np.array(bodies))
 
 
 def draw(axes: Axes, film: Film, lines: Lines, *, held: bool) -> None:
@@ -81,25 +82,29 @@ def draw(axes: Axes, film: Film, lines: Lines, *, held: bool) -> None:
     ):
         axes.add_collection(
             LineCollection(
-                lines.ends[chosen],
+                list(lines.ends[chosen]),
                 colors=colour,
                 linestyles=style,
-                linewidths=1.0 if style == ":" else 1.8,
+                linewidths=1.5,
                 alpha=0.35 if held else 1.0,
                 capstyle="round",
             )
         )
 
 
-def draw_ground(axes: Axes, centre: FloatArray, reach: float) -> None:
+def draw_ground(axes: Axes, centre: FloatArray, plane: FloatArray, reach: float) -> None:
     """Draws lines on the ground around a point, which show that the robot moves over it."""
     low = np.floor((centre[:2] - 3 * reach) / GRID) * GRID
     high = centre[:2] + 3 * reach
-    lines = []
-    for x in np.arange(low[0], high[0] + GRID, GRID):
-        lines.append([(x, low[1], 0.0), (x, high[1], 0.0)])
-    for y in np.arange(low[1], high[1] + GRID, GRID):
-        lines.append([(low[0], y, 0.0), (high[0], y, 0.0)])
+    across = [
+        [(x, low[1], 0.0), (x, high[1], 0.0)] for x in np.arange(low[0], high[0] + GRID, GRID)
+    ]
+    along = [[(low[0], y, 0.0), (high[0], y, 0.0)] for y in np.arange(low[1], high[1] + GRID, GRID)]
     axes.add_collection(
-        LineCollection(projected(np.array(lines) - centre), colors="0.85", linewidths=0.6, zorder=0)
+        LineCollection(
+            list((np.array(across + along) - centre) @ plane),
+            colors="0.85",
+            linewidths=0.6,
+            zorder=0,
+        )
     )

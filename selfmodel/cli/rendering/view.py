@@ -6,9 +6,9 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.cli.rendering.film import Film, Shot
 
-AZIMUTH, ELEVATION = 70.0, -18.0
-"""Where the camera looks to, degrees: from the robot's right side and a little from behind and
-above, so that forward is to the right."""
+ASIDE, ELEVATION = 65.0, -22.0
+"""How far to the side of the robot's heading the camera looks, and how far up, degrees: from the
+side, a little from behind and above."""
 
 STEADY = 0.5
 """Seconds over which the camera's way is averaged, so that it does not sway with each step."""
@@ -42,10 +42,23 @@ def size(film: Film) -> float:
     return float((distance + model.geom_rbound[own]).max(initial=0.1))
 
 
-def axes() -> tuple[FloatArray, FloatArray]:
+def azimuth(film: Film) -> float:
+    """Returns the heading of the camera, degrees from the world's x axis.
+
+    It stands where what is lost or jammed is in sight: on the robot's left, or else on its right,
+    where forward is to the right.
+    """
+    model, data = film.model, mujoco.MjData(film.model)
+    mujoco.mj_kinematics(model, data)
+    wrong = sorted(film.lost | film.jammed)
+    left = float((data.xipos[wrong, 1] - data.xpos[film.root, 1]).sum())
+    return -ASIDE if left > 0 else ASIDE
+
+
+def axes(film: Film) -> tuple[FloatArray, FloatArray]:
     """Returns the directions that are to the right and up in a picture, ``(3,)`` each."""
-    azimuth, elevation = np.radians(AZIMUTH), np.radians(ELEVATION)
-    right = np.array([np.sin(azimuth), -np.cos(azimuth), 0.0])
-    ahead = np.array([np.cos(azimuth), np.sin(azimuth), 0.0]) * np.cos(elevation)
+    heading, elevation = np.radians(azimuth(film)), np.radians(ELEVATION)
+    right = np.array([np.sin(heading), -np.cos(heading), 0.0])
+    ahead = np.array([np.cos(heading), np.sin(heading), 0.0]) * np.cos(elevation)
     ahead[2] = np.sin(elevation)
     return right, np.cross(right, ahead)
