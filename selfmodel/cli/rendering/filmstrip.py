@@ -46,7 +46,7 @@ def stick_frames(film: Film) -> Iterator[NDArray[np.uint8]]:
     for frame in range(len(film.time)):
         figure.clear()
         row = figure.subplots(1, len(film.shots), squeeze=False)[0]
-        figure.subplots_adjust(left=0.01, right=0.99, bottom=0.1, top=0.88, wspace=0.03)
+        figure.subplots_adjust(left=0.01, right=0.99, bottom=0.07, top=0.93, wspace=0.03)
         for axes, artist in zip(row, artists, strict=True):
             artist.draw(axes, frame)
             axes.set_title(_plain("\n".join(textwrap.wrap(artist.shot.title, 54))), fontsize=10)
