@@ -84,7 +84,8 @@ def test_a_strip_is_drawn_whatever_there_is_of_opengl(folder: Path, tmp_path: Pa
     told = json.loads(done.stdout)
 
     assert (done.returncode, done.stderr) == (0, "")
-    assert Image.open(out).format == "PNG"
+    with Image.open(out) as image:
+        assert image.format == "PNG"
     assert (told["out"], told["hypothesis"], told["frames"]) == (str(out), DAMAGE, 3)
     assert (told["drawn_by"], told["gl"], told["held"]) == ("matplotlib", None, 0)
     assert told["bytes"] == out.stat().st_size
