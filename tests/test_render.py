@@ -30,16 +30,12 @@ from selfmodel.simulator import Simulator
 from selfmodel.trial import Plan
 from tests.command import selfmodel
 from tests.conftest import random_controllers
+from tests.opengl import WORKS, draws
 
 STEPS = 31
 """0.3 s, which are 8 frames of a film."""
 
 DAMAGE = "break:front_left_knee"
-
-WORKS = next((name for name in ("egl", "osmesa") if gl._draws(name)), None)
-draws = pytest.mark.skipif(
-    WORKS is None, reason="neither EGL nor OSMesa is there: apt-get install libosmesa6"
-)
 
 
 def has_ffmpeg() -> bool:
@@ -124,7 +120,7 @@ def test_egl_is_tried_before_osmesa_and_where_neither_is_packages_are_named(
     works: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setenv("MUJOCO_GL", "")
-    monkeypatch.setattr(gl, "_draws", lambda name: name in works)
+    monkeypatch.setattr(gl, "works", lambda name: name in works)
     monkeypatch.setattr(gl, "WITHOUT_SCREEN", ("egl", "osmesa"))
     if works:
         assert gl.choose_gl() == os.environ["MUJOCO_GL"] == works[0]
@@ -135,7 +131,7 @@ def test_egl_is_tried_before_osmesa_and_where_neither_is_packages_are_named(
 
 def test_what_is_asked_for_is_taken_or_nothing(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("MUJOCO_GL", "osmesa")
-    monkeypatch.setattr(gl, "_draws", lambda name: name == "egl")
+    monkeypatch.setattr(gl, "works", lambda name: name == "egl")
     with pytest.raises(WorkError, match="MUJOCO_GL=osmesa: unset it"):
         gl.choose_gl()
 

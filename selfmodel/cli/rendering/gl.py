@@ -42,7 +42,7 @@ def choose_gl() -> str:
     wanted = os.environ.get(VARIABLE, "")
     tried = (wanted,) if wanted else WITHOUT_SCREEN
     for name in tried:
-        if _draws(name):
+        if works(name):
             os.environ[VARIABLE] = name
             return name
     if wanted:
@@ -62,8 +62,8 @@ def choose_nothing() -> None:
     os.environ[VARIABLE] = NOTHING
 
 
-def _draws(name: str) -> bool:
-    """Whether a picture can be drawn with a library."""
+def works(name: str) -> bool:
+    """Whether a picture can be drawn with a library, by its value of ``MUJOCO_GL``."""
     try:
         done = subprocess.run(  # noqa: S603  # this Python, and a text from above
             [sys.executable, "-c", TRIAL],
