@@ -30,7 +30,7 @@ def filmed(film: Film) -> Iterator[NDArray[np.uint8]]:
 
     Nothing else may draw in this thread meanwhile.
     """
-    model = _painted(film)
+    model = painted(film)
     data = mujoco.MjData(model)
     camera = mujoco.MjvCamera()
     camera.azimuth, camera.elevation = azimuth(film), ELEVATION
@@ -55,8 +55,8 @@ def _stand(model: mujoco.MjModel, data: mujoco.MjData, qpos: FloatArray) -> None
     mujoco.mj_camlight(model, data)
 
 
-def _painted(film: Film) -> mujoco.MjModel:
-    """The model in the colours of what is wrong with it."""
+def painted(film: Film) -> mujoco.MjModel:
+    """Returns a copy of the model in the colours of what is wrong with it."""
     model = copy.copy(film.model)
     # On wide ground, shadows are grainy at any size that a program that draws can afford.
     model.light_castshadow[:] = 0
