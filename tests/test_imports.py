@@ -66,7 +66,16 @@ LAYERS = (
             "anatomy",
             "controller",
         ),
-        *("settings", "memo", "evolution", "playback", "driver", "streams", "intervals"),
+        *(
+            "settings",
+            "memo",
+            "evolution",
+            "playback",
+            "oscillators",
+            "driver",
+            "streams",
+            "intervals",
+        ),
         *("workers", "grid"),
     ),
     (
@@ -83,6 +92,8 @@ LAYERS = (
         "events",
     ),
     (
+        *("transmission", "couplings", "roots", "carried", "dissection", "activations"),
+        *("commands", "neurons"),
         *("embodiment", "robot", "places", "noise", "senses", "batches", "tally", "prediction"),
         *("gap", "instruments", "start", "debris", "structure", "contract_kind"),
         *("simulator", "physical", "judge", "replay", "poses", "parameters", "disagreement"),
