@@ -7,7 +7,7 @@ import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.behaviour import Behaviour, Signal
-from selfmodel.places import places
+from selfmodel.places import writer
 from selfmodel.robot import Robot
 
 POSE: tuple[Signal, ...] = ("joint_positions", "base_position", "base_orientation")
@@ -40,10 +40,11 @@ def poses_of(robot: Robot, model: mujoco.MjModel, behaviour: Behaviour) -> Poses
         model: Of the robot's layout; what stands in no signal is as in its reference pose.
         behaviour: One run with the signals of ``POSE``.
     """
-    where = places(robot, model)
     qpos = np.tile(model.qpos0, (behaviour.steps, 1))
+    unmoved = np.zeros((behaviour.steps, model.nv))
     held = np.zeros(behaviour.steps, dtype=bool)
     missing: list[str] = []
+    state: dict[Signal, FloatArray] = {}
     for signal in POSE:
         values = behaviour[signal]
         seen = np.isfinite(values)
@@ -52,10 +53,16 @@ def poses_of(robot: Robot, model: mujoco.MjModel, behaviour: Behaviour) -> Poses
             seen[:] = seen.all(axis=1, keepdims=True)
         known: BoolArray = np.any(seen, axis=0)
         held |= (~seen & known).any(axis=1)
-        names = behaviour.names.columns(signal) if signal == "joint_positions" else (signal,)
-        missing += [name for column, name in enumerate(names) if not known[column]]
-        columns = np.arange(model.nq)[where[signal].columns][known]
-        qpos[:, columns] = _filled(values[:, known], seen[:, known])
+        if signal == "joint_positions":
+            names = behaviour.names.columns(signal)
+            missing += [name for column, name in enumerate(names) if not known[column]]
+            reference = [float(model.joint(name).qpos0[0]) for name in names]
+            state[signal] = np.where(known, _filled(values, seen), reference)
+        elif known.all():
+            state[signal] = _filled(values, seen)
+        else:
+            missing.append(signal)
+    writer(robot, {"qpos": qpos, "qvel": unmoved}.__getitem__, model)(state)
     return Poses(qpos, held, tuple(missing))
 
 
