@@ -17,6 +17,9 @@ FLAT = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
 CORNERS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 EDGES = [(i, j) for i in range(8) for j in range(i) if (CORNERS[i] == CORNERS[j]).sum() == 2]
 
+TURNS = np.linspace(0, 2 * np.pi, 12, endpoint=False)
+CIRCLE = np.stack([np.cos(TURNS), np.sin(TURNS)], axis=1)
+
 GRID = 0.5
 """Metres between the lines on the ground."""
 
@@ -40,7 +43,7 @@ def plane_of(film: Film) -> FloatArray:
 
 
 def lines_of(film: Film, data: mujoco.MjData, centre: FloatArray, plane: FloatArray) -> Lines:
-    """Returns a robot as lines: the axes of what is long, the edges of the rest.
+    """Returns a robot as lines: the axes of what is long, the rims of balls, the edges of the rest.
 
     Args:
         film: Whose body it is.
@@ -61,6 +64,9 @@ def lines_of(film: Film, data: mujoco.MjData, centre: FloatArray, plane: FloatAr
         if kind in LONG:
             half = turned[:, 2] * model.geom_size[geom, 1]
             found = [np.stack([data.geom_xpos[geom] - half, data.geom_xpos[geom] + half])]
+        elif kind == mujoco.mjtGeom.mjGEOM_SPHERE:
+            rim = data.geom_xpos[geom] + model.geom_size[geom, 0] * CIRCLE @ plane.T
+            found = [rim[[i - 1, i]] for i in range(len(rim))]
         else:
             middle, reach = model.geom_aabb[geom, :3], model.geom_aabb[geom, 3:]
             corners = data.geom_xpos[geom] + (middle + CORNERS * reach) @ turned.T
