@@ -268,6 +268,18 @@ def test_steps_that_were_not_observed_are_marked_in_every_kind_of_strip(
     assert strip(drawn, kind) != strip(film(quadruped, DAMAGE, frames=3), kind)
 
 
+@pytest.mark.parametrize("steps", [1, 2, 5])
+def test_a_trial_of_few_steps_shows_each_once(quadruped: Robot, steps: int):
+    (controller,) = random_controllers(quadruped, 1)
+    batch = Simulator(quadruped, 1).run([(INTACT, controller)], steps, POSE).behaviour
+    seen = Behaviour(batch.names, batch.time, {signal: batch[signal][0] for signal in POSE})
+    short = film_of(quadruped, INTACT, [("logged", seen)], np.linspace(0, batch.time[-1], 20))
+
+    np.testing.assert_array_equal(short.time, batch.time)
+    assert len(list(stick_frames(short))) == steps
+    assert strip(short, "png").startswith(b"\x89PNG")
+
+
 def test_each_frame_shows_the_pose_of_its_moment(quadruped: Robot):
     drawn = film(quadruped, "intact", frames=3)
     logged, simulated = drawn.shots

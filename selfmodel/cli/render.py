@@ -162,9 +162,8 @@ def _filmed(
     logged = log.trial.behaviour
     found = replay(log.trial, assumed, Simulator(robot, threads))
     end = float(logged.time[-1])
-    moments = np.arange(0.0, end, 1 / RATE) if pictures is None else np.linspace(0, end, pictures)
-    if not len(moments):
-        moments = np.zeros(1)
+    count = int(end * RATE) + 1
+    moments = np.arange(count) / RATE if pictures is None else np.linspace(0, end, pictures)
     film = film_of(
         robot,
         assumed,

@@ -67,12 +67,13 @@ def film_of(
         robot: The robot with nothing wrong.
         hypothesis: What is taken to be wrong: nothing in a log says so.
         motions: A title and the motion under it, all with the same times.
-        moments: ``(frames,)`` seconds: of each, the last step that was not later is drawn.
+        moments: ``(frames,)`` seconds: of each, the last step that was not later is drawn, and
+            none twice.
     """
     model = robot.build(hypothesis).model
     time = motions[0][1].time
     # A moment that is a step but for rounding is that step.
-    steps = np.searchsorted(time, moments + 1e-9, side="right") - 1
+    steps = np.unique(np.searchsorted(time, moments + 1e-9, side="right") - 1)
     shots: list[Shot] = []
     missing: list[str] = []
     for title, behaviour in motions:
