@@ -9,7 +9,7 @@ from selfmodel.behaviour import Names
 from selfmodel.errors import InputError
 from selfmodel.logs.errors import SchemaMismatchError
 from selfmodel.logs.reader import TrialLog
-from selfmodel.logs.untrusted import checked_model
+from selfmodel.untrusted import checked_model
 from selfmodel.robot import Robot
 
 MOST_SUBSTEPS = 1000

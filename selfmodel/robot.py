@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -9,7 +10,9 @@ import numpy as np
 from selfmodel.anatomy import Anatomy, Joint, Sensor
 from selfmodel.controller import HIDDEN_NEURONS, Network
 from selfmodel.embodiment import Embodiment, embody
+from selfmodel.errors import InputError
 from selfmodel.hypothesis import INTACT, Hypothesis
+from selfmodel.mjcf import MjcfSettings, adapt, read_settings
 
 CONTROL_DELAY = "selfmodel_control_delay"
 """The custom numeric of an MJCF that says how many control steps a command takes to its effect."""
@@ -52,6 +55,24 @@ class Robot:
                 f"the control time step {self.control_timestep} s must be a multiple of the "
                 f"physics time step {model.opt.timestep} s"
             )
+
+    @classmethod
+    def from_mjcf(cls, path: Path | str, settings: MjcfSettings | None = None) -> "Robot":
+        """Returns the robot that an MJCF file describes, whoever wrote it; see docs/robots.md.
+
+        Args:
+            path: The file, which is not changed. It may name others in its folder and below.
+            settings: What the file itself does not tell; None for those of the TOML beside it.
+
+        Raises:
+            InputError: No robot can be made of it; the sentence says why, and what to do.
+        """
+        file = Path(path)
+        adapted = adapt(file, read_settings(file) if settings is None else settings)
+        try:
+            return cls(adapted.name, adapted.mjcf, adapted.control_timestep, adapted.assets)
+        except ValueError as error:
+            raise InputError(f"{file}: {' '.join(str(error).split())}") from error
 
     @property
     def substeps(self) -> int:

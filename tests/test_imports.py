@@ -65,6 +65,8 @@ LAYERS = (
             "behaviour",
             "anatomy",
             "controller",
+            "attached",
+            "untrusted",
         ),
         *("settings", "memo", "evolution", "playback", "driver", "streams", "intervals"),
         *("workers", "grid"),
@@ -83,7 +85,7 @@ LAYERS = (
         "events",
     ),
     (
-        *("embodiment", "robot", "places", "noise", "senses", "batches", "tally", "prediction"),
+        *("mjcf", "embodiment", "robot", "places", "noise", "senses", "batches", "tally", "prediction"),
         *("gap", "instruments", "start", "debris", "structure", "contract_kind"),
         *("simulator", "physical", "judge", "replay", "parameters", "disagreement"),
     ),
