@@ -11,7 +11,7 @@ import numpy as np
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.behaviour import Behaviour, Signal
 from selfmodel.comparator import Segments
-from selfmodel.comparators.arithmetic import command_errors
+from selfmodel.comparators.arithmetic import command_errors, command_spans
 from selfmodel.differences import difference
 from selfmodel.errors import InputError
 from selfmodel.estimate import IMU, JOINTS, STATE, estimated_states
@@ -38,7 +38,8 @@ SCALES: Mapping[Signal, float] = MappingProxyType(
         "commands": 0.05,
     }
 )
-"""By how much a prediction may be wrong until the error counts as large, in each signal's unit."""
+"""By how much a prediction may be wrong until the error counts as large, in each signal's unit; of
+commands, for the paper's range, and as much more or less as a motor's own is wider or narrower."""
 
 CONTRADICTION = 3.0
 """How much more it counts that a sensor which is predicted never to switch does."""
@@ -149,7 +150,7 @@ def _cut(comparator: SegmentPrediction, trial: Trial) -> _Cut:
             f"this log out"
         )
     starts = starts[usable]
-    wrong = command_errors(trial) / SCALES["commands"]
+    wrong = command_errors(trial) / (SCALES["commands"] * command_spans(trial))
     rows = starts[:, np.newaxis] + np.arange(1, horizon + 1)
     return _Cut(states, starts, _mean(np.log1p(np.square(wrong[rows]))))
 

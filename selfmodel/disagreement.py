@@ -12,8 +12,8 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.behaviour import Behaviour, Signal
-from selfmodel.controller import Controller
 from selfmodel.differences import difference
+from selfmodel.driver import Evolved
 from selfmodel.hypothesis import Hypothesis
 from selfmodel.robot import Robot
 from selfmodel.simulator import Simulator
@@ -46,10 +46,10 @@ STEEPEST = np.radians(60)
 
 def most_disputed(
     hypotheses: Sequence[Hypothesis],
-    candidates: Sequence[Controller],
+    candidates: Sequence[Evolved],
     simulator: Simulator,
     steps: int,
-) -> Controller:
+) -> Evolved:
     """Returns the controller whose trial is predicted to tell the hypotheses apart best.
 
     A controller with which the robot falls under any of the hypotheses, or whose simulation
@@ -75,7 +75,7 @@ def most_disputed(
 
 def _predicted(
     hypotheses: Sequence[Hypothesis],
-    candidates: Sequence[Controller],
+    candidates: Sequence[Evolved],
     simulator: Simulator,
     steps: int,
 ) -> Simulated:

@@ -8,11 +8,14 @@ import mujoco
 import numpy as np
 
 from selfmodel.anatomy import Anatomy, Joint, Sensor
+from selfmodel.commands import command_ranges
 from selfmodel.controller import HIDDEN_NEURONS, Network
 from selfmodel.embodiment import Embodiment, embody
 from selfmodel.errors import InputError
 from selfmodel.hypothesis import INTACT, Hypothesis
 from selfmodel.mjcf import MjcfSettings, adapt, read_settings
+from selfmodel.neurons import hidden_neurons
+from selfmodel.oscillators import Cpg
 
 CONTROL_DELAY = "selfmodel_control_delay"
 """The custom numeric of an MJCF that says how many control steps a command takes to its effect."""
@@ -48,7 +51,7 @@ class Robot:
         if not model.opt.timestep > 0:
             raise ValueError(f"the physics time step must be above 0 s, got {model.opt.timestep}")
         object.__setattr__(self, "model", model)
-        object.__setattr__(self, "anatomy", read_anatomy(model))
+        object.__setattr__(self, "anatomy", read_anatomy(model, hidden_neurons(model)))
         object.__setattr__(self, "root", _root(model))
         if not np.isclose(self.substeps * model.opt.timestep, self.control_timestep, rtol=1e-9):
             raise ValueError(
@@ -88,9 +91,23 @@ class Robot:
 
     @property
     def network(self) -> Network:
-        """The network that controls it."""
-        names = self.anatomy.names
-        return Network(names.sensors, names.motors, self.anatomy.neurons)
+        """The network that controls it.
+
+        Raises:
+            InputError: A motor does not say what it may be commanded.
+        """
+        names, ranges = self.anatomy.names, command_ranges(self.model)
+        return Network(names.sensors, names.motors, self.anatomy.neurons, ranges)
+
+    @property
+    def cpg(self) -> Cpg:
+        """The oscillators that can control it in the network's place.
+
+        Raises:
+            InputError: A motor does not say what it may be commanded.
+        """
+        names, ranges = self.anatomy.names, command_ranges(self.model)
+        return Cpg(names.sensors, names.motors, self.control_timestep, ranges)
 
     @property
     def standing_height(self) -> float:

@@ -79,7 +79,7 @@ class Walk(base.Task):
         self._start = self._end = physics.forward_position()
 
     def before_step(self, action: FloatArray, physics: Physics) -> None:
-        """Takes the motor targets, rad."""
+        """Takes the commands of the motors."""
         self._start = physics.forward_position()
         super().before_step(action, physics)
 

@@ -68,7 +68,16 @@ LAYERS = (
             "attached",
             "untrusted",
         ),
-        *("settings", "memo", "evolution", "playback", "driver", "streams", "intervals"),
+        *(
+            "settings",
+            "memo",
+            "evolution",
+            "playback",
+            "oscillators",
+            "driver",
+            "streams",
+            "intervals",
+        ),
         *("workers", "grid"),
     ),
     (
@@ -85,7 +94,8 @@ LAYERS = (
         "events",
     ),
     (
-        *("mjcf", "embodiment", "robot", "places", "noise", "senses", "batches", "tally", "prediction"),
+        *("commands", "neurons", "mjcf"),
+        *("embodiment", "robot", "places", "noise", "senses", "batches", "tally", "prediction"),
         *("gap", "instruments", "start", "debris", "structure", "contract_kind"),
         *("simulator", "physical", "judge", "replay", "parameters", "disagreement"),
     ),

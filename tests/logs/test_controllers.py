@@ -70,7 +70,7 @@ def test_equal_controllers_give_equal_bytes_at_any_time():
         (b"PK not a zip", "expected a controller"),
         (archive(genome=None), "it holds hidden.npy, kind.npy"),
         (archive(extra=np.zeros(1)), "it holds extra.npy"),
-        (archive(kind=np.array("tree")), "expected the kind 'network', got 'tree'"),
+        (archive(kind=np.array("tree")), "expected the kind 'network' or 'cpg', got 'tree'"),
         (archive(genome=np.zeros(9)), "got a genome of shape"),
         (archive(genome=np.full(26, 2.0)), "every weight must lie in"),
         (archive(genome=np.full(26, np.nan)), "every weight must lie in"),
