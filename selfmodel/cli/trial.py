@@ -10,6 +10,7 @@ from selfmodel.cli.options import (
     Damage,
     GapLevel,
     Json,
+    ModelSettings,
     Neurons,
     RobotName,
     Seed,
@@ -31,6 +32,7 @@ def trial(
         ),
     ],
     damage: Damage = None,
+    model_settings: ModelSettings = None,
     controller: Annotated[
         Path | None,
         typer.Option(
@@ -60,7 +62,8 @@ def trial(
 
     kind = "network" if controller is None else str(controller)
     made = resolve.with_neurons(
-        resolve.robot_entry(robot).robot(), neurons, "cpg" if kind == "cpg" else "network"
+        resolve.robot_entry(robot, model_settings or ()).robot(),
+        neurons, "cpg" if kind == "cpg" else "network"
     )
     check_log_name(out)
     hidden = parse("intact" if damage is None else damage, made.anatomy)

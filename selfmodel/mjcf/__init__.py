@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from selfmodel.errors import InputError
+from selfmodel.mjcf.commands import add_commands
 from selfmodel.mjcf.document import Document, read_document
 from selfmodel.mjcf.expand import expand, refuse_unloggable
 from selfmodel.mjcf.ground import add_ground
@@ -74,6 +75,7 @@ def _adapted(document: Document, settings: MjcfSettings) -> Adapted:
     turn_forward(document, compiled(document.text, document.assets), settings)
     add_ground(document, compiled(document.text, document.assets))
     add_sensors(document, compiled(document.text, document.assets), settings)
+    add_commands(document, model, settings)
     timestep = _control_timestep(float(model.opt.timestep), settings.control_timestep)
     try:
         checked = checked_model(document.text, document.assets)

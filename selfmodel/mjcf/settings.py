@@ -1,5 +1,6 @@
 """What a user says about a robot's MJCF where the file itself does not tell."""
 
+import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -8,6 +9,7 @@ from typing import Any
 
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.mjcf.files import read_file
+from selfmodel.neurons import MOST
 
 LARGEST = 2**16
 """Bytes that the file of settings may have."""
@@ -30,6 +32,8 @@ class MjcfSettings:
             physics time step from 0.01 s on.
         touch: The bodies that get a touch sensor; None for every distal limb.
         angle: The joints that get an angle sensor; None for every hinge that a motor drives.
+        ctrlrange: Lowest and highest command of motors that have no range of their own.
+        neurons: Hidden neurons of its controller; None for those that the file says.
     """
 
     forward: str = "x"
@@ -37,6 +41,8 @@ class MjcfSettings:
     control_timestep: float | None = None
     touch: tuple[str, ...] | None = None
     angle: tuple[str, ...] | None = None
+    ctrlrange: tuple[float, float] | None = None
+    neurons: int | None = None
 
 
 def read_settings(path: Path, extra: Mapping[str, Any] | None = None) -> MjcfSettings:
@@ -87,9 +93,11 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
         if key not in {field.name for field in fields(MjcfSettings)}:
             raise unknown_name("setting", key, [field.name for field in fields(MjcfSettings)])
     step = given.get("control_timestep")
-    number = isinstance(step, int | float) and not isinstance(step, bool) and 0 < step <= 10
-    if step is not None and not number:
+    if step is not None and not (_is_number(step) and 0 < step <= 10):
         raise InputError(f"control_timestep needs a number from above 0 to 10 s, got {step!r}")
+    neurons = given.get("neurons")
+    if neurons is not None and not (type(neurons) is int and 1 <= neurons <= MOST):
+        raise InputError(f"neurons needs a whole number from 1 to {MOST}, got {neurons!r}")
     forward, keyframe = given.get("forward", "x"), given.get("keyframe", "")
     if forward not in DIRECTIONS:
         raise InputError(f"forward needs one of {', '.join(DIRECTIONS)}, got {forward!r}")
@@ -101,7 +109,24 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
         control_timestep=None if step is None else float(step),
         touch=_names(given, "touch"),
         angle=_names(given, "angle"),
+        ctrlrange=_range(given),
+        neurons=neurons,
     )
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _range(given: Mapping[str, Any]) -> tuple[float, float] | None:
+    ends = given.get("ctrlrange")
+    if ends is None:
+        return None
+    if not (isinstance(ends, list) and len(ends) == 2 and all(map(_is_number, ends))):
+        raise InputError(f"ctrlrange needs two numbers, such as [-1, 1], got {ends!r}")
+    if not ends[0] < ends[1]:
+        raise InputError(f"ctrlrange needs its lower end first, got {ends!r}")
+    return float(ends[0]), float(ends[1])
 
 
 def _names(given: Mapping[str, Any], key: str) -> tuple[str, ...] | None:
