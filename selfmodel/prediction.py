@@ -11,7 +11,7 @@ from selfmodel.batches import Alive, counted_not_printed, live_signals, new_batc
 from selfmodel.behaviour import Behaviour
 from selfmodel.comparator import Segments
 from selfmodel.embodiment import Embodiment
-from selfmodel.places import places
+from selfmodel.places import writer
 from selfmodel.robot import Robot
 from selfmodel.senses import Senses
 from selfmodel.tally import Simulated, Tally
@@ -85,8 +85,8 @@ def predict(
                 if "sensors" in kept:
                     senses.read(sensordata[place], qpos[place], readings)
                     kept["sensors"][:, stage, k] = readings.reshape(n, together, -1)
-                for signal, (source, chosen) in live.items():
-                    kept[signal][:, stage, k] = source[:, chosen][place].reshape(n, together, -1)
+                for signal, read in live.items():
+                    kept[signal][:, stage, k] = read()[place].reshape(n, together, -1)
                 if k < horizon:
                     start.command(segments.commands[stage, first + k])
                     clock = perf_counter()
@@ -111,10 +111,7 @@ class _Start:
         self, robot: Robot, batch: mujoco.batch.Batch, embodiments: Sequence[Embodiment]
     ) -> None:
         self._n = len(embodiments)
-        self._state = {
-            signal: (batch.bind(place.field), place.columns)
-            for signal, place in places(robot).items()
-        }
+        self._write = writer(robot, batch.bind)
         self._ctrl = batch.bind("ctrl")
         self._qpos, self._qvel = batch.bind("qpos"), batch.bind("qvel")
         self._held = [
@@ -125,9 +122,9 @@ class _Start:
 
     def write(self, segments: Segments, stage: IndexArray) -> None:
         """Begins the segments of these numbers."""
-        for signal, values in segments.states.items():
-            field, columns = self._state[signal]
-            field[:, columns] = self._for_all(values[stage])
+        self._write(
+            {signal: self._for_all(values[stage]) for signal, values in segments.states.items()}
+        )
         for number, position, velocity, angle in self._held:
             mine = slice(number * len(stage), (number + 1) * len(stage))
             self._qpos[mine, position] = angle

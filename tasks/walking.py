@@ -12,7 +12,7 @@ from dm_control.suite import base
 from selfmodel.arrays import FloatArray
 from selfmodel.embodiment import Embodiment
 from selfmodel.notation import parse
-from selfmodel.places import places
+from selfmodel.places import places, present
 from selfmodel.robot import Robot
 from selfmodel.senses import Senses
 
@@ -38,20 +38,12 @@ def environment(
     """
     embodiment = robot.build(parse(hypothesis, robot.anatomy))
     return control.Environment(
-        Physics.from_model(core.MjModel(embodiment.model)),
+        mujoco.Physics.from_model(core.MjModel(embodiment.model)),
         Walk(robot, embodiment, random),
         time_limit=time_limit,
         control_timestep=robot.control_timestep,
         **(environment_kwargs or {}),
     )
-
-
-class Physics(mujoco.Physics):
-    """MuJoCo with the reading that walking is about."""
-
-    def forward_position(self) -> float:
-        """Returns where the root body is along the world's x axis, m."""
-        return float(self.data.qpos[0])
 
 
 class Walk(base.Task):
@@ -73,26 +65,26 @@ class Walk(base.Task):
         self._places = places(robot)
         self._start = self._end = 0.0
 
-    def initialize_episode(self, physics: Physics) -> None:
+    def initialize_episode(self, physics: mujoco.Physics) -> None:
         """Puts the robot at its start."""
         super().initialize_episode(physics)
-        self._start = self._end = physics.forward_position()
+        self._start = self._end = self._forward(physics)
 
-    def before_step(self, action: FloatArray, physics: Physics) -> None:
+    def before_step(self, action: FloatArray, physics: mujoco.Physics) -> None:
         """Takes the commands of the motors."""
-        self._start = physics.forward_position()
+        self._start = self._forward(physics)
         super().before_step(action, physics)
 
-    def after_step(self, physics: Physics) -> None:
+    def after_step(self, physics: mujoco.Physics) -> None:
         """Sees where the step led."""
-        self._end = physics.forward_position()
+        self._end = self._forward(physics)
         super().after_step(physics)
 
-    def get_reward(self, _physics: Physics) -> float:
+    def get_reward(self, _physics: mujoco.Physics) -> float:
         """Returns the forward speed over the last control step, m/s."""
         return (self._end - self._start) / self._robot.control_timestep
 
-    def get_observation(self, physics: Physics) -> "OrderedDict[str, FloatArray]":
+    def get_observation(self, physics: mujoco.Physics) -> "OrderedDict[str, FloatArray]":
         """Returns what the controller receives, and the rest of the state but for where it is."""
         readings = np.empty((1, len(self._robot.anatomy.sensors)))
         data = physics.data
@@ -105,7 +97,10 @@ class Walk(base.Task):
             "base_linear_velocity",
             "base_angular_velocity",
         ):
-            place = self._places[signal]
-            observation[signal] = getattr(data, place.field)[place.columns].copy()
-        observation["base_height"] = data.qpos[2:3].copy()
+            observation[signal] = present(self._places[signal], data)
+        observation["base_height"] = present(self._places["base_position"], data)[2:]
         return observation
+
+    def _forward(self, physics: mujoco.Physics) -> float:
+        """Where the root body is along the world's x axis, m."""
+        return float(present(self._places["base_position"], physics.data)[0])

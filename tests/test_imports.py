@@ -95,6 +95,7 @@ LAYERS = (
     ),
     (
         *("commands", "neurons", "mjcf"),
+        *("transmission", "couplings", "roots", "carried", "dissection", "activations"),
         *("embodiment", "robot", "places", "noise", "senses", "batches", "tally", "prediction"),
         *("gap", "instruments", "start", "debris", "structure", "contract_kind"),
         *("simulator", "physical", "judge", "replay", "parameters", "disagreement"),

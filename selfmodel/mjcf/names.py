@@ -68,7 +68,6 @@ def name_parts(document: Document) -> None:
     for motor in actuators:
         drives = motor.get("joint") or motor.get("jointinparent") or motor.get("tendon")
         _name(motor, taken, _UNUSUAL.sub("_", drives) if drives else "motor")
-    _gather_hinges(document, bodies, actuators)
     taken = Taken(before["sensor"])
     for sensor in sensors:
         wish = f"{sensor.get('joint')}_angle" if sensor.tag == "jointpos" else sensor.tag
@@ -109,27 +108,3 @@ def _rename(
             told = element.get(f"{whose}type", "").removeprefix("x")
             if told == kind and element.get(f"{whose}name") in new:
                 element.set(f"{whose}name", new[str(element.get(f"{whose}name"))])
-
-
-def _gather_hinges(
-    document: Document, bodies: list[ET.Element], actuators: list[ET.Element]
-) -> None:
-    """Lets the driven joints of a body begin alike: they break together, under one name."""
-    driven = {motor.get("joint") or motor.get("jointinparent") for motor in actuators}
-    joints = [joint for body in bodies for joint in body if joint.tag in _HINGE_TAGS]
-    taken = Taken(joint.get("name") for joint in joints)
-    for body in bodies:
-        names = [str(j.get("name")) for j in body if j.tag == "joint" and j.get("name") in driven]
-        if len(names) > 1 and not _beginning(names).strip("_"):
-            new = {name: taken.new(f"{body.get('name')}_{name}") for name in names}
-            _rename(document, "joint", joints, new)
-            document.notes.append(
-                f"the joints {', '.join(names)} of one body are called {', '.join(new.values())}"
-            )
-
-
-def _beginning(names: list[str]) -> str:
-    shared = names[0]
-    while not all(name.startswith(shared) for name in names):
-        shared = shared[:-1]
-    return shared

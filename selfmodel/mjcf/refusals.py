@@ -3,8 +3,12 @@
 import mujoco
 import numpy as np
 
+from selfmodel.carried import check_carried
+from selfmodel.dissection import driven_joints
 from selfmodel.errors import InputError
 from selfmodel.mjcf.mujoco_errors import told_by_mujoco
+from selfmodel.roots import find_root, joints_of
+from selfmodel.transmission import motor_joints
 
 _PROBE_SECONDS = 0.2
 _MOST_PROBE_STEPS = 200
@@ -21,19 +25,18 @@ def refuse_unusable(model: mujoco.MjModel) -> None:
     if not model.opt.timestep > 0 or not np.isfinite(model.opt.timestep):
         raise InputError(f"its <option timestep> must be above 0 s, got {model.opt.timestep}")
     _refuse_infinite(model)
-    if model.nflex or model.nskin:
-        raise InputError(
-            f"it has {model.nflex} flexes and {model.nskin} skins, soft bodies that no log of "
-            f"joints tells of: make them rigid, or take them out"
-        )
     if not model.nu:
         raise InputError(
             "it has no actuators, and nothing to control: give each joint that a motor is to "
             "drive one in <actuator>"
         )
     _refuse_trees(model)
-    _refuse_joints(model)
-    _refuse_actuators(model)
+    try:
+        root = find_root(model, driven_joints(model))
+        check_carried(model, root)
+    except ValueError as error:
+        raise InputError(str(error)) from error
+    _refuse_driven_root(model, root)
     _refuse_unstable(model)
 
 
@@ -53,35 +56,14 @@ def _refuse_trees(model: mujoco.MjModel) -> None:
         )
 
 
-def _refuse_joints(model: mujoco.MjModel) -> None:
-    for joint in range(model.njnt):
-        body, kind = int(model.jnt_bodyid[joint]), model.jnt_type[joint]
-        name = model.joint(joint).name
-        if kind == mujoco.mjtJoint.mjJNT_BALL:
-            raise InputError(
-                f"its joint {name} is a ball joint, whose angle is no one number: make it three "
-                f"hinges on one body"
-            )
-        if kind == mujoco.mjtJoint.mjJNT_SLIDE and model.body_parentid[body]:
-            raise InputError(
-                f"its joint {name} slides, and limbs are diagnosed by the angles of hinges: make "
-                f"it a hinge, or fix it"
-            )
-
-
-def _refuse_actuators(model: mujoco.MjModel) -> None:
-    joint_like = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+def _refuse_driven_root(model: mujoco.MjModel, root: str) -> None:
+    own = joints_of(model, int(model.body(root).id))
     for motor in range(model.nu):
-        name = model.actuator(motor).name
-        if model.actuator_gaintype[motor] == mujoco.mjtGain.mjGAIN_MUSCLE:
-            raise InputError(f"its actuator {name} is a muscle: make it a motor or a position servo")
-        if int(model.actuator_trntype[motor]) in joint_like:
-            joint = int(model.actuator_trnid[motor, 0])
-            if model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_HINGE:
-                raise InputError(
-                    f"its actuator {name} drives {model.joint(joint).name}, which is no hinge of "
-                    f"a limb: take it out, the root must move by what its limbs do"
-                )
+        for joint in motor_joints(model, motor).intersection(own):
+            raise InputError(
+                f"its motor {model.actuator(motor).name} drives {model.joint(joint).name} of the "
+                f"root body {root}, which moves only by what its limbs do: take the motor out"
+            )
 
 
 def _refuse_unstable(model: mujoco.MjModel) -> None:

@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray
+from selfmodel.dissection import driven_joints
 from selfmodel.errors import unknown_name
 from selfmodel.mjcf.document import Document
 from selfmodel.mjcf.expand import numbers
@@ -46,30 +47,13 @@ def add_sensors(document: Document, model: mujoco.MjModel, settings: MjcfSetting
         )
 
 
-def driven_joints(model: mujoco.MjModel) -> list[int]:
-    """Returns the joints that an actuator moves, alone or by a tendon of joints, in order."""
-    joints = set()
-    for motor in range(model.nu):
-        target, kind = int(model.actuator_trnid[motor, 0]), int(model.actuator_trntype[motor])
-        if kind == mujoco.mjtTrn.mjTRN_TENDON:
-            first = int(model.tendon_adr[target])
-            wraps = range(first, first + int(model.tendon_num[target]))
-            joints |= {
-                int(model.wrap_objid[w])
-                for w in wraps
-                if model.wrap_type[w] == mujoco.mjtWrap.mjWRAP_JOINT
-            }
-        elif kind in _JOINT_TRANSMISSIONS:
-            joints.add(target)
-    return sorted(joints)
-
-
-_JOINT_TRANSMISSIONS = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+def _driven_hinges(model: mujoco.MjModel) -> list[int]:
+    return [j for j in sorted(driven_joints(model)) if model.jnt_type[j] == _HINGE]
 
 
 def _drop_useless(document: Document, model: mujoco.MjModel) -> None:
     """Takes out sensors of what no motor drives, and of what is no hinge."""
-    hinges = {model.joint(j).name for j in driven_joints(model) if model.jnt_type[j] == _HINGE}
+    hinges = {model.joint(j).name for j in _driven_hinges(model)}
     moving = {model.site(s).name for s in range(model.nsite) if _moves(model, s)}
     for part in document.root.findall("sensor"):
         for sensor in list(part):
@@ -86,7 +70,7 @@ def _moves(model: mujoco.MjModel, site: int) -> bool:
 
 
 def _angles(document: Document, model: mujoco.MjModel, settings: MjcfSettings) -> list[str]:
-    hinges = [model.joint(j).name for j in driven_joints(model) if model.jnt_type[j] == _HINGE]
+    hinges = [model.joint(j).name for j in _driven_hinges(model)]
     measured = {s.get("joint") for s in document.children("sensor") if s.tag == "jointpos"}
     return _chosen("joint with a motor", settings.angle, hinges, hinges, measured)
 
