@@ -20,7 +20,7 @@ from selfmodel.hypothesis import Hypothesis
 from selfmodel.logs import LogError, TrialLog, load_controller, read_log
 from selfmodel.logs.files import read_bounded
 from selfmodel.logs.robots import described_difference, the_robot_of
-from selfmodel.mjcf import parse_setting, read_settings
+from selfmodel.mjcf import MjcfSettings, adapt, parse_setting, read_settings
 from selfmodel.neurons import with_neurons as neurons_in
 from selfmodel.next_trial import NextTrial, by_disagreement, by_repair
 from selfmodel.playback import Playback
@@ -55,14 +55,23 @@ def robot_entry(name: str, settings: Iterable[str] = ()) -> Entry:
     """
     given = tuple(settings)
     if is_model(name):
-        extra = {key: value for text in given for key, value in parse_setting(text).items()}
-        made = Robot.from_mjcf(Path(name), read_settings(Path(name), extra))
+        made = Robot.from_mjcf(Path(name), _settings(name, given))
         return Entry(robot=lambda: made, cases={}, suite={})
     if given:
         raise InputError(f"--set {given[0]} is for a robot's MJCF: {name!r} has all that it needs")
     if name not in ROBOTS:
         raise unknown_name("robot", name, ROBOTS)
     return ROBOTS[name]
+
+
+def notes_on(name: str, settings: Iterable[str]) -> tuple[str, ...]:
+    """Returns what was done to an MJCF to make a robot of it; see ``robot_entry``."""
+    return adapt(Path(name), _settings(name, settings)).notes
+
+
+def _settings(name: str, given: Iterable[str]) -> MjcfSettings:
+    extra = {key: value for text in given for key, value in parse_setting(text).items()}
+    return read_settings(Path(name), extra)
 
 
 def case_notation(entry: Entry, case: int | None, damage: str | None) -> str:
