@@ -10,10 +10,8 @@ from selfmodel.errors import InputError
 from selfmodel.logs.errors import SchemaMismatchError
 from selfmodel.logs.reader import TrialLog
 from selfmodel.untrusted import checked_model
+from selfmodel.mjcf import MOST_SUBSTEPS
 from selfmodel.robot import Robot
-
-MOST_SUBSTEPS = 1000
-"""Physics steps in a control step: more would take for ever."""
 
 GOOD = "what was observed reads well"
 

@@ -26,6 +26,10 @@ CONTROL_TIMESTEP = 0.01
 """Seconds between two commands that are wanted where nothing else is said."""
 
 
+MOST_SUBSTEPS = 1000
+"""Physics steps in a control step that the log of a trial may tell of."""
+
+
 @dataclass(frozen=True, eq=False)
 class Adapted:
     """An MJCF that is ready to be a robot.
@@ -71,12 +75,12 @@ def _adapted(document: Document, settings: MjcfSettings) -> Adapted:
             document.notes.append(f"the mocap body {body.get('name')} stands still")
     model = compiled(document.text, document.assets)
     refuse_unusable(model)
+    timestep = _control_timestep(float(model.opt.timestep), settings.control_timestep)
     bake_keyframe(document, model, settings)
     turn_forward(document, compiled(document.text, document.assets), settings)
     add_ground(document, compiled(document.text, document.assets))
     add_sensors(document, compiled(document.text, document.assets), settings)
     add_commands(document, model, settings)
-    timestep = _control_timestep(float(model.opt.timestep), settings.control_timestep)
     try:
         checked = checked_model(document.text, document.assets)
     except ValueError as error:
@@ -92,6 +96,12 @@ def _adapted(document: Document, settings: MjcfSettings) -> Adapted:
 
 def _control_timestep(physics: float, wanted: float | None) -> float:
     """The wanted step, or the smallest multiple of the physics' that is not below 0.01 s."""
+    control = CONTROL_TIMESTEP if wanted is None else wanted
+    if control / physics > MOST_SUBSTEPS:
+        raise InputError(
+            f"its physics take {control / physics:.3g} steps in a control step of {control} s, "
+            f"more than {MOST_SUBSTEPS}: give it a larger <option timestep>"
+        )
     if wanted is None:
         return max(1, math.ceil(CONTROL_TIMESTEP / physics - 1e-9)) * physics
     if not math.isclose(max(1, round(wanted / physics)) * physics, wanted, rel_tol=1e-9):
