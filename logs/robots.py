@@ -9,9 +9,9 @@ from selfmodel.behaviour import Names
 from selfmodel.errors import InputError
 from selfmodel.logs.errors import SchemaMismatchError
 from selfmodel.logs.reader import TrialLog
-from selfmodel.untrusted import checked_model
 from selfmodel.mjcf import MOST_SUBSTEPS
 from selfmodel.robot import Robot
+from selfmodel.untrusted import checked_model
 
 GOOD = "what was observed reads well"
 

@@ -68,11 +68,8 @@ def print_parts(facts: dict[str, Any]) -> None:
             title=facts["robot"],
             rows=[
                 ("root", f"{facts['root']['body']}, {root}"),
-                (
-                    "steps",
-                    f"a command every {facts['control_timestep']:g} s, physics every "
-                    f"{facts['physics_timestep']:g} s",
-                ),
+                ("commands", f"every {facts['control_timestep']:g} s"),
+                ("physics", f"every {facts['physics_timestep']:g} s"),
                 ("controller", f"{facts['hidden_neurons']} neurons, {facts['weights']} weights"),
             ],
         ),

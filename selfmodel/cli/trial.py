@@ -63,7 +63,8 @@ def trial(
     kind = "network" if controller is None else str(controller)
     made = resolve.with_neurons(
         resolve.robot_entry(robot, model_settings or ()).robot(),
-        neurons, "cpg" if kind == "cpg" else "network"
+        neurons,
+        "cpg" if kind == "cpg" else "network",
     )
     check_log_name(out)
     hidden = parse("intact" if damage is None else damage, made.anatomy)

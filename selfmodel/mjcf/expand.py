@@ -22,7 +22,7 @@ def refuse_unloggable(document: Document) -> None:
         InputError: The model asks for other models, other code, or too much of anything.
     """
     if _size(document.root) > MOST_ELEMENTS:
-        raise InputError(f"its {' and '.join(COPIES)} make more than {MOST_ELEMENTS} elements")
+        raise InputError(f"its <{'> and <'.join(COPIES)}> make more than {MOST_ELEMENTS} elements")
     try:
         checked_model(document.text, document.assets, allowed=COPIES)
     except ValueError as error:
@@ -81,4 +81,6 @@ def _write_masses(document: Document) -> None:
 
 def numbers(values: np.ndarray) -> str:
     """Returns numbers as an attribute has them, to the last bit."""
-    return " ".join(repr(float(value)) for value in np.atleast_1d(values))
+    # MuJoCo cannot read numbers that are as good as none.
+    kept = np.where(np.abs(values) < np.finfo(np.float64).tiny, 0.0, values)
+    return " ".join(repr(float(value)) for value in kept)

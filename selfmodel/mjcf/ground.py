@@ -85,6 +85,7 @@ def _lowest(model: mujoco.MjModel) -> float:
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     far = 1e6
-    return min(
+    distances = (
         mujoco.mj_geomDistance(model, data, 0, geom, far, None) for geom in meets_ground(model)
     )
+    return float(min(distances))

@@ -179,7 +179,9 @@ def _check_pose(before: mujoco.MjData, model: mujoco.MjModel) -> None:
     after = mujoco.MjData(model)
     mujoco.mj_kinematics(model, after)
     turned = np.abs(np.sum(before.xquat * after.xquat, axis=1))
-    if not (np.allclose(before.xpos, after.xpos, atol=_SAME) and np.allclose(turned, 1, atol=_SAME)):
+    if not (
+        np.allclose(before.xpos, after.xpos, atol=_SAME) and np.allclose(turned, 1, atol=_SAME)
+    ):
         raise InputError(
             f"its keyframe cannot be made its reference pose: start it in another with "
             f"keyframe=NAME, or in its reference pose with keyframe={NO_KEYFRAME}"

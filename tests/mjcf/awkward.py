@@ -107,7 +107,7 @@ AWKWARD: dict[str, Awkward] = {
             root='<joint name="x" type="slide" axis="1 0 0"/>',
             motors=MOTORS + '<motor joint="x" ctrlrange="-1 1"/>',
         ),
-        "x",
+        "no motor moves",
     ),
     "a mocap body": Awkward(
         mjcf(world=GROUND + '<body name="hand" mocap="true"><geom size=".05"/></body>')
@@ -134,7 +134,9 @@ AWKWARD: dict[str, Awkward] = {
         )
     ),
     "an actuator on a site": Awkward(
-        mjcf(torso=TORSO + '<site name="s"/>', motors=MOTORS + '<general site="s" ctrlrange="0 1"/>')
+        mjcf(
+            torso=TORSO + '<site name="s"/>', motors=MOTORS + '<general site="s" ctrlrange="0 1"/>'
+        )
     ),
     "a muscle": Awkward(mjcf(motors='<muscle name="m" joint="left_hip"/>'), "muscle"),
     "an actuator of nothing": Awkward(mjcf(motors='<motor joint="tail"/>'), "tail"),
@@ -146,7 +148,8 @@ AWKWARD: dict[str, Awkward] = {
         mjcf(more='<equality><joint joint1="left_hip" joint2="right_hip"/></equality>')
     ),
     "a plugin": Awkward(
-        mjcf(more='<extension><plugin plugin="mujoco.elasticity.cable"/></extension>'), "plugin"
+        mjcf(more='<extension><plugin plugin="mujoco.elasticity.cable"/></extension>'),
+        "<extension>",
     ),
     "a flex": Awkward(
         mjcf(torso=TORSO + '<flexcomp name="f" type="grid" count="3 3 1" spacing=".1 .1 .1"/>'),
@@ -154,9 +157,8 @@ AWKWARD: dict[str, Awkward] = {
     ),
     "a composite": Awkward(
         mjcf(
-            legs=LEGS
-            + '<composite type="cable" curve="s" count="9 1 1" size="1"><geom size=".01"/>'
-            "</composite>"
+            legs=LEGS + '<composite type="cable" curve="s" count="9 1 1" size="1">'
+            '<joint kind="main"/><geom type="capsule" size=".01"/></composite>'
         ),
         "ball",
     ),
