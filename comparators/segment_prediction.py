@@ -10,7 +10,7 @@ import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.behaviour import Behaviour, Signal
-from selfmodel.comparator import Segments
+from selfmodel.comparator import Past, Segments
 from selfmodel.comparators.arithmetic import command_errors, command_spans
 from selfmodel.differences import difference
 from selfmodel.errors import InputError
@@ -96,6 +96,7 @@ class SegmentPrediction:
             commands=np.where(rows[..., np.newaxis] < 0, 0.0, commands[np.maximum(rows, 0)]),
             lead=LEAD,
             record=(*self.state, "sensors"),
+            past=Past(commands, cut.starts),
         )
 
     def losses(self, simulated: Behaviour, trial: Trial) -> FloatArray:

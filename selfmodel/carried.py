@@ -3,7 +3,7 @@
 import mujoco
 
 from selfmodel.roots import joints_of
-from selfmodel.transmission import TRANSMISSIONS, descends, motor_joints
+from selfmodel.transmission import TRANSMISSIONS
 
 _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 _REFUSED_JOINTS = {
@@ -25,17 +25,17 @@ _GAINS = (int(mujoco.mjtGain.mjGAIN_FIXED), int(mujoco.mjtGain.mjGAIN_AFFINE))
 _BIASES = (int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_AFFINE))
 
 
-def check_carried(model: mujoco.MjModel, root: str) -> None:
+def check_carried(model: mujoco.MjModel, root: int) -> None:
     """Checks that a robot of this model can be logged, damaged and predicted from its logs.
 
     Args:
         model: A compiled MJCF.
-        root: Its root body.
+        root: The number of its root body.
 
     Raises:
         ValueError: It has something that cannot; the sentence names what.
     """
-    own = joints_of(model, int(model.body(root).id))
+    own = joints_of(model, root)
     for j in range(model.njnt):
         kind = int(model.jnt_type[j])
         if j not in own and kind in _REFUSED_JOINTS:
@@ -79,11 +79,7 @@ def _check_motor(model: mujoco.MjModel, motor: int) -> None:
 def _check_names(model: mujoco.MjModel) -> None:
     motors = [model.actuator(m) for m in range(model.nu)]
     hinges = [model.joint(j) for j in range(model.njnt) if model.jnt_type[j] == _HINGE]
-    driven = {int(model.jnt_bodyid[j]) for m in range(model.nu) for j in motor_joints(model, m)}
-    limbs = [
-        model.body(b) for b in range(model.nbody) if any(descends(model, b, d) for d in driven)
-    ]
-    for what, parts in (("motor", motors), ("hinge", hinges), ("limb's body", limbs)):
+    for what, parts in (("motor", motors), ("hinge", hinges)):
         for part in parts:
             if not part.name:
                 raise ValueError(

@@ -66,12 +66,10 @@ def _linear(model: mujoco.MjModel, motor: int) -> tuple[float, tuple[float, floa
 
     Damping is left out: it is 0 at rest.
     """
-    follows = model.actuator_dyntype[motor] in (
-        mujoco.mjtDyn.mjDYN_NONE,
-        mujoco.mjtDyn.mjDYN_FILTER,
-        mujoco.mjtDyn.mjDYN_FILTEREXACT,
-    )
-    if not follows or model.actuator_gaintype[motor] != mujoco.mjtGain.mjGAIN_FIXED:
+    if (
+        int(model.actuator_dyntype[motor]) not in _FOLLOWS
+        or model.actuator_gaintype[motor] != mujoco.mjtGain.mjGAIN_FIXED
+    ):
         return 0.0, (0.0, 0.0)
     gain = float(model.actuator_gainprm[motor, 0])
     if model.actuator_biastype[motor] == mujoco.mjtBias.mjBIAS_NONE:
@@ -86,9 +84,9 @@ def _travel(model: mujoco.MjModel, motor: int) -> Range | None:
     """The range of the joint or tendon that a motor drives, if that is limited."""
     joint = _joint(model, motor)
     if joint is not None:
-        slides = model.jnt_type[joint] in (_HINGE, _SLIDE)
+        scalar = int(model.jnt_type[joint]) in _SCALAR
         low, high = model.jnt_range[joint]
-        return (float(low), float(high)) if slides and model.jnt_limited[joint] else None
+        return (float(low), float(high)) if scalar and model.jnt_limited[joint] else None
     if model.actuator_trntype[motor] == mujoco.mjtTrn.mjTRN_TENDON:
         tendon = model.actuator_trnid[motor, 0]
         low, high = model.tendon_range[tendon]
@@ -97,10 +95,7 @@ def _travel(model: mujoco.MjModel, motor: int) -> Range | None:
 
 
 def _joint(model: mujoco.MjModel, motor: int) -> int | None:
-    moves = model.actuator_trntype[motor] in (
-        mujoco.mjtTrn.mjTRN_JOINT,
-        mujoco.mjtTrn.mjTRN_JOINTINPARENT,
-    )
+    moves = int(model.actuator_trntype[motor]) in _OF_JOINTS
     return int(model.actuator_trnid[motor, 0]) if moves else None
 
 
@@ -114,4 +109,12 @@ def _centred(ends: Range) -> tuple[float, float]:
     return (low + high) / 2 + 0.0, (high - low) / 2  # -0 is 0
 
 
-_HINGE, _SLIDE = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
+# As numbers: a number of a model is in no tuple of enumerations.
+_SCALAR = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
+_OF_JOINTS = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+_FOLLOWS = (
+    int(mujoco.mjtDyn.mjDYN_NONE),
+    int(mujoco.mjtDyn.mjDYN_FILTER),
+    int(mujoco.mjtDyn.mjDYN_FILTEREXACT),
+)
+"""The activations that come to rest at the command."""

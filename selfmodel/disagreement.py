@@ -16,6 +16,7 @@ from selfmodel.differences import difference
 from selfmodel.driver import Evolved
 from selfmodel.hypothesis import Hypothesis
 from selfmodel.robot import Robot
+from selfmodel.rotation import directions
 from selfmodel.simulator import Simulator
 from selfmodel.tally import Simulated
 
@@ -38,10 +39,11 @@ SCALES: Mapping[Signal, float] = MappingProxyType(
 differs by more counts no more, so that one wild prediction does not decide."""
 
 LOWEST = 0.5
-"""A base below this part of its standing height has fallen."""
+"""A base below this part of its standing height has fallen; one that begins on the ground, as a
+swimmer's, cannot fall so."""
 
 STEEPEST = np.radians(60)
-"""A base that leans by more has fallen, rad."""
+"""A base that leans by more than at the start has fallen, rad."""
 
 
 def most_disputed(
@@ -125,7 +127,9 @@ def first_falls(behaviour: Behaviour, standing_height: float) -> IndexArray:
         Of shape ``(...)``.
     """
     height = behaviour["base_position"][..., 2]
-    x, y = (behaviour["base_orientation"][..., column] for column in (1, 2))
-    upright = 1 - 2 * (x * x + y * y)  # the cosine of how far the base leans
-    fallen = (height < LOWEST * standing_height) | (upright < np.cos(STEEPEST))
+    upward = directions(behaviour["base_orientation"])[..., 2:]  # the world's, as the base has it
+    # The cosine of how far the base leans.
+    upright = (upward * upward[..., :1, :]).sum(axis=-1)
+    low = (height < LOWEST * standing_height) & (standing_height > 0)
+    fallen = low | (upright < np.cos(STEEPEST))
     return np.where(fallen.any(axis=-1), fallen.argmax(axis=-1), behaviour.steps)

@@ -19,7 +19,7 @@ def driven_joints(model: mujoco.MjModel) -> frozenset[int]:
     return frozenset[int]().union(*(motor_joints(model, m) for m in range(model.nu)))
 
 
-def read_anatomy(model: mujoco.MjModel, root: str, neurons: int = HIDDEN_NEURONS) -> Anatomy:
+def read_anatomy(model: mujoco.MjModel, root: int, neurons: int = HIDDEN_NEURONS) -> Anatomy:
     """Returns the parts of a robot that its model names.
 
     The hinges of one body are one joint if a motor moves any of them. It is called by what their
@@ -28,13 +28,13 @@ def read_anatomy(model: mujoco.MjModel, root: str, neurons: int = HIDDEN_NEURONS
 
     Args:
         model: A compiled MJCF that ``carried.check_carried`` lets through.
-        root: The root body, whose own joints are not the limbs'.
+        root: The number of the root body, whose own joints are not the limbs'.
         neurons: Hidden neurons of its controller.
 
     Raises:
         ValueError: Two joints would be called alike.
     """
-    own = joints_of(model, int(model.body(root).id))
+    own = joints_of(model, root)
     hinges = [j for j in range(model.njnt) if model.jnt_type[j] == _HINGE and j not in own]
     driven = driven_joints(model)
     groups: dict[int, list[int]] = {}

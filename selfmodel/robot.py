@@ -56,9 +56,8 @@ class Robot:
         root = find_root(model, driven_joints(model))
         check_carried(model, root)
         object.__setattr__(self, "model", model)
-        anatomy = read_anatomy(model, root, hidden_neurons(model))
-        object.__setattr__(self, "anatomy", anatomy)
-        object.__setattr__(self, "root", root)
+        object.__setattr__(self, "anatomy", read_anatomy(model, root, hidden_neurons(model)))
+        object.__setattr__(self, "root", str(model.body(root).name))
         if not np.isclose(self.substeps * model.opt.timestep, self.control_timestep, rtol=1e-9):
             raise ValueError(
                 f"the control time step {self.control_timestep} s must be a multiple of the "

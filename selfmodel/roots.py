@@ -237,8 +237,8 @@ def joints_of(model: mujoco.MjModel, body: int) -> list[int]:
     return list(range(first, first + int(model.body_jntnum[body])))
 
 
-def find_root(model: mujoco.MjModel, driven: frozenset[int]) -> str:
-    """Returns the name of the root body of a robot.
+def find_root(model: mujoco.MjModel, driven: frozenset[int]) -> int:
+    """Returns the number of the root body of a robot.
 
     Args:
         model: A compiled MJCF.
@@ -262,7 +262,7 @@ def find_root(model: mujoco.MjModel, driven: frozenset[int]) -> str:
             "the model needs a root body with a free joint, or with slides and after them at most "
             "one hinge that no motor moves, and has none: its base is fixed"
         )
-    return str(model.body(floating[0]).name)
+    return floating[0]
 
 
 _FREE, _SLIDE, _HINGE = (

@@ -94,8 +94,8 @@ LAYERS = (
         "events",
     ),
     (
-        *("commands", "neurons", "mjcf"),
         *("transmission", "couplings", "roots", "carried", "dissection", "activations"),
+        *("commands", "neurons", "mjcf"),
         *("embodiment", "robot", "places", "noise", "senses", "batches", "tally", "prediction"),
         *("gap", "instruments", "start", "debris", "structure", "contract_kind"),
         *("simulator", "physical", "judge", "replay", "parameters", "disagreement"),

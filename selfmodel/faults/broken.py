@@ -3,7 +3,6 @@
 from typing import TYPE_CHECKING
 
 from selfmodel.anatomy import Anatomy
-from selfmodel.faults.joints import joints
 from selfmodel.faults.kind import Fault, Kind
 from selfmodel.faults.motor import WEAK_MOTOR
 
@@ -31,4 +30,11 @@ def _absorbs(fault: Fault, other: Fault, anatomy: Anatomy) -> bool:
     return other.part in broken.lost
 
 
-BROKEN = Kind(name="break", word="break", parts=joints, strike=_strike, absorbs=_absorbs)
+def _joints_with_limbs(anatomy: Anatomy) -> tuple[str, ...]:
+    """A body without a name cannot be told from others."""
+    return tuple(joint.name for joint in anatomy.joints if "" not in joint.bodies)
+
+
+BROKEN = Kind(
+    name="break", word="break", parts=_joints_with_limbs, strike=_strike, absorbs=_absorbs
+)

@@ -56,13 +56,13 @@ def _refuse_trees(model: mujoco.MjModel) -> None:
         )
 
 
-def _refuse_driven_root(model: mujoco.MjModel, root: str) -> None:
-    own = joints_of(model, int(model.body(root).id))
+def _refuse_driven_root(model: mujoco.MjModel, root: int) -> None:
+    own = joints_of(model, root)
     for motor in range(model.nu):
         for joint in motor_joints(model, motor).intersection(own):
             raise InputError(
                 f"its motor {model.actuator(motor).name} drives {model.joint(joint).name} of the "
-                f"root body {root}, which moves only by what its limbs do: take the motor out"
+                f"root body {model.body(root).name}, which moves only by what its limbs do: take the motor out"
             )
 
 
