@@ -15,7 +15,7 @@ from selfmodel.dissection import driven_joints, read_anatomy
 from selfmodel.embodiment import Embodiment, embody
 from selfmodel.errors import InputError
 from selfmodel.hypothesis import INTACT, Hypothesis
-from selfmodel.mjcf import MjcfSettings, adapt, read_settings
+from selfmodel.mjcf import Adapted, MjcfSettings, adapt, read_settings
 from selfmodel.neurons import hidden_neurons
 from selfmodel.oscillators import Cpg
 from selfmodel.roots import find_root
@@ -76,11 +76,25 @@ class Robot:
             InputError: No robot can be made of it; the sentence says why, and what to do.
         """
         file = Path(path)
-        adapted = adapt(file, read_settings(file) if settings is None else settings)
+        return cls.from_adapted(
+            adapt(file, read_settings(file) if settings is None else settings), str(file)
+        )
+
+    @classmethod
+    def from_adapted(cls, adapted: Adapted, where: str) -> "Robot":
+        """Returns the robot of an MJCF that was made ready.
+
+        Args:
+            adapted: As ``mjcf.adapt`` or ``mjcf.adapt_text`` returns it.
+            where: What a refusal calls it.
+
+        Raises:
+            InputError: No robot can be made of it after all.
+        """
         try:
             return cls(adapted.name, adapted.mjcf, adapted.control_timestep, adapted.assets)
         except ValueError as error:
-            raise InputError(f"{file}: {' '.join(str(error).split())}") from error
+            raise InputError(f"{where}: {' '.join(str(error).split())}") from error
 
     @property
     def substeps(self) -> int:

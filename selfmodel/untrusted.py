@@ -96,7 +96,11 @@ class CheckedModel:
 
 
 def checked_model(
-    mjcf: str, attached: Mapping[str, bytes], allowed: Collection[str] = ()
+    mjcf: str,
+    attached: Mapping[str, bytes],
+    *,
+    allowed: Collection[str] = (),
+    largest_files: int = LARGEST_FILES,
 ) -> CheckedModel:
     """Returns a model once nothing in it asks for what a model in a log may not have.
 
@@ -104,13 +108,14 @@ def checked_model(
         mjcf: The model, as it stands in a log.
         attached: The files that came with it.
         allowed: Elements of ``REFUSED`` that it may have all the same.
+        largest_files: Bytes that the files may have which it names, each as often as it does.
 
     Raises:
         ValueError: It asks for more; the sentence names what.
     """
     if len(mjcf) > LARGEST:
         raise ValueError(f"the model has {len(mjcf)} characters, more than {LARGEST}")
-    checker = _Checker(attached, allowed)
+    checker = _Checker(attached, allowed, largest_files)
     try:
         checker.check(mjcf)
         text = ET.tostring(ET.fromstring(mjcf), encoding="unicode")  # noqa: S314  # checked
@@ -122,10 +127,13 @@ def checked_model(
 class _Checker:
     """Looks at each element as it is parsed, so that nothing large is ever built."""
 
-    def __init__(self, attached: Mapping[str, bytes], allowed: Collection[str]) -> None:
+    def __init__(
+        self, attached: Mapping[str, bytes], allowed: Collection[str], largest_files: int
+    ) -> None:
         self.files: dict[str, bytes] = {}
         self._attached = attached
         self._allowed = allowed
+        self._largest_files = largest_files
         self._within: list[str] = []
         self._counts: Counter[str] = Counter()
         self._elements = self._cells = self._bytes = 0
@@ -191,8 +199,8 @@ class _Checker:
             self.files[name] = data
         # Each mention is read again, and takes its memory again.
         self._bytes += len(data)
-        if self._bytes > LARGEST_FILES:
-            raise ValueError(f"the model's files have more than {LARGEST_FILES} bytes")
+        if self._bytes > self._largest_files:
+            raise ValueError(f"the model's files have more than {self._largest_files} bytes")
         self._add(cells_of(name, data))
 
     def _weigh(self, tag: str, attributes: Mapping[str, str]) -> None:

@@ -89,7 +89,7 @@ def trial(
     log = read_log(out)
     facts = {
         "log": str(out),
-        "robot": robot,
+        "robot": made.name,
         "truth": str(hidden),
         "gap": gap,
         "structure": structure,
@@ -100,4 +100,4 @@ def trial(
     if as_json:
         typer.echo(json.dumps(facts, indent=2))
     else:
-        typer.echo(f"{robot} ({hidden}) went {log.trial.displacement:.3f} m forward: {out}")
+        typer.echo(f"{made.name} ({hidden}) went {log.trial.displacement:.3f} m forward: {out}")

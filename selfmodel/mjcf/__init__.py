@@ -13,14 +13,16 @@ from selfmodel.errors import InputError
 from selfmodel.mjcf.commands import add_commands
 from selfmodel.mjcf.document import Document, read_document
 from selfmodel.mjcf.expand import expand, refuse_unloggable
+from selfmodel.mjcf.files import Folder, InMemory, read_file
 from selfmodel.mjcf.ground import add_ground
+from selfmodel.mjcf.looks import drop_looks
 from selfmodel.mjcf.mujoco_errors import compiled
 from selfmodel.mjcf.names import name_parts
 from selfmodel.mjcf.pose import bake_keyframe, turn_forward
 from selfmodel.mjcf.refusals import refuse_unusable
 from selfmodel.mjcf.sensors import add_sensors
 from selfmodel.mjcf.settings import MjcfSettings, parse_setting, read_settings
-from selfmodel.untrusted import checked_model
+from selfmodel.untrusted import LARGEST, checked_model
 
 CONTROL_TIMESTEP = 0.01
 """Seconds between two commands that are wanted where nothing else is said."""
@@ -59,21 +61,41 @@ def adapt(path: Path, settings: MjcfSettings) -> Adapted:
     Raises:
         InputError: The file cannot be used; the sentence says why, and what to do.
     """
+    data = read_file(path, "an MJCF file", LARGEST)
     try:
-        document = read_document(path)
-        refuse_unloggable(document)
-        return _adapted(document, settings)
+        document = read_document(data, Folder(path.parent), path.name)
+        return _adapted(path.stem, document, settings)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
 
 
-def _adapted(document: Document, settings: MjcfSettings) -> Adapted:
+def adapt_text(
+    name: str, mjcf: str, files: Mapping[str, bytes | str], settings: MjcfSettings
+) -> Adapted:
+    """Returns the robot of an MJCF in memory, made ready; see ``adapt``.
+
+    Args:
+        name: What the robot is called.
+        mjcf: The text.
+        files: What it includes and names, by the paths that it says.
+        settings: What the text itself does not tell.
+    """
+    try:
+        return _adapted(name, read_document(mjcf.encode(), InMemory(files)), settings)
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from error
+
+
+def _adapted(name: str, document: Document, settings: MjcfSettings) -> Adapted:
+    refuse_unloggable(document)
     expand(document)
     name_parts(document)
     for body in document.bodies():
         if body.attrib.pop("mocap", "false") == "true":
             document.notes.append(f"the mocap body {body.get('name')} stands still")
     model = compiled(document.text, document.assets)
+    if drop_looks(document, model):
+        model = compiled(document.text, document.assets)
     refuse_unusable(model)
     timestep = _control_timestep(float(model.opt.timestep), settings.control_timestep)
     bake_keyframe(document, model, settings)
@@ -86,7 +108,7 @@ def _adapted(document: Document, settings: MjcfSettings) -> Adapted:
     except ValueError as error:
         raise InputError(f"no log could carry it: {error}") from error
     return Adapted(
-        name=document.path.stem,
+        name=name,
         mjcf=checked.mjcf,
         control_timestep=timestep,
         assets=checked.files,
@@ -112,4 +134,4 @@ def _control_timestep(physics: float, wanted: float | None) -> float:
     return wanted
 
 
-__all__ = ["Adapted", "MjcfSettings", "adapt", "parse_setting", "read_settings"]
+__all__ = ["Adapted", "MjcfSettings", "adapt", "adapt_text", "parse_setting", "read_settings"]

@@ -2,13 +2,17 @@
 
 import re
 from dataclasses import dataclass, field
-from pathlib import Path, PurePosixPath
+from pathlib import PurePosixPath
+from posixpath import dirname, join, normpath
 from xml.etree import ElementTree as ET  # _guard refuses what makes it unsafe
 from xml.parsers import expat  # the same
 
 from selfmodel.errors import InputError
-from selfmodel.mjcf.files import read_file, read_inside
-from selfmodel.untrusted import DEEPEST, LARGEST, LARGEST_FILES, MOST_ELEMENTS
+from selfmodel.mjcf.files import Files
+from selfmodel.untrusted import DEEPEST, LARGEST, MOST_ELEMENTS
+
+LARGEST_READ = 64 * 2**20
+"""Bytes of all files that a model names, before what is only seen is taken out of it."""
 
 _FOLDERS = {"meshdir": ("mesh", "skin", "flex"), "texturedir": ("texture",)}
 _NAMED_BY_FILE = ("mesh", "texture", "hfield")
@@ -20,13 +24,11 @@ class Document:
     """An MJCF that is being made ready.
 
     Attributes:
-        path: Where it was read from.
         root: Its ``<mujoco>``.
         assets: The files that it names, by plain names.
         notes: What was done to it, a sentence each.
     """
 
-    path: Path
     root: ET.Element
     assets: dict[str, bytes] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
@@ -56,22 +58,27 @@ class Document:
         return [body for world in self.root.findall("worldbody") for body in world.iter("body")]
 
 
-def read_document(path: Path) -> Document:
+def read_document(mjcf: bytes, files: Files, name: str = "") -> Document:
     """Returns an MJCF with its includes in their places and its files in memory.
 
+    Args:
+        mjcf: The text.
+        files: Where those that it names are looked for.
+        name: Its own among them, which it cannot include.
+
     Raises:
-        InputError: A file is missing, too large, outside the folder, or no MJCF.
+        InputError: A file is missing, too large, out of bounds, or no MJCF.
     """
-    folder = path.parent
-    root = _parse(read_file(path, "an MJCF file", LARGEST))
+    if len(mjcf) > LARGEST:
+        raise InputError(f"expected an MJCF of at most {LARGEST} bytes, got {len(mjcf)}")
+    root = _parse(mjcf)
     if root.tag != "mujoco":
         raise InputError(_no_mjcf(root.tag))
-    included: set[Path] = {path.resolve()}
-    _include(root, folder, folder, included)
+    _include(root, files, "", {normpath(name)})
     if sum(1 for _ in root.iter()) > MOST_ELEMENTS:
         raise InputError(f"it has more than {MOST_ELEMENTS} elements: take out what does not move")
-    document = Document(path, root)
-    _gather(document, folder)
+    document = Document(root)
+    _gather(document, files)
     return document
 
 
@@ -123,26 +130,24 @@ def _guard(data: bytes) -> None:
         raise InputError(f"expected an MJCF file, got no XML: {error}") from error
 
 
-def _include(parent: ET.Element, folder: Path, here: Path, included: set[Path]) -> None:
+def _include(parent: ET.Element, files: Files, here: str, included: set[str]) -> None:
     for place, child in reversed(list(enumerate(parent))):
         if child.tag != "include":
-            _include(child, folder, here, included)
+            _include(child, files, here, included)
             continue
         name = child.get("file", "")
         # As MuJoCo looks for it: from the main file's folder, then from that of this one.
-        base = folder if (folder / name).is_file() else here
-        within = str((base / name).relative_to(folder)) if base != folder else name
-        data = read_inside(folder, within, f"a file to <include> ({name!r})", LARGEST)
-        path = (folder / within).resolve()
+        path = normpath(name if files.has(name) else join(here, name))
+        data = files.read(path, f"a file to <include> ({name!r})", LARGEST)
         if path in included:
             raise InputError(f"it includes {name!r} twice: name each file once")
         included.add(path)
         inner = _parse(data)
-        _include(inner, folder, path.parent, included)
+        _include(inner, files, dirname(path), included)
         parent[place : place + 1] = list(inner)
 
 
-def _gather(document: Document, folder: Path) -> None:
+def _gather(document: Document, files: Files) -> None:
     """Takes the files that are named into memory, under plain names."""
     folders = _asset_folders(document.root)
     taken: dict[str, str] = {}
@@ -152,8 +157,10 @@ def _gather(document: Document, folder: Path) -> None:
                 continue
             where = str(PurePosixPath(folders.get(element.tag, ""), name))
             if where not in taken:
-                left = LARGEST_FILES - sum(map(len, document.assets.values()))
-                data = read_inside(folder, where, f"the file of a <{element.tag}> ({name!r})", left)
+                what = f"the file of a <{element.tag}> ({name!r})"
+                data = files.read(where, what, LARGEST_READ)
+                if sum(map(len, document.assets.values())) + len(data) > LARGEST_READ:
+                    raise InputError(f"its files have over {LARGEST_READ} bytes: simplify them")
                 taken[where] = _plain(where, document.assets)
                 document.assets[taken[where]] = data
             element.set(attribute, taken[where])

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.errors import InputError
-from selfmodel.mjcf.document import Document
+from selfmodel.mjcf.document import LARGEST_READ, Document
 from selfmodel.mjcf.mujoco_errors import compiled, told_by_mujoco
 from selfmodel.untrusted import MOST_ELEMENTS, REFUSED, checked_model
 
@@ -24,7 +24,7 @@ def refuse_unloggable(document: Document) -> None:
     if _size(document.root) > MOST_ELEMENTS:
         raise InputError(f"its <{'> and <'.join(COPIES)}> make more than {MOST_ELEMENTS} elements")
     try:
-        checked_model(document.text, document.assets, allowed=COPIES)
+        checked_model(document.text, document.assets, allowed=COPIES, largest_files=LARGEST_READ)
     except ValueError as error:
         raise InputError(
             f"every trial is logged with the robot's model, and this one cannot be: {error}"
@@ -47,7 +47,8 @@ def expand(document: Document) -> None:
             raise InputError(f"MuJoCo cannot write out its <{'>, <'.join(used)}>: do it by hand")
     compilers = list(document.root.iter("compiler"))
     if any(compiler.get("settotalmass") for compiler in compilers):
-        _write_masses(document)
+        write_masses(document, compiled(document.text, document.assets))
+        document.notes.append("its masses are written out, as settotalmass scales them")
 
 
 def _size(element: ET.Element) -> int:
@@ -58,9 +59,8 @@ def _size(element: ET.Element) -> int:
     return prod(map(int, counts)) * (1 + sum(_size(child) for child in element))
 
 
-def _write_masses(document: Document) -> None:
-    """Gives each body the mass and inertia that it has once the model is scaled to its sum."""
-    model = compiled(document.text, document.assets)
+def write_masses(document: Document, model: mujoco.MjModel) -> None:
+    """Gives each body in the text the mass and inertia that it has in the model."""
     for body, element in zip(range(1, model.nbody), document.bodies(), strict=True):
         for inertial in element.findall("inertial"):
             element.remove(inertial)
@@ -76,7 +76,6 @@ def _write_masses(document: Document) -> None:
     for compiler in document.root.iter("compiler"):
         compiler.attrib.pop("settotalmass", None)
         compiler.attrib.pop("inertiafromgeom", None)
-    document.notes.append("its masses are written out, as settotalmass scales them")
 
 
 def numbers(values: np.ndarray) -> str:

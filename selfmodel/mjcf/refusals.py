@@ -62,7 +62,8 @@ def _refuse_driven_root(model: mujoco.MjModel, root: int) -> None:
         for joint in motor_joints(model, motor).intersection(own):
             raise InputError(
                 f"its motor {model.actuator(motor).name} drives {model.joint(joint).name} of the "
-                f"root body {model.body(root).name}, which moves only by what its limbs do: take the motor out"
+                f"root body {model.body(root).name}, which moves only by what its limbs do: take "
+                f"the motor out"
             )
 
 
