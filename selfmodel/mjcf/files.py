@@ -4,7 +4,7 @@ import stat
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from posixpath import normpath
+from posixpath import basename, normpath
 from typing import Protocol
 
 from selfmodel.errors import InputError
@@ -100,4 +100,5 @@ class InMemory:
 
     def _found(self, name: str) -> bytes | str | None:
         plain = {normpath(path): content for path, content in self.files.items()}
-        return plain.get(normpath(name))
+        # MuJoCo does without the folder where a file in memory has none.
+        return plain.get(normpath(name), plain.get(basename(name)))
