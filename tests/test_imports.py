@@ -65,6 +65,8 @@ LAYERS = (
             "behaviour",
             "anatomy",
             "controller",
+            "attached",
+            "untrusted",
         ),
         *(
             "settings",
@@ -93,7 +95,7 @@ LAYERS = (
     ),
     (
         *("transmission", "couplings", "roots", "carried", "dissection", "activations"),
-        *("commands", "neurons"),
+        *("commands", "neurons", "mjcf"),
         *("embodiment", "robot", "places", "noise", "senses", "batches", "tally", "prediction"),
         *("gap", "instruments", "start", "debris", "structure", "contract_kind"),
         *("simulator", "physical", "judge", "replay", "poses", "parameters", "disagreement"),
