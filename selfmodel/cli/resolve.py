@@ -9,6 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from selfmodel.behaviour import Names
+from selfmodel.cases import cases_of
 from selfmodel.comparator import Comparator
 from selfmodel.comparators import COMPARATORS
 from selfmodel.controller import Controller, Network
@@ -25,7 +26,7 @@ from selfmodel.neurons import with_neurons as neurons_in
 from selfmodel.next_trial import NextTrial, by_disagreement, by_repair
 from selfmodel.playback import Playback
 from selfmodel.robot import Robot
-from selfmodel.tasks import ROBOTS, Entry
+from selfmodel.tasks import Entry, entry
 
 DESIGNS: Mapping[str, Callable[[Robot], Design]] = MappingProxyType(
     {"network": attrgetter("network"), "cpg": attrgetter("cpg")}
@@ -56,12 +57,10 @@ def robot_entry(name: str, settings: Iterable[str] = ()) -> Entry:
     given = tuple(settings)
     if is_model(name):
         made = Robot.from_mjcf(Path(name), _settings(name, given))
-        return Entry(robot=lambda: made, cases={}, suite={})
+        return Entry(robot=lambda: made, cases=cases_of(made.anatomy), suite={})
     if given:
         raise InputError(f"--set {given[0]} is for a robot's MJCF: {name!r} has all that it needs")
-    if name not in ROBOTS:
-        raise unknown_name("robot", name, ROBOTS)
-    return ROBOTS[name]
+    return entry(name)
 
 
 def notes_on(name: str, settings: Iterable[str]) -> tuple[str, ...]:
@@ -80,17 +79,11 @@ def case_notation(entry: Entry, case: int | None, damage: str | None) -> str:
     Raises:
         InputError: Neither or both are given, or there is no case of that number.
     """
-    if not entry.cases and damage is None:
-        joint = entry.robot().anatomy.joints[0].name
-        raise InputError(
-            f"expected --damage NOTATION, such as --damage break:{joint}: the cases of Table I are "
-            f"those of the robots that come with selfmodel"
-        )
     if (case is None) == (damage is None):
         given = "neither" if case is None else "both"
         raise InputError(
-            f"expected either --case N or --damage NOTATION, got {given}: cases are 1 to "
-            f"{len(entry.cases)}, a notation is like {entry.cases[1]}"
+            f"expected either --case N or --damage NOTATION, got {given}: cases are "
+            f"{', '.join(map(str, entry.cases))}, a notation is like {next(iter(entry.cases.values()))}"
         )
     if damage is not None:
         return damage
