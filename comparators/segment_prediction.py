@@ -62,7 +62,8 @@ class SegmentPrediction:
     onboard`` does without the base's position and linear velocity, and carries them on from one
     segment to the next, which makes it less sharp. What acts slowly, such as a light wind, hardly
     shows within an eighth of a second. The network is taken to be known: without one (a recording
-    of other software) its arithmetic is not judged.
+    of other software) its arithmetic is not judged. Nothing is judged across a step that was late
+    (``Behaviour.late``): what a command does in an eighth of a second, it does not in a quarter.
 
     Attributes:
         name: What it is called.
@@ -138,7 +139,7 @@ def _cut(comparator: SegmentPrediction, trial: Trial) -> _Cut:
         signal: np.asarray(np.isfinite(states[signal][starts]).all(axis=1))
         for signal in comparator.state
     }
-    known["commands"] = _known_all_along(behaviour["commands"], starts, horizon)
+    known["commands"] = _known_all_along(behaviour.steady_commands, starts, horizon)
     usable = np.asarray(np.logical_and.reduce(list(known.values())))
     if usable.sum() < FEWEST:
         lacking = [signal for signal, moments in known.items() if moments.sum() < FEWEST]

@@ -67,7 +67,7 @@ LAYERS = (
             "controller",
         ),
         *("settings", "memo", "evolution", "playback", "driver", "streams", "intervals"),
-        *("workers", "grid"),
+        *("workers", "grid", "stopwatch"),
     ),
     (
         "faults",
@@ -86,6 +86,7 @@ LAYERS = (
         *("embodiment", "robot", "places", "noise", "senses", "batches", "tally", "prediction"),
         *("gap", "instruments", "start", "debris", "structure", "contract_kind"),
         *("simulator", "physical", "judge", "replay", "parameters", "disagreement"),
+        *("limits", "environment_robot"),
     ),
     (
         *("database", "evidence", "refine", "degrees", "diagnose", "repair", "calibrate"),
