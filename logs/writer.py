@@ -194,7 +194,7 @@ class TrialWriter:
             if error is None and self.steps == self._plan.steps:
                 self._finish(FINISHED)
             elif error is not None and self._timed and self._sound and self.steps:
-                self._finish(STOPPED, " ".join(f"{type(error).__name__}: {error}".split()))
+                self._finish(STOPPED, _in_words(error))
         except (OSError, InputError) as failure:
             if error is None:
                 raise
@@ -227,6 +227,10 @@ class TrialWriter:
         result = Result(status, self.steps, self._end - self._start, reason)
         self._log.metadata(RESULT, result.texts())
         self._log.finish()
+
+
+def _in_words(error: BaseException) -> str:
+    return " ".join(f"{type(error).__name__}: {error}".split()).removesuffix(":")
 
 
 def _check_ends(robot: str, names: Names, driver: Driver) -> None:

@@ -7,11 +7,12 @@ from typing import Any
 import dm_env
 import numpy as np
 
-from selfmodel.arrays import FloatArray
+from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.behaviour import SIGNALS, Names, Sample, Signal
 from selfmodel.driver import Driver, drive
 from selfmodel.errors import InputError, TrialError
 from selfmodel.limits import Limit
+from selfmodel.playback import Playback
 from selfmodel.robot import Robot
 from selfmodel.stopwatch import TIME, Stopwatch
 
@@ -147,6 +148,7 @@ class EnvironmentRobot:
         brain = drive([controller], np.ones((1, robot.anatomy.neurons)), len(names.sensors))
         commands = np.zeros((1, len(names.motors)))
         silent = np.zeros(len(names.sensors), dtype=np.intp)
+        reads = not isinstance(controller, Playback)
         watch = Stopwatch(timestep, self._tolerance)
         ended = False
         for k in range(steps):
@@ -161,7 +163,7 @@ class EnvironmentRobot:
             moment = watch.look(self.clock(), told)
             values = _rows(names, {} if moment.missing or told is None else told)
             unread = np.isnan(values["sensors"])
-            silent = np.where(unread, silent + 1, 0)
+            silent = np.where(unread & (reads | moment.missing), silent + 1, 0)
             self._check(k, values, silent, missing=moment.missing)
             np.copyto(brain.readings[0], values["sensors"], where=~unread)
             brain.step(commands)
@@ -178,21 +180,19 @@ class EnvironmentRobot:
             raise TrialError(f"the environment failed: {_told(error)}") from error
 
     def _check(
-        self, k: int, values: Mapping[Signal, FloatArray], silent: FloatArray, *, missing: bool
+        self, k: int, values: Mapping[Signal, FloatArray], silent: IndexArray, *, missing: bool
     ) -> None:
         """Sees whether the robot can go on.
 
         Raises:
             TrialError: It cannot.
         """
-        if k == 0 and np.any(silent):
+        patience = self._patience if k else 0  # at first there is nothing to go on with
+        if np.any(silent > patience):
+            pairs = zip(self._robot.anatomy.names.sensors, silent > patience, strict=True)
+            lacking = ", ".join(name for name, is_silent in pairs if is_silent)
             raise TrialError(
-                f"the first observation must have all sensors: {self._lacking(silent)}"
-            )
-        if np.any(silent > self._patience):
-            raise TrialError(
-                f"{self._lacking(silent > self._patience)} for more than {self._patience} steps, "
-                f"at step {k}"
+                f"nothing was read of {lacking} for more than {patience} steps, at step {k}"
             )
         for signal, row in values.items():
             if np.any(np.isinf(row)):
@@ -202,11 +202,6 @@ class EnvironmentRobot:
         for limit in self._limits:
             if reason := limit(values):
                 raise TrialError(f"a limit was exceeded at step {k}: {reason}")
-
-    def _lacking(self, silent: FloatArray) -> str:
-        names = self._robot.anatomy.names.sensors
-        lacking = [name for name, is_silent in zip(names, silent, strict=True) if is_silent]
-        return f"nothing was read of {', '.join(lacking)}"
 
 
 def _rows(names: Names, told: Mapping[str, Any]) -> dict[Signal, FloatArray]:

@@ -1,0 +1,137 @@
+"""Promises of driving a robot in another process, over a socket, in real time.
+
+What is asserted are marks and messages; how fast this machine is, is not.
+"""
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from selfmodel.comparators.segment_prediction import SEGMENT_PREDICTION
+from selfmodel.logs import read_log
+from selfmodel.logs.verify import verify
+from tests.socket_robot import START, STOP, TIMESTEP
+
+ROOT = Path(__file__).parents[1]
+EXAMPLE = ROOT / "examples" / "drive_a_robot.py"
+
+
+@contextmanager
+def robot(folder: Path, **failures: float | str) -> Iterator[str]:
+    """A robot in another process; gives its port."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "tests.socket_robot", folder / "heard", json.dumps(failures)],
+        cwd=ROOT,
+        env={**os.environ, "MUJOCO_GL": "disable"},
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert process.stdout is not None
+        yield process.stdout.readline().strip()
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def driver(folder: Path, port: str) -> subprocess.Popen[str]:
+    command = [sys.executable, EXAMPLE, "127.0.0.1", port, folder / "trial.mcap"]
+    return subprocess.Popen(
+        command,
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT), "MUJOCO_GL": "disable"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def heard(folder: Path) -> list[int]:
+    """The numbers of the messages that the robot has heard, in order."""
+    with contextlib.suppress(FileNotFoundError):
+        return [int(line) for line in (folder / "heard").read_text().split()]
+    return []
+
+
+def test_delays_and_silence_are_marked_and_the_trial_goes_on(tmp_path: Path):
+    with robot(tmp_path, **{"30": 0.04, "90": "silent", "91": "silent"}) as port:
+        told, errors = (process := driver(tmp_path, port)).communicate(timeout=120)
+    assert process.returncode == 0, errors
+    assert told == f"250 steps: {tmp_path / 'trial.mcap'}\n"
+    log, _ = verify(tmp_path / "trial.mcap")
+    behaviour, timing = log.trial.behaviour, log.timing
+
+    assert (log.status, log.reason, behaviour.steps) == ("finished", "", 250)
+    assert timing is not None
+    assert timing.late[[30, 90, 91]].all()
+    assert timing.missing[[90, 91]].all()
+    assert np.array_equal(np.isnan(behaviour["sensors"]).any(axis=1), timing.missing)
+    assert np.isfinite(behaviour["commands"]).all()
+    # Real time: a robot that moves 20 ms a step cannot be done sooner.
+    assert timing.elapsed[-1] > 249 * TIMESTEP
+    assert np.all(np.diff(timing.elapsed)[[29, 89, 90]] > [0.06, 0.1, 0.1])
+    assert heard(tmp_path) == [STOP, *range(250), STOP]
+
+
+def test_no_segment_of_such_a_trial_spans_a_step_that_was_late(tmp_path: Path):
+    with robot(tmp_path, **{"30": 0.04, "90": "silent"}) as port:
+        _, errors = (process := driver(tmp_path, port)).communicate(timeout=120)
+    assert process.returncode == 0, errors
+    trial = read_log(tmp_path / "trial.mcap").trial
+    late = np.flatnonzero(trial.behaviour.late)
+
+    asked = SEGMENT_PREDICTION.request(trial)
+    where = trial.behaviour["joint_positions"]
+    for state in asked.states["joint_positions"]:
+        (start,) = np.flatnonzero((where == state).all(axis=1))
+        assert not np.any((late > start) & (late <= start + asked.horizon))
+
+
+def test_a_dropped_connection_stops_the_robot_and_leaves_a_whole_log(tmp_path: Path):
+    with robot(tmp_path, **{"70": "hang up"}) as port:
+        _, errors = (process := driver(tmp_path, port)).communicate(timeout=120)
+    log, _ = verify(tmp_path / "trial.mcap")
+
+    assert process.returncode == 1
+    assert "the environment failed: ConnectionError: the robot hung up" in errors
+    assert "the environment failed: ConnectionError: the robot hung up" in log.reason
+    assert (log.status, log.trial.behaviour.steps) == ("stopped", 70)
+    assert heard(tmp_path) == [STOP, *range(71), STOP]
+
+
+def test_ctrl_c_stops_the_robot_and_leaves_a_whole_log(tmp_path: Path):
+    with robot(tmp_path) as port:
+        process = driver(tmp_path, port)
+        while len(heard(tmp_path)) < 60 and process.poll() is None:
+            time.sleep(0.02)
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=120)
+    log, _ = verify(tmp_path / "trial.mcap")
+
+    assert errors.strip().endswith("KeyboardInterrupt")
+    assert (log.status, log.reason) == ("stopped", "KeyboardInterrupt")
+    first, *commands, last = heard(tmp_path)
+    assert (first, last) == (STOP, STOP)
+    assert commands == list(range(len(commands)))
+    assert len(commands) - 1 <= log.trial.behaviour.steps <= len(commands)
+
+
+def test_the_driver_that_the_docs_show_has_forty_lines():
+    text = EXAMPLE.read_text(encoding="utf-8")
+    shown = text.split("# The driver begins here: the docs show it.\n")[1]
+    shown = shown.split("\n\n# The driver ends here.\n")[0]
+
+    assert len([line for line in shown.splitlines() if line.strip()]) <= 50
+    assert f"```python\n{shown.strip()}\n```" in (ROOT / "docs" / "real-robots.md").read_text(
+        encoding="utf-8"
+    )
+    assert START == 0
