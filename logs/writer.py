@@ -164,6 +164,12 @@ class TrialWriter:
                 f"step {self.steps} of {self._plan.steps} is due at {time!r} s, "
                 f"got a sample of {sample.time!r} s"
             )
+        if (sample.moment is not None) != self._timed:
+            has, given = ("no", "True") if self._timed else ("a", "False")
+            raise InputError(
+                f"the sample of step {self.steps} has {has} moment, and timed is {given}: a trial "
+                f"is timed if its robot has a clock of its own"
+            )
         told = parts_of(sample)
         for part, rows in self._rows.items():
             row = told.get(part)

@@ -18,7 +18,10 @@ import numpy as np
 
 from selfmodel.comparators.segment_prediction import SEGMENT_PREDICTION
 from selfmodel.logs import read_log
+from selfmodel.logs.robots import robot_of
 from selfmodel.logs.verify import verify
+from selfmodel.notation import parse
+from selfmodel.simulator import Simulator
 from tests.socket_robot import START, STOP, TIMESTEP
 
 ROOT = Path(__file__).parents[1]
@@ -72,6 +75,7 @@ def test_delays_and_silence_are_marked_and_the_trial_goes_on(tmp_path: Path):
 
     assert (log.status, log.reason, behaviour.steps) == ("finished", "", 250)
     assert timing is not None
+    assert np.array_equal(behaviour.late, timing.late)
     assert timing.late[[30, 90, 91]].all()
     assert timing.missing[[90, 91]].all()
     assert np.array_equal(np.isnan(behaviour["sensors"]).any(axis=1), timing.missing)
@@ -82,18 +86,20 @@ def test_delays_and_silence_are_marked_and_the_trial_goes_on(tmp_path: Path):
     assert heard(tmp_path) == [STOP, *range(250), STOP]
 
 
-def test_no_segment_of_such_a_trial_spans_a_step_that_was_late(tmp_path: Path):
+def test_such_a_trial_is_explained_by_what_is_wrong_with_the_robot(tmp_path: Path):
     with robot(tmp_path, **{"30": 0.04, "90": "silent"}) as port:
         _, errors = (process := driver(tmp_path, port)).communicate(timeout=120)
     assert process.returncode == 0, errors
-    trial = read_log(tmp_path / "trial.mcap").trial
-    late = np.flatnonzero(trial.behaviour.late)
+    log = read_log(tmp_path / "trial.mcap")
+    self_model = robot_of(log)
+    texts = ("intact", "break:front_left_knee", "jam:back_right_shoulder")
+    hypotheses = [parse(text, self_model.anatomy) for text in texts]
 
-    asked = SEGMENT_PREDICTION.request(trial)
-    where = trial.behaviour["joint_positions"]
-    for state in asked.states["joint_positions"]:
-        (start,) = np.flatnonzero((where == state).all(axis=1))
-        assert not np.any((late > start) & (late <= start + asked.horizon))
+    asked = SEGMENT_PREDICTION.request(log.trial)
+    predicted = Simulator(self_model, 1).predict(hypotheses, asked).behaviour
+    intact, *others = SEGMENT_PREDICTION.distances(predicted, log.trial)
+    assert intact < 1e-12
+    assert min(others) > 0.1
 
 
 def test_a_dropped_connection_stops_the_robot_and_leaves_a_whole_log(tmp_path: Path):

@@ -1,121 +1,41 @@
-"""Promises of driving any environment: the same robot, marks of its clock, and the way it stops."""
+"""Promises of driving any environment: the same robot, and marks of when it was observed."""
 
-import dataclasses
-from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
 
-import dm_env
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from selfmodel.behaviour import SIGNALS, Behaviour, Sample, collect
+from selfmodel.behaviour import SIGNALS, collect
 from selfmodel.comparators.arithmetic import command_errors
 from selfmodel.controller import Controller, Population
 from selfmodel.environment_robot import EnvironmentRobot
 from selfmodel.errors import InputError, TrialError
-from selfmodel.limits import joint_limits, tilt_limit
 from selfmodel.logs import read_log
 from selfmodel.logs.journal import open_journal
-from selfmodel.logs.verify import verify
-from selfmodel.logs.writer import write_trial
 from selfmodel.notation import parse
 from selfmodel.physical import SimulatedRobot, Timed
 from selfmodel.playback import Playback
 from selfmodel.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.stopwatch import Stopwatch
-from selfmodel.tasks import ROBOTS, load
+from selfmodel.tasks import load
 from selfmodel.tasks.walking import motion_capture
 from selfmodel.trial import Plan
+from tests.bench import (
+    CONTROLLER,
+    NAMES,
+    QUADRUPED,
+    STEPS,
+    TIMESTEP,
+    Bench,
+    bench_robot,
+    driven,
+    observation,
+)
 from tests.conftest import random_controllers
-
-STEPS = 30
-QUADRUPED = ROBOTS["quadruped"].robot()
-(CONTROLLER,) = random_controllers(QUADRUPED, 1)
-NAMES = QUADRUPED.anatomy.names
-TIMESTEP = QUADRUPED.control_timestep
-
-
-class Bench(dm_env.Environment):
-    """A robot on a bench: what it observes at each step is made up, and so is its clock.
-
-    Args:
-        happens: By step what is other than usual: an observation, None, an exception to raise, or
-            the seconds that the step takes.
-    """
-
-    def __init__(self, happens: dict[int, object] | None = None, last: int = 10**9) -> None:
-        self.happens, self.last = happens or {}, last
-        self.now, self.done = 100.0, []
-        self.commands: list[np.ndarray] = []
-
-    def reset(self) -> dm_env.TimeStep:
-        """Observes step 0."""
-        self.done.append("reset")
-        self.step_number = 0
-        return dm_env.restart(self._observe())
-
-    def step(self, action: np.ndarray) -> dm_env.TimeStep:
-        """Observes the next step."""
-        self.done.append("step")
-        self.commands.append(action)
-        self.step_number += 1
-        make = dm_env.termination if self.step_number == self.last else dm_env.transition
-        return make(0.0, self._observe())
-
-    def stop(self) -> None:
-        """Is the safe command."""
-        self.done.append("stop")
-
-    def clock(self) -> float:
-        """Tells the made-up time."""
-        return self.now
-
-    def _observe(self) -> object:
-        happens = self.happens.get(self.step_number, TIMESTEP)
-        if isinstance(happens, BaseException):
-            raise happens
-        self.now += happens if isinstance(happens, float) else TIMESTEP
-        return observation(self.step_number) if isinstance(happens, float) else happens
-
-    def action_spec(self) -> dm_env.specs.Array:
-        """Returns that of the quadruped."""
-        return dm_env.specs.Array((len(NAMES.motors),), float)
-
-    def observation_spec(self) -> dict[str, dm_env.specs.Array]:
-        """Returns nothing: nobody asks."""
-        return {}
-
-
-def observation(step: int, **changed: object) -> dict[str, object]:
-    """An observation of which no two are alike."""
-    rng = np.random.default_rng(step)
-    rows = {signal: rng.uniform(-0.2, 0.2, NAMES.width(signal)) for signal in SIGNALS[2:]}
-    rows["sensors"] = rng.uniform(-1, 1, len(NAMES.sensors))
-    return rows | changed
-
-
-def bench_robot(bench: Bench, **options: object) -> EnvironmentRobot:
-    return EnvironmentRobot(bench, QUADRUPED, stop=bench.stop, clock=bench.clock, **options)
-
-
-def driven(bench: Bench, steps: int = STEPS, **options: object) -> Behaviour:
-    return collect(NAMES, bench_robot(bench, **options).run(CONTROLLER, steps))
-
-
-def logged(bench: Bench, folder: Path, steps: int = STEPS, **options: object) -> Path:
-    physical = bench_robot(bench, **options)
-    return write_trial(
-        folder / "trial.mcap",
-        QUADRUPED,
-        Plan("trial", "single", CONTROLLER, steps, 0),
-        physical.run(CONTROLLER, steps),
-        timed=True,
-        settings=Settings(),
-    )
 
 
 @pytest.mark.parametrize("text", ["intact", "break:{0}", "sensor:{1}+friction=0.5"])
@@ -207,151 +127,6 @@ def test_a_caller_that_stops_iterating_stops_the_robot():
     assert bench.done == ["stop", "reset", "step", "stop"]
 
 
-def leaning(angle: float) -> list[float]:
-    return [np.cos(angle / 2), 0.0, np.sin(angle / 2), 0.0]
-
-
-SENSORS = np.zeros(len(NAMES.sensors))
-ANGLES = np.zeros(len(NAMES.hinges))
-EMERGENCIES: dict[str, tuple[dict[int, object], dict[str, object], type[BaseException], str]] = {
-    "exception": ({7: OSError("no route")}, {}, TrialError, "environment failed: OSError: no rou"),
-    "ctrl-c": ({7: KeyboardInterrupt()}, {}, KeyboardInterrupt, "^$"),
-    "infinite": (
-        {7: observation(7, sensors=SENSORS + np.inf)},
-        {},
-        TrialError,
-        "sensors is infinite at step 7",
-    ),
-    "critical": (
-        {7: observation(7, base_orientation=[1.0, 0.0, 0.0, np.nan])},
-        {"critical": ["base_orientation"]},
-        TrialError,
-        "base_orientation is not a number at step 7",
-    ),
-    "silence": (
-        dict.fromkeys(range(4, 30)),
-        {"patience": 3},
-        TrialError,
-        "nothing was read of .* for more than 3 steps, at step 7",
-    ),
-    "joint": (
-        {7: observation(7, joint_positions=ANGLES + 3.0)},
-        {"limits": [joint_limits(QUADRUPED, 0.1)]},
-        TrialError,
-        "at step 7: front_left_shoulder is at 3.000 rad, beyond its range of",
-    ),
-    "tilt": (
-        {7: observation(7, base_orientation=leaning(1.2))},
-        {"limits": [tilt_limit(1.1)]},
-        TrialError,
-        "at step 7: it leans by 1.20 rad, more than 1.1 rad",
-    ),
-    "another robot": (
-        {7: observation(7, sensors=[0.0])},
-        {},
-        InputError,
-        r"expected sensors of shape \(8,\) in an observation, .* got the shape \(1,\)",
-    ),
-}
-
-
-@pytest.mark.parametrize("kind", EMERGENCIES)
-def test_an_emergency_stops_the_robot_first_and_leaves_a_whole_log(tmp_path: Path, kind: str):
-    happens, options, error, match = EMERGENCIES[kind]
-    bench = Bench(happens)
-    finished: list[bool] = []
-    stop = bench.stop
-    bench.stop = lambda: (stop(), finished.append((tmp_path / "trial.mcap").exists()))
-    with pytest.raises(error, match=match) as caught:
-        logged(bench, tmp_path, **options)
-
-    assert bench.done[-1] == "stop"
-    assert bench.done.count("stop") == 2
-    assert finished == [False, False]
-    assert [path.name for path in tmp_path.iterdir()] == ["trial.mcap"]
-    log, loaded = verify(tmp_path / "trial.mcap")
-    assert loaded
-    assert (log.status, log.trial.behaviour.steps, log.trial.plan.steps) == ("stopped", 7, STEPS)
-    assert log.reason == f"{error.__name__}: {caught.value}".removesuffix(": ")
-
-
-def test_limits_let_a_robot_within_them_go_on():
-    happens = {k: observation(k, base_orientation=leaning(1.0)) for k in range(STEPS)}
-    limits = [joint_limits(QUADRUPED, 0.1), tilt_limit(1.1)]
-
-    assert driven(Bench(happens | {9: None}), limits=limits).steps == STEPS
-
-
-def test_an_episode_that_ends_too_soon_is_said_so(tmp_path: Path):
-    bench = Bench(last=11)
-    with pytest.raises(TrialError, match="ended its episode after 12 of 30 steps"):
-        logged(bench, tmp_path)
-    assert bench.done[-1] == "stop"
-    assert read_log(tmp_path / "trial.mcap").trial.behaviour.steps == 12
-    assert driven(Bench(last=STEPS - 1)).steps == STEPS
-
-
-def test_a_writer_that_fails_stops_the_robot_before_it_closes_the_log(tmp_path: Path):
-    bench = Bench()
-
-    def samples() -> Iterator[Sample]:
-        with closing(bench_robot(bench).run(CONTROLLER, STEPS)) as real:
-            for k, sample in enumerate(real):
-                yield dataclasses.replace(sample, time=-1.0) if k == 9 else sample
-
-    plan = Plan("trial", "single", CONTROLLER, STEPS, 0)
-    with pytest.raises(InputError, match="step 9 of 30 is due"):
-        write_trial(
-            tmp_path / "trial.mcap", QUADRUPED, plan, samples(), timed=True, settings=Settings()
-        )
-    assert bench.done[-1] == "stop"
-    assert read_log(tmp_path / "trial.mcap").status == "stopped"
-
-
-def failing(*results: BaseException | None) -> Callable[[], None]:
-    rest = iter(results)
-
-    def stop() -> None:
-        if (result := next(rest)) is not None:
-            raise result
-
-    return stop
-
-
-def test_a_safe_command_that_fails_is_told_beside_what_ended_the_trial(tmp_path: Path):
-    bench = Bench({7: OSError("no route")})
-    bench.stop = failing(None, OSError("nor to stop"))
-    with pytest.raises(TrialError, match="no route") as caught:
-        logged(bench, tmp_path)
-    assert caught.value.__notes__ == ["the safe command could not be sent: OSError: nor to stop"]
-
-
-def test_a_safe_command_that_fails_at_the_end_is_an_error(tmp_path: Path):
-    bench = Bench()
-    bench.stop = failing(None, OSError("nor to stop"))
-    with pytest.raises(TrialError, match="the safe command could not be sent"):
-        logged(bench, tmp_path)
-    log = read_log(tmp_path / "trial.mcap")
-    assert (log.status, log.trial.behaviour.steps) == ("stopped", STEPS)
-    assert "the safe command could not be sent" in log.reason
-
-
-def test_a_second_ctrl_c_does_not_keep_the_safe_command_from_the_robot():
-    bench = Bench({7: KeyboardInterrupt()})
-    sent = []
-    results = iter([None, KeyboardInterrupt(), None])
-
-    def stop() -> None:
-        if (result := next(results)) is not None:
-            raise result
-        sent.append(bench.done[-1] if bench.done else "")
-
-    bench.stop = stop
-    with pytest.raises(KeyboardInterrupt):
-        driven(bench)
-    assert sent == ["", "step"]
-
-
 def test_a_robot_that_cannot_be_read_at_the_start_is_not_driven():
     bench = Bench({0: None})
     with pytest.raises(TrialError, match=r"nothing was read of front_left_touch, .* at step 0"):
@@ -407,7 +182,7 @@ def test_an_observation_in_other_words_is_translated():
     def observe(told: dict[str, object]) -> dict[str, object]:
         return {"sensors": told["feel"]}
 
-    happens = {k: {"feel": SENSORS + 0.01 * k} for k in range(STEPS)}
+    happens = {k: {"feel": np.full(len(NAMES.sensors), 0.01 * k)} for k in range(STEPS)}
     got = driven(Bench(happens), observe=observe)
 
     assert got["sensors"][:, 0].tolist() == [0.01 * k for k in range(STEPS)]
