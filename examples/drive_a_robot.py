@@ -43,9 +43,9 @@ class SocketRobot(dm_env.Environment):
 
     def __init__(self, address: tuple[str, int], robot: Robot) -> None:
         self._address, self._motors = address, len(robot.anatomy.motors)
-        self._widths = [robot.anatomy.names.width(signal) for signal in OBSERVED]
+        self._widths = {signal: robot.anatomy.names.width(signal) for signal in OBSERVED}
         self._targets = struct.Struct(f"<q{self._motors}d")
-        self._observed = struct.Struct(f"<q{sum(self._widths)}d")
+        self._observed = struct.Struct(f"<q{sum(self._widths.values())}d")
 
     def reset(self) -> dm_env.TimeStep:
         """Has the robot take its start pose, at rest."""
@@ -56,29 +56,30 @@ class SocketRobot(dm_env.Environment):
     def step(self, action: np.ndarray) -> dm_env.TimeStep:
         """Gives the targets of a control time step, which the robot's own clock ends."""
         self._number += 1
-        return dm_env.transition(0.0, self._exchange(action, SILENCE))
+        return dm_env.transition(0.0, self._exchange(action, silence=SILENCE))
 
     def _exchange(self, targets: np.ndarray, silence: float) -> dict[str, np.ndarray]:
+        self._link.settimeout(silence)
         self._link.sendall(self._targets.pack(self._number, *targets))
         until = time.monotonic() + silence
         number = None
         while number != self._number:  # what comes too late for its step is passed over
             while len(self._heard) < self._observed.size:
                 self._link.settimeout(max(until - time.monotonic(), 1e-3))
-                self._heard += self._link.recv(4096) or self._hung_up()
+                if not (heard := self._link.recv(4096)):
+                    raise ConnectionError("the robot hung up")
+                self._heard += heard
             number, *values = self._observed.unpack(self._heard[: self._observed.size])
             self._heard = self._heard[self._observed.size :]
-        parts = np.split(np.array(values), np.cumsum(self._widths)[:-1])
-        return dict(zip(OBSERVED, parts, strict=True))
-
-    def _hung_up(self) -> bytes:
-        raise ConnectionError("the robot hung up")
+        ends = np.cumsum(list(self._widths.values()))
+        return dict(zip(OBSERVED, np.split(np.array(values), ends[:-1]), strict=True))
 
     def stop(self) -> None:
         """Has the robot stand, by a connection of its own: the other may be what failed."""
         with socket.create_connection(self._address, timeout=1.0) as link:
             link.sendall(self._targets.pack(STOP, *np.zeros(self._motors)))
-            link.recv(1)  # once it has heard
+            if not link.recv(1):  # it says when it has heard
+                raise ConnectionError("the robot hung up")
 
     def action_spec(self) -> dm_env.specs.Array:
         """Returns what ``step`` takes: each motor's target, rad."""
@@ -86,7 +87,7 @@ class SocketRobot(dm_env.Environment):
 
     def observation_spec(self) -> dict[str, dm_env.specs.Array]:
         """Returns what ``reset`` and ``step`` observe."""
-        widths = zip(OBSERVED, self._widths, strict=True)
+        widths = self._widths.items()
         return {name: dm_env.specs.Array((width,), np.float64) for name, width in widths}
 
 

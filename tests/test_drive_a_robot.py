@@ -6,6 +6,7 @@ What is asserted are marks and messages; how fast this machine is, is not.
 import contextlib
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -22,7 +23,8 @@ from selfmodel.logs.robots import robot_of
 from selfmodel.logs.verify import verify
 from selfmodel.notation import parse
 from selfmodel.simulator import Simulator
-from tests.socket_robot import START, STOP, TIMESTEP
+from tests.command import selfmodel
+from tests.socket_robot import STOP, TIMESTEP
 
 ROOT = Path(__file__).parents[1]
 EXAMPLE = ROOT / "examples" / "drive_a_robot.py"
@@ -112,6 +114,12 @@ def test_a_dropped_connection_stops_the_robot_and_leaves_a_whole_log(tmp_path: P
     assert "the environment failed: ConnectionError: the robot hung up" in log.reason
     assert (log.status, log.trial.behaviour.steps) == ("stopped", 70)
     assert heard(tmp_path) == [STOP, *range(71), STOP]
+    told = selfmodel("logs", "info", "trial.mcap", cwd=tmp_path, PYTHONPATH=str(ROOT))
+    assert f"of quadruped, stopped: {log.reason}" in " ".join(told.stdout.split("\n"))
+    late, missing = log.timing.late.sum(), log.timing.missing.sum()
+    assert f"clock: {late} steps late, {missing} observations missing" in told.stdout
+    told = selfmodel("logs", "verify", "trial.mcap", cwd=tmp_path, PYTHONPATH=str(ROOT))
+    assert told.stdout == f"ok: trial.mcap: 70 steps, stopped ({log.reason})\n"
 
 
 def test_ctrl_c_stops_the_robot_and_leaves_a_whole_log(tmp_path: Path):
@@ -131,13 +139,24 @@ def test_ctrl_c_stops_the_robot_and_leaves_a_whole_log(tmp_path: Path):
     assert len(commands) - 1 <= log.trial.behaviour.steps <= len(commands)
 
 
-def test_the_driver_that_the_docs_show_has_forty_lines():
+def test_the_driver_that_the_docs_show_is_the_example_s_and_has_forty_lines():
     text = EXAMPLE.read_text(encoding="utf-8")
     shown = text.split("# The driver begins here: the docs show it.\n")[1]
-    shown = shown.split("\n\n# The driver ends here.\n")[0]
+    shown = shown.split("\n\n# The driver ends here.\n")[0].strip()
+    code = [line for line in shown.splitlines() if line.strip() and '"""' not in line]
 
-    assert len([line for line in shown.splitlines() if line.strip()]) <= 50
-    assert f"```python\n{shown.strip()}\n```" in (ROOT / "docs" / "real-robots.md").read_text(
-        encoding="utf-8"
-    )
-    assert START == 0
+    assert len(code) <= 40
+    docs = (ROOT / "docs" / "real-robots.md").read_text(encoding="utf-8")
+    assert f"```python\n{shown}\n```" in docs
+
+
+def test_the_trial_of_the_docs_runs(tmp_path: Path):
+    docs = (ROOT / "docs" / "real-robots.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"```python\n(from pathlib.*?)```", docs, flags=re.DOTALL)
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "MUJOCO_GL": "disable"}
+    subprocess.run([sys.executable, "-c", block], cwd=tmp_path, env=environment, check=True)
+    log, _ = verify(tmp_path / "walk.mcap")
+
+    assert (log.status, log.trial.behaviour.steps) == ("finished", 300)
+    assert log.timing is not None
+    assert not log.timing.late.any()

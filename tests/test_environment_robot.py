@@ -1,6 +1,7 @@
 """Promises of driving any environment: the same robot, and marks of when it was observed."""
 
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from selfmodel.behaviour import SIGNALS, collect
+from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.comparators.arithmetic import command_errors
 from selfmodel.controller import Controller, Population
 from selfmodel.environment_robot import EnvironmentRobot
@@ -16,10 +18,12 @@ from selfmodel.errors import InputError, TrialError
 from selfmodel.logs import read_log
 from selfmodel.logs.journal import open_journal
 from selfmodel.notation import parse
-from selfmodel.physical import SimulatedRobot, Timed
+from selfmodel.physical import PhysicalRobot, SimulatedRobot, Timed
 from selfmodel.playback import Playback
+from selfmodel.recover import Recovery, recover
 from selfmodel.robot import Robot
 from selfmodel.settings import Settings
+from selfmodel.simulator import Simulator
 from selfmodel.stopwatch import Stopwatch
 from selfmodel.tasks import load
 from selfmodel.tasks.walking import motion_capture
@@ -228,3 +232,33 @@ def test_a_recovery_s_journal_keeps_the_clock_of_a_robot_that_has_one(tmp_path: 
     assert isinstance(trial.plan.controller, Controller)
     assert np.isnan(command_errors(trial)[8:]).all()
     assert not np.any(command_errors(trial)[:8])
+
+
+def test_a_recovery_is_the_same_through_environments(tmp_path: Path):
+    truth = "break:front_left_knee"
+    settings = replace(Settings(generations=1).scaled(6), steps=80, trials=1)
+
+    def recovery(folder: str, healthy: PhysicalRobot, damaged: PhysicalRobot) -> Recovery:
+        return recover(
+            healthy=healthy,
+            damaged=damaged,
+            simulator=Simulator(QUADRUPED, 2),
+            comparator=FORWARD_DISPLACEMENT,
+            journal=open_journal(tmp_path / folder, QUADRUPED, settings, {}),
+            settings=settings,
+            seed=0,
+            watch=lambda _event: None,
+        )
+
+    envs = [load("quadruped", "walk", {"hypothesis": text}) for text in ("intact", truth)]
+    driven_ones = [EnvironmentRobot(env, QUADRUPED, observe=motion_capture(env)) for env in envs]
+    hidden = parse(truth, QUADRUPED.anatomy)
+    simulated = [SimulatedRobot(QUADRUPED), SimulatedRobot(QUADRUPED, hidden)]
+    got, expected = recovery("driven", *driven_ones), recovery("simulated", *simulated)
+
+    assert got.diagnosis == expected.diagnosis
+    assert (got.before, got.after, got.recovered) == (
+        expected.before,
+        expected.after,
+        expected.recovered,
+    )
