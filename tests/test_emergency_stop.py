@@ -14,6 +14,7 @@ from selfmodel.limits import joint_limits, tilt_limit
 from selfmodel.logs import read_log
 from selfmodel.logs.verify import verify
 from selfmodel.logs.writer import write_trial
+from selfmodel.playback import Playback
 from selfmodel.settings import Settings
 from selfmodel.trial import Plan
 from tests.bench import (
@@ -172,3 +173,15 @@ def test_a_second_ctrl_c_does_not_keep_the_safe_command_from_the_robot():
     with pytest.raises(KeyboardInterrupt):
         driven(bench)
     assert sent == ["", "step"]
+
+
+def test_what_is_critical_may_be_missing_with_all_the_rest():
+    assert driven(Bench({7: None}), critical=["sensors", "base_orientation"]).steps == STEPS
+
+
+def test_silence_stops_a_robot_that_plays_commands_back_too():
+    silent = Bench(dict.fromkeys(range(4, 30)))
+    driver = Playback(NAMES.motors, np.zeros((5, len(NAMES.motors))))
+    with pytest.raises(TrialError, match="for more than 5 steps, at step 9"):
+        list(bench_robot(silent).run(driver, STEPS))
+    assert silent.done[-1] == "stop"
