@@ -20,7 +20,7 @@ import numpy as np
 from selfmodel.behaviour import collect
 from selfmodel.calibrate import calibrate, prediction_error
 from selfmodel.cli.ablation.bank import gait
-from selfmodel.controller import Controller
+from selfmodel.driver import Evolved
 from selfmodel.gap import Gap, draw_gap, perturbed
 from selfmodel.hypothesis import INTACT
 from selfmodel.parameters import Parameters, with_model, with_parameters
@@ -82,9 +82,7 @@ def _peer() -> dict[str, Way]:
     return {"mujoco.sysid": lambda robot, trials: (sysid_parameters(robot, trials), [])}
 
 
-def _compare(
-    robot: Robot, gaits: Sequence[Controller], gap: Gap, ways: dict[str, Way]
-) -> list[Facts]:
+def _compare(robot: Robot, gaits: Sequence[Evolved], gap: Gap, ways: dict[str, Way]) -> list[Facts]:
     """A row a way, one of the nominal model, one of the physical robot's own model."""
     noisy = SimulatedRobot(robot, gap=gap)
     trials = [_trial(robot, noisy, gaits[number]) for number in range(SEEN)]
@@ -135,13 +133,13 @@ def _against_truth(robot: Robot, gap: Gap, found: Parameters, deviations: Sequen
     }
 
 
-def _trial(robot: Robot, physical: SimulatedRobot, driver: Controller) -> Trial:
+def _trial(robot: Robot, physical: SimulatedRobot, driver: Evolved) -> Trial:
     steps = Settings().steps
     behaviour = collect(robot.anatomy.names, physical.run(driver, steps))
     return Trial(Plan("trial", "before", driver, steps, 0), robot.name, behaviour, "a trial")
 
 
-def _gait(robot: Robot, number: int, bank: Path | None) -> Controller:
+def _gait(robot: Robot, number: int, bank: Path | None) -> Evolved:
     if bank is not None:
         return gait(bank, robot.name, number)
     repair = Repair(Simulator(robot, threads=1), Settings())

@@ -9,8 +9,8 @@ import tempfile
 from pathlib import Path
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT
-from selfmodel.controller import Controller
 from selfmodel.diagnose import Diagnose
+from selfmodel.driver import Evolved
 from selfmodel.explain import explain
 from selfmodel.faults import PAPER_KINDS
 from selfmodel.hypothesis import INTACT, Hypothesis, canonical
@@ -55,7 +55,7 @@ def single_faults(robot: Robot) -> list[Hypothesis]:
     ]
 
 
-def recorded(folder: Path, robot: Robot, truth: Hypothesis, gait: Controller) -> list[TrialLog]:
+def recorded(folder: Path, robot: Robot, truth: Hypothesis, gait: Evolved) -> list[TrialLog]:
     """Returns one trial as simulated, as imported, and as imported without its controller."""
     steps = SETTINGS.steps
     plan = Plan("trial", "single", gait, steps, SEED)

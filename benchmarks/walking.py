@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from selfmodel.controller import Controller, Population
+from selfmodel.driver import Evolved, drive
 from selfmodel.hypothesis import INTACT
 from selfmodel.robot import Robot
 from selfmodel.senses import Senses
@@ -33,13 +33,13 @@ class Walk:
         return self.lowest > 0 and self.highest < 2 and self.deepest <= 0.01
 
 
-def walk(robot: Robot, controller: Controller, steps: int) -> Walk:
+def walk(robot: Robot, controller: Evolved, steps: int) -> Walk:
     """Returns how a controller makes an intact robot walk."""
     embodiment = robot.build(INTACT)
     model, data = embodiment.model, mujoco.MjData(embodiment.model)
     mujoco.mj_forward(model, data)
     senses = Senses(model, robot.anatomy, [embodiment])
-    brain = Population([controller], embodiment.neurons[np.newaxis])
+    brain = drive([controller], embodiment.neurons[np.newaxis], len(robot.anatomy.sensors))
     start, heights, deepest = data.qpos[0], [data.qpos[2]], 0.0
     for step in range(steps):
         senses.read(data.sensordata[np.newaxis], data.qpos[np.newaxis], brain.readings)

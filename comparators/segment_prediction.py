@@ -10,8 +10,8 @@ import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.behaviour import Behaviour, Signal
-from selfmodel.comparator import Segments
-from selfmodel.comparators.arithmetic import command_errors
+from selfmodel.comparator import Past, Segments
+from selfmodel.comparators.arithmetic import command_errors, command_spans
 from selfmodel.differences import difference
 from selfmodel.errors import InputError
 from selfmodel.estimate import IMU, JOINTS, STATE, estimated_states
@@ -38,7 +38,8 @@ SCALES: Mapping[Signal, float] = MappingProxyType(
         "commands": 0.05,
     }
 )
-"""By how much a prediction may be wrong until the error counts as large, in each signal's unit."""
+"""By how much a prediction may be wrong until the error counts as large, in each signal's unit; of
+commands, for the paper's range, and as much more or less as a motor's own is wider or narrower."""
 
 CONTRADICTION = 3.0
 """How much more it counts that a sensor which is predicted never to switch does."""
@@ -96,6 +97,7 @@ class SegmentPrediction:
             commands=np.where(rows[..., np.newaxis] < 0, 0.0, commands[np.maximum(rows, 0)]),
             lead=LEAD,
             record=(*self.state, "sensors"),
+            past=Past(commands, cut.starts),
         )
 
     def losses(self, simulated: Behaviour, trial: Trial) -> FloatArray:
@@ -163,7 +165,7 @@ def _cut(comparator: SegmentPrediction, trial: Trial) -> _Cut:
             f"this log out"
         )
     starts, steady = starts[usable], steady[usable]
-    wrong = command_errors(trial) / SCALES["commands"]
+    wrong = command_errors(trial) / (SCALES["commands"] * command_spans(trial))
     rows = starts[:, np.newaxis] + np.arange(1, horizon + 1)
     return _Cut(states, starts, steady, _mean(np.log1p(np.square(wrong[rows]))))
 

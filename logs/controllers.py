@@ -1,7 +1,9 @@
 """Controllers as ``.npz`` files: numpy arrays and nothing that could run.
 
-The arrays: ``kind`` ("network"), ``sensors`` and ``motors`` (names), ``hidden`` (a count) and
-``genome`` (float64).
+The arrays: ``kind``, ``sensors`` and ``motors`` (names) and ``genome`` (float64); of the kind
+"network" also ``hidden`` (a count), of the kind "cpg" also ``timestep`` (s). Where motors have
+other command ranges than the paper's, also ``ranges`` (float64, by motor the centre and half the
+range).
 """
 
 import io
@@ -9,25 +11,47 @@ import struct
 import tokenize
 import zipfile
 import zlib
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from selfmodel.controller import Controller, Network
+from selfmodel.controller import Network, checked_ranges
+from selfmodel.driver import Design, Evolved
 from selfmodel.errors import InputError
 from selfmodel.logs.errors import LogWriteError
 from selfmodel.logs.files import read_bounded
+from selfmodel.oscillators import Cpg
 
 LARGEST = 2**20
 """Bytes that a controller may have: the paper's have under 3,000."""
 
-_KIND = "network"
-_ARRAYS = ("kind", "sensors", "motors", "hidden", "genome")
+_TYPES: Mapping[str, tuple[str, int]] = MappingProxyType(
+    {
+        "kind": ("U", 0),
+        "sensors": ("U", 1),
+        "motors": ("U", 1),
+        "hidden": ("i", 0),
+        "timestep": ("f", 0),
+        "genome": ("f", 1),
+        "ranges": ("f", 2),
+    }
+)
+"""Of every array the type and the rank."""
+
+_ARRAYS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "network": ("kind", "sensors", "motors", "hidden", "genome"),
+        "cpg": ("kind", "sensors", "motors", "timestep", "genome"),
+    }
+)
+"""Of each kind the arrays, in their order; ``ranges`` may follow."""
 
 
-def save_controller(path: Path, controller: Controller) -> None:
+def save_controller(path: Path, controller: Evolved) -> None:
     """Writes a controller to a file that does not exist yet.
 
     Raises:
@@ -43,7 +67,7 @@ def save_controller(path: Path, controller: Controller) -> None:
         raise LogWriteError(path, error) from error
 
 
-def load_controller(path: Path) -> Controller:
+def load_controller(path: Path) -> Evolved:
     """Returns the controller in a file.
 
     Raises:
@@ -52,22 +76,29 @@ def load_controller(path: Path) -> Controller:
     return parse_controller(read_bounded(path, "a controller file", LARGEST), str(path))
 
 
-def controller_bytes(controller: Controller) -> bytes:
+def controller_bytes(controller: Evolved) -> bytes:
     """Returns a controller as the bytes of an ``.npz`` file; equal controllers, equal bytes."""
-    file = io.BytesIO()
-    np.savez(
-        file,
-        allow_pickle=False,
-        kind=np.array(_KIND),
-        sensors=np.array(controller.network.sensors, dtype=np.str_),
-        motors=np.array(controller.network.motors, dtype=np.str_),
-        hidden=np.array(controller.network.hidden, dtype=np.int64),
-        genome=controller.genome,
+    design = controller.design
+    own: dict[str, NDArray[Any]] = (
+        {"kind": np.array("network"), "hidden": np.array(design.hidden, dtype=np.int64)}
+        if isinstance(design, Network)
+        else {"kind": np.array("cpg"), "timestep": np.array(design.timestep)}
     )
+    arrays = {
+        "sensors": np.array(design.sensors, dtype=np.str_),
+        "motors": np.array(design.motors, dtype=np.str_),
+        "genome": controller.genome,
+        **own,
+    }
+    ordered = {name: arrays[name] for name in _ARRAYS[str(own["kind"])]}
+    if design.ranges != checked_ranges(design.motors, ()):
+        ordered["ranges"] = np.array(design.ranges)
+    file = io.BytesIO()
+    np.savez(file, allow_pickle=False, **ordered)
     return file.getvalue()
 
 
-def parse_controller(data: bytes, source: str) -> Controller:
+def parse_controller(data: bytes, source: str) -> Evolved:
     """Returns the controller that ``controller_bytes`` was given.
 
     Args:
@@ -79,17 +110,23 @@ def parse_controller(data: bytes, source: str) -> Controller:
     """
     try:
         arrays = _arrays(data)
-        network = Network(
-            sensors=tuple(arrays["sensors"].tolist()),
-            motors=tuple(arrays["motors"].tolist()),
-            hidden=int(arrays["hidden"]),
-        )
-        return Controller(network, arrays["genome"])
+        return _design(arrays).controller(arrays["genome"])
     except _FAILURES as failure:
         raise InputError(
-            f"{source}: expected a controller (.npz with the arrays {', '.join(_ARRAYS)}): "
+            f"{source}: expected a controller (.npz with the arrays "
+            f"{', '.join(_ARRAYS['network'])}, or those of a CPG): "
             f"{failure or type(failure).__name__}"
         ) from failure
+
+
+def _design(arrays: Mapping[str, NDArray[Any]]) -> Design:
+    sensors, motors = (tuple(arrays[name].tolist()) for name in ("sensors", "motors"))
+    ranges = tuple(
+        (float(centre), float(half)) for centre, half in arrays.get("ranges", np.empty((0, 2)))
+    )
+    if "hidden" in arrays:
+        return Network(sensors, motors, int(arrays["hidden"]), ranges)
+    return Cpg(sensors, motors, float(arrays["timestep"]), ranges)
 
 
 _FAILURES = (
@@ -114,23 +151,31 @@ def _arrays(data: bytes) -> dict[str, NDArray[Any]]:
         raise ValueError(f"it has more than {LARGEST} bytes")
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         members = {info.filename: info for info in archive.infolist()}
-        expected = {f"{name}.npy" for name in _ARRAYS}
-        if set(members) != expected or len(archive.infolist()) != len(expected):
-            raise ValueError(f"it holds {', '.join(sorted(members)) or 'nothing'}")
         if sum(info.file_size for info in members.values()) > LARGEST:
             raise ValueError(f"it unpacks to more than {LARGEST} bytes")
-        found = {name: _array(archive.read(f"{name}.npy")) for name in _ARRAYS}
+        kind = _kind(archive) if "kind.npy" in members else "network"
+        expected = _ARRAYS[kind] + (("ranges",) if "ranges.npy" in members else ())
+        names = {f"{name}.npy" for name in expected}
+        if set(members) != names or len(archive.infolist()) != len(names):
+            raise ValueError(f"it holds {', '.join(sorted(members)) or 'nothing'}")
+        found = {name: _array(archive.read(f"{name}.npy")) for name in expected}
     types = {name: array.dtype.kind for name, array in found.items()}
     ranks = {name: array.ndim for name, array in found.items()}
-    if types != {"kind": "U", "sensors": "U", "motors": "U", "hidden": "i", "genome": "f"}:
+    if types != {name: _TYPES[name][0] for name in expected}:
         raise ValueError(f"its arrays have the types {types}")
-    if found["genome"].dtype != np.float64:
-        raise ValueError(f"its genome is {found['genome'].dtype}, expected float64")
-    if ranks != {"kind": 0, "sensors": 1, "motors": 1, "hidden": 0, "genome": 1}:
+    if ranks != {name: _TYPES[name][1] for name in expected}:
         raise ValueError(f"its arrays have the ranks {ranks}")
-    if str(found["kind"]) != _KIND:
-        raise ValueError(f"expected the kind {_KIND!r}, got {str(found['kind'])!r}")
+    for name, array in found.items():
+        if array.dtype.kind == "f" and array.dtype != np.float64:
+            raise ValueError(f"its {name} is {array.dtype}, expected float64")
     return found
+
+
+def _kind(archive: zipfile.ZipFile) -> str:
+    kind = str(_array(archive.read("kind.npy")))
+    if kind not in _ARRAYS:
+        raise ValueError(f"expected the kind {' or '.join(map(repr, _ARRAYS))}, got {kind!r}")
+    return kind
 
 
 def _array(data: bytes) -> NDArray[Any]:

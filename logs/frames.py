@@ -4,12 +4,10 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.behaviour import Signal
 from selfmodel.logs.topics import WORLD
-from selfmodel.places import places
+from selfmodel.places import fields_of, writer
 from selfmodel.robot import Robot
 
-_CONFIGURATION: tuple[Signal, ...] = ("joint_positions", "base_position", "base_orientation")
 _POSITION_XYZW = [0, 1, 2, 4, 5, 6, 3]
 
 
@@ -32,10 +30,9 @@ class Kinematics:
     """
 
     def __init__(self, robot: Robot) -> None:
-        where = places(robot)
         self._model = robot.model
         self._data = mujoco.MjData(robot.model)
-        self._columns = [where[signal].columns for signal in _CONFIGURATION]
+        self._write = writer(robot, fields_of(self._data))
 
     def transforms(
         self, joint_positions: FloatArray, position: FloatArray, orientation: FloatArray
@@ -51,12 +48,16 @@ class Kinematics:
             ``(steps, 7 bodies)``: of each body x y z in metres and the quaternion x y z w, rounded
             like all that is derived.
         """
-        data, (hinges, where, turn) = self._data, self._columns
+        data = self._data
         poses = np.empty((len(position), self._model.nbody, 7))
         for k in range(len(position)):
-            data.qpos[hinges] = joint_positions[k]
-            data.qpos[where] = position[k]
-            data.qpos[turn] = orientation[k]
+            self._write(
+                {
+                    "joint_positions": joint_positions[k : k + 1],
+                    "base_position": position[k : k + 1],
+                    "base_orientation": orientation[k : k + 1],
+                }
+            )
             mujoco.mj_kinematics(self._model, data)
             poses[k, :, :3] = data.xpos
             poses[k, :, 3:] = data.xquat

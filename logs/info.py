@@ -8,9 +8,11 @@ import numpy as np
 
 from selfmodel.behaviour import SIGNALS, Signal
 from selfmodel.controller import Controller
+from selfmodel.driver import Driver
 from selfmodel.logs.contents import Contents, read_contents
 from selfmodel.logs.reader import TrialLog, interpret
 from selfmodel.logs.records import HIDDEN, IMPORT, SALVAGE
+from selfmodel.oscillators import Oscillators
 
 
 @dataclass(frozen=True)
@@ -73,13 +75,17 @@ def read_info(path: Path) -> Info:
             signal: float(np.mean(~np.isnan(behaviour[signal]))) if behaviour[signal].size else 1.0
             for signal in SIGNALS
         },
-        driver=(
-            f"its controller, a network of {driver.network.hidden} hidden neurons"
-            if isinstance(driver, Controller)
-            else "other software; its commands are played back"
-        ),
+        driver=_in_words(driver),
         source=contents.metadata.get(SALVAGE) or contents.metadata.get(IMPORT) or {},
     )
+
+
+def _in_words(driver: Driver) -> str:
+    if isinstance(driver, Controller):
+        return f"its controller, a network of {driver.network.hidden} hidden neurons"
+    if isinstance(driver, Oscillators):
+        return f"its controller, oscillators of {driver.frequency:.2f} Hz"
+    return "other software; its commands are played back"
 
 
 def hides_truth(info: Info) -> bool:

@@ -7,7 +7,6 @@ import mujoco
 import numpy as np
 
 import selfmodel
-from selfmodel.controller import Controller
 from selfmodel.logs.controllers import controller_bytes
 from selfmodel.logs.logfile import LogFile
 from selfmodel.logs.records import (
@@ -30,6 +29,7 @@ from selfmodel.logs.records import (
 )
 from selfmodel.logs.topics import DESCRIPTION, DESCRIPTION_TYPE, description
 from selfmodel.logs.urdf import urdf
+from selfmodel.playback import Playback
 from selfmodel.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trial import Plan
@@ -62,7 +62,7 @@ def write_preamble(
         LogWriteError: The disk is full, or failed.
     """
     driver = plan.controller
-    controller = controller_bytes(driver) if isinstance(driver, Controller) else b""
+    controller = b"" if isinstance(driver, Playback) else controller_bytes(driver)
     model = robot.mjcf.encode()
     record = TrialRecord(
         format=TIMED_FORMAT if timed else FORMAT,

@@ -8,8 +8,7 @@ from types import MappingProxyType
 from typing import Any
 
 from selfmodel.behaviour import Behaviour
-from selfmodel.controller import Controller
-from selfmodel.driver import Driver
+from selfmodel.driver import Driver, Evolved
 from selfmodel.errors import InputError
 from selfmodel.logs.contents import Contents, read_contents
 from selfmodel.logs.controllers import parse_controller
@@ -246,7 +245,7 @@ def read_attachment(path: Path, contents: Contents, name: str, expected: str = "
     return data
 
 
-def read_controller(path: Path, contents: Contents, record: TrialRecord) -> Controller | None:
+def read_controller(path: Path, contents: Contents, record: TrialRecord) -> Evolved | None:
     """Returns what drove the robot; None if that is not known.
 
     Raises:

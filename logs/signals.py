@@ -6,7 +6,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray, frozen
 from selfmodel.behaviour import SIGNALS, Behaviour, Names, Signal
-from selfmodel.controller import Controller, Network
+from selfmodel.driver import Evolved
 from selfmodel.logs.cdr import names_of
 from selfmodel.logs.contents import Contents, Messages
 from selfmodel.logs.errors import CorruptError, SchemaMismatchError
@@ -15,7 +15,7 @@ from selfmodel.logs.topics import Part, Topic, topics
 
 
 def read_behaviour(
-    path: Path, contents: Contents, record: TrialRecord, steps: int, controller: Controller | None
+    path: Path, contents: Contents, record: TrialRecord, steps: int, controller: Evolved | None
 ) -> Behaviour:
     """Returns what the messages of a log say.
 
@@ -30,11 +30,11 @@ def read_behaviour(
         LogError: The messages do not fit the record, the controller or their types.
     """
     names = read_names(path, contents)
-    network = controller.network if controller else Network(names.sensors, names.motors)
-    if (names.sensors, names.motors) != (network.sensors, network.motors):
+    ends = controller.design if controller else names
+    if (names.sensors, names.motors) != (ends.sensors, ends.motors):
         raise SchemaMismatchError(
             path,
-            f"its controller is for the sensors {network.sensors} and motors {network.motors}, "
+            f"its controller is for the sensors {ends.sensors} and motors {ends.motors}, "
             f"its messages have {names.sensors} and {names.motors}",
             good=contents.good,
         )

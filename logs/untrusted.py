@@ -48,7 +48,7 @@ MOST: Mapping[str, int] = MappingProxyType(
 
 LIMITS: Mapping[str, float] = MappingProxyType(
     {
-        **dict.fromkeys(("width", "height", "nrow", "ncol"), 4096),
+        **dict.fromkeys(("width", "height", "nrow", "ncol"), 8192),
         **dict.fromkeys(("dim", "num", "nsample", "maxhullvert", "njmax", "nconmax"), 10_000),
         **dict.fromkeys(("nuserdata", "nstack"), 10**6),
         **dict.fromkeys(("nkey", "actdim", "cellcount"), 100),

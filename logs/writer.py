@@ -9,7 +9,6 @@ from typing import Self
 
 from selfmodel.atomic import part_of
 from selfmodel.behaviour import Names, Sample
-from selfmodel.controller import Controller
 from selfmodel.driver import Driver
 from selfmodel.errors import InputError
 from selfmodel.logs.encoder import Encoder, empty_rows, parts_of
@@ -18,6 +17,7 @@ from selfmodel.logs.files import explained
 from selfmodel.logs.logfile import LogFile
 from selfmodel.logs.preamble import write_preamble
 from selfmodel.logs.records import FINISHED, RESULT, STOPPED, Imported, Result, checked_name
+from selfmodel.playback import Playback
 from selfmodel.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trial import Plan
@@ -240,10 +240,10 @@ def _in_words(error: BaseException) -> str:
 
 
 def _check_ends(robot: str, names: Names, driver: Driver) -> None:
-    if isinstance(driver, Controller):
-        sensors, motors = driver.network.sensors, driver.network.motors
-    else:
+    if isinstance(driver, Playback):
         sensors, motors = names.sensors, driver.motors
+    else:
+        sensors, motors = driver.design.sensors, driver.design.motors
     if (sensors, motors) != (names.sensors, names.motors):
         raise InputError(
             f"expected a controller for {robot}, with the sensors {names.sensors} and motors "

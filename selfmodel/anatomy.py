@@ -13,10 +13,13 @@ class Joint:
     Attributes:
         name: As in notation, such as ``front_left_knee``.
         hinges: The model's joints that it consists of.
-        motors: The actuators that drive them.
+        motors: The actuators that drive them; one that moves several joints through a tendon
+            counts to the first of them.
         bodies: Every body that is lost when it breaks: the one it moves and all beyond.
         lost: The joints and sensors that are lost with them, without the joint itself.
-        limits: Lower and upper angle of each hinge, rad.
+        limits: Lower and upper angle of each hinge, rad; a half turn where it has none.
+        slack: The motors that move nothing once it is broken.
+        idle: The motors that move nothing once it is held.
     """
 
     name: str
@@ -25,6 +28,8 @@ class Joint:
     bodies: frozenset[str]
     lost: frozenset[str]
     limits: tuple[tuple[float, float], ...]
+    slack: frozenset[str]
+    idle: frozenset[str]
 
 
 @dataclass(frozen=True)
@@ -34,10 +39,11 @@ class Sensor:
     Attributes:
         name: As in notation and in the model, such as ``front_left_touch``.
         kind: ``touch`` is 1 while the force is above zero, else 0; ``angle`` is the hinge's angle
-            divided by ``half_range``.
+            from ``centre`` divided by ``half_range``: from -1 to 1 over the hinge's range.
         body: The body it sits on; for an angle, the one that the hinge moves.
         hinge: The hinge whose angle is measured, or "" for touch.
-        half_range: The angle that reads as 1, rad; 1 for touch.
+        half_range: How far from the centre an angle reads as 1, rad; 1 for touch.
+        centre: The angle that reads as 0, rad; 0 for touch.
     """
 
     name: str
@@ -45,6 +51,11 @@ class Sensor:
     body: str
     hinge: str
     half_range: float
+    centre: float
+
+    def reading(self, angle: float) -> float:
+        """Returns what an angle reads as."""
+        return (angle - self.centre) / self.half_range
 
 
 @dataclass(frozen=True)
@@ -55,7 +66,7 @@ class Anatomy:
         joints: What can break or jam.
         sensors: What feeds the controller, touch before angle, in its order.
         motors: What the controller commands, in its order.
-        hinges: Every hinge of the model, in its order.
+        hinges: Every hinge of the model but its root's, in its order.
         neurons: How many hidden neurons its controller has.
     """
 

@@ -7,11 +7,12 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch, SimulationError
 
-from selfmodel.arrays import BoolArray, FloatArray, IndexArray
+from selfmodel.arrays import BoolArray, IndexArray
 from selfmodel.behaviour import Signal
 from selfmodel.embodiment import Embodiment
 from selfmodel.places import places
 from selfmodel.robot import Robot
+from selfmodel.roots import Reader
 
 
 def new_batch(model: mujoco.MjModel, embodiments: Sequence[Embodiment], threads: int) -> Batch:
@@ -21,16 +22,14 @@ def new_batch(model: mujoco.MjModel, embodiments: Sequence[Embodiment], threads:
     return batch
 
 
-def live_signals(
-    robot: Robot, batch: Batch, record: Sequence[Signal]
-) -> dict[Signal, tuple[FloatArray, slice | list[int]]]:
-    """Returns for each signal of the state the array that holds its present value, and its columns.
+def live_signals(robot: Robot, batch: Batch, record: Sequence[Signal]) -> dict[Signal, Reader]:
+    """Returns for each signal of the state what reads its present value.
 
     What the controllers receive and give is not part of MuJoCo's state, and is left out.
     """
     state = places(robot)
     return {
-        signal: (batch.bind(state[signal].field), state[signal].columns)
+        signal: state[signal].reader(batch.bind)
         for signal in record
         if signal not in ("sensors", "commands")
     }

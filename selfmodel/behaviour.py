@@ -25,7 +25,8 @@ SIGNALS: tuple[Signal, ...] = get_args(Signal)
 """Every signal of a run, in the order in which a log lists them.
 
 ``sensors``: what the controller received (touch 0 or 1, angles scaled to the joint's range).
-``commands``: motor targets, rad. ``joint_positions``: rad. ``joint_velocities``: rad/s.
+``commands``: what goes into the motors, each in its own unit: a position servo's target, rad.
+``joint_positions``: rad. ``joint_velocities``: rad/s.
 ``joint_efforts``: torque at the joint over the last physics step, N m; 0 at the start.
 ``base_position``: root body, world frame, m. ``base_orientation``: unit quaternion, w x y z.
 ``base_linear_velocity``: world frame, m/s. ``base_angular_velocity``: body frame, rad/s.

@@ -13,7 +13,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.behaviour import Signal
-from selfmodel.comparator import Segments
+from selfmodel.comparator import Past, Segments
 from selfmodel.differences import difference
 from selfmodel.embodiment import embody
 from selfmodel.errors import InputError
@@ -203,6 +203,7 @@ def _stretches(trial: Trial) -> _Stretches:
             commands=np.stack([commands[k - LEAD : k + HORIZON] for k in starts]),
             lead=LEAD,
             record=STATE,
+            past=Past(commands, np.array(starts)),
         ),
         {
             signal: np.stack([states[signal][k + 1 : k + HORIZON + 1] for k in starts])

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-from selfmodel.arrays import FloatArray
+from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.behaviour import SIGNALS, Behaviour, Signal
 from selfmodel.trial import Trial
 
@@ -21,6 +21,19 @@ class ClosedLoop:
 
 
 @dataclass(frozen=True, eq=False)
+class Past:
+    """What was commanded before segments begin, for motors that remember it.
+
+    Attributes:
+        commands: Of the whole trial, ``(steps, motors)``; NaN where it is not known.
+        starts: The step of the trial at which each segment begins, ``(segments,)``.
+    """
+
+    commands: FloatArray
+    starts: IndexArray
+
+
+@dataclass(frozen=True, eq=False)
 class Segments:
     """A request to predict short stretches of the trial, each from a state that was logged.
 
@@ -33,12 +46,15 @@ class Segments:
         lead: Rows of ``commands`` from before the segment.
         record: The signals that the comparator looks at, ``(n, segments, horizon + 1, width)``
             each; row 0 is the beginning. Any but ``commands``, which are given.
+        past: What motors remember that have a state of their own, such as a filter; None: only
+            what stands in ``commands``.
     """
 
     states: Mapping[Signal, FloatArray]
     commands: FloatArray
     lead: int
     record: tuple[Signal, ...]
+    past: Past | None = None
 
     @property
     def horizon(self) -> int:

@@ -1,5 +1,6 @@
 """The controller: the paper's recurrent network, decoded from a genome."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -8,7 +9,11 @@ import numpy as np
 from selfmodel.arrays import FloatArray, frozen
 
 TARGET_RANGE = np.pi / 4
-"""Motor targets span plus and minus this angle, rad."""
+"""The paper's motor targets span plus and minus this angle, rad."""
+
+Ranges = tuple[tuple[float, float], ...]
+"""Of each motor the centre of what it is commanded, and half the range, in the motor's own unit:
+rad for a position servo, rad/s for a velocity servo, a part of its torque for many a motor."""
 
 HIDDEN_NEURONS = 3
 
@@ -21,11 +26,23 @@ class Network:
         sensors: Names of its inputs, in order.
         motors: Names of its outputs, in order.
         hidden: Number of hidden neurons.
+        ranges: What each motor is commanded; the paper's where none is given.
+
+    Raises:
+        ValueError: The ranges do not fit the motors, or one is none.
     """
 
     sensors: tuple[str, ...]
     motors: tuple[str, ...]
     hidden: int = HIDDEN_NEURONS
+    ranges: Ranges = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "ranges", checked_ranges(self.motors, self.ranges))
+
+    def controller(self, genome: FloatArray) -> "Controller":
+        """Returns this network with the weights of a genome, ``(weights,)``."""
+        return Controller(self, genome)
 
     @property
     def weights(self) -> int:
@@ -77,6 +94,11 @@ class Controller:
     network: Network
     genome: FloatArray
 
+    @property
+    def design(self) -> Network:
+        """What the genome is decoded with."""
+        return self.network
+
     def __post_init__(self) -> None:
         if self.genome.shape != (self.network.weights,):
             raise ValueError(
@@ -95,6 +117,44 @@ class Controller:
 
     def __hash__(self) -> int:
         return hash((self.network, self.genome.tobytes()))
+
+
+def checked_ranges(motors: tuple[str, ...], ranges: Ranges) -> Ranges:
+    """Returns the command ranges of some motors, the paper's for all where none is given.
+
+    Raises:
+        ValueError: They do not fit the motors, or one is not finite or has no width.
+    """
+    if not ranges:
+        return ((0.0, TARGET_RANGE),) * len(motors)
+    if len(ranges) != len(motors):
+        raise ValueError(f"{len(motors)} motors need a command range each, got {len(ranges)}")
+    for motor, (centre, half) in zip(motors, ranges, strict=True):
+        if not (math.isfinite(centre) and math.isfinite(half) and half > 0):
+            raise ValueError(
+                f"the motor {motor} needs a finite command range of some width, got "
+                f"{centre} plus and minus {half}"
+            )
+    return ranges
+
+
+class Commands:
+    """Turns outputs in [-1, 1] into the commands of many robots of the same motors.
+
+    Args:
+        ranges: What each motor is commanded.
+    """
+
+    def __init__(self, ranges: Ranges) -> None:
+        self._half = np.array([half for _, half in ranges])
+        centre = np.array([middle for middle, _ in ranges])
+        self._centre = centre if centre.any() else None
+
+    def write(self, outputs: FloatArray, commands: FloatArray) -> None:
+        """Writes the commands, ``(n, motors)``, for outputs of that shape."""
+        np.multiply(outputs, self._half, out=commands)
+        if self._centre is not None:
+            commands += self._centre
 
 
 def draw_weights(rng: np.random.Generator, shape: tuple[int, ...]) -> FloatArray:
@@ -119,6 +179,7 @@ class Population:
             raise ValueError("controllers of one population must have the same network")
         genomes = np.array([controller.genome for controller in controllers])
         self._to_hidden, self._to_motors = network.layers(genomes)
+        self._commands = Commands(network.ranges)
         self._neurons = None if np.all(neurons == 1) else neurons
         sensors = len(network.sensors)
         # Sensors, hidden neurons and the bias in one row: what feeds either layer is a slice of it.
@@ -129,10 +190,10 @@ class Population:
         self._outputs = self._inputs[:, sensors:]
 
     def step(self, targets: FloatArray) -> None:
-        """Computes the motor targets for what stands in ``readings``.
+        """Computes the commands for what stands in ``readings``.
 
         Args:
-            targets: ``(n, motors)``, written: rad, within plus and minus ``TARGET_RANGE``.
+            targets: ``(n, motors)``, written: within the network's ranges, in each motor's unit.
         """
         # einsum sums each row by itself, in an order that the number of rows does not change.
         hidden = np.einsum("nij,nj->ni", self._to_hidden, self._inputs)
@@ -141,4 +202,4 @@ class Population:
             self._hidden *= self._neurons
         motors = np.einsum("nij,nj->ni", self._to_motors, self._outputs)
         np.tanh(motors, out=motors)
-        np.multiply(motors, TARGET_RANGE, out=targets)
+        self._commands.write(motors, targets)

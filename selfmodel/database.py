@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import Protocol
 
-from selfmodel.controller import Controller
 from selfmodel.diagnosis import Diagnosis
+from selfmodel.driver import Evolved
 from selfmodel.hypothesis import Hypothesis
 from selfmodel.physical import PhysicalRobot
 from selfmodel.trial import Plan, Trial
@@ -25,10 +25,10 @@ class Database:
     diagnoses: tuple[Diagnosis, ...] = ()
 
     @property
-    def controllers(self) -> tuple[Controller, ...]:
+    def controllers(self) -> tuple[Evolved, ...]:
         """Every controller that a physical robot has run, the newest first, each once."""
         drivers = dict.fromkeys(trial.plan.controller for trial in reversed(self.trials))
-        return tuple(driver for driver in drivers if isinstance(driver, Controller))
+        return tuple(driver for driver in drivers if isinstance(driver, Evolved))
 
     @property
     def evidence(self) -> tuple[Trial, ...]:

@@ -26,8 +26,8 @@ def add_debris(spec: mujoco.MjSpec, limbs: tuple[str, ...]) -> None:
     """Adds a free copy of each limb to the physical robot's model, behind everything else.
 
     The robot's own limb stays where it is: as a ghost it keeps the layout of what is logged. The
-    copy has no motors and no sensors, its joints hang loose, and it collides with the ground, the
-    robot and other debris; but not with a part that it overlaps when it falls off, which would
+    copy has no motors, tendons and sensors, its joints hang loose, and it collides with the ground,
+    the robot and other debris; but not with a part that it overlaps when it falls off, which would
     throw it away.
 
     Args:
@@ -35,8 +35,13 @@ def add_debris(spec: mujoco.MjSpec, limbs: tuple[str, ...]) -> None:
         limbs: The first body of each.
     """
     bare = spec.copy()
-    for part in (*bare.actuators, *bare.sensors):
-        bare.delete(part)
+    for parts in (bare.actuators, bare.sensors, bare.equalities, bare.tendons):
+        for part in list(parts):
+            bare.delete(part)
+    # What is excluded from collisions as it overlaps is found out anew.
+    for parts in (bare.excludes, bare.pairs):
+        for part in list(parts):
+            bare.delete(part)
     for k, limb in enumerate(limbs):
         _add_limb(spec, bare, limb, k)
     spec.memory = max(spec.memory, MEMORY)

@@ -10,9 +10,11 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 
+from selfmodel import couplings
 from selfmodel.anatomy import Anatomy
 from selfmodel.arrays import FloatArray
 from selfmodel.hypothesis import Hypothesis
+from selfmodel.transmission import motor_bodies, motor_joints
 
 GHOST_ARMATURE = 1.0
 """Rotor inertia of a lost hinge, kg m^2; any positive value keeps the mass matrix invertible, and
@@ -38,6 +40,7 @@ class Embodiment:
         neurons: 1 for each hidden neuron that works, 0 for a silent one, ``(hidden,)``.
         held: Of each hinge that is held still its places in ``qpos`` and ``qvel`` and its angle.
         seed: Of what is random in it: the noise, and the shape of rough terrain.
+        normal: Unit vector that stands on the ground, world frame, ``(3,)``.
     """
 
     model: mujoco.MjModel
@@ -48,29 +51,37 @@ class Embodiment:
     neurons: FloatArray
     held: list[tuple[int, int, float]] = field(default_factory=list)
     seed: int = 0
+    normal: FloatArray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
 
     def lose_body(self, name: str) -> None:
-        """Makes a body a ghost: no mass, no collisions, no force from its motors."""
+        """Makes a body a ghost: no mass, no collisions, no force from its motors and couplings."""
         model, body = self.model, self.model.body(name).id
         model.body_mass[body] = 0.0
         model.body_inertia[body] = 0.0
         model.geom_contype[model.geom_bodyid == body] = 0
         model.geom_conaffinity[model.geom_bodyid == body] = 0
-        model.dof_armature[model.dof_bodyid == body] = GHOST_ARMATURE
+        degrees = model.dof_bodyid == body
+        model.dof_armature[degrees] = GHOST_ARMATURE
+        model.dof_frictionloss[degrees] = 0.0
+        model.jnt_stiffness[model.jnt_bodyid == body] = 0.0
+        model.jnt_stiffnesspoly[model.jnt_bodyid == body] = 0.0
         for motor in range(model.nu):
-            if model.jnt_bodyid[model.actuator_trnid[motor, 0]] == body:
+            if body in motor_bodies(model, motor):
                 self.release_motor(motor)
+        couplings.cut(model, body)
 
     def hold_hinge(self, name: str, angle: float) -> None:
         """Holds a hinge rigidly at an angle, rad.
 
         The angle becomes the reference of the hinge and part of its body's frame, as in a model
         whose bodies are welded there. All hinges of a body are held together, in their order.
+        Motors that move nothing else are released.
         """
         model, hinge = self.model, self.model.joint(name)
         body = model.body(hinge.bodyid[0])
         turn, frame = np.empty(4), np.empty(4)
-        mujoco.mju_axisAngle2Quat(turn, hinge.axis, angle)
+        shift = angle - float(hinge.qpos0[0])
+        mujoco.mju_axisAngle2Quat(turn, hinge.axis, shift)
         mujoco.mju_mulQuat(frame, body.quat, turn)
         before, after = np.empty(3), np.empty(3)
         mujoco.mju_rotVecQuat(before, hinge.pos, body.quat)
@@ -82,6 +93,14 @@ class Embodiment:
         # A limit that it touches must not push against the weld.
         model.jnt_limited[hinge.id] = 0
         self.held.append((int(hinge.qposadr[0]), int(hinge.dofadr[0]), angle))
+        couplings.keep_meaning(model, int(hinge.id), shift)
+        places = [position for position, _, _ in self.held]
+        held = frozenset(np.flatnonzero(np.isin(model.jnt_qposadr, places)).tolist())
+        couplings.settle(model, held)
+        for motor in range(model.nu):
+            moved = motor_joints(model, motor)
+            if moved and moved <= held:
+                self.release_motor(motor)
 
     def release_motor(self, motor: int) -> None:
         """Takes all force from the motor of that number."""
@@ -93,6 +112,8 @@ class Embodiment:
         self.model.actuator_gainprm[motor] *= part
         self.model.actuator_biasprm[motor] *= part
         self.model.actuator_forcerange[motor] *= part
+        for joint in motor_joints(self.model, motor):
+            self.model.jnt_actfrcrange[joint] *= part
 
     def set_friction(self, coefficient: float) -> None:
         """Sets the sliding friction between the world and everything that can touch it."""
@@ -106,6 +127,21 @@ class Embodiment:
         model.geom_friction[world | (touching != 0), 0] = coefficient
         paired = world[model.pair_geom1] | world[model.pair_geom2]
         model.pair_friction[paired, :2] = coefficient
+
+    def tilt_ground(self, angle: float) -> None:
+        """Turns the world's shapes, and whatever stands in it, uphill along x by an angle, rad."""
+        model = self.model
+        tilt = np.empty(4)
+        mujoco.mju_axisAngle2Quat(tilt, np.array([0.0, 1.0, 0.0]), -angle)
+        mujoco.mju_rotVecQuat(self.normal, self.normal.copy(), tilt)
+        for geom in np.flatnonzero(model.geom_bodyid == 0):
+            _turn(model.geom_pos[geom], model.geom_quat[geom], tilt)
+        for body in np.flatnonzero(model.body_parentid == 0)[1:]:
+            _turn(model.body_pos[body], model.body_quat[body], tilt)
+            joint = model.body_jntadr[body]
+            if joint >= 0 and model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE:
+                start = model.qpos0[model.jnt_qposadr[joint] :]
+                start[:3], start[3:7] = model.body_pos[body], model.body_quat[body]
 
     def scale_reading(self, sensor: int, factor: float) -> None:
         """Multiplies what the sensor of that column measures."""
@@ -143,10 +179,18 @@ def embody(
     for fault in hypothesis.faults:
         fault.kind.strike(embodiment, anatomy, fault)
     mujoco.mj_setConst(embodiment.model, mujoco.MjData(embodiment.model))
+    # Tendons are as long as ever, though a held joint's angle has become its reference.
+    embodiment.model.tendon_length0[:] = model.tendon_length0
     # The solver's tolerance is relative to the mean inertia; a held hinge's would make any answer
     # good enough. Kept absolute, what is left of the robot is solved as exactly as ever.
     embodiment.model.opt.tolerance *= _mean_inertia(model) / _mean_inertia(embodiment.model)
     return embodiment
+
+
+def _turn(position: FloatArray, orientation: FloatArray, by: FloatArray) -> None:
+    """Turns a frame about the world's origin, in place."""
+    mujoco.mju_rotVecQuat(position, position.copy(), by)
+    mujoco.mju_mulQuat(orientation, by, orientation.copy())
 
 
 def _mean_inertia(model: mujoco.MjModel) -> float:

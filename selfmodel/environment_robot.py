@@ -65,7 +65,8 @@ class EnvironmentRobot:
         stop: Brings the robot to rest, safely, at any time, and again if it is at rest. Without it,
             ``env.step(safe)`` does; before ``reset`` and after the last step of an episode, that
             begins a new episode, as ``dm_env`` has it.
-        safe: The motor targets that are safe, ``(motors,)``; all 0 if not given.
+        safe: The motor targets that are safe, ``(motors,)``; if not given, 0 or what is nearest to
+            it that a motor can be commanded.
         limits: What the robot is stopped for; ``selfmodel.limits`` has some.
         critical: Signals of which no number may be NaN in an observation that came.
         patience: Steps in a row for which a reading may be missing.
@@ -93,7 +94,7 @@ class EnvironmentRobot:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         motors = (len(robot.anatomy.motors),)
-        targets = np.zeros(motors) if safe is None else np.array(safe, dtype=np.float64)
+        targets = _nearest_to_zero(robot) if safe is None else np.array(safe, dtype=np.float64)
         for what, shape in (
             ("the environment's actions", tuple(env.action_spec().shape)),
             ("the safe targets", targets.shape),
@@ -202,6 +203,11 @@ class EnvironmentRobot:
         for limit in self._limits:
             if reason := limit(values):
                 raise TrialError(f"a limit was exceeded at step {k}: {reason}")
+
+
+def _nearest_to_zero(robot: Robot) -> FloatArray:
+    centre, half = np.array(robot.network.ranges).T
+    return np.asarray(np.clip(0.0, centre - half, centre + half))
 
 
 def _rows(names: Names, told: Mapping[str, Any]) -> dict[Signal, FloatArray]:

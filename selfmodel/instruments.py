@@ -66,7 +66,8 @@ class NoisyInstruments:
         self._dead = dead_sensors(anatomy, embodiment)
         self._touch = np.array([sensor.kind == "touch" for sensor in anatomy.sensors])
         ranges = [embodiment.model.joint(hinge).range for hinge in anatomy.hinges]
-        self._half_ranges = np.array([(high - low) / 2 for low, high in ranges])
+        # A hinge without limits turns half way round to either side.
+        self._half_ranges = np.array([(high - low) / 2 or np.pi for low, high in ranges])
 
     def receive(self, readings: FloatArray) -> None:
         """Adds noise to the readings."""

@@ -18,7 +18,7 @@ def joint_limits(robot: Robot, margin: float) -> Limit:
 
     Args:
         robot: Whose hinges; those without a range have no limit.
-        margin: By how much an angle may be beyond, rad.
+        margin: By how much a hinge may be beyond, rad; m where it slides.
     """
     names = robot.anatomy.hinges
     hinges = [robot.model.joint(name) for name in names]
@@ -34,8 +34,8 @@ def joint_limits(robot: Robot, margin: float) -> Limit:
             return ""
         k = int(beyond[0])
         return (
-            f"{names[k]} is at {angles[k]:.3f} rad, beyond its range of {ranges[k, 0]:.3f} to "
-            f"{ranges[k, 1]:.3f} rad and the margin of {margin:g} rad"
+            f"{names[k]} is at {angles[k]:.3f}, beyond its range of {ranges[k, 0]:.3f} to "
+            f"{ranges[k, 1]:.3f} and the margin of {margin:g}"
         )
 
     return limit

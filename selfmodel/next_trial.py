@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from selfmodel.controller import Controller, draw_weights
+from selfmodel.controller import draw_weights
 from selfmodel.database import Database
 from selfmodel.diagnosis import Diagnosis
 from selfmodel.disagreement import most_disputed
+from selfmodel.driver import Evolved
 from selfmodel.events import Event, Question
 from selfmodel.evolution import varied
 from selfmodel.hypothesis import Hypothesis
@@ -39,20 +40,20 @@ class Situation:
     simulator: Simulator
     settings: Settings
     rng: np.random.Generator
-    repaired: Callable[[], Controller]
+    repaired: Callable[[], Evolved]
     watch: Callable[[Event], None]
 
 
-NextTrial = Callable[[Situation], Controller]
+NextTrial = Callable[[Situation], Evolved]
 """A way to choose the controller of the next physical trial."""
 
 
-def by_repair(situation: Situation) -> Controller:
+def by_repair(situation: Situation) -> Evolved:
     """Chooses the controller that compensates for the best hypothesis, as the paper does."""
     return situation.repaired()
 
 
-def by_disagreement(situation: Situation) -> Controller:
+def by_disagreement(situation: Situation) -> Evolved:
     """Chooses the controller on which hypotheses disagree, and a repair when that is over.
 
     It is over once a diagnosis is ``explained``, or when only one trial is left: the trials are
@@ -73,11 +74,11 @@ def by_disagreement(situation: Situation) -> Controller:
 
 def telling_apart(
     diagnosis: Diagnosis,
-    known: Sequence[Controller],
+    known: Sequence[Evolved],
     simulator: Simulator,
     settings: Settings,
     rng: np.random.Generator,
-) -> Controller:
+) -> Evolved:
     """Returns the controller on which the hypotheses that are in the running disagree most.
 
     Args:
@@ -107,22 +108,23 @@ def in_the_running(diagnosis: Diagnosis) -> tuple[Hypothesis, ...]:
 
 
 def candidates(
-    known: Sequence[Controller], settings: Settings, rng: np.random.Generator
-) -> list[Controller]:
+    known: Sequence[Evolved], settings: Settings, rng: np.random.Generator
+) -> list[Evolved]:
     """Returns the controllers that a choice is made from, each once, the tried ones first.
 
     Args:
-        known: Controllers that were tried, the newest first. They are candidates, but for the
-            newest; and so are their offspring, as many as an EA has genomes.
+        known: Controllers that were tried, the newest first. Those of its design are candidates,
+            but for the newest; and so are their offspring, as many as an EA has genomes.
         settings: How offspring is bred.
         rng: Every random choice comes from it.
     """
     newest = known[0]
-    genomes = np.array([controller.genome for controller in known])
+    alike = [controller for controller in known if controller.design == newest.design]
+    genomes = np.array([controller.genome for controller in alike])
     parents = np.resize(genomes, (settings.population, genomes.shape[1]))  # each in turn
     children = varied(parents, draw_weights, settings, rng)
-    bred = [Controller(newest.network, genome) for genome in children]
-    found = [one for one in dict.fromkeys([*known, *bred]) if one != newest]
+    bred = [newest.design.controller(genome) for genome in children]
+    found = [one for one in dict.fromkeys([*alike, *bred]) if one != newest]
     if not found:  # no child is another than its parent, as where nothing mutates
-        found = [Controller(newest.network, draw_weights(rng, newest.genome.shape))]
+        found = [newest.design.controller(draw_weights(rng, newest.genome.shape))]
     return found

@@ -15,7 +15,7 @@ from selfmodel.errors import TrialError
 from selfmodel.gap import Gap, perturbed
 from selfmodel.hypothesis import INTACT, Hypothesis
 from selfmodel.instruments import ExactInstruments, Instruments, NoisyInstruments
-from selfmodel.places import places
+from selfmodel.places import fields_of, places
 from selfmodel.robot import Robot
 from selfmodel.senses import Senses
 from selfmodel.start import jitter_start
@@ -121,13 +121,10 @@ class SimulatedRobot:
         brain = drive([controller], embodiment.neurons[np.newaxis], len(robot.anatomy.sensors))
         commands = np.zeros((1, model.nu))
         underway = deque(np.zeros((delay, model.nu)))
-        where = places(robot, model)
         # What is logged as commanded is what the controller said, not what the motors have got.
-        live = {
-            **{signal: (getattr(data, at.field), at.columns) for signal, at in where.items()},
-            "sensors": (brain.readings[0], slice(None)),
-            "commands": (commands[0], slice(None)),
-        }
+        where = places(robot, model)
+        live = {signal: place.reader(fields_of(data)) for signal, place in where.items()}
+        live |= {"sensors": lambda: brain.readings, "commands": lambda: commands}
         for k in range(steps):
             senses.read(data.sensordata[np.newaxis], data.qpos[np.newaxis], brain.readings)
             instruments.receive(brain.readings[0])
@@ -137,7 +134,7 @@ class SimulatedRobot:
             yield Sample(
                 time=k * robot.control_timestep,
                 values={
-                    signal: instruments.observe(signal, live[signal][0][live[signal][1]]).copy()
+                    signal: instruments.observe(signal, live[signal]()[0]).copy()
                     for signal in SIGNALS
                 },
             )

@@ -1,23 +1,20 @@
 """Where in MuJoCo's state each signal of a behaviour stands."""
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 
 import mujoco
+import numpy as np
 
-from selfmodel.arrays import columns
+from selfmodel.arrays import FloatArray, columns
 from selfmodel.behaviour import Signal
 from selfmodel.robot import Robot
+from selfmodel.roots import Bind, Derived, Place, root_of
+
+Writer = Callable[[Mapping[Signal, FloatArray]], None]
+"""Puts signals of the state, ``(n, width)`` each, into it; what is not given stays."""
 
 
-@dataclass(frozen=True)
-class Place:
-    """A field of MjData, and the columns of it that hold a signal."""
-
-    field: str
-    columns: slice | list[int]
-
-
-def places(robot: Robot, model: mujoco.MjModel | None = None) -> dict[Signal, Place]:
+def places(robot: Robot, model: mujoco.MjModel | None = None) -> dict[Signal, Place | Derived]:
     """Returns where each signal stands that is part of the physics' state.
 
     The commands are the controls; what the sensors read is not among them, because a controller
@@ -29,20 +26,57 @@ def places(robot: Robot, model: mujoco.MjModel | None = None) -> dict[Signal, Pl
             more of them.
     """
     model = robot.model if model is None else model
-    root = model.body_jntadr[model.body(robot.root).id]
-    q, v = int(model.jnt_qposadr[root]), int(model.jnt_dofadr[root])
+    motors = columns([int(model.actuator(name).id) for name in robot.anatomy.motors])
+    return {
+        "commands": Place("ctrl", motors),
+        **_joints(robot, model),
+        **root_of(model, robot.root).places(),
+    }
+
+
+def writer(robot: Robot, bind: Bind, model: mujoco.MjModel | None = None) -> Writer:
+    """Returns what writes joints and base into a state.
+
+    Args:
+        robot: The robot, whose parts the signals tell of.
+        bind: Gives the fields that are written.
+        model: As for ``places``.
+    """
+    model = robot.model if model is None else model
+    qpos, qvel = bind("qpos"), bind("qvel")
+    fields = {"qpos": qpos, "qvel": qvel}
+    root, joints = root_of(model, robot.root), _joints(robot, model)
+
+    def write(state: Mapping[Signal, FloatArray]) -> None:
+        for signal in ("joint_positions", "joint_velocities"):
+            if signal in state:
+                fields[joints[signal].field][:, joints[signal].columns] = state[signal]
+        root.write(qpos, qvel, state)
+
+    return write
+
+
+def fields_of(data: mujoco.MjData) -> Bind:
+    """Returns what gives the fields of a single robot's state as those of many, of which it is."""
+
+    def bind(field: str) -> FloatArray:
+        values: FloatArray = getattr(data, field)
+        return values[np.newaxis]
+
+    return bind
+
+
+def present(place: Place | Derived, data: mujoco.MjData) -> FloatArray:
+    """Returns a copy of the present value of a signal of a single robot, ``(width,)``."""
+    return np.array(place.reader(fields_of(data))()[0])
+
+
+def _joints(robot: Robot, model: mujoco.MjModel) -> dict[Signal, Place]:
     hinges = [model.joint(name) for name in robot.anatomy.hinges]
     hinge_q = columns([int(hinge.qposadr[0]) for hinge in hinges])
     hinge_v = columns([int(hinge.dofadr[0]) for hinge in hinges])
     return {
-        "commands": Place(
-            "ctrl", columns([int(model.actuator(name).id) for name in robot.anatomy.motors])
-        ),
         "joint_positions": Place("qpos", hinge_q),
         "joint_velocities": Place("qvel", hinge_v),
         "joint_efforts": Place("qfrc_actuator", hinge_v),
-        "base_position": Place("qpos", slice(q, q + 3)),
-        "base_orientation": Place("qpos", slice(q + 3, q + 7)),
-        "base_linear_velocity": Place("qvel", slice(v, v + 3)),
-        "base_angular_velocity": Place("qvel", slice(v + 3, v + 6)),
     }

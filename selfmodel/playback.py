@@ -14,7 +14,7 @@ class Playback:
 
     Attributes:
         motors: What is commanded, in order.
-        commands: ``(steps, motors)`` motor targets, rad. The last one stands when they end.
+        commands: ``(steps, motors)``, each in its motor's unit. The last stands when they end.
 
     Raises:
         ValueError: There are no commands, they do not fit the motors, or one is not finite.
@@ -53,7 +53,7 @@ def played_back(motors: tuple[str, ...], commands: FloatArray) -> Playback:
 
     Args:
         motors: What is commanded, in order.
-        commands: ``(steps, motors)`` motor targets, rad.
+        commands: ``(steps, motors)``, each in its motor's unit.
 
     Raises:
         ValueError: The first is not known.
@@ -80,7 +80,7 @@ class Playbacks:
         """Gives the commands of the next step.
 
         Args:
-            targets: ``(n, motors)``, written: rad.
+            targets: ``(n, motors)``, written: each in its motor's unit.
         """
         for target, commands in zip(targets, self._commands, strict=True):
             target[:] = commands[min(self._step, len(commands) - 1)]

@@ -6,12 +6,13 @@ from time import perf_counter
 import mujoco
 import numpy as np
 
+from selfmodel.activations import starting_activations
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.batches import Alive, counted_not_printed, live_signals, new_batch
 from selfmodel.behaviour import Behaviour
 from selfmodel.comparator import Segments
 from selfmodel.embodiment import Embodiment
-from selfmodel.places import places
+from selfmodel.places import writer
 from selfmodel.robot import Robot
 from selfmodel.senses import Senses
 from selfmodel.tally import Simulated, Tally
@@ -72,12 +73,14 @@ def predict(
         for signal in segments.record
     }
     start = _Start(robot, batch, moving)
+    late = robot.control_delay if delay is None else delay
+    activations = starting_activations(robot, segments, late)
     batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE)
     alive = Alive(batch)
-    first = segments.lead - (robot.control_delay if delay is None else delay)
+    first = segments.lead - late
     with counted_not_printed():
         for stage in stages:
-            start.write(segments, stage)
+            start.write(segments, activations, stage)
             clock = perf_counter()
             alive.forward()
             tally.physics_seconds += perf_counter() - clock
@@ -85,8 +88,8 @@ def predict(
                 if "sensors" in kept:
                     senses.read(sensordata[place], qpos[place], readings)
                     kept["sensors"][:, stage, k] = readings.reshape(n, together, -1)
-                for signal, (source, chosen) in live.items():
-                    kept[signal][:, stage, k] = source[:, chosen][place].reshape(n, together, -1)
+                for signal, read in live.items():
+                    kept[signal][:, stage, k] = read()[place].reshape(n, together, -1)
                 if k < horizon:
                     start.command(segments.commands[stage, first + k])
                     clock = perf_counter()
@@ -111,11 +114,9 @@ class _Start:
         self, robot: Robot, batch: mujoco.batch.Batch, embodiments: Sequence[Embodiment]
     ) -> None:
         self._n = len(embodiments)
-        self._state = {
-            signal: (batch.bind(place.field), place.columns)
-            for signal, place in places(robot).items()
-        }
+        self._write = writer(robot, batch.bind)
         self._ctrl = batch.bind("ctrl")
+        self._act = batch.bind("act")
         self._qpos, self._qvel = batch.bind("qpos"), batch.bind("qvel")
         self._held = [
             (number, *held)
@@ -123,11 +124,12 @@ class _Start:
             for held in embodiment.held
         ]
 
-    def write(self, segments: Segments, stage: IndexArray) -> None:
+    def write(self, segments: Segments, activations: FloatArray, stage: IndexArray) -> None:
         """Begins the segments of these numbers."""
-        for signal, values in segments.states.items():
-            field, columns = self._state[signal]
-            field[:, columns] = self._for_all(values[stage])
+        self._write(
+            {signal: self._for_all(values[stage]) for signal, values in segments.states.items()}
+        )
+        self._act[:] = self._for_all(activations[stage])
         for number, position, velocity, angle in self._held:
             mine = slice(number * len(stage), (number + 1) * len(stage))
             self._qpos[mine, position] = angle

@@ -6,10 +6,10 @@ from functools import partial
 
 from selfmodel.calibrate import Calibration
 from selfmodel.comparator import Comparator
-from selfmodel.controller import Controller
 from selfmodel.database import Journal
 from selfmodel.diagnose import Diagnose
 from selfmodel.diagnosis import Diagnosis
+from selfmodel.driver import Design, Evolved
 from selfmodel.events import Event, SearchBegins
 from selfmodel.faults import PAPER_KINDS, Kind
 from selfmodel.hypothesis import INTACT, Hypothesis
@@ -70,7 +70,8 @@ def recover(
     settings: Settings,
     seed: int,
     watch: Callable[[Event], None],
-    gait: Controller | None = None,
+    gait: Evolved | None = None,
+    design: Design | None = None,
     kinds: Sequence[Kind] = PAPER_KINDS,
     calibrate: Callable[[Sequence[Trial]], Calibration] | None = None,
     next_trial: NextTrial = by_repair,
@@ -88,6 +89,7 @@ def recover(
         watch: Is told what happens.
         gait: How the robot walks before it fails; evolved if there is none. The rest of the
             recovery is the same whether a gait was evolved here, or earlier from the same seed.
+        design: The kind of controller to evolve; the paper's network if none is given.
         kinds: What a diagnosis considers.
         calibrate: Fits the self-model to the trials before the failure; without it, the self-model
             stays as it is.
@@ -96,10 +98,12 @@ def recover(
     Returns:
         What the journal says at the end.
     """
-    repair = Repair(simulator, settings)
+    # As the robot's own model says: a fitted one is written with fewer digits.
+    design = simulator.robot.network if design is None else design
+    repair = Repair(simulator, settings, design)
     tried: list[Hypothesis] = []
 
-    def evolve_controller(hypothesis: Hypothesis) -> Controller:
+    def evolve_controller(hypothesis: Hypothesis) -> Evolved:
         watch(SearchBegins("repair", hypothesis))
         known = journal.read()
         rng = repair_stream(seed, len(known.diagnoses))
@@ -114,7 +118,7 @@ def recover(
         watch(diagnosis)
         return diagnosis
 
-    def act(robot: PhysicalRobot, stage: Stage, believed: Hypothesis, by: Controller) -> None:
+    def act(robot: PhysicalRobot, stage: Stage, believed: Hypothesis, by: Evolved) -> None:
         plan = Plan(f"{len(tried):02d}-{stage}", stage, by, settings.steps, seed)
         tried.append(believed)
         watch(journal.record(robot, plan))
@@ -128,7 +132,7 @@ def recover(
         watch(calibration.summary)
         if calibration.robot is not simulator.robot:
             simulator = Simulator(calibration.robot, simulator.threads, simulator.tally)
-            repair = Repair(simulator, settings, repair.evaluations)
+            repair = Repair(simulator, settings, design, repair.evaluations)
     diagnose = Diagnose(simulator, comparator, settings, kinds, intact=intact)
     act(damaged, "after", INTACT, gait)
     for trials_left in range(settings.trials, 0, -1):

@@ -6,7 +6,8 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.behaviour import forward_displacement
-from selfmodel.controller import Controller, draw_weights
+from selfmodel.controller import draw_weights
+from selfmodel.driver import Design, Evolved
 from selfmodel.evolution import Evolution, Observe, evolve
 from selfmodel.hypothesis import Hypothesis
 from selfmodel.memo import Memo
@@ -22,46 +23,56 @@ class Repair:
     Args:
         simulator: The self-model.
         settings: The numbers of the search.
+        design: The kind of controller to evolve; the paper's network for the simulator's robot if
+            none is given.
         evaluations: Controllers that were asked about before.
     """
 
-    def __init__(self, simulator: Simulator, settings: Settings, evaluations: int = 0) -> None:
+    def __init__(
+        self,
+        simulator: Simulator,
+        settings: Settings,
+        design: Design | None = None,
+        evaluations: int = 0,
+    ) -> None:
         self._simulator = simulator
         self._settings = settings
+        self._design = simulator.robot.network if design is None else design
         self._fitness: Memo[Run] = Memo()
         self.evaluations = evaluations
 
     def __call__(
         self,
         hypothesis: Hypothesis,
-        seeds: Sequence[Controller],
+        seeds: Sequence[Evolved],
         rng: np.random.Generator,
         observe: Observe,
-    ) -> Controller:
+    ) -> Evolved:
         """Returns the best controller found.
 
         Args:
             hypothesis: What is taken to be wrong with the robot.
-            seeds: Controllers to start from, beside random ones.
+            seeds: Controllers to start from, beside random ones; those of another design are left
+                out.
             rng: Every random choice comes from it.
             observe: Is told of every generation.
         """
-        network = self._simulator.robot.network
+        design = self._design
 
         def fitness(genomes: FloatArray) -> FloatArray:
-            runs = [(hypothesis, Controller(network, genome)) for genome in genomes]
+            runs: list[Run] = [(hypothesis, design.controller(genome)) for genome in genomes]
             return np.array(self._fitness.values(runs, self._simulate))
 
         search = Evolution(
-            network.weights,
+            design.weights,
             draw_weights,
             self._settings,
             rng,
-            [controller.genome for controller in seeds],
+            [controller.genome for controller in seeds if controller.design == design],
         )
         evolve(search, fitness, observe)
         self.evaluations += search.evaluations
-        return Controller(network, search.best)
+        return design.controller(search.best)
 
     def _simulate(self, runs: list[Run]) -> FloatArray:
         outcome = self._simulator.run(runs, self._settings.steps, ("base_position",))

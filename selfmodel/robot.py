@@ -6,10 +6,16 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 
-from selfmodel.anatomy import Anatomy, Joint, Sensor
-from selfmodel.controller import HIDDEN_NEURONS, Network
+from selfmodel.anatomy import Anatomy
+from selfmodel.carried import check_carried
+from selfmodel.commands import command_ranges
+from selfmodel.controller import Network
+from selfmodel.dissection import driven_joints, read_anatomy
 from selfmodel.embodiment import Embodiment, embody
 from selfmodel.hypothesis import INTACT, Hypothesis
+from selfmodel.neurons import hidden_neurons
+from selfmodel.oscillators import Cpg
+from selfmodel.roots import find_root
 
 CONTROL_DELAY = "selfmodel_control_delay"
 """The custom numeric of an MJCF that says how many control steps a command takes to its effect."""
@@ -44,9 +50,11 @@ class Robot:
         model = mujoco.MjModel.from_xml_string(self.mjcf, dict(self.assets))
         if not model.opt.timestep > 0:
             raise ValueError(f"the physics time step must be above 0 s, got {model.opt.timestep}")
+        root = find_root(model, driven_joints(model))
+        check_carried(model, root)
         object.__setattr__(self, "model", model)
-        object.__setattr__(self, "anatomy", read_anatomy(model))
-        object.__setattr__(self, "root", _root(model))
+        object.__setattr__(self, "anatomy", read_anatomy(model, root, hidden_neurons(model)))
+        object.__setattr__(self, "root", str(model.body(root).name))
         if not np.isclose(self.substeps * model.opt.timestep, self.control_timestep, rtol=1e-9):
             raise ValueError(
                 f"the control time step {self.control_timestep} s must be a multiple of the "
@@ -67,9 +75,23 @@ class Robot:
 
     @property
     def network(self) -> Network:
-        """The network that controls it."""
-        names = self.anatomy.names
-        return Network(names.sensors, names.motors, self.anatomy.neurons)
+        """The network that controls it.
+
+        Raises:
+            InputError: A motor does not say what it may be commanded.
+        """
+        names, ranges = self.anatomy.names, command_ranges(self.model)
+        return Network(names.sensors, names.motors, self.anatomy.neurons, ranges)
+
+    @property
+    def cpg(self) -> Cpg:
+        """The oscillators that can control it in the network's place.
+
+        Raises:
+            InputError: A motor does not say what it may be commanded.
+        """
+        names, ranges = self.anatomy.names, command_ranges(self.model)
+        return Cpg(names.sensors, names.motors, self.control_timestep, ranges)
 
     @property
     def standing_height(self) -> float:
@@ -104,112 +126,3 @@ class Robot:
             if fault.kind.reshape:
                 fault.kind.reshape(spec, fault, seed)
         return spec
-
-
-def read_anatomy(model: mujoco.MjModel, neurons: int = HIDDEN_NEURONS) -> Anatomy:
-    """Returns the parts of a robot that its model names.
-
-    Hinges that move one body and have a motor are one joint, called by what their names share.
-    Touch sensors and joint position sensors feed the controller.
-
-    Args:
-        model: A compiled MJCF.
-        neurons: Hidden neurons of its controller.
-
-    Raises:
-        ValueError: The hinges of a body share no name, or the range of an angle sensor's hinge is
-            not symmetric about 0.
-    """
-    sensors = _sensors(model)
-    hinges = [model.joint(j) for j in range(model.njnt) if model.jnt_type[j] == _HINGE]
-    by_body: dict[int, list[str]] = {}
-    for hinge in hinges:
-        if _motors(model, hinge.name):
-            by_body.setdefault(int(hinge.bodyid[0]), []).append(hinge.name)
-    bodies_beyond = {
-        body: frozenset(model.body(b).name for b in _subtree(model, body)) for body in by_body
-    }
-    names = {body: _shared_name(group) for body, group in by_body.items()}
-    joints = tuple(
-        Joint(
-            name=names[body],
-            hinges=tuple(group),
-            motors=tuple(name for hinge in group for name in _motors(model, hinge)),
-            bodies=bodies_beyond[body],
-            lost=frozenset(
-                [names[b] for b in by_body if b != body and model.body(b).name in lost_bodies]
-                + [sensor.name for sensor in sensors if sensor.body in lost_bodies]
-            ),
-            limits=tuple((float(r[0]), float(r[1])) for r in (model.joint(h).range for h in group)),
-        )
-        for body, group in by_body.items()
-        for lost_bodies in (bodies_beyond[body],)
-    )
-    return Anatomy(
-        joints=joints,
-        sensors=sensors,
-        motors=tuple(model.actuator(m).name for m in range(model.nu)),
-        hinges=tuple(hinge.name for hinge in hinges),
-        neurons=neurons,
-    )
-
-
-_HINGE = mujoco.mjtJoint.mjJNT_HINGE
-_TOUCH = mujoco.mjtSensor.mjSENS_TOUCH
-_ANGLE = mujoco.mjtSensor.mjSENS_JOINTPOS
-
-
-def _root(model: mujoco.MjModel) -> str:
-    for j in range(model.njnt):
-        if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_FREE:
-            return str(model.body(model.jnt_bodyid[j]).name)
-    raise ValueError("the model needs a root body with a free joint, and has none")
-
-
-def _subtree(model: mujoco.MjModel, body: int) -> list[int]:
-    """The body and all beyond it; a child comes after its parent in a model."""
-    found = [body]
-    found += [b for b in range(body + 1, model.nbody) if _descends(model, b, body)]
-    return found
-
-
-def _descends(model: mujoco.MjModel, body: int, ancestor: int) -> bool:
-    while body > ancestor:
-        body = model.body_parentid[body]
-    return body == ancestor
-
-
-def _motors(model: mujoco.MjModel, hinge: str) -> list[str]:
-    joint = model.joint(hinge).id
-    return [model.actuator(m).name for m in range(model.nu) if model.actuator_trnid[m, 0] == joint]
-
-
-def _shared_name(hinges: list[str]) -> str:
-    """What all names have in common: ``front_left_hip`` of its ``_swing`` and ``_lift``."""
-    shared = hinges[0]
-    while not all(name.startswith(shared) for name in hinges):
-        shared = shared[:-1]
-    if not shared.rstrip("_"):
-        raise ValueError(
-            f"hinges of one body fail together and need names that begin alike, got {hinges}"
-        )
-    return shared.rstrip("_")
-
-
-def _sensors(model: mujoco.MjModel) -> tuple[Sensor, ...]:
-    touch, angle = [], []
-    for s in range(model.nsensor):
-        name, target = model.sensor(s).name, int(model.sensor_objid[s])
-        if model.sensor_type[s] == _TOUCH:
-            body = model.body(model.site_bodyid[target]).name
-            touch.append(Sensor(name, "touch", body, "", 1.0))
-        elif model.sensor_type[s] == _ANGLE:
-            hinge = model.joint(target)
-            if not hinge.range[1] == -hinge.range[0] > 0:
-                raise ValueError(
-                    f"the angle sensor {name} needs a hinge whose range is symmetric about 0, got "
-                    f"{hinge.name} with {hinge.range[0]} to {hinge.range[1]} rad"
-                )
-            body = model.body(hinge.bodyid[0]).name
-            angle.append(Sensor(name, "angle", body, hinge.name, float(hinge.range[1])))
-    return tuple(touch + angle)

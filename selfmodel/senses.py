@@ -12,7 +12,7 @@ from selfmodel.noise import SensorNoise
 
 
 class Senses:
-    """Turns the state of many robots into readings: touch 0 or 1, angles over half range.
+    """Turns the state of many robots into readings: touch 0 or 1, angles from -1 to 1.
 
     Angles are read from the joint positions themselves: after a step, MuJoCo's sensors are one
     physics step behind them, and bringing them up to date costs a fifth of the physics.
@@ -31,6 +31,7 @@ class Senses:
         self._touches = len(touches)
         self._touch = columns([int(model.sensor(sensor.name).adr[0]) for sensor in touches])
         self._angle = columns([int(model.joint(sensor.hinge).qposadr[0]) for sensor in angles])
+        self._centre = np.array([sensor.centre for sensor in angles])
         self._scale = np.array([1 / sensor.half_range for sensor in angles])
         gain = np.array([embodiment.gain for embodiment in embodiments])
         offset = np.array([embodiment.offset + embodiment.bias for embodiment in embodiments])
@@ -49,7 +50,9 @@ class Senses:
         np.greater(
             sensordata[:, self._touch], 0, out=readings[:, : self._touches], casting="unsafe"
         )
-        np.multiply(qpos[:, self._angle], self._scale, out=readings[:, self._touches :])
+        angles = readings[:, self._touches :]
+        np.subtract(qpos[:, self._angle], self._centre, out=angles)
+        np.multiply(angles, self._scale, out=angles)
         if self._faulty:
             readings *= self._gain
             readings += self._offset

@@ -115,7 +115,7 @@ class Simulator:
         sensordata, qpos, ctrl = (batch.bind(field) for field in ("sensordata", "qpos", "ctrl"))
         motors = _DelayLine(ctrl, robot.control_delay)
         live = live_signals(robot, batch, record)
-        live |= {"sensors": (brains.readings, slice(None)), "commands": (motors.inlet, slice(None))}
+        live |= {"sensors": lambda: brains.readings, "commands": lambda: motors.inlet}
         # By step while it runs, so that a step is written in one piece.
         kept = {
             signal: np.empty((steps, n, robot.anatomy.names.width(signal))) for signal in record
@@ -129,8 +129,7 @@ class Simulator:
                 brains.step(motors.inlet)
                 motors.advance()
                 for signal, rows in kept.items():
-                    values, chosen = live[signal]
-                    rows[k] = values[:, chosen]
+                    rows[k] = live[signal]()
                 if k + 1 < steps:
                     start = perf_counter()
                     alive.step(robot.substeps)

@@ -5,7 +5,7 @@ import numpy as np
 
 from selfmodel.embodiment import WELD_ARMATURE
 from selfmodel.instruments import turned
-from selfmodel.places import places
+from selfmodel.places import fields_of, places, present, writer
 from selfmodel.robot import Robot
 
 ANGLES = 0.2
@@ -20,7 +20,8 @@ def jitter_start(
 ) -> None:
     """Moves a robot from its reference pose to one nearby, and lifts it out of the ground.
 
-    Joint angles stay within their limits, held joints and the heading as they are.
+    Joint angles stay within their limits, held joints and the heading as they are. A root that
+    cannot tilt or rise does not.
 
     Args:
         robot: The robot, whose parts are moved.
@@ -29,7 +30,7 @@ def jitter_start(
         level: The gap's.
         rng: Where the pose is drawn from.
     """
-    where = places(robot, model)
+    where, write = places(robot, model), writer(robot, fields_of(data), model)
     deepest = _depth(robot, model, data)
     angles = level * ANGLES * rng.standard_normal(len(robot.anatomy.hinges))
     for name, angle in zip(robot.anatomy.hinges, angles, strict=True):
@@ -39,11 +40,11 @@ def jitter_start(
         moved = data.qpos[hinge.qposadr[0]] + angle
         data.qpos[hinge.qposadr[0]] = np.clip(moved, *hinge.range) if hinge.limited[0] else moved
     tilt = np.append(level * TILT * rng.standard_normal(2), 0.0)
-    base = where["base_orientation"].columns
-    data.qpos[base] = turned(data.qpos[base], tilt)
-    position = where["base_position"].columns
+    base = turned(present(where["base_orientation"], data), tilt)
+    write({"base_orientation": base[np.newaxis]})
     # Contact forces start within the skin: no deeper than in the reference pose, nothing kicks.
-    data.qpos[position] += [0.0, 0.0, max(0.0, _depth(robot, model, data) - deepest)]
+    lift = [0.0, 0.0, max(0.0, _depth(robot, model, data) - deepest)]
+    write({"base_position": (present(where["base_position"], data) + lift)[np.newaxis]})
 
 
 def _depth(robot: Robot, model: mujoco.MjModel, data: mujoco.MjData) -> float:

@@ -14,7 +14,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.behaviour import Signal
 from selfmodel.embodiment import Embodiment
 from selfmodel.notation import parse
-from selfmodel.places import places
+from selfmodel.places import places, present
 from selfmodel.robot import Robot
 from selfmodel.senses import Senses
 
@@ -40,7 +40,7 @@ def environment(
     """
     embodiment = robot.build(parse(hypothesis, robot.anatomy))
     return control.Environment(
-        Physics.from_model(core.MjModel(embodiment.model)),
+        mujoco.Physics.from_model(core.MjModel(embodiment.model)),
         Walk(robot, embodiment, random),
         time_limit=time_limit,
         control_timestep=robot.control_timestep,
@@ -69,14 +69,6 @@ def motion_capture(
     return observe
 
 
-class Physics(mujoco.Physics):
-    """MuJoCo with the reading that walking is about."""
-
-    def forward_position(self) -> float:
-        """Returns where the root body is along the world's x axis, m."""
-        return float(self.data.qpos[0])
-
-
 class Walk(base.Task):
     """Rewards forward speed, m/s: the sum of the rewards times the time step is the distance.
 
@@ -96,26 +88,26 @@ class Walk(base.Task):
         self._places = places(robot)
         self._start = self._end = 0.0
 
-    def initialize_episode(self, physics: Physics) -> None:
+    def initialize_episode(self, physics: mujoco.Physics) -> None:
         """Puts the robot at its start."""
         super().initialize_episode(physics)
-        self._start = self._end = physics.forward_position()
+        self._start = self._end = self._forward(physics)
 
-    def before_step(self, action: FloatArray, physics: Physics) -> None:
-        """Takes the motor targets, rad."""
-        self._start = physics.forward_position()
+    def before_step(self, action: FloatArray, physics: mujoco.Physics) -> None:
+        """Takes the commands of the motors."""
+        self._start = self._forward(physics)
         super().before_step(action, physics)
 
-    def after_step(self, physics: Physics) -> None:
+    def after_step(self, physics: mujoco.Physics) -> None:
         """Sees where the step led."""
-        self._end = physics.forward_position()
+        self._end = self._forward(physics)
         super().after_step(physics)
 
-    def get_reward(self, _physics: Physics) -> float:
+    def get_reward(self, _physics: mujoco.Physics) -> float:
         """Returns the forward speed over the last control step, m/s."""
         return (self._end - self._start) / self._robot.control_timestep
 
-    def get_observation(self, physics: Physics) -> "OrderedDict[str, FloatArray]":
+    def get_observation(self, physics: mujoco.Physics) -> "OrderedDict[str, FloatArray]":
         """Returns what the controller receives, and the rest of the state but for where it is."""
         readings = np.empty((1, len(self._robot.anatomy.sensors)))
         data = physics.data
@@ -130,11 +122,13 @@ class Walk(base.Task):
         )
         for signal in signals:
             observation[signal] = self.observe(physics, signal)
-        observation["base_height"] = data.qpos[2:3].copy()
+        observation["base_height"] = self.observe(physics, "base_position")[2:]
         return observation
 
-    def observe(self, physics: Physics, signal: Signal) -> FloatArray:
+    def observe(self, physics: mujoco.Physics, signal: Signal) -> FloatArray:
         """Returns a signal of the physics' state, ``(width,)``."""
-        place = self._places[signal]
-        row: FloatArray = getattr(physics.data, place.field)[place.columns].copy()
-        return row
+        return present(self._places[signal], physics.data)
+
+    def _forward(self, physics: mujoco.Physics) -> float:
+        """Where the root body is along the world's x axis, m."""
+        return float(self.observe(physics, "base_position")[0])

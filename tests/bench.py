@@ -31,6 +31,7 @@ class Bench(dm_env.Environment):
     def __init__(self, happens: dict[int, object] | None = None, last: int = 10**9) -> None:
         self.happens, self.last = happens or {}, last
         self.now, self.done = 100.0, []
+        self.step_number = 0
         self.commands: list[np.ndarray] = []
 
     def reset(self) -> dm_env.TimeStep:

@@ -15,6 +15,7 @@ from hypothesis import settings
 from selfmodel.controller import Controller, draw_weights
 from selfmodel.hypothesis import Hypothesis
 from selfmodel.notation import parse
+from selfmodel.oscillators import Oscillators
 from selfmodel.robot import Robot
 from selfmodel.simulator import Simulator
 from selfmodel.tasks import ROBOTS
@@ -53,6 +54,12 @@ def random_controllers(robot: Robot, count: int, seed: int = 0) -> list[Controll
     """Returns controllers with random weights for a robot."""
     genomes = draw_weights(np.random.default_rng(seed), (count, robot.network.weights))
     return [Controller(robot.network, genome) for genome in genomes]
+
+
+def random_oscillators(robot: Robot, count: int, seed: int = 0) -> list[Oscillators]:
+    """Returns oscillators with random genomes for a robot."""
+    genomes = draw_weights(np.random.default_rng(seed), (count, robot.cpg.weights))
+    return [Oscillators(robot.cpg, genome) for genome in genomes]
 
 
 def random_motion(robot: Robot, steps: int, seed: int = 0) -> np.ndarray:

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from selfmodel.behaviour import SIGNALS, Behaviour
-from selfmodel.comparators.arithmetic import command_errors
+from selfmodel.comparators.arithmetic import command_errors, command_spans
+from selfmodel.controller import Controller
 from selfmodel.notation import parse
 from selfmodel.physical import SimulatedRobot
 from selfmodel.playback import Playback
 from selfmodel.robot import Robot
 from selfmodel.trial import Plan, Trial
-from tests.conftest import random_controllers
+from tests.conftest import random_controllers, random_oscillators
 from tests.memory import MemoryJournal
 
 STEPS = 60
@@ -37,6 +38,39 @@ def test_a_controller_that_works_errs_by_exactly_nothing_whatever_else_is_wrong(
     one = trial(robot, truth.replace("front_left_knee", robot.anatomy.joints[0].name))
 
     assert np.array_equal(command_errors(one), np.zeros((STEPS, len(robot.anatomy.motors))))
+
+
+def rhythmic(robot: Robot, truth: str) -> Trial:
+    """A trial that oscillators drive."""
+    (driver,) = random_oscillators(robot, 1)
+    physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
+    return MemoryJournal(robot).record(physical, Plan("t", "after", driver, STEPS, 0))
+
+
+@pytest.mark.parametrize("truth", ["intact", "sensor:front_left_angle"])
+def test_oscillators_err_by_exactly_nothing_too(robot: Robot, truth: str):
+    assert not command_errors(rhythmic(robot, truth)).any()
+
+
+def test_oscillators_that_hear_other_readings_are_at_another_phase_from_then_on(quadruped: Robot):
+    one = rhythmic(quadruped, "intact")
+    readings = one.behaviour["sensors"].copy()
+    readings[30, 5] += 5
+    errors = command_errors(with_signals(one, sensors=readings))
+
+    assert not errors[:31].any()
+    assert errors[31:].all(axis=1).any()
+
+
+def test_a_motor_s_error_is_weighed_by_its_own_range(quadruped: Robot):
+    one = trial(quadruped)
+    network = quadruped.network
+    wide = dataclasses.replace(network, ranges=((0.0, np.pi / 2), *network.ranges[1:]))
+    driver = Controller(wide, one.plan.controller.genome)
+    other = dataclasses.replace(one, plan=dataclasses.replace(one.plan, controller=driver))
+
+    assert np.array_equal(command_spans(one), np.ones(8))
+    assert np.array_equal(command_spans(other), [2, *np.ones(7)])
 
 
 @pytest.mark.parametrize("neuron", [0, 1, 2])

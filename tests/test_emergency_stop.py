@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 from selfmodel.behaviour import Sample
+from selfmodel.environment_robot import EnvironmentRobot
 from selfmodel.errors import InputError, TrialError
 from selfmodel.limits import joint_limits, tilt_limit
 from selfmodel.logs import read_log
 from selfmodel.logs.verify import verify
 from selfmodel.logs.writer import write_trial
 from selfmodel.playback import Playback
+from selfmodel.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trial import Plan
 from tests.bench import (
@@ -61,7 +63,7 @@ EMERGENCIES: dict[str, tuple[dict[int, object], dict[str, object], type[BaseExce
         {7: observation(7, joint_positions=ANGLES + 3.0)},
         {"limits": [joint_limits(QUADRUPED, 0.1)]},
         TrialError,
-        "at step 7: front_left_shoulder is at 3.000 rad, beyond its range of",
+        "at step 7: front_left_shoulder is at 3.000, beyond its range of",
     ),
     "tilt": (
         {7: observation(7, base_orientation=leaning(1.2))},
@@ -173,6 +175,21 @@ def test_a_second_ctrl_c_does_not_keep_the_safe_command_from_the_robot():
     with pytest.raises(KeyboardInterrupt):
         driven(bench)
     assert sent == ["", "step"]
+
+
+def test_without_safe_targets_they_are_those_nearest_to_zero():
+    mjcf = QUADRUPED.mjcf.replace(
+        '<position name="front_left_shoulder"',
+        '<position ctrllimited="true" ctrlrange="0.25 0.75" name="front_left_shoulder"',
+    )
+    assert mjcf != QUADRUPED.mjcf
+    bench = Bench()
+    physical = EnvironmentRobot(
+        bench, Robot("raised", mjcf, QUADRUPED.control_timestep), clock=bench.clock
+    )
+    list(physical.run(CONTROLLER, 2))
+
+    assert bench.commands[-1].tolist() == [0.25, *[0.0] * (len(NAMES.motors) - 1)]
 
 
 def test_what_is_critical_may_be_missing_with_all_the_rest():

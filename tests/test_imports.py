@@ -66,7 +66,16 @@ LAYERS = (
             "anatomy",
             "controller",
         ),
-        *("settings", "memo", "evolution", "playback", "driver", "streams", "intervals"),
+        *(
+            "settings",
+            "memo",
+            "evolution",
+            "playback",
+            "oscillators",
+            "driver",
+            "streams",
+            "intervals",
+        ),
         *("workers", "grid", "stopwatch"),
     ),
     (
@@ -83,9 +92,11 @@ LAYERS = (
         "events",
     ),
     (
+        *("transmission", "couplings", "roots", "carried", "dissection", "activations"),
+        *("commands", "neurons"),
         *("embodiment", "robot", "places", "noise", "senses", "batches", "tally", "prediction"),
         *("gap", "instruments", "start", "debris", "structure", "contract_kind"),
-        *("simulator", "physical", "judge", "replay", "parameters", "disagreement"),
+        *("simulator", "physical", "judge", "replay", "poses", "parameters", "disagreement"),
         *("limits", "environment_robot"),
     ),
     (

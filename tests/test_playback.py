@@ -76,5 +76,5 @@ def test_robots_of_one_batch_are_driven_alike(quadruped: Robot):
     motors = quadruped.anatomy.motors
     (controller,) = random_controllers(quadruped, 1)
     mixed = [controller, Playback(motors, np.zeros((1, len(motors))))]
-    with pytest.raises(ValueError, match="got 1 controllers and 1 recordings"):
+    with pytest.raises(ValueError, match="got 1 networks, 0 sets of oscillators and 1 recordings"):
         drive(mixed, np.ones((2, 3)), sensors=8)

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from selfmodel.behaviour import SIGNALS, Behaviour
-from selfmodel.controller import Controller
+from selfmodel.driver import Driver
 from selfmodel.hypothesis import INTACT
 from selfmodel.logs import read_log
 from selfmodel.logs.robots import robot_of
 from selfmodel.logs.writer import write_trial
+from selfmodel.neurons import with_neurons
 from selfmodel.notation import parse
 from selfmodel.physical import SimulatedRobot
 from selfmodel.playback import Playback
@@ -20,12 +21,12 @@ from selfmodel.settings import Settings
 from selfmodel.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 from selfmodel.trial import Plan, Trial
-from tests.conftest import random_controllers
+from tests.conftest import random_controllers, random_oscillators
 
 STEPS = 1000
 
 
-def logged(folder: Path, robot: Robot, truth: str, driver: Controller | Playback) -> Path:
+def logged(folder: Path, robot: Robot, truth: str, driver: Driver) -> Path:
     """Logs a trial of a robot with something wrong."""
     plan = Plan("trial", "single", driver, STEPS, 0)
     samples = SimulatedRobot(robot, parse(truth, robot.anatomy)).run(driver, STEPS)
@@ -48,6 +49,31 @@ def test_every_case_replays_to_the_bit_from_its_log_alone(name: str, case: int, 
         assert found.identical
         assert found.first_divergence_step is None
         assert all(found.rms(signal) == 0 for signal in SIGNALS)
+
+
+@pytest.mark.parametrize("truth", ["intact", "break:front_left_knee+sensor:back_right_touch"])
+def test_a_trial_that_oscillators_drove_replays_to_the_bit(
+    robot: Robot, truth: str, tmp_path: Path
+):
+    (driver,) = random_oscillators(robot, 1)
+    log = read_log(logged(tmp_path, robot, truth, driver))
+    hypothesis = parse(truth, robot.anatomy)
+
+    assert log.trial.plan.controller == driver
+    assert replay(log.trial, hypothesis, Simulator(robot_of(log), 2)).identical
+
+
+def test_a_trial_of_a_larger_network_replays_to_the_bit_with_its_neurons(
+    quadruped: Robot, tmp_path: Path
+):
+    large = with_neurons(quadruped, 5)
+    (controller,) = random_controllers(large, 1)
+    log = read_log(logged(tmp_path, large, "neuron:4", controller))
+    robot = robot_of(log)
+
+    assert robot.anatomy.neurons == 5
+    assert replay(log.trial, parse("neuron:4", robot.anatomy), Simulator(robot, 1)).identical
+    assert not replay(log.trial, INTACT, Simulator(robot, 1)).identical
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray, frozen
 from selfmodel.behaviour import SIGNALS, Behaviour, Sample, Signal
-from selfmodel.controller import Controller
+from selfmodel.driver import Evolved
 from selfmodel.logs.records import Imported
 from selfmodel.logs.rosbag.bag import Source, open_bag
 from selfmodel.logs.rosbag.checks import check_columns, check_names, check_topics
@@ -117,7 +117,7 @@ def write_recording(
     robot: Robot,
     recording: Recording,
     mapping: BagMapping,
-    controller: Controller | None,
+    controller: Evolved | None,
 ) -> Path:
     """Writes a recording as a trial's log.
 

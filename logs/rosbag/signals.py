@@ -68,7 +68,7 @@ def sensor_signals(
     for column, sensor in enumerate(anatomy.sensors):
         if sensor.kind == "angle":
             angle = joint_positions[:, anatomy.hinges.index(sensor.hinge)]
-            readings[:, column] = angle / sensor.half_range
+            readings[:, column] = (angle - sensor.centre) / sensor.half_range
         elif sensor.name in tracks.touch:
             readings[:, column] = _at(tracks.touch[sensor.name], steps, hold)[:, 0]
     return {"sensors": readings}

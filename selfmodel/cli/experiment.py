@@ -10,7 +10,7 @@ from selfmodel.cli.fitting import fitted
 from selfmodel.cli.reality import draw_reality
 from selfmodel.cli.resolve import NEXT_TRIAL
 from selfmodel.comparator import Comparator
-from selfmodel.controller import Controller
+from selfmodel.driver import Design, Evolved
 from selfmodel.events import Event
 from selfmodel.faults import PAPER_KINDS, Kind, known
 from selfmodel.hypothesis import INTACT, Hypothesis
@@ -42,6 +42,7 @@ class Experiment:
         kinds: What a diagnosis considers.
         calibrated: Whether the self-model is fitted to the trials before the failure.
         next_trial: How each trial after the failing one is chosen, one of ``NEXT_TRIAL``.
+        design: The kind of controller to evolve; the robot's network if none is given.
     """
 
     robot: Robot
@@ -52,12 +53,13 @@ class Experiment:
     seed: int
     threads: int
     folder: Path
-    gait: Controller | None = None
+    gait: Evolved | None = None
     gap: float = 0.0
     structure: bool = False
     kinds: tuple[Kind, ...] = PAPER_KINDS
     calibrated: bool = True
     next_trial: str = "repair"
+    design: Design | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +102,7 @@ def run(experiment: Experiment, watch: Callable[[Event], None]) -> Outcome:
         seed=experiment.seed,
         watch=watch,
         gait=experiment.gait,
+        design=experiment.design,
         kinds=experiment.kinds,
         calibrate=partial(fitted, robot, threads=experiment.threads)
         if experiment.calibrated

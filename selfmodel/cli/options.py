@@ -75,6 +75,24 @@ KindNames = Annotated[
     ),
 ]
 DEFAULT_KINDS = ",".join(kind.name for kind in PAPER_KINDS)
+ControllerKind = Annotated[
+    str,
+    typer.Option(
+        "--controller",
+        metavar="network|cpg",
+        help="What is evolved: the paper's network, or a central pattern generator, one "
+        "oscillator a motor.",
+    ),
+]
+Neurons = Annotated[
+    int | None,
+    typer.Option(
+        min=1,
+        max=100,
+        help="Hidden neurons of the network.",
+        show_default="the robot's own, 3 for those that come with selfmodel",
+    ),
+]
 NextTrialName = Annotated[
     str,
     typer.Option(

@@ -9,11 +9,13 @@ from selfmodel.cli.options import (
     DEFAULT_KINDS,
     Calibrated,
     ComparatorName,
+    ControllerKind,
     Damage,
     GapLevel,
     Generations,
     Json,
     KindNames,
+    Neurons,
     NextTrialName,
     Population,
     RobotName,
@@ -37,6 +39,8 @@ def recover(
     structure: Structural = False,
     kinds: KindNames = DEFAULT_KINDS,
     next_trial: NextTrialName = "repair",
+    controller: ControllerKind = "network",
+    neurons: Neurons = None,
     seed: Seed = 0,
     trials: Annotated[
         int, typer.Option(min=1, max=99, help="Physical trials after the failing one.")
@@ -66,11 +70,14 @@ def recover(
     entry = resolve.robot_entry(robot)
     considered = resolve.kinds(kinds)
     damaged = resolve.case_notation(entry, case, damage)
-    made = entry.robot()
+    made = resolve.with_neurons(entry.robot(), neurons, controller)
+    design = resolve.design(controller, made)
+    truth = parse(damaged, made.anatomy, known(considered))
+    resolve.check_neurons(truth, design)
     experiment = Experiment(
         robot=made,
         case=case,
-        truth=parse(damaged, made.anatomy, known(considered)),
+        truth=truth,
         comparator=resolve.comparator(comparator),
         kinds=considered,
         calibrated=calibrate,
@@ -81,6 +88,7 @@ def recover(
         gap=gap,
         structure=structure,
         next_trial=resolve.next_trial(next_trial),
+        design=design,
     )
     try:
         with display() as watch:

@@ -3,21 +3,33 @@
 import hashlib
 import importlib
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from operator import attrgetter
 from pathlib import Path
 from types import MappingProxyType
 
+from selfmodel.behaviour import Names
 from selfmodel.comparator import Comparator
 from selfmodel.comparators import COMPARATORS
 from selfmodel.controller import Controller, Network
+from selfmodel.driver import Design, Driver, Evolved
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.faults import ALL_KINDS, KINDS, Kind
+from selfmodel.faults.neuron import SILENT_NEURON
+from selfmodel.hypothesis import Hypothesis
 from selfmodel.logs import LogError, TrialLog, load_controller, read_log
 from selfmodel.logs.files import read_bounded
 from selfmodel.logs.robots import described_difference, the_robot_of
+from selfmodel.neurons import with_neurons as neurons_in
 from selfmodel.next_trial import NextTrial, by_disagreement, by_repair
+from selfmodel.playback import Playback
 from selfmodel.robot import Robot
 from selfmodel.tasks import ROBOTS, Entry
+
+DESIGNS: Mapping[str, Callable[[Robot], Design]] = MappingProxyType(
+    {"network": attrgetter("network"), "cpg": attrgetter("cpg")}
+)
+"""The kinds of controller that a repair EA can evolve."""
 
 NEXT_TRIAL: Mapping[str, NextTrial] = MappingProxyType(
     {"repair": by_repair, "disagreement": by_disagreement}
@@ -139,7 +151,47 @@ def _plugged_in(what: str, name: str, known: Iterable[str]) -> object:
         ) from error
 
 
-def controller(path: Path, network: Network) -> Controller:
+def design(name: str, robot: Robot) -> Design:
+    """Returns the kind of controller of that name, for a robot.
+
+    Raises:
+        InputError: There is no such kind, or a motor does not say what it may be commanded.
+    """
+    if name not in DESIGNS:
+        raise unknown_name("kind of controller", name, DESIGNS)
+    return DESIGNS[name](robot)
+
+
+def with_neurons(robot: Robot, neurons: int | None, design: str) -> Robot:
+    """Returns the robot with that many hidden neurons, or as it is where none are asked for.
+
+    Raises:
+        InputError: They are too many or none, or its controller is to be of a kind without them.
+    """
+    if neurons is None:
+        return robot
+    if design != "network":
+        raise InputError(f"--neurons {neurons} is of a network: leave it out with {design!r}")
+    return neurons_in(robot, neurons)
+
+
+def check_neurons(truth: Hypothesis, driver: Design | Driver) -> None:
+    """Checks that what drives a robot has neurons where one of them is to be silent.
+
+    Raises:
+        InputError: It has none.
+    """
+    if isinstance(driver, Network | Controller):
+        return
+    for fault in truth.faults:
+        if fault.kind is SILENT_NEURON:
+            raise InputError(
+                f"{fault} means nothing to a robot that oscillators drive, which have no hidden "
+                f"neurons: leave it out, or drive the robot with a network"
+            )
+
+
+def controller(path: Path, robot: Robot) -> Evolved:
     """Returns the controller in a ``.npz`` file or in a trial's log.
 
     Raises:
@@ -153,22 +205,33 @@ def controller(path: Path, network: Network) -> Controller:
         )
     except LogError as error:
         raise InputError(str(error)) from error
-    if not isinstance(loaded, Controller):
+    if isinstance(loaded, Playback):
         raise InputError(
             f"{path} has no controller, only the commands that were recorded: give the log of a "
             f"robot that selfmodel drove, or a .npz"
         )
-    if loaded.network != network:
+    needed = _described(
+        robot.anatomy.names,
+        f"with {robot.anatomy.neurons} hidden neurons"
+        if isinstance(loaded, Controller)
+        else f"every {robot.control_timestep:g} s",
+    )
+    found = _described(
+        loaded.design,
+        f"with {loaded.network.hidden} hidden neurons"
+        if isinstance(loaded, Controller)
+        else f"every {loaded.cpg.timestep:g} s",
+    )
+    if found != needed:
         raise InputError(
-            f"{path} has a controller for {_described(loaded.network)}; this robot needs one for "
-            f"{_described(network)}: give one that was made for it"
+            f"{path} has a controller for {found}; this robot needs one for {needed}: give one "
+            f"that was made for it"
         )
     return loaded
 
 
-def _described(network: Network) -> str:
-    sensors, motors = ", ".join(network.sensors), ", ".join(network.motors)
-    return f"the sensors {sensors}, the motors {motors}, with {network.hidden} hidden neurons"
+def _described(ends: Design | Names, more: str) -> str:
+    return f"the sensors {', '.join(ends.sensors)}, the motors {', '.join(ends.motors)}, {more}"
 
 
 def logs(paths: Sequence[Path]) -> list[TrialLog]:

@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -10,11 +10,15 @@ from selfmodel.cli.options import (
     Damage,
     GapLevel,
     Json,
+    Neurons,
     RobotName,
     Seed,
     Structural,
     check_log_name,
 )
+
+if TYPE_CHECKING:
+    from selfmodel.driver import Evolved
 
 
 def trial(
@@ -30,10 +34,12 @@ def trial(
     controller: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE.npz|LOG.mcap",
-            help="Whose controller drives the robot; without it, a random one from the seed.",
+            metavar="FILE.npz|LOG.mcap|network|cpg",
+            help="Whose controller drives the robot, or the kind of a random one from the seed.",
+            show_default="network",
         ),
     ] = None,
+    neurons: Neurons = None,
     gap: GapLevel = 0.0,
     structure: Structural = False,
     seed: Seed = 0,
@@ -45,22 +51,27 @@ def trial(
 
     from selfmodel.cli import resolve  # noqa: PLC0415
     from selfmodel.cli.reality import draw_reality  # noqa: PLC0415
-    from selfmodel.controller import Controller, draw_weights  # noqa: PLC0415
+    from selfmodel.controller import draw_weights  # noqa: PLC0415
     from selfmodel.logs import read_log  # noqa: PLC0415
     from selfmodel.logs.writer import write_trial  # noqa: PLC0415
     from selfmodel.notation import parse  # noqa: PLC0415
     from selfmodel.settings import Settings  # noqa: PLC0415
     from selfmodel.trial import Plan  # noqa: PLC0415
 
-    made = resolve.robot_entry(robot).robot()
+    kind = "network" if controller is None else str(controller)
+    made = resolve.with_neurons(
+        resolve.robot_entry(robot).robot(), neurons, "cpg" if kind == "cpg" else "network"
+    )
     check_log_name(out)
     hidden = parse("intact" if damage is None else damage, made.anatomy)
     reality = draw_reality(made, seed, gap, structure=structure)
-    if controller:
-        driver = resolve.controller(controller, made.network)
+    driver: Evolved
+    if kind in resolve.DESIGNS:
+        design = resolve.design(kind, made)
+        driver = design.controller(draw_weights(np.random.default_rng(seed), (design.weights,)))
     else:
-        rng = np.random.default_rng(seed)
-        driver = Controller(made.network, draw_weights(rng, (made.network.weights,)))
+        driver = resolve.controller(Path(kind), made)
+    resolve.check_neurons(hidden, driver)
     settings = Settings()
     plan = Plan("trial", "single", driver, settings.steps, seed)
     samples = reality.robot(made, hidden).run(driver, settings.steps)

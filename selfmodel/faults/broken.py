@@ -3,8 +3,8 @@
 from typing import TYPE_CHECKING
 
 from selfmodel.anatomy import Anatomy
-from selfmodel.faults.joints import joints
 from selfmodel.faults.kind import Fault, Kind
+from selfmodel.faults.motor import WEAK_MOTOR
 
 if TYPE_CHECKING:
     from selfmodel.embodiment import Embodiment
@@ -24,7 +24,17 @@ def _absorbs(fault: Fault, other: Fault, anatomy: Anatomy) -> bool:
     """Whatever is wrong with a part that fell off no longer matters."""
     if other.part == fault.part:
         return other.kind != fault.kind
-    return other.part in anatomy.joint(fault.part).lost
+    broken = anatomy.joint(fault.part)
+    if other.kind == WEAK_MOTOR and broken.slack.issuperset(anatomy.joint(other.part).motors):
+        return True
+    return other.part in broken.lost
 
 
-BROKEN = Kind(name="break", word="break", parts=joints, strike=_strike, absorbs=_absorbs)
+def _joints_with_limbs(anatomy: Anatomy) -> tuple[str, ...]:
+    """A body without a name cannot be told from others."""
+    return tuple(joint.name for joint in anatomy.joints if "" not in joint.bodies)
+
+
+BROKEN = Kind(
+    name="break", word="break", parts=_joints_with_limbs, strike=_strike, absorbs=_absorbs
+)

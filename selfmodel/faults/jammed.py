@@ -1,8 +1,12 @@
-"""A jammed joint: it is held rigidly, at 0 or at an angle."""
+"""A jammed joint: it is held rigidly, at 0 or at an angle.
 
+A hinge that cannot be at 0 is held at the end of its range that is nearest.
+"""
+
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from selfmodel.anatomy import Anatomy
+from selfmodel.anatomy import Anatomy, Joint
 from selfmodel.faults.joints import joints
 from selfmodel.faults.kind import Fault, Kind
 from selfmodel.faults.motor import WEAK_MOTOR
@@ -15,30 +19,55 @@ LEVELS = 12
 """Angles that a genome proposes, evenly inside the joint's range: 0.09 rad apart for 60 degrees."""
 
 
-def _strike(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+def _strike_at_zero(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
     joint = anatomy.joint(fault.part)
-    for hinge in joint.hinges:
-        embodiment.hold_hinge(hinge, fault.degree)
-    for motor in joint.motors:
-        embodiment.release_motor(anatomy.motors.index(motor))
+    _hold(embodiment, anatomy, _nearest_to_zero(joint))
+
+
+def _strike_at_angle(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+    hinges = anatomy.joint(fault.part).hinges
+    _hold(embodiment, anatomy, dict.fromkeys(hinges, fault.degree))
+
+
+def _hold(embodiment: "Embodiment", anatomy: Anatomy, angles: Mapping[str, float]) -> None:
+    for hinge, angle in angles.items():
+        embodiment.hold_hinge(hinge, angle)
     for column, sensor in enumerate(anatomy.sensors):
-        if sensor.hinge in joint.hinges:
-            embodiment.fix_reading(column, fault.degree / sensor.half_range)
+        if sensor.hinge in angles:
+            embodiment.fix_reading(column, sensor.reading(angles[sensor.hinge]))
+
+
+def _nearest_to_zero(joint: Joint) -> dict[str, float]:
+    return {
+        hinge: min(max(low, 0.0), high)
+        for hinge, (low, high) in zip(joint.hinges, joint.limits, strict=True)
+    }
 
 
 def _absorbs_at_zero(fault: Fault, other: Fault, anatomy: Anatomy) -> bool:
-    """A sensor of a joint held at 0 reads 0; so does a failed one, and any multiple of it is 0.
+    """A sensor that reads 0 of a held joint might have failed, and any multiple of 0 is 0.
 
     Of a joint that is said to be held at 0 and at another angle, 0 counts.
     """
     if other.kind in (FAILED_SENSOR, SENSOR_GAIN):
-        return anatomy.sensor(other.part).hinge in anatomy.joint(fault.part).hinges
-    return other.part == fault.part and other.kind in (WEAK_MOTOR, JAMMED_AT_ANGLE)
+        sensor, angles = anatomy.sensor(other.part), _nearest_to_zero(anatomy.joint(fault.part))
+        return sensor.hinge in angles and sensor.reading(angles[sensor.hinge]) == 0
+    if other.part == fault.part and other.kind == JAMMED_AT_ANGLE:
+        return True
+    return _absorbs_motor(fault, other, anatomy)
 
 
-def _absorbs_at_angle(fault: Fault, other: Fault, _anatomy: Anatomy) -> bool:
-    """A joint that nothing turns is not turned by its motor either."""
-    return other.part == fault.part and other.kind == WEAK_MOTOR
+def _absorbs_motor(fault: Fault, other: Fault, anatomy: Anatomy) -> bool:
+    """A joint that nothing turns is not turned by its motors either."""
+    if other.part != fault.part or other.kind != WEAK_MOTOR:
+        return False
+    joint = anatomy.joint(fault.part)
+    return joint.idle.issuperset(joint.motors)
+
+
+def _joints_with_angles(anatomy: Anatomy) -> tuple[str, ...]:
+    """Those whose hinges can all be at one angle that is not the nearest to 0."""
+    return tuple(joint.name for joint in anatomy.joints if _levels(anatomy, joint.name))
 
 
 def _degrees(anatomy: Anatomy, part: str) -> tuple[float, float]:
@@ -48,18 +77,22 @@ def _degrees(anatomy: Anatomy, part: str) -> tuple[float, float]:
 
 def _levels(anatomy: Anatomy, part: str) -> tuple[float, ...]:
     low, high = _degrees(anatomy, part)
+    if low >= high:
+        return ()
     angles = (low + (high - low) * (k + 0.5) / LEVELS for k in range(LEVELS))
     return tuple(dict.fromkeys(round(angle, 3) + 0.0 for angle in angles if round(angle, 3)))
 
 
-JAMMED = Kind(name="jam", word="jam", parts=joints, strike=_strike, absorbs=_absorbs_at_zero)
+JAMMED = Kind(
+    name="jam", word="jam", parts=joints, strike=_strike_at_zero, absorbs=_absorbs_at_zero
+)
 
 JAMMED_AT_ANGLE = Kind(
     name="jam-angle",
     word="jam",
-    parts=joints,
-    strike=_strike,
-    absorbs=_absorbs_at_angle,
+    parts=_joints_with_angles,
+    strike=_strike_at_angle,
+    absorbs=_absorbs_motor,
     degrees=_degrees,
     levels=_levels,
     special={0.0: JAMMED},

@@ -3,7 +3,6 @@
 from typing import TYPE_CHECKING
 
 from selfmodel.anatomy import Anatomy
-from selfmodel.faults.joints import joints
 from selfmodel.faults.kind import Fault, Kind, between, grid
 
 if TYPE_CHECKING:
@@ -15,10 +14,15 @@ def _strike(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
         embodiment.weaken_motor(anatomy.motors.index(motor), fault.degree)
 
 
+def _joints_with_motors(anatomy: Anatomy) -> tuple[str, ...]:
+    """One motor may move several joints through a tendon, and counts to the first."""
+    return tuple(joint.name for joint in anatomy.joints if joint.motors)
+
+
 WEAK_MOTOR = Kind(
     name="motor",
     word="motor",
-    parts=joints,
+    parts=_joints_with_motors,
     strike=_strike,
     degrees=between(0.0, 1.0),
     levels=grid(0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9),

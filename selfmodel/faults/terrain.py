@@ -23,6 +23,9 @@ CELL = 0.1
 BUMP = 3
 """Cells between two heights that are drawn; those between are interpolated."""
 
+TERRAIN = "selfmodel_terrain"
+"""What the field is called in a model."""
+
 FLAT, LEVEL_OFF = 0.8, 0.4
 """Around the start the ground is flat up to this distance, and rises to its full roughness within
 the other, m: no robot starts inside it."""
@@ -62,7 +65,7 @@ def _reshape(spec: "MjSpec", fault: Fault, seed: int) -> None:
     heights = fault.degree * unit_heights(seed)
     low, high = float(heights.min()), float(heights.max())
     spec.add_hfield(
-        name="terrain",
+        name=TERRAIN,
         nrow=heights.shape[0],
         ncol=heights.shape[1],
         # The last is how thick the ground is below its lowest point.
@@ -71,8 +74,9 @@ def _reshape(spec: "MjSpec", fault: Fault, seed: int) -> None:
     )
     for plane in planes:
         plane.type = mujoco.mjtGeom.mjGEOM_HFIELD
-        plane.hfieldname = "terrain"
-        plane.pos = [plane.pos[0], plane.pos[1], plane.pos[2] + low]
+        plane.hfieldname = TERRAIN
+        # A plane has no end, wherever its middle is; a field is where the robot starts.
+        plane.pos = [0.0, 0.0, plane.pos[2] + low]
 
 
 def _strike(_embodiment: "Embodiment", _anatomy: Anatomy, _fault: Fault) -> None:

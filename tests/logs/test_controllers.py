@@ -1,4 +1,5 @@
 import contextlib
+import hashlib
 import io
 import zipfile
 from pathlib import Path
@@ -9,11 +10,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from selfmodel.controller import Controller, Network, draw_weights
+from selfmodel.driver import Design
 from selfmodel.errors import InputError
 from selfmodel.logs import load_controller, save_controller
 from selfmodel.logs.controllers import LARGEST, controller_bytes, parse_controller
+from selfmodel.oscillators import Cpg
 
 PARTS = st.lists(st.text("abc_é", min_size=1, max_size=5), max_size=5).map(tuple)
+
+
+CPG = Cpg(("touch", "angle"), ("hip", "knee"), 0.02)
 
 
 def controller() -> Controller:
@@ -36,16 +42,51 @@ def archive(**replaced: object) -> bytes:
     return file.getvalue()
 
 
-@given(sensors=PARTS, motors=PARTS, hidden=st.integers(0, 4), seed=st.integers(0, 99))
-def test_a_controller_comes_back_equal(
-    sensors: tuple[str, ...], motors: tuple[str, ...], hidden: int, seed: int
-):
-    network = Network(sensors, motors, hidden)
-    genome = draw_weights(np.random.default_rng(seed), (network.weights,))
-    before = Controller(network, genome)
+def oscillators(**replaced: object) -> bytes:
+    """The bytes of a file of oscillators with some of its arrays replaced."""
+    own = {"kind": np.array("cpg"), "hidden": None, "timestep": np.array(0.02)}
+    return archive(**own | {"genome": np.zeros(9)} | replaced)
+
+
+RANGE = st.tuples(st.floats(-1e3, 1e3), st.floats(1e-3, 1e3))
+
+
+@st.composite
+def designs(draw: st.DrawFn) -> Design:
+    """Networks and oscillators of any size, with the paper's command ranges or others."""
+    sensors, motors = draw(PARTS), draw(PARTS)
+    some = st.lists(RANGE, min_size=len(motors), max_size=len(motors)).map(tuple)
+    ranges = draw(st.just(()) | some)
+    return draw(
+        st.builds(Network, st.just(sensors), st.just(motors), st.integers(0, 4), st.just(ranges))
+        | st.builds(Cpg, st.just(sensors), st.just(motors), st.floats(1e-4, 1), st.just(ranges))
+    )
+
+
+@given(design=designs(), seed=st.integers(0, 99))
+def test_a_controller_comes_back_equal(design: Design, seed: int):
+    before = design.controller(draw_weights(np.random.default_rng(seed), (design.weights,)))
     data = controller_bytes(before)
     assert parse_controller(data, "here") == before
     assert controller_bytes(parse_controller(data, "here")) == data
+
+
+def test_a_file_of_the_paper_s_ranges_has_the_bytes_that_it_always_had():
+    plain = Network(("touch", "angle"), ("hip", "knee"), 3, ((0.0, np.pi / 4),) * 2)
+    with zipfile.ZipFile(io.BytesIO(controller_bytes(controller()))) as file:
+        names = [info.filename for info in file.infolist()]
+    digest = hashlib.sha256(controller_bytes(controller())).hexdigest()
+
+    assert names == ["kind.npy", "sensors.npy", "motors.npy", "hidden.npy", "genome.npy"]
+    assert digest == "d63d2b7afbe6bd76c61499b9508b9c27fad4ce6aacdb7f758d6feb48977c7637"
+    assert controller().network == plain
+
+
+def test_a_controller_says_of_which_kind_it_is():
+    for design, kind in ((controller().network, "network"), (CPG, "cpg")):
+        data = controller_bytes(design.controller(np.zeros(design.weights)))
+        with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+            assert str(arrays["kind"]) == kind
 
 
 def test_a_controller_comes_back_from_a_file_that_any_numpy_reads(tmp_path: Path):
@@ -70,7 +111,7 @@ def test_equal_controllers_give_equal_bytes_at_any_time():
         (b"PK not a zip", "expected a controller"),
         (archive(genome=None), "it holds hidden.npy, kind.npy"),
         (archive(extra=np.zeros(1)), "it holds extra.npy"),
-        (archive(kind=np.array("tree")), "expected the kind 'network', got 'tree'"),
+        (archive(kind=np.array("tree")), "expected the kind 'network' or 'cpg', got 'tree'"),
         (archive(genome=np.zeros(9)), "got a genome of shape"),
         (archive(genome=np.full(26, 2.0)), "every weight must lie in"),
         (archive(genome=np.full(26, np.nan)), "every weight must lie in"),
@@ -80,6 +121,18 @@ def test_equal_controllers_give_equal_bytes_at_any_time():
         (archive(hidden=np.array(-3)), "got a genome of shape"),
         (archive(sensors=np.array([None, "x"])), "does not fit its size"),
         (archive(genome=np.zeros(LARGEST)), "1048576 bytes"),
+        (archive(ranges=np.ones((1, 2))), "2 motors need a command range each, got 1"),
+        (archive(ranges=np.ones((2, 3))), "too many values to unpack"),
+        (archive(ranges=np.ones(2)), "its arrays have the ranks"),
+        (archive(ranges=np.ones((2, 2), np.float32)), "its ranges is float32, expected float64"),
+        (archive(ranges=np.full((2, 2), np.nan)), "needs a finite command range"),
+        (archive(ranges=np.zeros((2, 2))), "needs a finite command range of some width"),
+        (archive(kind=np.array("cpg")), "it holds genome.npy, hidden.npy"),
+        (oscillators(timestep=np.array(0.0)), "time step must be above 0 s"),
+        (oscillators(timestep=np.array(np.inf)), "time step must be above 0 s"),
+        (oscillators(timestep=np.array(1)), "its arrays have the types"),
+        (oscillators(genome=np.zeros(8)), "have 9 values, got a genome of shape"),
+        (oscillators(genome=np.full(9, np.nan)), "must lie in"),
     ],
 )
 def test_what_is_no_controller_is_refused(tmp_path: Path, data: bytes, match: str):
@@ -110,8 +163,11 @@ def test_a_bomb_is_not_unpacked():
         parse_controller(file.getvalue(), "here")
 
 
-def test_no_damage_to_a_controller_raises_anything_else():
-    good, rng = controller_bytes(controller()), np.random.default_rng(3)
+@pytest.mark.parametrize("kind", ["network", "cpg"])
+def test_no_damage_to_a_controller_raises_anything_else(kind: str):
+    design = {"network": controller().network, "cpg": CPG}[kind]
+    good = controller_bytes(design.controller(np.zeros(design.weights)))
+    rng = np.random.default_rng(3)
     for _ in range(1000):
         damaged = bytearray(good)
         for _ in range(rng.integers(1, 4)):

@@ -10,7 +10,7 @@ from selfmodel import __version__
 from selfmodel.atomic import put
 from selfmodel.cli import resolve
 from selfmodel.cli.ablation.plan import Ablation, Cell, model_digest
-from selfmodel.controller import Controller
+from selfmodel.driver import Evolved
 from selfmodel.grid import GridBegins, Job, PartEnds, run_grid
 from selfmodel.hypothesis import INTACT
 from selfmodel.logs.controllers import controller_bytes
@@ -63,15 +63,13 @@ def folder(ablation: Ablation) -> Path:
     return ablation.folder / "bank" if ablation.bank is None else ablation.bank
 
 
-def gait(bank: Path, robot: str, number: int) -> Controller:
+def gait(bank: Path, robot: str, number: int) -> Evolved:
     """Returns a gait of the bank.
 
     Raises:
         InputError: There is none, or it is for another robot.
     """
-    return resolve.controller(
-        _path(bank, robot, number), resolve.robot_entry(robot).robot().network
-    )
+    return resolve.controller(_path(bank, robot, number), resolve.robot_entry(robot).robot())
 
 
 def digests(bank: Path, cell: Cell, settings: Settings) -> list[str] | None:

@@ -10,7 +10,7 @@ from selfmodel.calibrate import calibrate
 from selfmodel.cli.ablation.plan import HEALTHY_TRIALS, Spec
 from selfmodel.cli.reality import draw_reality
 from selfmodel.comparator import Comparator
-from selfmodel.controller import Controller
+from selfmodel.driver import Evolved
 from selfmodel.hypothesis import INTACT, Hypothesis
 from selfmodel.logs.reader import read_log
 from selfmodel.logs.writer import write_trial
@@ -37,7 +37,7 @@ class Setting:
     name: str
     robot: Robot
     truth: Hypothesis
-    gaits: tuple[Controller, ...]
+    gaits: tuple[Evolved, ...]
     folder: Path
 
 
@@ -49,7 +49,7 @@ def before_failure(setting: Setting) -> list[Trial]:
     ]
 
 
-def after_failure(setting: Setting, number: int, controller: Controller) -> Trial:
+def after_failure(setting: Setting, number: int, controller: Evolved) -> Trial:
     """Returns the trial of that number, from 0, of the damaged robot; see ``before_failure``."""
     return _trial(setting, HEALTHY_TRIALS + number, "after", controller)
 
@@ -65,7 +65,7 @@ def calibrated_robot(setting: Setting, intact: Sequence[Trial]) -> Robot:
     return dataclasses.replace(robot, mjcf=path.read_text(encoding="utf-8"))
 
 
-def _trial(setting: Setting, number: int, stage: Stage, gait: Controller) -> Trial:
+def _trial(setting: Setting, number: int, stage: Stage, gait: Evolved) -> Trial:
     """The trial as its log says it; run if there is no log yet."""
     steps, seed = setting.spec.settings.steps, setting.spec.cell.seed
     plan = Plan(f"{number:02d}-{stage}", stage, gait, steps, seed)

@@ -11,7 +11,7 @@ from selfmodel.cli.plain import plain
 from selfmodel.errors import InputError
 
 if TYPE_CHECKING:
-    from selfmodel.controller import Controller
+    from selfmodel.driver import Evolved
     from selfmodel.logs.rosbag.importer import Recording
     from selfmodel.logs.rosbag.mapping import BagMapping
     from selfmodel.robot import Robot
@@ -129,13 +129,13 @@ def _mapped_robot(mapping: "BagMapping", folder: Path) -> "Robot":
         raise mapping.document.error(("robot",), str(error)) from error
 
 
-def _controller(mapping: "BagMapping", folder: Path, robot: "Robot") -> "Controller | None":
+def _controller(mapping: "BagMapping", folder: Path, robot: "Robot") -> "Evolved | None":
     from selfmodel.cli import resolve  # noqa: PLC0415
 
     if mapping.controller is None:
         return None
     try:
-        return resolve.controller(folder / mapping.controller, robot.network)
+        return resolve.controller(folder / mapping.controller, robot)
     except InputError as error:
         raise mapping.document.error(("controller",), str(error)) from error
 

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.controller import Controller, Population
+from selfmodel.driver import Evolved, drive
 from selfmodel.hypothesis import Hypothesis
 from selfmodel.places import places
 from selfmodel.robot import Robot
@@ -27,9 +27,7 @@ BEFORE, AFTER = 0.1, 0.05
 and after the trial, while the controller goes on."""
 
 
-def record(
-    folder: Path, robot: Robot, hidden: Hypothesis, controller: Controller, steps: int
-) -> Path:
+def record(folder: Path, robot: Robot, hidden: Hypothesis, controller: Evolved, steps: int) -> Path:
     """Drives a robot and writes the bag: joints at 200 Hz, odometry at 50, the rest at its own.
 
     Args:
@@ -65,12 +63,12 @@ def mapping(robot: Robot, steps: int, controller: str | None) -> str:
     )
 
 
-def _driven(robot: Robot, hidden: Hypothesis, controller: Controller, steps: int) -> Iterator[Item]:
+def _driven(robot: Robot, hidden: Hypothesis, controller: Evolved, steps: int) -> Iterator[Item]:
     embodiment = robot.build(hidden)
     model, data = embodiment.model, mujoco.MjData(embodiment.model)
     mujoco.mj_forward(model, data)
     senses = Senses(model, robot.anatomy, [embodiment])
-    brain = Population([controller], embodiment.neurons[np.newaxis])
+    brain = drive([controller], embodiment.neurons[np.newaxis], len(robot.anatomy.sensors))
     where = places(robot)
     states: list[dict[str, FloatArray]] = []
 
