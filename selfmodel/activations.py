@@ -59,6 +59,28 @@ def starting_activations(robot: Robot, segments: Segments, delay: int) -> FloatA
     return found
 
 
+def activations_of(robot: Robot, commands: FloatArray) -> FloatArray:
+    """Returns the activations in a run that shows all commands since rest.
+
+    Args:
+        robot: The robot with nothing wrong.
+        commands: As the motors got them, ``(steps, motors)``.
+
+    Returns:
+        ``(steps, na)``, in each row those with which its command was given.
+    """
+    model = robot.model
+    motors: IndexArray = np.flatnonzero(model.actuator_dyntype != mujoco.mjtDyn.mjDYN_NONE)
+    found = np.zeros((len(commands), model.na))
+    if not len(motors):
+        return found
+    follow, state = _Follower(robot, motors), np.zeros(len(motors))
+    for row, command in zip(found[1:], commands[:, motors], strict=False):  # the last has no row
+        state = follow.after(state, command)
+        row[model.actuator_actadr[motors]] = state
+    return found
+
+
 class _Follower:
     """How the activations of some motors change over a control step.
 

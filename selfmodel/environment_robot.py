@@ -71,6 +71,8 @@ class EnvironmentRobot:
         critical: Signals of which no number may be NaN in an observation that came.
         patience: Steps in a row for which a reading may be missing.
         tolerance: By how much of a control time step a step may be late.
+        neurons: 1 for each hidden neuron of the controller that works, 0 for a silent one,
+            ``(hidden,)``; all work if not given.
         clock: Tells the time, s; it never goes back. The environment's observations may tell it
             better, as ``time``.
 
@@ -91,6 +93,7 @@ class EnvironmentRobot:
         critical: Sequence[Signal] = (),
         patience: int = 5,
         tolerance: float = 0.25,
+        neurons: FloatArray | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         motors = (len(robot.anatomy.motors),)
@@ -108,6 +111,7 @@ class EnvironmentRobot:
         self._halt = stop or (lambda: env.step(targets.copy()))
         self._limits, self._critical = tuple(limits), tuple(critical)
         self._patience, self._tolerance = patience, tolerance
+        self._neurons = np.ones(robot.anatomy.neurons) if neurons is None else np.array(neurons)
         self.clock = clock
 
     def run(self, controller: Driver, steps: int) -> Iterator[Sample]:
@@ -146,7 +150,7 @@ class EnvironmentRobot:
     def _steps(self, controller: Driver, steps: int) -> Iterator[Sample]:
         robot = self._robot
         names, timestep = robot.anatomy.names, robot.control_timestep
-        brain = drive([controller], np.ones((1, robot.anatomy.neurons)), len(names.sensors))
+        brain = drive([controller], self._neurons[np.newaxis], len(names.sensors))
         commands = np.zeros((1, len(names.motors)))
         silent = np.zeros(len(names.sensors), dtype=np.intp)
         reads = not isinstance(controller, Playback)

@@ -16,6 +16,7 @@ from selfmodel.hypothesis import INTACT, Hypothesis
 from selfmodel.next_trial import NextTrial, Situation, by_repair
 from selfmodel.physical import PhysicalRobot
 from selfmodel.repair import Repair
+from selfmodel.score import DISPLACEMENT, Score
 from selfmodel.settings import Settings
 from selfmodel.simulator import Simulator
 from selfmodel.streams import choice_stream, diagnosis_stream, repair_stream
@@ -75,6 +76,7 @@ def recover(
     kinds: Sequence[Kind] = PAPER_KINDS,
     calibrate: Callable[[Sequence[Trial]], Calibration] | None = None,
     next_trial: NextTrial = by_repair,
+    score: Score = DISPLACEMENT,
 ) -> Recovery:
     """Lets a robot walk until it fails, then finds out what is wrong and how it walks again.
 
@@ -94,13 +96,14 @@ def recover(
         calibrate: Fits the self-model to the trials before the failure; without it, the self-model
             stays as it is.
         next_trial: Chooses the controller of each trial after the failing one.
+        score: What controllers are evolved for.
 
     Returns:
         What the journal says at the end.
     """
     # As the robot's own model says: a fitted one is written with fewer digits.
     design = simulator.robot.network if design is None else design
-    repair = Repair(simulator, settings, design)
+    repair = Repair(simulator, settings, design, score=score)
     tried: list[Hypothesis] = []
 
     def evolve_controller(hypothesis: Hypothesis) -> Evolved:
@@ -132,7 +135,7 @@ def recover(
         watch(calibration.summary)
         if calibration.robot is not simulator.robot:
             simulator = Simulator(calibration.robot, simulator.threads, simulator.tally)
-            repair = Repair(simulator, settings, design, repair.evaluations)
+            repair = Repair(simulator, settings, design, repair.evaluations, score)
     diagnose = Diagnose(simulator, comparator, settings, kinds, intact=intact)
     act(damaged, "after", INTACT, gait)
     for trials_left in range(settings.trials, 0, -1):

@@ -5,12 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.behaviour import forward_displacement
+from selfmodel.behaviour import Behaviour
 from selfmodel.controller import draw_weights
 from selfmodel.driver import Design, Evolved
 from selfmodel.evolution import Evolution, Observe, evolve
 from selfmodel.hypothesis import Hypothesis
 from selfmodel.memo import Memo
+from selfmodel.score import DISPLACEMENT, Score
 from selfmodel.settings import Settings
 from selfmodel.simulator import Run, Simulator
 
@@ -18,7 +19,7 @@ from selfmodel.simulator import Run, Simulator
 class Repair:
     """Evolves controllers in simulation; it remembers the fitness of every run.
 
-    Fitness is the forward displacement in metres. Source: the paper, section III.
+    Fitness is the forward displacement in metres, or another score. Source: the paper, section III.
 
     Args:
         simulator: The self-model.
@@ -26,6 +27,7 @@ class Repair:
         design: The kind of controller to evolve; the paper's network for the simulator's robot if
             none is given.
         evaluations: Controllers that were asked about before.
+        score: The fitness.
     """
 
     def __init__(
@@ -34,11 +36,13 @@ class Repair:
         settings: Settings,
         design: Design | None = None,
         evaluations: int = 0,
+        score: Score = DISPLACEMENT,
     ) -> None:
         self._simulator = simulator
         self._settings = settings
         self._design = simulator.robot.network if design is None else design
         self._fitness: Memo[Run] = Memo()
+        self._score = score
         self.evaluations = evaluations
 
     def __call__(
@@ -75,5 +79,12 @@ class Repair:
         return design.controller(search.best)
 
     def _simulate(self, runs: list[Run]) -> FloatArray:
-        outcome = self._simulator.run(runs, self._settings.steps, ("base_position",))
-        return np.where(outcome.diverged, -np.inf, forward_displacement(outcome.behaviour))
+        """The fitness of runs with one hypothesis; the worst for those that diverge."""
+        outcome = self._simulator.run(runs, self._settings.steps, self._score.record)
+        fitness, sound = np.full(len(runs), -np.inf), ~outcome.diverged
+        if sound.any():
+            all_of = outcome.behaviour
+            signals = {signal: values[sound] for signal, values in all_of.signals.items()}
+            behaviour = Behaviour(all_of.names, all_of.time, signals)
+            fitness[sound] = self._score.of(self._simulator.robot, runs[0][0], behaviour)
+        return fitness

@@ -1,30 +1,14 @@
 """The robots and their dm_control tasks, by name."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.robot import Robot
-from selfmodel.tasks import hexapod, quadruped
+from selfmodel.tasks import hexapod, quadruped, suite_bodies
+from selfmodel.tasks.entry import Entry
 
 if TYPE_CHECKING:
     from dm_control.rl import control
-
-
-@dataclass(frozen=True)
-class Entry:
-    """A robot that comes with selfmodel.
-
-    Attributes:
-        robot: Makes it, with nothing wrong.
-        cases: The failures of Table I of the paper, by number, in notation.
-        suite: Its tasks, as dm_control's suite keeps them.
-    """
-
-    robot: Callable[[], Robot]
-    cases: Mapping[int, str]
-    suite: Mapping[str, Callable[..., "control.Environment"]]
 
 
 ROBOTS: Mapping[str, Entry] = {
@@ -47,6 +31,19 @@ TASKS_BY_DOMAIN: Mapping[str, tuple[str, ...]] = {
     domain: tuple(tasks) for domain, tasks in SUITE.items()
 }
 """The names of the tasks of every domain."""
+
+
+def entry(name: str) -> Entry:
+    """Returns what is known of a robot: one of ``ROBOTS``, or a body of dm_control's suite.
+
+    Raises:
+        InputError: There is none of that name; the message names the nearest.
+    """
+    if name in ROBOTS:
+        return ROBOTS[name]
+    if name not in suite_bodies.names():
+        raise unknown_name("robot", name, (*ROBOTS, *suite_bodies.names()))
+    return suite_bodies.entry(*suite_bodies.parse_name(name))
 
 
 def load(
@@ -84,4 +81,4 @@ def load(
     )
 
 
-__all__ = ["ALL_TASKS", "ROBOTS", "SUITE", "TASKS_BY_DOMAIN", "Entry", "load"]
+__all__ = ["ALL_TASKS", "ROBOTS", "SUITE", "TASKS_BY_DOMAIN", "Entry", "entry", "load"]

@@ -2,11 +2,14 @@
 
 import importlib
 from collections.abc import Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 
+from selfmodel.cases import cases_of
 from selfmodel.errors import unknown_name
 from selfmodel.mjcf import MjcfSettings, adapt_text
 from selfmodel.robot import Robot
+from selfmodel.tasks.entry import Entry
+from selfmodel.tasks.suite_environment import SuiteRobot, episode_return
 
 PREFIX = "suite-"
 """What the name of such a robot begins with: ``suite-walker-run``."""
@@ -49,6 +52,16 @@ def parse_name(text: str) -> tuple[str, str]:
     if not text.startswith(PREFIX) or task not in DOMAINS.get(domain, ()):
         raise unknown_name("robot", text, names())
     return domain, task
+
+
+def entry(domain: str, task: str) -> Entry:
+    """Returns the body of a task with its failures, its environment and its return."""
+    return Entry(
+        robot=partial(robot, domain, task),
+        cases=cases_of(robot(domain, task).anatomy),
+        physical=partial(SuiteRobot, domain, task),
+        episode_return=episode_return(domain, task),
+    )
 
 
 @lru_cache

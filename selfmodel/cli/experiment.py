@@ -16,8 +16,10 @@ from selfmodel.faults import PAPER_KINDS, Kind, known
 from selfmodel.hypothesis import INTACT, Hypothesis
 from selfmodel.judge import is_correct
 from selfmodel.logs.journal import open_journal
+from selfmodel.physical import PhysicalRobot
 from selfmodel.recover import Recovery, recover
 from selfmodel.robot import Robot
+from selfmodel.score import DISPLACEMENT, Score
 from selfmodel.settings import Settings
 from selfmodel.simulator import Simulator
 from selfmodel.tally import Tally
@@ -43,6 +45,9 @@ class Experiment:
         calibrated: Whether the self-model is fitted to the trials before the failure.
         next_trial: How each trial after the failing one is chosen, one of ``NEXT_TRIAL``.
         design: The kind of controller to evolve; the robot's network if none is given.
+        score: What controllers are evolved for.
+        physical: Makes the physical robot with something wrong, if it is more than a simulation of
+            the model; it has no gap then.
     """
 
     robot: Robot
@@ -60,6 +65,8 @@ class Experiment:
     calibrated: bool = True
     next_trial: str = "repair"
     design: Design | None = None
+    score: Score = DISPLACEMENT
+    physical: Callable[[Robot, Hypothesis], PhysicalRobot] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,9 +92,13 @@ def run(experiment: Experiment, watch: Callable[[Event], None]) -> Outcome:
     robot, truth = experiment.robot, experiment.truth
     simulator = Simulator(robot, experiment.threads)
     reality = draw_reality(robot, experiment.seed, experiment.gap, structure=experiment.structure)
+    if experiment.physical is not None and reality.text is None:
+        healthy, damaged = (experiment.physical(robot, hidden) for hidden in (INTACT, truth))
+    else:
+        healthy, damaged = reality.robot(robot), reality.robot(robot, truth, stream=1)
     recovery = recover(
-        healthy=reality.robot(robot),
-        damaged=reality.robot(robot, truth, stream=1),
+        healthy=healthy,
+        damaged=damaged,
         simulator=simulator,
         comparator=experiment.comparator,
         journal=open_journal(
@@ -108,6 +119,7 @@ def run(experiment: Experiment, watch: Callable[[Event], None]) -> Outcome:
         if experiment.calibrated
         else None,
         next_trial=NEXT_TRIAL[experiment.next_trial],
+        score=experiment.score,
     )
     return Outcome(
         recovery=recovery,

@@ -91,6 +91,7 @@ def recover(
         structure=structure,
         next_trial=resolve.next_trial(next_trial),
         design=design,
+        physical=entry.physical,
     )
     try:
         with display() as watch:
