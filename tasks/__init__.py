@@ -6,14 +6,15 @@ from typing import TYPE_CHECKING, Any
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.tasks import hexapod, quadruped, suite_bodies
 from selfmodel.tasks.entry import Entry
+from selfmodel.tasks.walking_return import WALKING_RETURN
 
 if TYPE_CHECKING:
     from dm_control.rl import control
 
 
 ROBOTS: Mapping[str, Entry] = {
-    "quadruped": Entry(quadruped.robot, quadruped.CASES, quadruped.SUITE),
-    "hexapod": Entry(hexapod.robot, hexapod.CASES, hexapod.SUITE),
+    name: Entry(module.robot, module.CASES, module.SUITE, episode_return=WALKING_RETURN)
+    for name, module in (("quadruped", quadruped), ("hexapod", hexapod))
 }
 """Every robot that comes with selfmodel."""
 

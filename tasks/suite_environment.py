@@ -50,14 +50,10 @@ class SuiteRobot:
         physics, rewarding = episode_parts(domain, task)
         stepped = _Stepped(rewarding, robot, embodiment)
         control = importlib.import_module("dm_control.rl.control")
-        env = control.Environment(
-            physics(embodiment.model), stepped, n_sub_steps=robot.substeps
-        )
+        env = control.Environment(physics(embodiment.model), stepped, n_sub_steps=robot.substeps)
         self.returns = stepped.returns
         # Nothing but a simulation is to be brought to rest; and a step would be rewarded.
-        self._robot = EnvironmentRobot(
-            env, robot, stop=lambda: None, neurons=embodiment.neurons
-        )
+        self._robot = EnvironmentRobot(env, robot, stop=lambda: None, neurons=embodiment.neurons)
         self.clock = self._robot.clock
 
     def run(self, controller: Driver, steps: int) -> Iterator[Sample]:

@@ -4,7 +4,7 @@ import sys
 
 import typer
 
-from selfmodel.cli import logs
+from selfmodel.cli import logs, suite
 from selfmodel.cli.ablate import ablate
 from selfmodel.cli.calibrate import calibrate
 from selfmodel.cli.diagnose import diagnose
@@ -32,6 +32,7 @@ app.command()(diagnose)
 app.command()(replay)
 app.command()(render)
 app.command()(ablate)
+app.add_typer(suite.app)
 app.add_typer(logs.app)
 
 

@@ -26,6 +26,7 @@ from selfmodel.neurons import with_neurons as neurons_in
 from selfmodel.next_trial import NextTrial, by_disagreement, by_repair
 from selfmodel.playback import Playback
 from selfmodel.robot import Robot
+from selfmodel.score import DISPLACEMENT, Score
 from selfmodel.tasks import Entry, entry
 
 DESIGNS: Mapping[str, Callable[[Robot], Design]] = MappingProxyType(
@@ -37,6 +38,9 @@ NEXT_TRIAL: Mapping[str, NextTrial] = MappingProxyType(
     {"repair": by_repair, "disagreement": by_disagreement}
 )
 """The ways to choose the next trial of a recovery."""
+
+RETURN = "return"
+"""The score that is the sum of a task's rewards."""
 
 LARGEST_MODEL = 64 * 2**20
 """Bytes that an MJCF file may have."""
@@ -60,6 +64,8 @@ def robot_entry(name: str, settings: Iterable[str] = ()) -> Entry:
         return Entry(robot=lambda: made, cases=cases_of(made.anatomy), suite={})
     if given:
         raise InputError(f"--set {given[0]} is for a robot's MJCF: {name!r} has all that it needs")
+    # Nothing is drawn here, and dm_control would look for what to draw with.
+    os.environ.setdefault("MUJOCO_GL", "disable")
     return entry(name)
 
 
@@ -182,6 +188,23 @@ def design(name: str, robot: Robot) -> Design:
     if name not in DESIGNS:
         raise unknown_name("kind of controller", name, DESIGNS)
     return DESIGNS[name](robot)
+
+
+def score(name: str, robot: str, entry: Entry) -> Score:
+    """Returns the measure of that name of how well a robot does.
+
+    Raises:
+        InputError: There is none, or the robot has no task whose rewards could be added up.
+    """
+    if name == DISPLACEMENT.name:
+        return DISPLACEMENT
+    if name != RETURN:
+        raise unknown_name("score", name, (DISPLACEMENT.name, RETURN))
+    if entry.episode_return is None:
+        raise InputError(
+            f"{robot} has no task of dm_control, so no rewards: leave --score at {DISPLACEMENT.name}"
+        )
+    return entry.episode_return
 
 
 def with_neurons(robot: Robot, neurons: int | None, design: str) -> Robot:

@@ -1,0 +1,153 @@
+"""What a study of many bodies consists of, as the runs of a grid."""
+
+import dataclasses
+import hashlib
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from selfmodel import __version__
+from selfmodel.cli import resolve
+from selfmodel.errors import InputError, unknown_name
+from selfmodel.grid import Job, difference, parameters_of, runs
+from selfmodel.settings import Settings
+
+OF_DIAGNOSIS = ("trials", "genes", "kept")
+"""Settings that no gait depends on."""
+
+
+@dataclass(frozen=True)
+class Study:
+    """Which bodies fail in which ways, and how they are brought back.
+
+    Attributes:
+        bodies: Names of robots, and paths of MJCF files.
+        cases: Numbers of failures like those of Table I; a body that cannot have one has none.
+        seeds: A run for each.
+        folder: Where all of it is kept.
+        settings: The paper's numbers.
+        score: What controllers are evolved for, and what is told of the trials.
+        controller: The kind of controller.
+        comparator: Its name, or ``package.module:object``.
+    """
+
+    bodies: Sequence[str]
+    cases: Sequence[int]
+    seeds: Sequence[int]
+    folder: Path
+    settings: Settings
+    score: str
+    controller: str
+    comparator: str
+
+
+def check(study: Study) -> None:
+    """Checks all that can be wrong with a study, before anything is run.
+
+    Raises:
+        InputError: Something is, and which.
+    """
+    resolve.comparator(study.comparator)
+    keys: dict[str, str] = {}
+    known = set()
+    for body in study.bodies:
+        entry = resolve.robot_entry(body)
+        resolve.design(study.controller, entry.robot())
+        resolve.score(study.score, body, entry)
+        known |= entry.cases.keys()
+        first = keys.setdefault(_key(body), body)
+        if first != body:
+            raise InputError(f"{first} and {body} would be called alike: rename one of the files")
+    for case in study.cases:
+        if case not in known:
+            raise unknown_name("case of these bodies", str(case), map(str, sorted(known)))
+    for run in runs(study.folder / "runs"):
+        where = difference(parameters_of(run)["shared"], _shared(study))
+        if where:
+            raise InputError(
+                f"{study.folder} holds a study that was made otherwise ({where}): choose another "
+                f"folder"
+            )
+
+
+def gait_jobs(study: Study) -> list[Job]:
+    """Returns the evolution of each body's gait before it fails, one a seed."""
+    shared = _shared(study)
+    made_of = {name: shared["settings"][name] for name in shared["settings"]}
+    for name in OF_DIAGNOSIS:
+        del made_of[name]
+    return [
+        Job(
+            key=f"{_key(body)}-seed{seed:03d}",
+            parameters={
+                **_body(body),
+                "settings": made_of,
+                **{name: shared[name] for name in ("selfmodel", "score", "controller")},
+            },
+            seed=seed,
+            parts=("gait",),
+        )
+        for seed in study.seeds
+        for body in study.bodies
+    ]
+
+
+def recovery_jobs(study: Study) -> list[Job]:
+    """Returns the recoveries whose gait has been evolved, one seed after another."""
+    found = []
+    for gait in gait_jobs(study):
+        path = gait_path(study.folder, gait.key)
+        if not path.exists():
+            continue
+        body = gait.parameters["body"]
+        entry = resolve.robot_entry(body)
+        found += [
+            Job(
+                key=f"{_key(body)}-case{case:02d}-seed{gait.seed:03d}",
+                parameters={
+                    **_body(body),
+                    "case": case,
+                    "truth": entry.cases[case],
+                    "gait": gait.key,
+                    "gait_sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
+                    "shared": _shared(study),
+                },
+                seed=gait.seed,
+                parts=("recovery",),
+            )
+            for case in study.cases
+            if case in entry.cases
+        ]
+    return found
+
+
+def gait_path(folder: Path, key: str) -> Path:
+    """Returns where the gait of that key is, in the folder of a study."""
+    return folder / "gaits" / f"{key}.npz"
+
+
+def _key(body: str) -> str:
+    name = Path(body).stem if resolve.is_model(body) else body
+    return re.sub(r"[^\w.-]", "_", name, flags=re.ASCII).lstrip(".-") or "robot"
+
+
+def _body(body: str) -> dict[str, Any]:
+    robot = resolve.robot_entry(body).robot()
+    return {
+        "body": body,
+        "robot": robot.name,
+        "model": hashlib.sha256(robot.mjcf.encode()).hexdigest(),
+    }
+
+
+def _shared(study: Study) -> dict[str, Any]:
+    """What is the same for all runs, and must be for their rows to stand in one table."""
+    return {
+        "selfmodel": __version__,
+        "settings": dataclasses.asdict(study.settings),
+        "score": study.score,
+        "controller": study.controller,
+        "comparator": study.comparator,
+    }

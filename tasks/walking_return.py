@@ -1,0 +1,15 @@
+"""The return of our own walking task."""
+
+from selfmodel.arrays import FloatArray
+from selfmodel.behaviour import Behaviour, forward_displacement
+from selfmodel.hypothesis import Hypothesis
+from selfmodel.robot import Robot
+from selfmodel.score import Score
+
+
+def _speeds(robot: Robot, _hypothesis: Hypothesis, behaviour: Behaviour) -> FloatArray:
+    return forward_displacement(behaviour) / robot.control_timestep
+
+
+WALKING_RETURN = Score("return", ("base_position",), _speeds)
+"""The sum of the forward speeds in m/s that ``walking.Walk`` rewards: the way over the time step."""
