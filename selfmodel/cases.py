@@ -43,7 +43,7 @@ def cases_of(anatomy: Anatomy) -> Mapping[int, str]:
         found[6] = f"jam:{first.joints[0].name}"
         # The paper jams the leg behind the lost one, not the one opposite.
         held = next(iter(others[1:] or others), None)
-        found[7] = _also(lost, held and f"jam:{held.joints[0].name}")
+        found[7] = _also(lost, f"jam:{held.joints[0].name}" if held else None)
         rest = [limb for limb in others if limb is not held and limb.angle]
         found[8] = found[7] and _also(found[7], _dead(rest[-1].angle if rest else ()))
     cases = {number: notation for number, notation in found.items() if notation}

@@ -3,6 +3,7 @@
 import importlib
 from collections.abc import Mapping
 from functools import lru_cache, partial
+from typing import Any
 
 from selfmodel.cases import cases_of
 from selfmodel.errors import unknown_name
@@ -100,6 +101,6 @@ def _model(domain: str, task: str) -> tuple[str | bytes, Mapping[str, bytes]]:
     return found
 
 
-def _module(domain: str):  # noqa: ANN202  # modules of dm_control have no types
+def _module(domain: str) -> Any:  # noqa: ANN401  # modules of dm_control have no types
     # When it is needed, because dm_control's physics looks for a display as it is imported.
     return importlib.import_module(f"dm_control.suite.{domain}")

@@ -12,4 +12,4 @@ def _speeds(robot: Robot, _hypothesis: Hypothesis, behaviour: Behaviour) -> Floa
 
 
 WALKING_RETURN = Score("return", ("base_position",), _speeds)
-"""The sum of the forward speeds in m/s that ``walking.Walk`` rewards: the way over the time step."""
+"""The sum of the speeds in m/s that ``walking.Walk`` rewards: the way over the time step."""

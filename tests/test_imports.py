@@ -64,6 +64,7 @@ LAYERS = (
             "differences",
             "behaviour",
             "anatomy",
+            "cases",
             "controller",
             "attached",
             "untrusted",
@@ -99,7 +100,7 @@ LAYERS = (
         *("embodiment", "robot", "places", "noise", "senses", "batches", "tally", "prediction"),
         *("gap", "instruments", "start", "debris", "structure", "contract_kind"),
         *("simulator", "physical", "judge", "replay", "poses", "parameters", "disagreement"),
-        *("limits", "environment_robot"),
+        *("limits", "environment_robot", "score"),
     ),
     (
         *("database", "evidence", "refine", "degrees", "diagnose", "repair", "calibrate"),

@@ -87,9 +87,10 @@ def case_notation(entry: Entry, case: int | None, damage: str | None) -> str:
     """
     if (case is None) == (damage is None):
         given = "neither" if case is None else "both"
+        numbers, example = ", ".join(map(str, entry.cases)), next(iter(entry.cases.values()))
         raise InputError(
-            f"expected either --case N or --damage NOTATION, got {given}: cases are "
-            f"{', '.join(map(str, entry.cases))}, a notation is like {next(iter(entry.cases.values()))}"
+            f"expected either --case N or --damage NOTATION, got {given}: cases are {numbers}, a "
+            f"notation is like {example}"
         )
     if damage is not None:
         return damage
@@ -202,7 +203,8 @@ def score(name: str, robot: str, entry: Entry) -> Score:
         raise unknown_name("score", name, (DISPLACEMENT.name, RETURN))
     if entry.episode_return is None:
         raise InputError(
-            f"{robot} has no task of dm_control, so no rewards: leave --score at {DISPLACEMENT.name}"
+            f"{robot} has no task of dm_control, so no rewards: leave --score at "
+            f"{DISPLACEMENT.name}"
         )
     return entry.episode_return
 

@@ -51,7 +51,7 @@ def check(study: Study) -> None:
     """
     resolve.comparator(study.comparator)
     keys: dict[str, str] = {}
-    known = set()
+    known: set[int] = set()
     for body in study.bodies:
         entry = resolve.robot_entry(body)
         resolve.design(study.controller, entry.robot())
