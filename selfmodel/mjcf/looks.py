@@ -11,12 +11,15 @@ from selfmodel.untrusted import LARGEST_FILES
 
 _MEANT_BY_NAME = ("tendon", "sensor", "contact", "actuator", "equality", "deformable")
 _MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
+_PIXELS = 64
+"""Width and height of a pattern that MuJoCo makes: each hypothesis has a copy of the model."""
 
 
 def drop_looks(document: Document, model: mujoco.MjModel) -> bool:
     """Takes out skins; and meshes and pictures that nothing can touch, if the files are too large.
 
-    The bodies keep the masses that the meshes gave them.
+    Patterns that MuJoCo makes become small, so that a model takes kilobytes and not megabytes. The
+    bodies keep the masses that the meshes gave them.
 
     Returns:
         Whether anything was taken out.
@@ -25,6 +28,7 @@ def drop_looks(document: Document, model: mujoco.MjModel) -> bool:
         InputError: What is left is still too large.
     """
     skins = _remove(document.root, ("skin",))
+    _shrink_patterns(document)
     before = _bytes(document)
     if before <= LARGEST_FILES:
         _forget_files(document)
@@ -80,6 +84,14 @@ def _drop_geoms(document: Document, model: mujoco.MjModel) -> int:
                 element.remove(geom)
                 dropped += 1
     return dropped
+
+
+def _shrink_patterns(document: Document) -> None:
+    for texture in document.root.iter("texture"):
+        if texture.get("builtin", "none") != "none":
+            for side in ("width", "height"):
+                if int(texture.get(side, "0").strip() or 0) > _PIXELS:
+                    texture.set(side, str(_PIXELS))
 
 
 def _drop_pictures(document: Document) -> None:
