@@ -22,6 +22,10 @@ MOSTLY, HALF = 0.6, 0.5
 each. Where it is all there is, two in three contradict each other; without noise fewer than a half
 do, but for joints that tremble."""
 
+OF_TURNS = 0.5
+"""Which part of the moves may be left, where they are no noise. Of the noise of 370 trials with a
+gap 0.98 was left, and of a cheetah that trembles less than 0.001."""
+
 _SMOOTHED: tuple[tuple[Signal, Signal, int, float], ...] = (
     ("joint_positions", "joint_velocities", 3, 1e-3),
     ("base_position", "base_linear_velocity", 6, 1e-4),
@@ -52,7 +56,9 @@ def estimated_states(
             ways = _steps_along(behaviour[velocity], timestep)
             if behaviour.late is not None:
                 ways = np.where(behaviour.late[1:, np.newaxis], np.nan, ways)
-            if _is_noise(np.diff(values, axis=0) - ways, little):
+            moved = np.diff(values, axis=0) - ways
+            turns = np.diff(behaviour[velocity], axis=0) * timestep
+            if _is_noise(moved, little) and not _is_of_turns(moved, turns):
                 states[position] = _averaged(values, behaviour[velocity], ways, reach)
     return states
 
@@ -85,6 +91,20 @@ def _is_noise(moved: FloatArray, little: float) -> bool:
         and shares.mean() > MOSTLY
         and np.all(shares > HALF)
     )
+
+
+def _is_of_turns(moved: FloatArray, turns: FloatArray) -> bool:
+    """Whether what is left of the moves is in truth how the velocities change within each step.
+
+    A robot that is driven to and fro at every step moves like one that is measured with noise. But
+    its moves then follow from its velocities: by another weight of the two than that of a control
+    step of two physics steps. Of noise, next to nothing follows.
+    """
+    known = np.isfinite(moved) & np.isfinite(turns)
+    rest, turn = np.where(known, moved, 0.0), np.where(known, turns, 0.0)
+    weights = (rest * turn).sum(axis=0) / np.maximum((turn * turn).sum(axis=0), 1e-300)
+    left = np.abs(rest - weights * turn)[known]
+    return bool(np.median(left) < OF_TURNS * np.median(np.abs(rest[known])))
 
 
 def _averaged(

@@ -14,7 +14,7 @@ from selfmodel.notation import parse
 from selfmodel.playback import played_back
 from selfmodel.robot import Robot
 from selfmodel.simulator import Simulator
-from selfmodel.tasks import ROBOTS
+from selfmodel.tasks import ROBOTS, entry
 from tests.conftest import random_controllers, random_motion
 
 QUADRUPED = ROBOTS["quadruped"].robot()
@@ -57,6 +57,16 @@ def test_without_noise_a_jerky_run_is_what_was_logged_too():
     drivers = random_controllers(QUADRUPED, 12)
 
     assert all(is_as_logged(run) for run in runs(QUADRUPED, "intact", drivers))
+
+
+@pytest.mark.parametrize("name", ["suite-cheetah-run", "suite-swimmer-swimmer6"])
+def test_without_noise_a_robot_that_trembles_at_every_step_is_as_logged(name: str):
+    robot = entry(name).robot()
+    to_and_fro = np.where(np.arange(300)[:, np.newaxis] % 2, 1.0, -1.0)
+    motors = robot.anatomy.motors
+    (run,) = runs(robot, "intact", [played_back(motors, to_and_fro * np.ones(len(motors)))])
+
+    assert is_as_logged(run)
 
 
 def is_as_logged(run: Behaviour) -> bool:
