@@ -1,6 +1,7 @@
 """The bodies of dm_control's suite that move about, as robots."""
 
 import importlib
+import math
 from collections.abc import Mapping
 from functools import lru_cache, partial
 from typing import Any
@@ -69,7 +70,8 @@ def entry(domain: str, task: str) -> Entry:
 def robot(domain: str, task: str) -> Robot:
     """Returns the body of a task with nothing wrong, with the suite's own time steps.
 
-    It starts as ``Physics.reset`` leaves it, without the pose that the suite draws afterwards.
+    It starts as ``Physics.reset`` leaves it, without the pose that the suite draws afterwards; a
+    swimmer, which lies across there, with its nose forward.
 
     Args:
         domain: One of ``DOMAINS``.
@@ -77,7 +79,10 @@ def robot(domain: str, task: str) -> Robot:
     """
     mjcf, assets = _model(domain, task)
     text = mjcf.decode() if isinstance(mjcf, bytes) else mjcf
-    settings = MjcfSettings(keyframe="none", control_timestep=control_timestep(domain))
+    keyframe = "none"
+    if domain == "swimmer":
+        keyframe, text = _FORWARD, text.replace("</mujoco>", _swimmers_start(_links(task)))
+    settings = MjcfSettings(keyframe=keyframe, control_timestep=control_timestep(domain))
     named = name(domain, task)
     return Robot.from_adapted(adapt_text(named, text, assets, settings), named)
 
@@ -96,9 +101,22 @@ def _model(domain: str, task: str) -> tuple[str | bytes, Mapping[str, bytes]]:
     module = _module(domain)
     if domain == "quadruped":
         return module.make_model(), importlib.import_module("dm_control.suite.common").ASSETS
-    size = (int(task.removeprefix("swimmer")),) if domain == "swimmer" else ()
+    size = (_links(task),) if domain == "swimmer" else ()
     found: tuple[str | bytes, Mapping[str, bytes]] = module.get_model_and_assets(*size)
     return found
+
+
+def _links(task: str) -> int:
+    return int(task.removeprefix("swimmer"))
+
+
+def _swimmers_start(links: int) -> str:
+    """A swimmer turned by a right angle; its other joints, one fewer than links, at 0."""
+    qpos = f"0 0 {math.pi / 2!r}" + " 0" * (links - 1)
+    return f'<keyframe><key name="{_FORWARD}" qpos="{qpos}"/></keyframe></mujoco>'
+
+
+_FORWARD = "forward"
 
 
 def _module(domain: str) -> Any:  # noqa: ANN401  # modules of dm_control have no types

@@ -2,13 +2,18 @@
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from selfmodel.cli.suite.bodies import DOMAINS, bodies
+from selfmodel.cli.suite.plan import Study, check
 from selfmodel.cli.suite.rows import Row, summarise
+from selfmodel.cli.suite.work import run_study
+from selfmodel.comparators import DEFAULT
 from selfmodel.errors import InputError
+from selfmodel.settings import Settings
 from tests.command import SMALL, selfmodel
 
 TINY = (*SMALL, "--steps", "60", "--trials", "1", "--workers", "1")
@@ -101,6 +106,7 @@ def test_one_more_seed_is_added_to_what_is_there(study: tuple[Path, dict, list[s
     folder, told, arguments = study
     more = [*arguments, "--seeds", "2"]
     more[more.index("--domains") + 1] = "biped.xml"
+    more[more.index("--cases") + 1] = "5"
     done = selfmodel(*more, "--json", cwd=folder)
     assert done.returncode == 0, done.stderr
     rows = json.loads(done.stdout)["rows"]
@@ -133,31 +139,46 @@ def test_the_score_may_be_the_tasks_own_rewards(tmp_path: Path):
     )
 
 
-@pytest.mark.parametrize(
-    ("arguments", "reason"),
-    [
-        (["--domains", "walkr"], "did you mean suite-walker"),
-        (["--domains", "walker", "--tasks", "hop"], "has none of the tasks hop"),
-        (["--domains", "biped.xml", "--score", "return"], "no rewards"),
-        (["--domains", "walker", "--cases", "8"], "unknown case of these bodies '8'"),
-        (["--domains", "walker", "--score", "beauty"], "unknown score 'beauty'"),
-        (["--domains", "walker", "--comparator", "no-such"], "unknown comparator"),
-        (["--domains", "walker", "--controller", "brain"], "unknown kind of controller"),
-        (["--domains", "biped.xml,other/biped.xml"], "would be called alike"),
-    ],
-)
+REFUSED = [
+    ({"bodies": ["suite-walker-walk"], "cases": [8]}, "unknown case of these bodies '8'"),
+    ({"score": "return"}, "no rewards"),
+    ({"score": "beauty"}, "unknown score 'beauty'"),
+    ({"comparator": "no-such"}, "unknown comparator"),
+    ({"controller": "brain"}, "unknown kind of controller"),
+    ({"bodies": ["biped.xml", "other/biped.xml"]}, "would be called alike"),
+]
+
+
+@pytest.mark.parametrize(("changed", "reason"), REFUSED)
 def test_what_cannot_be_run_is_refused_before_anything_is(
-    arguments: list[str], reason: str, tmp_path: Path
+    changed: dict, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "other").mkdir()
     for name in ("biped.xml", "other/biped.xml"):
         (tmp_path / name).write_text(BIPED)
-    done = selfmodel("suite", "run", *arguments, "--out", "out", cwd=tmp_path)
+    study = Study(
+        bodies=["biped.xml"],
+        cases=[2],
+        seeds=range(1),
+        folder=tmp_path / "out",
+        settings=Settings(),
+        score="displacement",
+        controller="network",
+        comparator=DEFAULT,
+    )
+    check(study)
+
+    with pytest.raises(InputError, match=reason):
+        run_study(replace(study, **changed), workers=1, watch=lambda _: None)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_domain_that_nobody_has_is_told_from_the_nearest(tmp_path: Path):
+    done = selfmodel("suite", "run", "--domains", "walkr", "--out", "out", cwd=tmp_path)
 
     assert done.returncode == 2
-    assert done.stderr.startswith("error: ")
-    assert reason in done.stderr
-    assert not (tmp_path / "out").exists()
+    assert done.stderr.startswith("error: unknown domain 'walkr': did you mean suite-walker")
 
 
 def test_domains_of_the_suite_need_no_prefix_where_we_have_no_robot_of_that_name():

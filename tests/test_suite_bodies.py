@@ -34,12 +34,14 @@ def test_the_simulated_return_is_that_of_the_suites_own_environment(domain: str,
     env.reset()
     env.physics.model.geom_pos[:] = targets
     with env.physics.reset_context():
-        pass
+        env.physics.data.qpos[:] = robot.model.qpos0
     earned = sum(env.step(command).reward for command in simulated["commands"][0, :-1])
 
     exact = 1e-9 if domain not in TOUCHING else 0.01
     assert earned == pytest.approx(score.of(robot, INTACT, simulated)[0], rel=exact)
     assert earned != 0 or domain == "hopper"
+    turned = np.flatnonzero(robot.model.qpos0 != env.physics.model.qpos0)
+    assert turned.tolist() == ([2] if domain == "swimmer" else [])
 
 
 @pytest.mark.parametrize("name", ["suite-walker-walk", "suite-quadruped-walk", "suite-hopper-hop"])
