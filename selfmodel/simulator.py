@@ -23,7 +23,10 @@ Run = tuple[Hypothesis, Driver]
 """What one simulation runs: a robot with what the hypothesis says wrong, and what drives it."""
 
 REMEMBERED_EMBODIMENTS = 1024
-"""Built models that are kept: a few tens of kB each."""
+"""Built models that are kept, where they are small."""
+
+REMEMBERED_BYTES = 2**29
+"""What they may take: one of our robots' takes 0.3 MB, a dog's with its meshes 5 MB."""
 
 
 class Simulator:
@@ -39,7 +42,8 @@ class Simulator:
         self.robot = robot
         self.threads = threads
         self.tally = Tally() if tally is None else tally
-        self._embodiment = lru_cache(REMEMBERED_EMBODIMENTS)(robot.build)
+        room = REMEMBERED_BYTES // int(robot.model.nbuffer)
+        self._embodiment = lru_cache(max(1, min(REMEMBERED_EMBODIMENTS, room)))(robot.build)
         self._members = lru_cache(partial(perturbed_models, robot))
 
     def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> Simulated:
