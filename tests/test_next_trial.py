@@ -169,6 +169,26 @@ def test_a_base_has_fallen_when_it_leans_by_more_than_sixty_degrees_whatever_its
         assert falls == (1 if lean > np.pi / 3 else 2)
 
 
+@pytest.mark.parametrize("height", [0.0, -0.1])
+def test_a_base_that_begins_on_the_ground_has_no_height_to_fall_from(height: float):
+    signals = {"base_position": np.full((2, 3), height), "base_orientation": np.eye(4)[[0, 0]]}
+    signals["base_position"][1] -= 0.01
+
+    assert first_falls(Behaviour(NAMES, np.array([0, 0.01]), signals), height) == 2
+
+
+@given(start=st.integers(0, 2**31), lean=st.floats(0, np.pi))
+def test_a_base_leans_from_where_it_started(start: int, lean: float):
+    lying = Rotation.random(random_state=start)
+    about = Rotation.from_rotvec(lean * np.array([0.6, 0.8, 0]))
+    turns = Rotation.concatenate([lying, about * lying]).as_quat(scalar_first=True)
+    signals = {"base_position": np.full((2, 3), HEIGHT), "base_orientation": turns}
+    falls = first_falls(Behaviour(NAMES, np.array([0, 0.01]), signals), HEIGHT)
+
+    if abs(lean - np.pi / 3) > 1e-6:
+        assert falls == (1 if lean > np.pi / 3 else 2)
+
+
 @settings(deadline=None)
 @given(seed=st.integers(0, 2**32), hypotheses=st.integers(1, 4), size=st.floats(0, 10))
 def test_disagreement_is_a_part_of_one_and_knows_no_order_of_the_hypotheses(
