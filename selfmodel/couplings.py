@@ -77,8 +77,8 @@ def _separate(model: mujoco.MjModel, body: int) -> None:
         model.pair_margin[pairs] = NEVER
 
 
-NEVER = -1e6
-"""A distance of geoms, m, below which no contact ever is."""
+NEVER = -100.0
+"""A distance of geoms, m, that no contact is ever below; only below it would there be a force."""
 
 
 def _joints(model: mujoco.MjModel, constraint: int) -> frozenset[int]:

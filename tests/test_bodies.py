@@ -201,3 +201,48 @@ def test_a_broken_joint_moves_like_a_model_without_the_limb(name: str, joint: st
     np.testing.assert_allclose(
         path(robot, edited, hinges, 40), path(robot, truth, hinges, 40), atol=1e-7, rtol=0
     )
+
+
+def with_weld(robot: Robot, joint: Joint, angle: float) -> mujoco.MjModel:
+    """The robot's model with a joint's body welded where the physics has it at an angle."""
+    data = mujoco.MjData(robot.model)
+    for hinge in joint.hinges:
+        data.joint(hinge).qpos[0] = angle
+    mujoco.mj_kinematics(robot.model, data)
+    body = robot.model.body(robot.model.joint(joint.hinges[0]).bodyid[0])
+    parent, back = data.body(int(body.parentid[0])), np.empty(4)
+    mujoco.mju_negQuat(back, parent.xquat)
+    place, turn = np.empty(3), np.empty(4)
+    mujoco.mju_rotVecQuat(place, data.body(body.id).xpos - parent.xpos, back)
+    mujoco.mju_mulQuat(turn, back, data.body(body.id).xquat)
+    spec = mujoco.MjSpec.from_string(robot.mjcf)
+    spec.body(body.name).pos, spec.body(body.name).quat = place, turn
+    for name in joint.hinges:
+        users = [motor for motor in spec.actuators if motor.target == name]
+        users += [sensor for sensor in spec.sensors if sensor.objname == name]
+        for part in (*users, spec.joint(name)):
+            spec.delete(part)
+    return spec.compile()
+
+
+HELD = [
+    (name, joint.name)
+    for name in ("walker", "hopper", "swimmer", "ant", "humanoid")
+    for joint in BODIES[name]().anatomy.joints[-3:]
+]
+
+
+@pytest.mark.parametrize(("name", "joint"), HELD)
+def test_a_jammed_joint_moves_like_a_welded_one(name: str, joint: str):
+    robot = BODIES[name]()
+    held = robot.anatomy.joint(joint)
+    low, high = held.limits[0]
+    angle = low + 0.3 * (high - low)
+    edited = robot.build(parse(f"jam:{joint}={angle}", robot.anatomy)).model
+    truth = with_weld(robot, held, angle)
+    hinges = [hinge for hinge in robot.anatomy.hinges if hinge not in held.hinges]
+
+    assert truth.nv < edited.nv == robot.model.nv
+    np.testing.assert_allclose(
+        path(robot, edited, hinges, 20), path(robot, truth, hinges, 20), atol=1e-6, rtol=0
+    )

@@ -25,7 +25,7 @@ COLUMNS: "tuple[tuple[Signal, str], ...]" = (
     ("base_position", "base, m"),
     ("joint_positions", "joints, rad"),
     ("joint_velocities", "joints, rad/s"),
-    ("commands", "commands, rad"),
+    ("commands", "commands"),
     ("sensors", "sensors"),
 )
 

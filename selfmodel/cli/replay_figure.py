@@ -21,7 +21,7 @@ FORMATS = ("png", "svg", "pdf")
 SHOWN: "tuple[tuple[Signal, str], ...]" = (
     ("base_position", "base position, m"),
     ("joint_positions", "joint angles, rad"),
-    ("commands", "commands, rad"),
+    ("commands", "commands"),
     ("sensors", "sensor readings"),
 )
 

@@ -10,6 +10,7 @@ from rich.table import Table
 from selfmodel.cli.experiment import Experiment, Outcome
 from selfmodel.cli.fitting import calibration_values
 from selfmodel.cli.ranking import as_values, in_words, ranking_table, sureness
+from selfmodel.oscillators import Cpg
 
 
 def as_object(experiment: Experiment, outcome: Outcome) -> str:
@@ -61,6 +62,8 @@ def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
         "gap": experiment.gap,
         "structure": experiment.structure,
         "next_trial": experiment.next_trial,
+        "controller": "cpg" if isinstance(experiment.design, Cpg) else "network",
+        "neurons": 0 if isinstance(experiment.design, Cpg) else experiment.robot.anatomy.neurons,
         "seed": experiment.seed,
         "trials": [
             {
