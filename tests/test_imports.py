@@ -98,7 +98,7 @@ LAYERS = (
         *("commands", "neurons", "mjcf"),
         *("embodiment", "robot", "places", "noise", "senses", "batches", "tally", "prediction"),
         *("gap", "instruments", "start", "debris", "structure", "contract_kind"),
-        *("simulator", "physical", "judge", "replay", "parameters", "disagreement"),
+        *("simulator", "physical", "judge", "replay", "poses", "parameters", "disagreement"),
     ),
     (
         *("database", "evidence", "refine", "degrees", "diagnose", "repair", "calibrate"),
