@@ -78,7 +78,7 @@ LAYERS = (
             "streams",
             "intervals",
         ),
-        *("workers", "grid"),
+        *("workers", "grid", "stopwatch"),
     ),
     (
         "faults",
@@ -99,6 +99,7 @@ LAYERS = (
         *("embodiment", "robot", "places", "noise", "senses", "batches", "tally", "prediction"),
         *("gap", "instruments", "start", "debris", "structure", "contract_kind"),
         *("simulator", "physical", "judge", "replay", "poses", "parameters", "disagreement"),
+        *("limits", "environment_robot"),
     ),
     (
         *("database", "evidence", "refine", "degrees", "diagnose", "repair", "calibrate"),
