@@ -18,11 +18,11 @@ from absl import logging
 from selfmodel.arrays import FloatArray
 from selfmodel.behaviour import Signal
 from selfmodel.calibrate import BOUND, DELAYS, HORIZON, LEAD, SCALES, SEGMENTS
+from selfmodel.differences import difference
 from selfmodel.estimate import STATE, estimated_states
 from selfmodel.parameters import Parameters, edited_model, factor_names, from_factors
-from selfmodel.places import places
+from selfmodel.places import places, writer
 from selfmodel.robot import Robot
-from selfmodel.rotation import rotation_between
 from selfmodel.trial import Trial
 
 Theirs = Any
@@ -108,11 +108,9 @@ def _sequences(robot: Robot, trials: Sequence[Trial], delay: int) -> Theirs:
 
 def _vectors(robot: Robot, states: Theirs) -> FloatArray:
     """The state as MuJoCo orders it, ``(steps, nq + nv)``."""
-    model, where = robot.model, places(robot)
-    fields = {"qpos": np.zeros((len(states[STATE[0]]), model.nq))}
-    fields["qvel"] = np.zeros((len(fields["qpos"]), model.nv))
-    for signal in STATE:
-        fields[where[signal].field][:, where[signal].columns] = states[signal]
+    model, steps = robot.model, len(states[STATE[0]])
+    fields = {"qpos": np.zeros((steps, model.nq)), "qvel": np.zeros((steps, model.nv))}
+    writer(robot, fields.__getitem__)(states)
     return np.concatenate([fields["qpos"], fields["qvel"]], axis=1)
 
 
@@ -139,18 +137,10 @@ class _Residual:
         seen = self._signals(observed.data)
         rows = []
         for signal, scale in SCALES.items():
-            error = (
-                rotation_between(made[signal], seen[signal])
-                if signal == "base_orientation"
-                else made[signal] - seen[signal]
-            )
-            rows.append((error / scale).ravel())
+            rows.append((difference(signal, made[signal], seen[signal]) / scale).ravel())
         return np.concatenate(rows), observed, observed
 
     def _signals(self, rows: FloatArray) -> States:
         nq = self._robot.model.nq
         fields = {"qpos": rows[:, :nq], "qvel": rows[:, nq:]}
-        return {
-            signal: fields[self._where[signal].field][:, self._where[signal].columns]
-            for signal in SCALES
-        }
+        return {signal: self._where[signal].reader(fields.__getitem__)() for signal in SCALES}

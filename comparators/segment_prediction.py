@@ -63,7 +63,8 @@ class SegmentPrediction:
     onboard`` does without the base's position and linear velocity, and carries them on from one
     segment to the next, which makes it less sharp. What acts slowly, such as a light wind, hardly
     shows within an eighth of a second. The network is taken to be known: without one (a recording
-    of other software) its arithmetic is not judged.
+    of other software) its arithmetic is not judged. Nothing is judged across a step that was late
+    (``Behaviour.late``): what a command does in an eighth of a second, it does not in a quarter.
 
     Attributes:
         name: What it is called.
@@ -100,7 +101,7 @@ class SegmentPrediction:
         )
 
     def losses(self, simulated: Behaviour, trial: Trial) -> FloatArray:
-        """Returns the loss of each segment, ``(n, segments)``."""
+        """Returns the loss of each segment in which no step was late, ``(n, segments)``."""
         cut = _cut(self, trial)
         looks = np.unique(np.linspace(0, self.horizon, LOOKS + 1).round().astype(int)[1:])
         rows = cut.starts[:, np.newaxis] + looks
@@ -109,7 +110,8 @@ class SegmentPrediction:
             logged, predicted = cut.states[signal][rows], simulated[signal][:, :, looks]
             error = difference(signal, predicted, logged) / SCALES[signal]
             total += _mean(np.log1p(np.square(error)))
-        return total + _readings(simulated["sensors"], trial.behaviour["sensors"], cut.starts)
+        total += _readings(simulated["sensors"], trial.behaviour["sensors"], cut.starts)
+        return total if cut.steady.all() else np.ascontiguousarray(total[:, cut.steady])
 
     def distances(self, simulated: Behaviour, trial: Trial) -> FloatArray:
         """Returns the mean loss of the segments, ``(n,)``."""
@@ -118,10 +120,15 @@ class SegmentPrediction:
 
 @dataclass(frozen=True, eq=False)
 class _Cut:
-    """What does not depend on the hypothesis: the state, the segments, the arithmetic's loss."""
+    """What does not depend on the hypothesis: the state, the segments, the arithmetic's loss.
+
+    Segments with a step that was late are predicted, for those after them may go on from their end,
+    and are not judged: only the steady ones are.
+    """
 
     states: Mapping[Signal, FloatArray]
     starts: IndexArray
+    steady: BoolArray
     arithmetic: FloatArray
 
 
@@ -142,7 +149,14 @@ def _cut(comparator: SegmentPrediction, trial: Trial) -> _Cut:
     }
     known["commands"] = _known_all_along(behaviour["commands"], starts, horizon)
     usable = np.asarray(np.logical_and.reduce(list(known.values())))
-    if usable.sum() < FEWEST:
+    steady = _known_all_along(behaviour.steady_commands, starts, horizon)
+    if np.sum(usable & steady) < FEWEST:
+        if usable.sum() >= FEWEST:
+            raise InputError(
+                f"{trial.path}: {comparator.name} needs {FEWEST} or more stretches of {horizon} "
+                f"steps in which none was late, and the log does not have them: have the robot "
+                f"keep its control time step, or leave this log out"
+            )
         lacking = [signal for signal, moments in known.items() if moments.sum() < FEWEST]
         raise InputError(
             f"{trial.path}: {comparator.name} needs {', '.join(lacking or comparator.state)} at "
@@ -150,10 +164,10 @@ def _cut(comparator: SegmentPrediction, trial: Trial) -> _Cut:
             f"a comparator that needs less (docs/how-it-works.md lists what each needs), or leave "
             f"this log out"
         )
-    starts = starts[usable]
+    starts, steady = starts[usable], steady[usable]
     wrong = command_errors(trial) / (SCALES["commands"] * command_spans(trial))
     rows = starts[:, np.newaxis] + np.arange(1, horizon + 1)
-    return _Cut(states, starts, _mean(np.log1p(np.square(wrong[rows]))))
+    return _Cut(states, starts, steady, _mean(np.log1p(np.square(wrong[rows]))))
 
 
 def _known_all_along(commands: FloatArray, starts: IndexArray, horizon: int) -> BoolArray:

@@ -1,5 +1,6 @@
 """From the rows of some steps to the messages that a log gets for them."""
 
+import dataclasses
 from collections.abc import Mapping
 from itertools import repeat
 from operator import itemgetter
@@ -7,7 +8,7 @@ from operator import itemgetter
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.behaviour import Signal
+from selfmodel.behaviour import SIGNALS, Names, Sample
 from selfmodel.logs.frames import (
     Kinematics,
     body_names,
@@ -15,8 +16,33 @@ from selfmodel.logs.frames import (
     parent_names,
     to_micrometres,
 )
-from selfmodel.logs.topics import Part, frames_stride, topics, transforms
+from selfmodel.logs.topics import TIMING, Part, frames_stride, topics, transforms
 from selfmodel.robot import Robot
+
+
+def empty_rows(names: Names, steps: int, *, timed: bool) -> dict[Part, FloatArray]:
+    """Returns room for what so many steps have to be told of, ``(steps, width)`` each.
+
+    Args:
+        names: The columns of a robot's signals.
+        steps: How many rows.
+        timed: Whether the steps say when they really happened.
+    """
+    rows: dict[Part, FloatArray] = {
+        signal: np.empty((steps, names.width(signal))) for signal in SIGNALS
+    }
+    if timed:
+        rows["timing"] = np.empty((steps, 3))
+    return rows
+
+
+def parts_of(sample: Sample) -> dict[Part, FloatArray]:
+    """Returns what a sample tells, ``(width,)`` each."""
+    parts: dict[Part, FloatArray] = {}
+    parts.update(sample.values.items())
+    if sample.moment is not None:
+        parts["timing"] = np.array(dataclasses.astuple(sample.moment), dtype=np.float64)
+    return parts
 
 
 class Encoder:
@@ -24,26 +50,28 @@ class Encoder:
 
     Args:
         robot: As its model describes it.
+        timed: Whether the rows say when they really happened.
 
     Attributes:
         topics: What there are messages of, in the order in which a step has them.
     """
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, *, timed: bool = False) -> None:
         frames = transforms(body_names(robot.model), parent_names(robot.model))
-        self.topics = (*topics(robot.anatomy.names, robot.root), frames)
+        every = topics(robot.anatomy.names, robot.root)
+        self.topics = (*every, *([TIMING] if timed else []), frames)
         self._timestep = robot.control_timestep
         self._kinematics = Kinematics(robot)
         self._stride = frames_stride(robot.control_timestep)
 
     def encode(
-        self, first: int, rows: Mapping[Signal, FloatArray]
+        self, first: int, rows: Mapping[Part, FloatArray]
     ) -> list[tuple[int, int, int, bytes]]:
         """Returns the messages of some steps, in order.
 
         Args:
             first: The number of the first step.
-            rows: Each signal, ``(steps, width)``.
+            rows: Each signal, ``(steps, width)``, and ``timing`` if there is one.
 
         Returns:
             Step, index into ``topics``, time in ns, and payload of each.
@@ -63,7 +91,7 @@ class Encoder:
                 rows["base_orientation"][seen],
             ),
         }
-        parts.update((signal, values) for signal, values in rows.items())
+        parts.update(rows)
         told: list[tuple[int, int, int, bytes]] = []
         for number, topic in enumerate(self.topics):
             chosen = seen if number == len(self.topics) - 1 else every

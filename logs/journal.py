@@ -18,7 +18,7 @@ from selfmodel.logs.reader import read_log
 from selfmodel.logs.records import checked_name
 from selfmodel.logs.writer import write_trial
 from selfmodel.notation import parse
-from selfmodel.physical import PhysicalRobot
+from selfmodel.physical import PhysicalRobot, Timed
 from selfmodel.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trial import Plan, Stage, Trial
@@ -61,6 +61,7 @@ class FolderJournal:
             self.robot,
             plan,
             physical.run(plan.controller, plan.steps),
+            timed=isinstance(physical, Timed),
             settings=self.settings,
             hidden=self._hidden.get(plan.stage),
             gap=self._gap,

@@ -19,6 +19,7 @@ from selfmodel.logs.records import (
     MODEL_FILE,
     SETTINGS_FILE,
     SOFTWARE,
+    TIMED_FORMAT,
     TRIAL,
     TRUTH,
     Imported,
@@ -39,6 +40,7 @@ def write_preamble(
     robot: Robot,
     plan: Plan,
     *,
+    timed: bool,
     settings: Settings,
     hidden: str | None,
     gap: str | None,
@@ -50,6 +52,7 @@ def write_preamble(
         log: Where to.
         robot: The robot as its model describes it.
         plan: What is to be done.
+        timed: Whether it is to be told when each step really happened.
         settings: The paper's numbers.
         hidden: What is wrong with a simulated robot, in notation.
         gap: How else it differs from its model, as JSON.
@@ -62,7 +65,7 @@ def write_preamble(
     controller = b"" if isinstance(driver, Playback) else controller_bytes(driver)
     model = robot.mjcf.encode()
     record = TrialRecord(
-        format=FORMAT,
+        format=TIMED_FORMAT if timed else FORMAT,
         name=plan.name,
         stage=plan.stage,
         robot=robot.name,

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -25,7 +25,7 @@ from selfmodel.logs.errors import (
 from selfmodel.logs.records import (
     CONTROLLER_FILE,
     FINISHED,
-    FORMAT,
+    FORMATS,
     GAP,
     HIDDEN,
     IMPORT,
@@ -35,6 +35,7 @@ from selfmodel.logs.records import (
     RESULT,
     SETTINGS_FILE,
     SOFTWARE,
+    STOPPED,
     TRIAL,
     TRUTH,
     Result,
@@ -45,6 +46,7 @@ from selfmodel.logs.records import (
     trial_record,
 )
 from selfmodel.logs.signals import read_behaviour
+from selfmodel.logs.timing import Timing, read_timing
 from selfmodel.playback import played_back
 from selfmodel.settings import Settings
 from selfmodel.trial import Plan, Trial
@@ -63,7 +65,10 @@ class TrialLog:
         control_timestep: Seconds between two commands.
         settings: The paper's numbers, as they were.
         software: Versions, by the name of what they are of.
-        status: ``finished``, or ``interrupted`` where the steps that were salvaged are all.
+        status: ``finished``, ``interrupted`` where the steps that were salvaged are all, or
+            ``stopped`` where a robot with a clock of its own was.
+        reason: Why it was stopped, or "".
+        timing: When each step really happened, on a robot with a clock of its own.
         imported: Whether it is a recording that was resampled, and rounded by that.
     """
 
@@ -75,6 +80,8 @@ class TrialLog:
     settings: Settings
     software: Mapping[str, str]
     status: str
+    reason: str
+    timing: Timing | None
     imported: bool
 
 
@@ -108,6 +115,9 @@ def interpret(path: Path, contents: Contents) -> TrialLog:
     mjcf = read_attachment(path, contents, MODEL_FILE, record.model_sha256)
     controller = read_controller(path, contents, record)
     behaviour = read_behaviour(path, contents, record, result.steps, controller)
+    timing = read_timing(path, contents, record, result.steps)
+    if timing is not None:
+        behaviour = replace(behaviour, late=timing.late)
     driver = controller or _playback(path, behaviour)
     plan = Plan(record.name, record.stage, driver, record.steps, record.seed)
     trial = Trial(plan, record.robot, behaviour, str(path))
@@ -137,6 +147,8 @@ def interpret(path: Path, contents: Contents) -> TrialLog:
         settings=settings,
         software=MappingProxyType(dict(contents.metadata.get(SOFTWARE, {}))),
         status=result.status,
+        reason=result.reason,
+        timing=timing,
         imported=IMPORT in contents.metadata,
     )
 
@@ -198,10 +210,9 @@ def read_record(path: Path, contents: Contents) -> TrialRecord:
         raise SchemaMismatchError(
             path, f"it has no record {TRIAL}", good=contents.good, advice=advice
         )
-    if texts.get("format") != FORMAT:
-        raise UnsupportedError(
-            path, f"expected format {FORMAT}, got {texts.get('format')!r}", advice=OTHER_VERSION
-        )
+    if texts.get("format") not in FORMATS:
+        what = f"expected format {' or '.join(FORMATS)}, got {texts.get('format')!r}"
+        raise UnsupportedError(path, what, advice=OTHER_VERSION)
     try:
         return trial_record(texts)
     except ValueError as error:
@@ -264,7 +275,7 @@ def _result(path: Path, contents: Contents, record: TrialRecord) -> Result:
         raise SchemaMismatchError(
             path, f"its record {RESULT} is wrong: {error}", good=contents.good
         ) from error
-    if result.status not in (FINISHED, INTERRUPTED):
+    if result.status not in (FINISHED, INTERRUPTED, STOPPED):
         raise UnsupportedError(
             path, f"the trial is {result.status!r}", good=contents.good, advice=OTHER_VERSION
         )

@@ -16,6 +16,11 @@ from selfmodel.trial import Stage
 FORMAT = "1"
 """The version of the log's format; a reader refuses others."""
 
+TIMED_FORMAT = "2"
+"""That of a robot with a clock of its own: the same with ``/timing``."""
+
+FORMATS = (FORMAT, TIMED_FORMAT)
+
 TRIAL = "selfmodel.trial"
 SOFTWARE = "selfmodel.software"
 HIDDEN = "selfmodel.hidden"
@@ -48,7 +53,7 @@ TRUTH = "truth"
 GAP = "gap"
 FINISHED = "finished"
 INTERRUPTED = "interrupted"
-
+STOPPED = "stopped"
 
 SHORTEST, LONGEST = 1e-9, 3600.0
 """Seconds that a control step may take: a log's clock ticks in nanoseconds, and ends."""
@@ -100,14 +105,16 @@ class Result:
     """The record ``selfmodel.result``, written last.
 
     Attributes:
-        status: ``finished`` or ``interrupted``.
+        status: ``finished``, ``interrupted`` or ``stopped``.
         steps: Control steps that were logged.
         displacement: How far the robot travelled forward, m.
+        reason: Why it was stopped.
     """
 
     status: str
     steps: int
     displacement: float
+    reason: str = ""
 
     def texts(self) -> dict[str, str]:
         """Returns the record as MCAP holds it."""
@@ -115,6 +122,7 @@ class Result:
             "status": self.status,
             "steps": str(self.steps),
             "displacement": repr(self.displacement),
+            **({"reason": self.reason[:LONGEST_TEXT]} if self.reason else {}),
         }
 
 
@@ -177,7 +185,10 @@ def result_record(texts: Mapping[str, str]) -> Result:
     missing = [name for name in ("status", "steps", "displacement") if name not in texts]
     if missing:
         raise ValueError(f"it lacks {', '.join(missing)}")
-    return Result(texts["status"], int(texts["steps"]), float(texts["displacement"]))
+    reason = texts.get("reason", "")
+    if len(reason) > LONGEST_TEXT:
+        raise ValueError(f"expected at most {LONGEST_TEXT} characters in reason")
+    return Result(texts["status"], int(texts["steps"]), float(texts["displacement"]), reason)
 
 
 def settings_json(settings: Settings) -> bytes:

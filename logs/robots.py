@@ -9,11 +9,9 @@ from selfmodel.behaviour import Names
 from selfmodel.errors import InputError
 from selfmodel.logs.errors import SchemaMismatchError
 from selfmodel.logs.reader import TrialLog
-from selfmodel.logs.untrusted import checked_model
+from selfmodel.mjcf import MOST_SUBSTEPS
 from selfmodel.robot import Robot
-
-MOST_SUBSTEPS = 1000
-"""Physics steps in a control step: more would take for ever."""
+from selfmodel.untrusted import checked_model
 
 GOOD = "what was observed reads well"
 

@@ -22,6 +22,7 @@ from selfmodel.logs.records import (
     RESULT,
     SALVAGE,
     SETTINGS_FILE,
+    TIMED_FORMAT,
     TRIAL,
     Result,
     TrialRecord,
@@ -30,7 +31,7 @@ from selfmodel.logs.records import (
 )
 from selfmodel.logs.rescue import rescue
 from selfmodel.logs.signals import read_behaviour, read_names
-from selfmodel.logs.topics import DESCRIPTION, TRANSFORMS, Topic, frames_stride, topics
+from selfmodel.logs.topics import DESCRIPTION, TIMING, TRANSFORMS, Topic, frames_stride, topics
 from selfmodel.settings import Settings
 
 
@@ -141,6 +142,8 @@ def _complete(
     """The topics, and the steps that all of them tell of."""
     try:
         every = topics(read_names(path, contents), record.root)
+        if record.format == TIMED_FORMAT:
+            every = (*every, TIMING)
     except SchemaMismatchError as error:
         raise _nothing(path) from error
     if record.steps > RECORD_LIMIT // len(every):

@@ -43,12 +43,17 @@ def read_behaviour(
         raise CorruptError(
             path, f"{held} messages on /joint_states for {steps} steps", good=contents.good
         )
-    time: FloatArray = np.arange(steps, dtype=np.float64) * record.control_timestep
+    time = times_of(record, steps)
     parts: dict[Part, FloatArray] = {}
     for topic in topics(names, record.root):
-        parts |= _rows(path, contents, topic, time)
+        parts |= read_rows(path, contents, topic, time)
     signals: dict[Signal, FloatArray] = {signal: frozen(parts[signal]) for signal in SIGNALS}
     return Behaviour(names, frozen(time), signals)
+
+
+def times_of(record: TrialRecord, steps: int) -> FloatArray:
+    """Returns when the first steps of a trial were due, ``(steps,)`` s."""
+    return np.arange(steps, dtype=np.float64) * record.control_timestep
 
 
 def read_names(path: Path, contents: Contents) -> Names:
@@ -78,7 +83,20 @@ def _names(path: Path, contents: Contents, topic: str) -> tuple[str, ...]:
         raise SchemaMismatchError(path, f"on {topic}: {error}", good=contents.good) from error
 
 
-def _rows(path: Path, contents: Contents, topic: Topic, time: FloatArray) -> dict[Part, FloatArray]:
+def read_rows(
+    path: Path, contents: Contents, topic: Topic, time: FloatArray
+) -> dict[Part, FloatArray]:
+    """Returns what the messages of a topic say, ``(steps, width)`` for each of its parts.
+
+    Args:
+        path: The log, for errors.
+        contents: What stands in it.
+        topic: What the messages are to be.
+        time: When the steps were due, ``(steps,)`` s.
+
+    Raises:
+        LogError: The messages are not those of these steps, or not of the topic's type.
+    """
     messages, good = _messages(path, contents, topic.name), contents.good
     if (messages.type, messages.encoding) != (topic.type, "cdr"):
         raise SchemaMismatchError(

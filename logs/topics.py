@@ -24,7 +24,9 @@ Derived = Literal["child_linear_velocity", "transforms"]
 frame, ``(steps, 3)`` m/s; each body's position and orientation (x y z w) in its parent's frame,
 ``(steps, 7 bodies)``."""
 
-Part = Signal | Derived
+Part = Signal | Derived | Literal["timing"]
+"""What the numbers of a message are. ``timing`` is ``(steps, 3)``: the seconds that had elapsed,
+and 1 or 0 for whether the step was late and whether its observation is missing."""
 
 _XYZW = (1, 2, 3, 0)  # where a message's quaternion stands in one of MuJoCo
 
@@ -174,3 +176,12 @@ def _vector() -> Template:
     layout.header(WORLD)
     layout.floats(3)
     return layout.template()
+
+
+TIMING = Topic(
+    "/timing",
+    "selfmodel_msgs/msg/SensorReadings",
+    _joint_state(("elapsed", "late", "missing"), (3,)),
+    (("timing", 3),),
+)
+"""When each step really happened, on a robot with a clock of its own."""

@@ -1,24 +1,22 @@
 """Writes a trial into its log while it runs, so that whatever happens, what happened is kept."""
 
 import itertools
-from collections.abc import Iterable
+from collections.abc import Generator, Iterable
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-import numpy as np
-
 from selfmodel.atomic import part_of
-from selfmodel.behaviour import SIGNALS, Names, Sample
+from selfmodel.behaviour import Names, Sample
 from selfmodel.driver import Driver
 from selfmodel.errors import InputError
-from selfmodel.logs.encoder import Encoder
+from selfmodel.logs.encoder import Encoder, empty_rows, parts_of
 from selfmodel.logs.errors import IncompleteError, salvage_it
 from selfmodel.logs.files import explained
 from selfmodel.logs.logfile import LogFile
 from selfmodel.logs.preamble import write_preamble
-from selfmodel.logs.records import FINISHED, RESULT, Imported, Result, checked_name
+from selfmodel.logs.records import FINISHED, RESULT, STOPPED, Imported, Result, checked_name
 from selfmodel.playback import Playback
 from selfmodel.robot import Robot
 from selfmodel.settings import Settings
@@ -34,6 +32,7 @@ def write_trial(
     plan: Plan,
     samples: Iterable[Sample],
     *,
+    timed: bool = False,
     settings: Settings,
     hidden: str | None = None,
     gap: str | None = None,
@@ -45,7 +44,9 @@ def write_trial(
         path: The log's name; until the trial is finished, the file is called ``path.part``.
         robot: The robot as its model describes it.
         plan: What is to be done.
-        samples: What happens, as it happens; not more than the plan's steps are asked for.
+        samples: What happens, as it happens; not more than the plan's steps are asked for, and a
+            generator is closed before the log is, which stops the robot.
+        timed: Whether the robot is ``selfmodel.physical.Timed``: its samples have moments.
         settings: The paper's numbers, for the record.
         hidden: What is wrong with a simulated robot, in notation; for ``read_truth`` only.
         gap: How else it differs from its model, as JSON; for ``read_gap`` only.
@@ -60,9 +61,19 @@ def write_trial(
         LogWriteError: The disk is full, or failed.
     """
     writer = TrialWriter(
-        path, robot, plan, settings=settings, hidden=hidden, gap=gap, imported=imported
+        path,
+        robot,
+        plan,
+        timed=timed,
+        settings=settings,
+        hidden=hidden,
+        gap=gap,
+        imported=imported,
     )
-    with writer:
+    with writer, ExitStack() as robot_stops:
+        # Before the log is closed, and wherever this was interrupted.
+        if isinstance(samples, Generator):
+            robot_stops.callback(samples.close)
         for sample in itertools.islice(samples, plan.steps):
             writer.add(sample)
     return path
@@ -72,12 +83,15 @@ class TrialWriter:
     """Writes one trial, sample by sample; a context manager that finishes the file by itself.
 
     Whatever ends the trial early, from an exception to a kill, leaves a ``.part`` with all steps
-    but at most the last ``FLUSH_STEPS``. A file without ``.part`` is a finished trial.
+    but at most the last ``FLUSH_STEPS``. Only of a robot with a clock of its own, whose trial
+    cannot be made again, an exception leaves a whole log, once there is a step: its status is
+    ``stopped``.
 
     Args:
         path: The log's name.
         robot: The robot as its model describes it.
         plan: What is to be done.
+        timed: Whether the robot has a clock of its own.
         settings: The paper's numbers.
         hidden: What is wrong with a simulated robot, in notation.
         gap: How else it differs from its model, as JSON.
@@ -93,6 +107,7 @@ class TrialWriter:
         robot: Robot,
         plan: Plan,
         *,
+        timed: bool = False,
         settings: Settings,
         hidden: str | None = None,
         gap: str | None = None,
@@ -107,8 +122,9 @@ class TrialWriter:
         self.steps = 0
         self._robot, self._plan, self._settings = robot, plan, settings
         self._hidden, self._gap, self._imported = hidden, gap, imported
-        self._encoder = Encoder(robot)
-        self._rows = {signal: np.empty((FLUSH_STEPS, names.width(signal))) for signal in SIGNALS}
+        self._timed = timed
+        self._encoder = Encoder(robot, timed=timed)
+        self._rows = empty_rows(names, FLUSH_STEPS, timed=timed)
         self._written = 0
         self._start = self._end = 0.0
         self._sound = False
@@ -121,6 +137,7 @@ class TrialWriter:
                 self._log,
                 self._robot,
                 self._plan,
+                timed=self._timed,
                 settings=self._settings,
                 hidden=self._hidden,
                 gap=self._gap,
@@ -147,11 +164,18 @@ class TrialWriter:
                 f"step {self.steps} of {self._plan.steps} is due at {time!r} s, "
                 f"got a sample of {sample.time!r} s"
             )
-        for signal, rows in self._rows.items():
-            row = sample.values.get(signal)
+        if (sample.moment is not None) != self._timed:
+            has, given = ("no", "True") if self._timed else ("a", "False")
+            raise InputError(
+                f"the sample of step {self.steps} has {has} moment, and timed is {given}: a trial "
+                f"is timed if its robot has a clock of its own"
+            )
+        told = parts_of(sample)
+        for part, rows in self._rows.items():
+            row = told.get(part)
             if row is None or row.shape != rows.shape[1:]:
                 raise InputError(
-                    f"the sample of step {self.steps} must have {signal} of shape "
+                    f"the sample of step {self.steps} must have {part} of shape "
                     f"{rows.shape[1:]}, got {'nothing' if row is None else row.shape}"
                 )
             rows[self.steps - self._written] = row
@@ -174,8 +198,10 @@ class TrialWriter:
             if self._sound:
                 self._flush()
             if error is None and self.steps == self._plan.steps:
-                self._finish()
-        except OSError as failure:
+                self._finish(FINISHED)
+            elif error is not None and self._timed and self._sound and self.steps:
+                self._finish(STOPPED, _in_words(error))
+        except (OSError, InputError) as failure:
             if error is None:
                 raise
             error.add_note(str(failure))  # what ended the trial comes first
@@ -195,7 +221,7 @@ class TrialWriter:
         if not count:
             return
         self._sound = False
-        rows = {signal: rows[:count] for signal, rows in self._rows.items()}
+        rows = {part: rows[:count] for part, rows in self._rows.items()}
         with explained(part_of(self.path)):
             for step, topic, stamp, payload in self._encoder.encode(self._written, rows):
                 self._log.message(self._channels[topic], stamp, payload, step)
@@ -203,10 +229,14 @@ class TrialWriter:
         self._written = self.steps
         self._sound = True
 
-    def _finish(self) -> None:
-        result = Result(FINISHED, self.steps, self._end - self._start)
+    def _finish(self, status: str, reason: str = "") -> None:
+        result = Result(status, self.steps, self._end - self._start, reason)
         self._log.metadata(RESULT, result.texts())
         self._log.finish()
+
+
+def _in_words(error: BaseException) -> str:
+    return " ".join(f"{type(error).__name__}: {error}".split()).removesuffix(":")
 
 
 def _check_ends(robot: str, names: Names, driver: Driver) -> None:

@@ -1,13 +1,13 @@
 """What a run of a robot looked like: the record that simulation, logs and comparators share."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal, get_args
 
 import numpy as np
 
-from selfmodel.arrays import FloatArray, frozen
+from selfmodel.arrays import BoolArray, FloatArray, frozen
 
 Signal = Literal[
     "sensors",
@@ -64,16 +64,36 @@ class Names:
 
 
 @dataclass(frozen=True)
+class Moment:
+    """When a control step of a robot with a clock of its own really happened.
+
+    Attributes:
+        elapsed: Seconds from the first observation to this one by the robot's clock; NaN where it
+            did not say.
+        late: Whether it came more than a tolerance later than a control time step after the one
+            before, or, as where a driver catches up, sooner.
+        missing: Whether nothing was observed.
+    """
+
+    elapsed: float
+    late: bool
+    missing: bool
+
+
+@dataclass(frozen=True)
 class Sample:
     """One control step of a run, as it happened: the state, what was read, what was commanded.
 
     Attributes:
-        time: Seconds since the start of the run, when the sensors were read.
+        time: Seconds since the start of the run, when the sensors were to be read: a multiple of
+            the control time step.
         values: Each signal's row at that moment, ``(width,)``.
+        moment: When that really was, where the robot has a clock of its own.
     """
 
     time: float
     values: Mapping[Signal, FloatArray]
+    moment: Moment | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +107,8 @@ class Behaviour:
         names: What the columns are called.
         time: ``(steps,)`` seconds since the start of the run, strictly increasing.
         signals: What was recorded, each ``(..., steps, width)``.
+        late: ``(steps,)``: whether other than a control time step lies between a row and the one
+            before, as on a robot with a clock of its own; None where that is never so.
 
     Raises:
         ValueError: A shape does not fit its names, or time does not increase.
@@ -95,12 +117,15 @@ class Behaviour:
     names: Names
     time: FloatArray
     signals: Mapping[Signal, FloatArray]
+    late: BoolArray | None = None
 
     def __post_init__(self) -> None:
         if self.time.ndim != 1 or not np.all(np.diff(self.time) > 0):
             raise ValueError(
                 f"time must be (steps,) and strictly increasing, got shape {self.time.shape}"
             )
+        if self.late is not None and self.late.shape != self.time.shape:
+            raise ValueError(f"late must be (steps,) = {self.time.shape}, got {self.late.shape}")
         for signal, values in self.signals.items():
             expected = (len(self.time), self.names.width(signal))
             if values.shape[-2:] != expected:
@@ -121,6 +146,18 @@ class Behaviour:
         except KeyError:
             recorded = ", ".join(self.signals) or "nothing"
             raise KeyError(f"{signal} was not recorded; recorded: {recorded}") from None
+
+    @property
+    def steady_commands(self) -> FloatArray:
+        """The commands, with NaN for each that stood for other than a control time step.
+
+        What was commanded then is known; what it led to is at another time than a row says.
+        """
+        commands = self["commands"]
+        if self.late is None:
+            return commands
+        until_late = np.append(self.late[1:], False)  # the last leads nowhere
+        return np.where(until_late[:, np.newaxis], np.nan, commands)
 
     @property
     def steps(self) -> int:
@@ -144,7 +181,14 @@ def collect(names: Names, samples: Iterable[Sample]) -> Behaviour:
             signal: frozen(np.stack([row.values[signal] for row in rows]))
             for signal in rows[0].values
         },
+        late=late_steps([row.moment for row in rows]),
     )
+
+
+def late_steps(moments: Sequence[Moment | None]) -> BoolArray | None:
+    """Returns which steps were late, ``(steps,)``; None for a robot without a clock of its own."""
+    known = [moment for moment in moments if moment is not None]
+    return np.array([moment.late for moment in known]) if known else None
 
 
 def forward_displacement(behaviour: Behaviour) -> FloatArray:

@@ -183,7 +183,7 @@ class _Stretches:
 
 def _stretches(trial: Trial) -> _Stretches:
     behaviour = trial.behaviour
-    states, commands = estimated_states(behaviour), behaviour["commands"]
+    states, commands = estimated_states(behaviour), behaviour.steady_commands
     last = behaviour.steps - 1 - HORIZON
     evenly = np.unique(np.linspace(LEAD, max(last, LEAD), SEGMENTS).round().astype(int))
     known = {signal: np.isfinite(states[signal]).all(axis=1) for signal in STATE}

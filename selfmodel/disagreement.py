@@ -64,12 +64,12 @@ def most_disputed(
         steps: Control steps of a trial. Falls are looked for in all of it, disagreement early on.
     """
     early = _predicted(hypotheses, candidates, simulator, min(steps, EARLY))
-    falls = _first_of_any(early, simulator.robot)
+    falls = _first_of_any(early, hypotheses, simulator.robot)
     # NaN, of a simulation that diverged, sorts last.
     order = np.argsort(-disagreements(early.behaviour), kind="stable")
     for i in map(int, order[falls[order] == early.behaviour.steps]):
         whole = _predicted(hypotheses, [candidates[i]], simulator, steps)
-        falls[i] = _first_of_any(whole, simulator.robot)[0]
+        falls[i] = _first_of_any(whole, hypotheses, simulator.robot)[0]
         if falls[i] == steps:
             return candidates[i]
     return candidates[int(falls.argmax())]
@@ -87,9 +87,12 @@ def _predicted(
     return outcome.grouped(len(candidates), len(hypotheses))
 
 
-def _first_of_any(simulated: Simulated, robot: Robot) -> IndexArray:
+def _first_of_any(
+    simulated: Simulated, hypotheses: Sequence[Hypothesis], robot: Robot
+) -> IndexArray:
     """When the robot first falls under any of the hypotheses; what diverges falls at once."""
-    falls = first_falls(simulated.behaviour, robot.standing_height)
+    normals = np.array([robot.build(hypothesis).normal for hypothesis in hypotheses])
+    falls = first_falls(simulated.behaviour, normals, robot.standing_height)
     return np.asarray(np.where(simulated.diverged, 0, falls).min(axis=1))
 
 
@@ -116,17 +119,19 @@ def disagreements(behaviour: Behaviour) -> FloatArray:
     return total / max(len(pairs), 1) / len(SCALES)
 
 
-def first_falls(behaviour: Behaviour, standing_height: float) -> IndexArray:
+def first_falls(behaviour: Behaviour, normals: FloatArray, standing_height: float) -> IndexArray:
     """Returns the step at which the robot has first fallen, or the number of steps if it never has.
 
     Args:
         behaviour: Of the base its position and orientation, ``(..., steps, width)`` each.
+        normals: Unit vectors that stand on the ground, ``(..., 3)``, of a shape that broadcasts to
+            that of the runs. The ground goes through the origin.
         standing_height: Of the base at the start, m.
 
     Returns:
         Of shape ``(...)``.
     """
-    height = behaviour["base_position"][..., 2]
+    height = np.einsum("...sk,...k->...s", behaviour["base_position"], normals)
     upward = directions(behaviour["base_orientation"])[..., 2:]  # the world's, as the base has it
     # The cosine of how far the base leans.
     upright = (upward * upward[..., :1, :]).sum(axis=-1)

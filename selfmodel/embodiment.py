@@ -40,6 +40,7 @@ class Embodiment:
         neurons: 1 for each hidden neuron that works, 0 for a silent one, ``(hidden,)``.
         held: Of each hinge that is held still its places in ``qpos`` and ``qvel`` and its angle.
         seed: Of what is random in it: the noise, and the shape of rough terrain.
+        normal: Unit vector that stands on the ground, world frame, ``(3,)``.
     """
 
     model: mujoco.MjModel
@@ -50,6 +51,7 @@ class Embodiment:
     neurons: FloatArray
     held: list[tuple[int, int, float]] = field(default_factory=list)
     seed: int = 0
+    normal: FloatArray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
 
     def lose_body(self, name: str) -> None:
         """Makes a body a ghost: no mass, no collisions, no force from its motors and couplings."""
@@ -126,6 +128,21 @@ class Embodiment:
         paired = world[model.pair_geom1] | world[model.pair_geom2]
         model.pair_friction[paired, :2] = coefficient
 
+    def tilt_ground(self, angle: float) -> None:
+        """Turns the world's shapes, and whatever stands in it, uphill along x by an angle, rad."""
+        model = self.model
+        tilt = np.empty(4)
+        mujoco.mju_axisAngle2Quat(tilt, np.array([0.0, 1.0, 0.0]), -angle)
+        mujoco.mju_rotVecQuat(self.normal, self.normal.copy(), tilt)
+        for geom in np.flatnonzero(model.geom_bodyid == 0):
+            _turn(model.geom_pos[geom], model.geom_quat[geom], tilt)
+        for body in np.flatnonzero(model.body_parentid == 0)[1:]:
+            _turn(model.body_pos[body], model.body_quat[body], tilt)
+            joint = model.body_jntadr[body]
+            if joint >= 0 and model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE:
+                start = model.qpos0[model.jnt_qposadr[joint] :]
+                start[:3], start[3:7] = model.body_pos[body], model.body_quat[body]
+
     def scale_reading(self, sensor: int, factor: float) -> None:
         """Multiplies what the sensor of that column measures."""
         self.gain[sensor] *= factor
@@ -168,6 +185,12 @@ def embody(
     # good enough. Kept absolute, what is left of the robot is solved as exactly as ever.
     embodiment.model.opt.tolerance *= _mean_inertia(model) / _mean_inertia(embodiment.model)
     return embodiment
+
+
+def _turn(position: FloatArray, orientation: FloatArray, by: FloatArray) -> None:
+    """Turns a frame about the world's origin, in place."""
+    mujoco.mju_rotVecQuat(position, position.copy(), by)
+    mujoco.mju_mulQuat(orientation, by, orientation.copy())
 
 
 def _mean_inertia(model: mujoco.MjModel) -> float:

@@ -41,16 +41,19 @@ def estimated_states(
 
     Returns:
         Each signal, ``(steps, width)``. Where no noise shows it is what was logged, to the bit;
-        NaN where something that it would be estimated from was not observed.
+        NaN where something that it would be estimated from was not observed, or a step that was
+        late lies between.
     """
     states = {signal: behaviour[signal] for signal in signals}
     timestep = float(behaviour.time[1] - behaviour.time[0]) if behaviour.steps > 1 else 0.0
     for position, velocity, reach, little in _SMOOTHED:
         if position in states:
             values = behaviour[position]
-            moved = np.diff(values, axis=0) - _steps_along(behaviour[velocity], timestep)
-            if _is_noise(moved, little):
-                states[position] = _averaged(values, behaviour[velocity], timestep, reach)
+            ways = _steps_along(behaviour[velocity], timestep)
+            if behaviour.late is not None:
+                ways = np.where(behaviour.late[1:, np.newaxis], np.nan, ways)
+            if _is_noise(np.diff(values, axis=0) - ways, little):
+                states[position] = _averaged(values, behaviour[velocity], ways, reach)
     return states
 
 
@@ -85,12 +88,10 @@ def _is_noise(moved: FloatArray, little: float) -> bool:
 
 
 def _averaged(
-    values: FloatArray, velocities: FloatArray, timestep: float, reach: int
+    values: FloatArray, velocities: FloatArray, ways: FloatArray, reach: int
 ) -> FloatArray:
     steps = len(values)
-    along = np.concatenate(
-        [np.zeros((1, values.shape[1])), np.nancumsum(_steps_along(velocities, timestep), axis=0)]
-    )
+    along = np.concatenate([np.zeros((1, values.shape[1])), np.nancumsum(ways, axis=0)])
     still = values - along
     known = np.isfinite(still) & np.isfinite(velocities)
     sums = _summed(np.where(known, still, 0.0))
@@ -98,6 +99,8 @@ def _averaged(
     first = np.maximum(np.arange(steps) - reach, 0)
     last = np.minimum(np.arange(steps) + reach + 1, steps)
     all_known = counts[last] - counts[first] == (last - first)[:, np.newaxis]
+    unknown_ways = _summed(np.isnan(ways).astype(np.float64))
+    all_known &= unknown_ways[last - 1] == unknown_ways[first]
     mean = (sums[last] - sums[first]) / (last - first)[:, np.newaxis] + along
     return np.where(all_known, mean, np.nan)
 

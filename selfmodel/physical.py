@@ -1,8 +1,8 @@
 """Physical robots: what the algorithm may ask of one, and a simulated one that hides its fault."""
 
 from collections import deque
-from collections.abc import Iterator
-from typing import Protocol
+from collections.abc import Callable, Iterator
+from typing import Protocol, runtime_checkable
 
 import mujoco
 import numpy as np
@@ -36,9 +36,23 @@ class PhysicalRobot(Protocol):
 
         Yields:
             The state, the readings and the commands of each step, ``steps`` of them. Times are
-            those that the control loop aims at, multiples of the control time step to the bit: a
-            log of this format has no place for jitter.
+            those that the control loop aims at, multiples of the control time step to the bit;
+            when a step really was is its ``moment``, on a robot that is ``Timed``.
         """
+        ...
+
+
+@runtime_checkable
+class Timed(PhysicalRobot, Protocol):
+    """A physical robot with a clock of its own: each of its samples has a ``moment``.
+
+    No trial of it can be made again as it was. So one that is stopped before its end is kept as a
+    finished log that says so, where that of a simulated robot is an unfinished file.
+    """
+
+    @property
+    def clock(self) -> Callable[[], float]:
+        """Tells the time, s, from any beginning; it never goes back."""
         ...
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -12,7 +13,9 @@ from selfmodel.commands import command_ranges
 from selfmodel.controller import Network
 from selfmodel.dissection import driven_joints, read_anatomy
 from selfmodel.embodiment import Embodiment, embody
+from selfmodel.errors import InputError
 from selfmodel.hypothesis import INTACT, Hypothesis
+from selfmodel.mjcf import Adapted, MjcfSettings, adapt, read_settings
 from selfmodel.neurons import hidden_neurons
 from selfmodel.oscillators import Cpg
 from selfmodel.roots import find_root
@@ -60,6 +63,38 @@ class Robot:
                 f"the control time step {self.control_timestep} s must be a multiple of the "
                 f"physics time step {model.opt.timestep} s"
             )
+
+    @classmethod
+    def from_mjcf(cls, path: Path | str, settings: MjcfSettings | None = None) -> "Robot":
+        """Returns the robot that an MJCF file describes, whoever wrote it; see docs/robots.md.
+
+        Args:
+            path: The file, which is not changed. It may name others in its folder and below.
+            settings: What the file itself does not tell; None for those of the TOML beside it.
+
+        Raises:
+            InputError: No robot can be made of it; the sentence says why, and what to do.
+        """
+        file = Path(path)
+        return cls.from_adapted(
+            adapt(file, read_settings(file) if settings is None else settings), str(file)
+        )
+
+    @classmethod
+    def from_adapted(cls, adapted: Adapted, where: str) -> "Robot":
+        """Returns the robot of an MJCF that was made ready.
+
+        Args:
+            adapted: As ``mjcf.adapt`` or ``mjcf.adapt_text`` returns it.
+            where: What a refusal calls it.
+
+        Raises:
+            InputError: No robot can be made of it after all.
+        """
+        try:
+            return cls(adapted.name, adapted.mjcf, adapted.control_timestep, adapted.assets)
+        except ValueError as error:
+            raise InputError(f"{where}: {' '.join(str(error).split())}") from error
 
     @property
     def substeps(self) -> int:

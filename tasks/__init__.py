@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from selfmodel.errors import unknown_name
+from selfmodel.errors import InputError, unknown_name
 from selfmodel.robot import Robot
 from selfmodel.tasks import hexapod, quadruped
 
@@ -33,10 +33,20 @@ ROBOTS: Mapping[str, Entry] = {
 }
 """Every robot that comes with selfmodel."""
 
+SUITE: Mapping[str, Mapping[str, Callable[..., "control.Environment"]]] = {
+    domain: entry.suite for domain, entry in ROBOTS.items()
+}
+"""The tasks of every domain; each is what ``SUITE`` is in a domain of dm_control's suite."""
+
 ALL_TASKS: tuple[tuple[str, str], ...] = tuple(
-    (domain, task) for domain, entry in ROBOTS.items() for task in entry.suite
+    (domain, task) for domain, tasks in SUITE.items() for task in tasks
 )
 """Every ``(domain, task)`` that ``load`` knows."""
+
+TASKS_BY_DOMAIN: Mapping[str, tuple[str, ...]] = {
+    domain: tuple(tasks) for domain, tasks in SUITE.items()
+}
+"""The names of the tasks of every domain."""
 
 
 def load(
@@ -44,6 +54,7 @@ def load(
     task_name: str,
     task_kwargs: Mapping[str, Any] | None = None,
     environment_kwargs: Mapping[str, Any] | None = None,
+    visualize_reward: bool = False,  # noqa: FBT001, FBT002  # dm_control's signature
 ) -> "control.Environment":
     """Returns a dm_control environment, as ``dm_control.suite.load`` does for its own.
 
@@ -53,16 +64,24 @@ def load(
         task_kwargs: For the task: ``hypothesis``, what is wrong with the robot, in notation;
             ``time_limit`` in seconds; ``random``, a seed or a numpy ``RandomState``.
         environment_kwargs: For ``dm_control.rl.control.Environment``.
+        visualize_reward: Has to be ``False``: these rewards are speeds, and have no colours.
 
     Raises:
-        InputError: There is no such robot or task, or the hypothesis cannot be read.
+        InputError: There is no such robot or task, the hypothesis cannot be read, or the reward is
+            to be shown.
     """
-    if domain_name not in ROBOTS:
-        raise unknown_name("robot", domain_name, ROBOTS)
-    suite = ROBOTS[domain_name].suite
-    if task_name not in suite:
-        raise unknown_name(f"task of {domain_name}", task_name, suite)
-    return suite[task_name](**(task_kwargs or {}), environment_kwargs=environment_kwargs)
+    if domain_name not in SUITE:
+        raise unknown_name("robot", domain_name, SUITE)
+    if task_name not in SUITE[domain_name]:
+        raise unknown_name(f"task of {domain_name}", task_name, SUITE[domain_name])
+    if visualize_reward:
+        raise InputError(
+            f"{domain_name} {task_name}: the reward is a speed and has no colours to be shown in: "
+            f"leave visualize_reward at False"
+        )
+    return SUITE[domain_name][task_name](
+        **(task_kwargs or {}), environment_kwargs=environment_kwargs
+    )
 
 
-__all__ = ["ALL_TASKS", "ROBOTS", "Entry", "load"]
+__all__ = ["ALL_TASKS", "ROBOTS", "SUITE", "TASKS_BY_DOMAIN", "Entry", "load"]

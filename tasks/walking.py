@@ -1,6 +1,7 @@
 """The walking task: get forward, in the form of a dm_control task."""
 
 from collections import OrderedDict
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from dm_control.rl import control
 from dm_control.suite import base
 
 from selfmodel.arrays import FloatArray
+from selfmodel.behaviour import Signal
 from selfmodel.embodiment import Embodiment
 from selfmodel.notation import parse
 from selfmodel.places import places, present
@@ -44,6 +46,27 @@ def environment(
         control_timestep=robot.control_timestep,
         **(environment_kwargs or {}),
     )
+
+
+def motion_capture(
+    environment: control.Environment,
+) -> Callable[[Mapping[str, FloatArray]], Mapping[str, Any]]:
+    """Returns what adds to an observation what a robot does not see: where it is, torques, time.
+
+    With it as ``observe``, an ``EnvironmentRobot`` has trials of all signals.
+
+    Args:
+        environment: The one that the observations are of.
+    """
+
+    def observe(observation: Mapping[str, FloatArray]) -> Mapping[str, Any]:
+        task, physics = environment.task, environment.physics
+        seen = {
+            signal: task.observe(physics, signal) for signal in ("base_position", "joint_efforts")
+        }
+        return {**observation, **seen, "time": physics.time()}
+
+    return observe
 
 
 class Walk(base.Task):
@@ -90,17 +113,22 @@ class Walk(base.Task):
         data = physics.data
         self._senses.read(data.sensordata[np.newaxis], data.qpos[np.newaxis], readings)
         observation = OrderedDict(sensors=readings[0])
-        for signal in (
+        signals: tuple[Signal, ...] = (
             "joint_positions",
             "joint_velocities",
             "base_orientation",
             "base_linear_velocity",
             "base_angular_velocity",
-        ):
-            observation[signal] = present(self._places[signal], data)
-        observation["base_height"] = present(self._places["base_position"], data)[2:]
+        )
+        for signal in signals:
+            observation[signal] = self.observe(physics, signal)
+        observation["base_height"] = self.observe(physics, "base_position")[2:]
         return observation
+
+    def observe(self, physics: mujoco.Physics, signal: Signal) -> FloatArray:
+        """Returns a signal of the physics' state, ``(width,)``."""
+        return present(self._places[signal], physics.data)
 
     def _forward(self, physics: mujoco.Physics) -> float:
         """Where the root body is along the world's x axis, m."""
-        return float(present(self._places["base_position"], physics.data)[0])
+        return float(self.observe(physics, "base_position")[0])

@@ -97,7 +97,23 @@ def test_friction_leaves_what_cannot_touch_the_world_alone():
 
 
 @pytest.mark.parametrize("angle", [0.17, -0.3])
-def test_a_slope_moves_like_a_robot_on_tilted_ground(robot: Robot, angle: float):
+def test_a_slope_is_the_model_on_tilted_ground(robot: Robot, angle: float):
+    spec = mujoco.MjSpec.from_string(robot.mjcf)
+    tilt, turned = np.empty(4), np.empty(3)
+    # Uphill along x: the x axis of the ground points up, by a negative turn about y.
+    mujoco.mju_axisAngle2Quat(tilt, np.array([0.0, 1.0, 0.0]), -angle)
+    torso = spec.body("torso")
+    mujoco.mju_rotVecQuat(turned, torso.pos, tilt)
+    torso.pos, torso.quat = turned, tilt
+    spec.geom("ground").quat = tilt
+
+    assert_same_paths(
+        follow(robot, built(robot, f"slope={angle}"), STEPS), follow(robot, spec.compile(), STEPS)
+    )
+
+
+@pytest.mark.parametrize("angle", [0.17, -0.3])
+def test_a_slope_pulls_like_gravity_that_leans(robot: Robot, angle: float):
     # A pyramid of friction has edges, which lie differently on tilted ground; a cone has none.
     mjcf = robot.mjcf.replace('cone="pyramidal"', 'cone="elliptic"')
     # MuJoCo's frame of a contact is not square where a leg stands upright on tilted ground, so
@@ -106,22 +122,29 @@ def test_a_slope_moves_like_a_robot_on_tilted_ground(robot: Robot, angle: float)
     assert f'name="torso" pos="0 0 {height}"' in mjcf
     mjcf = mjcf.replace(f'pos="0 0 {height}"', f'pos="0 0 {height + 0.1}"')
     robot = Robot(robot.name, mjcf, robot.control_timestep)
-    spec = mujoco.MjSpec.from_string(mjcf)
-    tilt, turned = np.empty(4), np.empty(3)
-    # Uphill along x: the x axis of the ground points up, by a negative turn about y.
+    leaning = robot.specification()
+    leaning.option.gravity = 9.81 * np.array([-math.sin(angle), 0.0, -math.cos(angle)])
+    truth = follow(robot, leaning.compile(), STEPS)
+    tilt = np.empty(4)
     mujoco.mju_axisAngle2Quat(tilt, np.array([0.0, 1.0, 0.0]), -angle)
-    torso = spec.body("torso")
-    mujoco.mju_rotVecQuat(turned, torso.pos, tilt)
-    torso.pos, torso.quat = turned, tilt
-    spec.geom("ground").quat = tilt
-    truth = follow(robot, spec.compile(), STEPS)
-    back = tilt * [1, -1, -1, -1]
     for pose in truth["torso"]:
         position, orientation = pose[:3].copy(), pose[3:].copy()
-        mujoco.mju_rotVecQuat(pose[:3], position, back)
-        mujoco.mju_mulQuat(pose[3:], back, orientation)
+        mujoco.mju_rotVecQuat(pose[:3], position, tilt)
+        mujoco.mju_mulQuat(pose[3:], tilt, orientation)
 
     assert_same_paths(follow(robot, built(robot, f"slope={angle}"), STEPS), truth)
+
+
+@pytest.mark.parametrize("roughness", ["", "+roughness=0.02"])
+def test_a_robot_on_a_slope_stands_on_the_ground_as_on_level_ground(robot: Robot, roughness: str):
+    for text in (f"slope=0.2{roughness}", roughness.removeprefix("+") or "intact"):
+        embodiment = robot.build(parse(text, robot.anatomy))
+        data = mujoco.MjData(embodiment.model)
+        mujoco.mj_forward(embodiment.model, data)
+        place = data.body(robot.root).xpos
+
+        assert place @ embodiment.normal == pytest.approx(robot.standing_height)
+        assert data.body(robot.root).xmat.reshape(3, 3)[:, 2] == pytest.approx(embodiment.normal)
 
 
 def test_wind_is_the_model_with_that_wind(robot: Robot):

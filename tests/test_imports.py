@@ -65,6 +65,8 @@ LAYERS = (
             "behaviour",
             "anatomy",
             "controller",
+            "attached",
+            "untrusted",
         ),
         *(
             "settings",
@@ -76,7 +78,7 @@ LAYERS = (
             "streams",
             "intervals",
         ),
-        *("workers", "grid"),
+        *("workers", "grid", "stopwatch"),
     ),
     (
         "faults",
@@ -93,10 +95,11 @@ LAYERS = (
     ),
     (
         *("transmission", "couplings", "roots", "carried", "dissection", "activations"),
-        *("commands", "neurons"),
+        *("commands", "neurons", "mjcf"),
         *("embodiment", "robot", "places", "noise", "senses", "batches", "tally", "prediction"),
         *("gap", "instruments", "start", "debris", "structure", "contract_kind"),
-        *("simulator", "physical", "judge", "replay", "parameters", "disagreement"),
+        *("simulator", "physical", "judge", "replay", "poses", "parameters", "disagreement"),
+        *("limits", "environment_robot"),
     ),
     (
         *("database", "evidence", "refine", "degrees", "diagnose", "repair", "calibrate"),

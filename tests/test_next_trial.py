@@ -15,7 +15,7 @@ from selfmodel.behaviour import Behaviour, Names, Signal
 from selfmodel.controller import Controller, Network
 from selfmodel.database import Database
 from selfmodel.diagnosis import Candidate, Diagnosis, Verdict
-from selfmodel.disagreement import EARLY, SCALES, disagreements, first_falls, most_disputed
+from selfmodel.disagreement import EARLY, LOWEST, SCALES, disagreements, first_falls, most_disputed
 from selfmodel.events import Event, Question
 from selfmodel.hypothesis import INTACT, Hypothesis
 from selfmodel.next_trial import (
@@ -36,6 +36,7 @@ from tests.conftest import random_controllers
 
 SMALL = dataclasses.replace(Settings().scaled(12), steps=150)
 NAMES = Names(sensors=("touch",), motors=("motor",), hinges=("hinge",))
+UP = np.array([0.0, 0.0, 1.0])
 HEIGHT = 0.3
 
 
@@ -59,7 +60,9 @@ class Fate:
 class Oracle:
     """A simulator that knows the fate of each controller."""
 
-    robot = SimpleNamespace(standing_height=HEIGHT)
+    robot = SimpleNamespace(
+        standing_height=HEIGHT, build=lambda _hypothesis: SimpleNamespace(normal=UP)
+    )
 
     def __init__(self, fates: Sequence[Fate]) -> None:
         network = Network(NAMES.sensors, NAMES.motors)
@@ -163,7 +166,7 @@ def test_a_base_has_fallen_when_it_leans_by_more_than_sixty_degrees_whatever_its
     x, y, z, w = turned.as_quat()
     orientation = np.array([[1, 0, 0, 0], [w, x, y, z]])
     signals = {"base_position": np.full((2, 3), HEIGHT), "base_orientation": orientation}
-    falls = first_falls(Behaviour(NAMES, np.array([0, 0.01]), signals), HEIGHT)
+    falls = first_falls(Behaviour(NAMES, np.array([0, 0.01]), signals), UP, HEIGHT)
 
     if abs(lean - np.pi / 3) > 1e-6:
         assert falls == (1 if lean > np.pi / 3 else 2)
@@ -174,7 +177,7 @@ def test_a_base_that_begins_on_the_ground_has_no_height_to_fall_from(height: flo
     signals = {"base_position": np.full((2, 3), height), "base_orientation": np.eye(4)[[0, 0]]}
     signals["base_position"][1] -= 0.01
 
-    assert first_falls(Behaviour(NAMES, np.array([0, 0.01]), signals), height) == 2
+    assert first_falls(Behaviour(NAMES, np.array([0, 0.01]), signals), UP, height) == 2
 
 
 @given(start=st.integers(0, 2**31), lean=st.floats(0, np.pi))
@@ -183,10 +186,24 @@ def test_a_base_leans_from_where_it_started(start: int, lean: float):
     about = Rotation.from_rotvec(lean * np.array([0.6, 0.8, 0]))
     turns = Rotation.concatenate([lying, about * lying]).as_quat(scalar_first=True)
     signals = {"base_position": np.full((2, 3), HEIGHT), "base_orientation": turns}
-    falls = first_falls(Behaviour(NAMES, np.array([0, 0.01]), signals), HEIGHT)
+    falls = first_falls(Behaviour(NAMES, np.array([0, 0.01]), signals), UP, HEIGHT)
 
     if abs(lean - np.pi / 3) > 1e-6:
         assert falls == (1 if lean > np.pi / 3 else 2)
+
+
+@given(way=st.floats(-10, 10), height=st.floats(0, 2), slope=st.floats(-0.3, 0.3))
+def test_a_base_has_fallen_when_it_is_near_the_ground_however_far_up_or_down_a_slope_it_is(
+    way: float, height: float, slope: float
+):
+    along = np.array([np.cos(slope), 0, np.sin(slope)])
+    normal = np.array([-np.sin(slope), 0, np.cos(slope)])
+    position = np.array([HEIGHT * normal, way * along + height * normal])
+    signals = {"base_position": position, "base_orientation": np.tile([1.0, 0, 0, 0], (2, 1))}
+    falls = first_falls(Behaviour(NAMES, np.array([0, 0.01]), signals), normal, HEIGHT)
+
+    if abs(height - LOWEST * HEIGHT) > 1e-6:
+        assert falls == (1 if height < LOWEST * HEIGHT else 2)
 
 
 @settings(deadline=None)

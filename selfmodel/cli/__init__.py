@@ -10,6 +10,7 @@ from selfmodel.cli.calibrate import calibrate
 from selfmodel.cli.diagnose import diagnose
 from selfmodel.cli.plain import plain
 from selfmodel.cli.recover import recover
+from selfmodel.cli.render import render
 from selfmodel.cli.replay import replay
 from selfmodel.cli.robots import robots
 from selfmodel.cli.trial import trial
@@ -29,6 +30,7 @@ app.command()(trial)
 app.command()(calibrate)
 app.command()(diagnose)
 app.command()(replay)
+app.command()(render)
 app.command()(ablate)
 app.add_typer(logs.app)
 

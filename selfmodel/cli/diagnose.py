@@ -108,6 +108,12 @@ def _notes(logs: "list[TrialLog]") -> list[str]:
         for log in logs
         if _is_played_back(log)
     ]
+    notes += [
+        f"{log.trial.path}: {log.timing.late.sum()} of {log.trial.behaviour.steps} steps were "
+        f"late; short predictions leave them out, but a comparator of whole trials cannot"
+        for log in logs
+        if log.timing is not None and log.timing.late.any()
+    ]
     if any(log.settings != first.settings for log in logs):
         notes.append(f"the logs have different settings: those of {first.trial.path} are taken")
     if any(log.trial.plan.seed != first.trial.plan.seed for log in logs):

@@ -9,7 +9,19 @@ from selfmodel.errors import InputError
 from selfmodel.faults import ALL_KINDS, PAPER_KINDS
 
 RobotName = Annotated[
-    str, typer.Argument(metavar="ROBOT", help="One of those that `selfmodel robots` lists.")
+    str,
+    typer.Argument(
+        metavar="ROBOT|ROBOT.xml",
+        help="One of those that `selfmodel robots` lists, or an MJCF of your own.",
+    ),
+]
+ModelSettings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="What ROBOT.xml does not tell, such as forward=-x; as in ROBOT.toml beside it.",
+    ),
 ]
 Damage = Annotated[
     str | None,

@@ -15,6 +15,7 @@ from selfmodel.cli.options import (
     Generations,
     Json,
     KindNames,
+    ModelSettings,
     Neurons,
     NextTrialName,
     Population,
@@ -33,6 +34,7 @@ def recover(
         int | None, typer.Option(metavar="N", help="A failure of the paper's Table I, 1 to 10.")
     ] = None,
     damage: Damage = None,
+    model_settings: ModelSettings = None,
     comparator: ComparatorName = DEFAULT,
     calibrate: Calibrated = True,
     gap: GapLevel = 0.0,
@@ -67,7 +69,7 @@ def recover(
     from selfmodel.notation import parse  # noqa: PLC0415
     from selfmodel.settings import Settings  # noqa: PLC0415
 
-    entry = resolve.robot_entry(robot)
+    entry = resolve.robot_entry(robot, model_settings or ())
     considered = resolve.kinds(kinds)
     damaged = resolve.case_notation(entry, case, damage)
     made = resolve.with_neurons(entry.robot(), neurons, controller)
@@ -84,7 +86,7 @@ def recover(
         settings=Settings(trials=trials, generations=generations).scaled(population),
         seed=seed,
         threads=resolve.threads(threads),
-        folder=out or _new_folder(robot),
+        folder=out or _new_folder(made.name),
         gap=gap,
         structure=structure,
         next_trial=resolve.next_trial(next_trial),

@@ -20,6 +20,7 @@ from selfmodel.hypothesis import Hypothesis
 from selfmodel.logs import LogError, TrialLog, load_controller, read_log
 from selfmodel.logs.files import read_bounded
 from selfmodel.logs.robots import described_difference, the_robot_of
+from selfmodel.mjcf import MjcfSettings, adapt, parse_setting, read_settings
 from selfmodel.neurons import with_neurons as neurons_in
 from selfmodel.next_trial import NextTrial, by_disagreement, by_repair
 from selfmodel.playback import Playback
@@ -40,15 +41,37 @@ LARGEST_MODEL = 64 * 2**20
 """Bytes that an MJCF file may have."""
 
 
-def robot_entry(name: str) -> Entry:
-    """Returns the robot of that name.
+def robot_entry(name: str, settings: Iterable[str] = ()) -> Entry:
+    """Returns the robot of that name, or the one that somebody's MJCF describes.
+
+    Args:
+        name: One of those that come with selfmodel, or a path that ends in ``.xml``.
+        settings: What the MJCF does not tell, such as ``forward=-x``; they count before those of
+            the TOML beside it.
 
     Raises:
-        InputError: There is none; the message names the nearest.
+        InputError: There is none, and the message names the nearest; or none can be made of the
+            MJCF, or settings are given for a robot that needs none.
     """
+    given = tuple(settings)
+    if is_model(name):
+        made = Robot.from_mjcf(Path(name), _settings(name, given))
+        return Entry(robot=lambda: made, cases={}, suite={})
+    if given:
+        raise InputError(f"--set {given[0]} is for a robot's MJCF: {name!r} has all that it needs")
     if name not in ROBOTS:
         raise unknown_name("robot", name, ROBOTS)
     return ROBOTS[name]
+
+
+def notes_on(name: str, settings: Iterable[str]) -> tuple[str, ...]:
+    """Returns what was done to an MJCF to make a robot of it; see ``robot_entry``."""
+    return adapt(Path(name), _settings(name, settings)).notes
+
+
+def _settings(name: str, given: Iterable[str]) -> MjcfSettings:
+    extra = {key: value for text in given for key, value in parse_setting(text).items()}
+    return read_settings(Path(name), extra)
 
 
 def case_notation(entry: Entry, case: int | None, damage: str | None) -> str:
@@ -57,6 +80,12 @@ def case_notation(entry: Entry, case: int | None, damage: str | None) -> str:
     Raises:
         InputError: Neither or both are given, or there is no case of that number.
     """
+    if not entry.cases and damage is None:
+        joint = entry.robot().anatomy.joints[0].name
+        raise InputError(
+            f"expected --damage NOTATION, such as --damage break:{joint}: the cases of Table I are "
+            f"those of the robots that come with selfmodel"
+        )
     if (case is None) == (damage is None):
         given = "neither" if case is None else "both"
         raise InputError(
@@ -270,13 +299,32 @@ def robot_of_logs(found: Sequence[TrialLog], override: str | None) -> Robot:
         raise InputError(str(error)) from error
     if override is None:
         return own
-    chosen = robot(override, own.control_timestep)
+    chosen = _override(override, own)
     if chosen.anatomy.names != own.anatomy.names:
         raise InputError(
             f"{override} is another robot than that of {found[0].trial.path}: "
             f"{described_difference(chosen.anatomy.names, own.anatomy.names)}"
         )
     return chosen
+
+
+def _override(name: str, own: Robot) -> Robot:
+    """The model to take in the place of a log's: as it stands, or made ready as the log's was."""
+    if not is_model(name):
+        return robot_entry(name).robot()
+    try:
+        chosen = robot(name, own.control_timestep)
+    except InputError:
+        chosen = None
+    if chosen is not None and chosen.anatomy.names == own.anatomy.names:
+        return chosen
+    path = Path(name)
+    return Robot.from_mjcf(path, read_settings(path, {"control_timestep": own.control_timestep}))
+
+
+def is_model(name: str) -> bool:
+    """Returns whether a robot's name is the path of an MJCF file."""
+    return Path(name).suffix.lower() == ".xml"
 
 
 def robot(name: str, control_timestep: float) -> Robot:
@@ -290,7 +338,7 @@ def robot(name: str, control_timestep: float) -> Robot:
         InputError: There is none, or the model cannot be used.
     """
     path = Path(name)
-    if path.suffix.lower() != ".xml":
+    if not is_model(name):
         return robot_entry(name).robot()
     data = read_bounded(path, "an MJCF file", LARGEST_MODEL)
     try:

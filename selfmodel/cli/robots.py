@@ -1,11 +1,12 @@
-"""``selfmodel robots``: the robots that come with it, and the parts of one."""
+"""``selfmodel robots``: the robots that come with it, and the parts of one or of your own."""
 
 import json
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from selfmodel.cli.options import Json
+from selfmodel.cli.options import Json, ModelSettings
+from selfmodel.cli.plain import plain
 
 if TYPE_CHECKING:
     from selfmodel.tasks import Entry
@@ -13,30 +14,44 @@ if TYPE_CHECKING:
 
 def robots(
     robot: Annotated[
-        str | None, typer.Argument(metavar="[ROBOT]", help="Show the parts of this one.")
+        str | None,
+        typer.Argument(
+            metavar="[ROBOT|ROBOT.xml]", help="Show the parts of this one, or of an MJCF of yours."
+        ),
     ] = None,
     *,
+    model_settings: ModelSettings = None,
     as_json: Json = False,
 ) -> None:
     """List the robots, or the parts and failure cases of one."""
     # The robots bring MuJoCo, which takes longer to import than the help takes to print.
-    from selfmodel.cli.resolve import robot_entry  # noqa: PLC0415
+    from selfmodel.cli.resolve import is_model, notes_on, robot_entry  # noqa: PLC0415
+    from selfmodel.cli.robot_parts import parts, print_parts  # noqa: PLC0415
     from selfmodel.tasks import ROBOTS  # noqa: PLC0415
 
-    names = [robot] if robot else list(ROBOTS)
-    facts = [_facts(name, robot_entry(name)) for name in names]
+    if robot is None:
+        every = [_facts(robot_entry(name)) for name in ROBOTS]
+        if as_json:
+            typer.echo(json.dumps({"robots": every}, indent=2))
+        else:
+            _print_all(every)
+        return
+    entry = robot_entry(robot, model_settings or ())
+    notes = notes_on(robot, model_settings or ()) if is_model(robot) else ()
+    facts = {**_facts(entry), **parts(entry.robot()), "notes": list(notes)}
     if as_json:
-        typer.echo(json.dumps(facts[0] if robot else {"robots": facts}, indent=2))
-    elif robot:
-        _print_one(facts[0])
-    else:
-        _print_all(facts)
+        typer.echo(json.dumps(facts, indent=2, allow_nan=False))
+        return
+    print_parts(facts)
+    _print_cases(facts)
+    for note in notes:
+        typer.echo(plain(f"note: {note}"))
 
 
-def _facts(name: str, entry: "Entry") -> dict[str, Any]:
+def _facts(entry: "Entry") -> dict[str, Any]:
     made = entry.robot()
     return {
-        "robot": name,
+        "robot": made.name,
         "joints": [joint.name for joint in made.anatomy.joints],
         "hinges": list(made.anatomy.hinges),
         "sensors": [sensor.name for sensor in made.anatomy.sensors],
@@ -63,15 +78,14 @@ def _print_all(facts: list[dict[str, Any]]) -> None:
     typer.echo("`selfmodel robots ROBOT` lists its parts and cases.")
 
 
-def _print_one(facts: dict[str, Any]) -> None:
+def _print_cases(facts: dict[str, Any]) -> None:
     from rich.console import Console  # noqa: PLC0415  # only where a table is drawn
     from rich.table import Table  # noqa: PLC0415
 
-    table = Table("part", "names", title=facts["robot"])
-    for kind in ("joints", "hinges", "sensors", "motors"):
-        table.add_row(kind, ", ".join(facts[kind]))
+    if not facts["cases"]:
+        return
     cases = Table("case", "damage", title="failures of Table I")
     cases.columns[1].overflow = "fold"
     for number, notation in facts["cases"].items():
         cases.add_row(number, notation)
-    Console().print(table, cases)
+    Console().print(cases)

@@ -10,6 +10,7 @@ from selfmodel.cli.options import (
     Damage,
     GapLevel,
     Json,
+    ModelSettings,
     Neurons,
     RobotName,
     Seed,
@@ -31,6 +32,7 @@ def trial(
         ),
     ],
     damage: Damage = None,
+    model_settings: ModelSettings = None,
     controller: Annotated[
         Path | None,
         typer.Option(
@@ -60,7 +62,9 @@ def trial(
 
     kind = "network" if controller is None else str(controller)
     made = resolve.with_neurons(
-        resolve.robot_entry(robot).robot(), neurons, "cpg" if kind == "cpg" else "network"
+        resolve.robot_entry(robot, model_settings or ()).robot(),
+        neurons,
+        "cpg" if kind == "cpg" else "network",
     )
     check_log_name(out)
     hidden = parse("intact" if damage is None else damage, made.anatomy)
@@ -85,7 +89,7 @@ def trial(
     log = read_log(out)
     facts = {
         "log": str(out),
-        "robot": robot,
+        "robot": made.name,
         "truth": str(hidden),
         "gap": gap,
         "structure": structure,
@@ -96,4 +100,4 @@ def trial(
     if as_json:
         typer.echo(json.dumps(facts, indent=2))
     else:
-        typer.echo(f"{robot} ({hidden}) went {log.trial.displacement:.3f} m forward: {out}")
+        typer.echo(f"{made.name} ({hidden}) went {log.trial.displacement:.3f} m forward: {out}")

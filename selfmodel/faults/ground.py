@@ -1,9 +1,6 @@
 """The ground: how slippery it is, and how it slopes."""
 
-import math
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from selfmodel.anatomy import Anatomy
 from selfmodel.faults.kind import Fault, Kind, between, grid
@@ -17,10 +14,7 @@ def _grip(embodiment: "Embodiment", _anatomy: Anatomy, fault: Fault) -> None:
 
 
 def _tilt(embodiment: "Embodiment", _anatomy: Anatomy, fault: Fault) -> None:
-    """Turns gravity about the y axis, in the place of the ground."""
-    sine, cosine = math.sin(fault.degree), math.cos(fault.degree)
-    x, y, z = embodiment.model.opt.gravity
-    embodiment.model.opt.gravity = np.array([cosine * x + sine * z, y, cosine * z - sine * x])
+    embodiment.tilt_ground(fault.degree)
 
 
 FRICTION = Kind(
@@ -43,5 +37,6 @@ SLOPE = Kind(
     special={0.0: None},
     unit="rad",
 )
-"""The angle of the ground along forward, uphill positive. Gravity is turned and the ground stays:
-the frame of every logged signal is then the ground's, whose z axis is normal to it."""
+"""The angle of the ground along forward, uphill positive. The ground and the robot's start pose are
+turned about the start, and gravity stays: the world's z axis points up in every logged signal, as
+for a robot whose odometry knows from its IMU where up is."""

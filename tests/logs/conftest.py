@@ -1,12 +1,13 @@
 """What the tests of the log share: a small robot, made-up trials of it, and one log."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from selfmodel.behaviour import SIGNALS, Sample
+from selfmodel.behaviour import SIGNALS, Moment, Sample
 from selfmodel.controller import Controller, draw_weights
 from selfmodel.logs.writer import write_trial
 from selfmodel.robot import Robot
@@ -82,6 +83,12 @@ def plan_of(robot: Robot, steps: int, name: str = "00-before") -> Plan:
     """Returns a plan with a random controller."""
     genome = draw_weights(np.random.default_rng(1), (robot.network.weights,))
     return Plan(name, "before", Controller(robot.network, genome), steps, seed=7)
+
+
+def timed(samples: Iterable[Sample]) -> Iterator[Sample]:
+    """Yields the samples with made-up moments: some late, some missing."""
+    for k, sample in enumerate(samples):
+        yield replace(sample, moment=Moment(1.01 * sample.time, k % 7 == 3, k % 11 == 5))
 
 
 def made_up(robot: Robot, steps: int, seed: int = 0) -> Iterator[Sample]:

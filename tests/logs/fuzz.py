@@ -12,7 +12,7 @@ import resource
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from time import perf_counter
 from typing import cast
@@ -22,7 +22,7 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, Message, Metadata, Schema
 from mcap.writer import CompressionType, Writer
 
-from selfmodel.behaviour import SIGNALS
+from selfmodel.behaviour import SIGNALS, Sample
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError, TrialLog, read_log
 from selfmodel.logs.budget import Budget
@@ -32,7 +32,7 @@ from selfmodel.logs.scan import scan
 from selfmodel.logs.writer import write_trial
 from selfmodel.robot import Robot
 from selfmodel.settings import Settings
-from tests.logs.conftest import MJCF, made_up, plan_of
+from tests.logs.conftest import MJCF, made_up, plan_of, timed
 
 STEPS = 120
 SALVAGED = 5
@@ -130,13 +130,12 @@ def check(path: Path, damaged: bytes, whole: TrialLog) -> str:
     return "same"
 
 
-def check_salvage(path: Path, form: "Form", whole: TrialLog) -> str:
+def check_salvage(path: Path, form: "Form") -> str:
     """Returns how salvage ended; raises where it saved what was not written, or less than it could.
 
     Args:
         path: The damaged log.
         form: The log as it was.
-        whole: What it said.
     """
     out = path.with_name("saved.mcap")
     expected = form.surviving_steps(path.read_bytes())
@@ -152,7 +151,7 @@ def check_salvage(path: Path, form: "Form", whole: TrialLog) -> str:
     out.unlink()
     if saved.status != "interrupted" or told.steps < expected:
         raise AssertionError(f"{expected} steps are whole, saved: {saved.status} {told}")
-    _same(saved, whole, allow_unobserved=True)
+    _same(saved, form.whole, allow_unobserved=True)
     return "saved"
 
 
@@ -161,10 +160,11 @@ class Form:
 
     Args:
         data: The file.
+        whole: What it says.
     """
 
-    def __init__(self, data: bytes) -> None:
-        self.data = data
+    def __init__(self, data: bytes, whole: TrialLog) -> None:
+        self.data, self.whole = data, whole
         every = [(frame, data[frame.offset : frame.end]) for frame in frames(data)]
         first = [text for frame, text in every if frame.opcode in (Opcode.METADATA, Opcode.CHUNK)]
         models = [text for frame, text in every if frame.opcode == Opcode.ATTACHMENT]
@@ -192,6 +192,22 @@ class Form:
         return sum(left[time] == count for time, count in full.items())
 
 
+def packings(log: Path) -> list[Form]:
+    """Returns a log in each packing."""
+    whole, data = read_log(log), log.read_bytes()
+    return [
+        Form(data, whole),
+        Form(packed(data, CompressionType.ZSTD, 8 * 2**10), whole),
+        Form(packed(data, CompressionType.LZ4, 64 * 2**10), whole),
+        Form(packed(data, CompressionType.NONE, 64 * 2**10), whole),
+        Form(packed(data, CompressionType.NONE, None), whole),
+    ]
+
+
+def _with_a_clock(robot: Robot) -> Iterator[Sample]:
+    return timed(made_up(robot, STEPS))
+
+
 def _same(read: TrialLog, whole: TrialLog, *, allow_unobserved: bool) -> None:
     told = (read.mjcf, read.control_timestep, read.settings, read.trial.robot, read.root)
     expected = (whole.mjcf, whole.control_timestep, whole.settings, whole.trial.robot, whole.root)
@@ -207,6 +223,21 @@ def _same(read: TrialLog, whole: TrialLog, *, allow_unobserved: bool) -> None:
             equal |= np.isnan(row)
         if not np.all(equal):
             raise AssertionError(f"{signal} has changed")
+    _same_timing(read, whole, allow_unobserved=allow_unobserved)
+
+
+def _same_timing(read: TrialLog, whole: TrialLog, *, allow_unobserved: bool) -> None:
+    if read.timing is None or whole.timing is None:
+        if read.timing is not whole.timing:
+            raise AssertionError("whether the robot has a clock has changed")
+        return
+    steps = len(read.timing.elapsed)
+    lost = np.isnan(read.timing.elapsed) if allow_unobserved else np.zeros(steps, dtype=bool)
+    for name in ("elapsed", "late", "missing"):
+        if not np.all((getattr(read.timing, name) == getattr(whole.timing, name)[:steps]) | lost):
+            raise AssertionError(f"{name} has changed")
+    if not np.all((read.timing.late & read.timing.missing)[lost]):
+        raise AssertionError("a step that was lost is not marked")
 
 
 def main() -> None:
@@ -221,22 +252,21 @@ def main() -> None:
     slowest = 0.0
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "damaged.mcap"
-        written = write_trial(
-            Path(folder) / "whole.mcap",
-            robot,
-            plan_of(robot, STEPS),
-            made_up(robot, STEPS),
-            settings=Settings(),
-            hidden="intact",
-        )
-        whole, data = read_log(written), written.read_bytes()
-        forms = (
-            Form(data),
-            Form(packed(data, CompressionType.ZSTD, 8 * 2**10)),
-            Form(packed(data, CompressionType.LZ4, 64 * 2**10)),
-            Form(packed(data, CompressionType.NONE, 64 * 2**10)),
-            Form(packed(data, CompressionType.NONE, None)),
-        )
+        forms = [
+            form
+            for samples, clock in ((made_up(robot, STEPS), False), (_with_a_clock(robot), True))
+            for form in packings(
+                write_trial(
+                    Path(folder) / f"whole-{clock}.mcap",
+                    robot,
+                    plan_of(robot, STEPS),
+                    samples,
+                    timed=clock,
+                    settings=Settings(),
+                    hidden="intact",
+                )
+            )
+        ]
         for number in range(options.count):
             rng = np.random.default_rng([options.seed, number])
             damage = DAMAGES[number % len(DAMAGES)]
@@ -244,9 +274,9 @@ def main() -> None:
             damaged = damage(form.data, rng)
             start = perf_counter()
             try:
-                outcomes[check(path, damaged, whole)] += 1
+                outcomes[check(path, damaged, form.whole)] += 1
                 if number // (len(DAMAGES) * len(forms)) % SALVAGED == 0:
-                    salvages[check_salvage(path, form, whole)] += 1
+                    salvages[check_salvage(path, form)] += 1
             except Exception:
                 print(f"case {number} of seed {options.seed}: {damage.__name__}", file=sys.stderr)
                 raise

@@ -155,7 +155,8 @@ def retyped(record: McapRecord) -> McapRecord:
     [
         (without(Metadata, TRIAL), SchemaMismatchError, r"no record selfmodel\.trial"),
         (without(Metadata, RESULT), IncompleteError, "did not finish; 625 messages"),
-        (metadata(TRIAL, format="2"), UnsupportedError, "expected format 1, got '2'"),
+        (metadata(TRIAL, format="3"), UnsupportedError, "expected format 1 or 2, got '3'"),
+        (metadata(TRIAL, format="2"), SchemaMismatchError, "no messages on /timing"),
         (metadata(TRIAL, stage="later"), SchemaMismatchError, "stage must be one of before"),
         (metadata(TRIAL, steps="many"), SchemaMismatchError, "invalid literal"),
         (metadata(TRIAL, steps=str(10**15)), IncompleteError, "after 120 of 1000000000000000"),

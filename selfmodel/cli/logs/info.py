@@ -12,6 +12,7 @@ from selfmodel.cli.plain import plain
 from selfmodel.errors import InputError
 
 if TYPE_CHECKING:
+    from selfmodel.logs import TrialLog
     from selfmodel.logs.info import Info
 
 
@@ -68,6 +69,7 @@ def _as_object(path: Path, found: "Info") -> dict[str, Any]:
         "trial": trial.plan.name,
         "stage": trial.plan.stage,
         "status": found.log.status,
+        "reason": found.log.reason,
         "steps": trial.behaviour.steps,
         "planned_steps": trial.plan.steps,
         "control_timestep": found.log.control_timestep,
@@ -82,9 +84,16 @@ def _as_object(path: Path, found: "Info") -> dict[str, Any]:
         "attachments": dict(found.attachments),
         "records": list(found.records),
         "observed": {signal: round(share, 6) for signal, share in found.observed.items()},
+        "clock": _clock(found.log),
         "truth": "hidden" if hides_truth(found) else "unknown",
         "source": dict(found.source),
     }
+
+
+def _clock(log: "TrialLog") -> dict[str, int] | None:
+    if log.timing is None:
+        return None
+    return {"late": int(log.timing.late.sum()), "missing": int(log.timing.missing.sum())}
 
 
 def _print(one: dict[str, Any]) -> None:
@@ -98,7 +107,8 @@ def _print(one: dict[str, Any]) -> None:
     way = one["displacement"]
     told = (
         f"{one['file']} ({one['bytes'] / 1000:.0f} kB)\n"
-        f"trial {one['trial']} ({one['stage']}) of {one['robot']}, {one['status']}\n"
+        f"trial {one['trial']} ({one['stage']}) of {one['robot']}, {one['status']}"
+        f"{': ' + one['reason'] if one['reason'] else ''}\n"
         f"{one['steps']} of {one['planned_steps']} steps of {one['control_timestep']:g} s = "
         f"{seconds:.2f} s; {'displacement unknown' if way is None else f'{way:.3f} m forward'}; "
         f"seed {one['seed']}\n"
@@ -107,6 +117,8 @@ def _print(one: dict[str, Any]) -> None:
         f"what was wrong: {_TRUTH[one['truth']]}"
     )
     typer.echo(plain(told))
+    if clock := one["clock"]:
+        typer.echo(f"clock: {clock['late']} steps late, {clock['missing']} observations missing")
     for name, text in one["source"].items():
         typer.echo(plain(f"{name}: {text if len(text) <= 100 else text[:97] + '...'}"))
     rows = [

@@ -34,6 +34,7 @@ def _checked(path: Path) -> dict[str, Any]:
         "file": str(path),
         "ok": True,
         "status": log.status,
+        "reason": log.reason,
         "steps": log.trial.behaviour.steps,
         "model_loaded": loaded,
     }
@@ -42,5 +43,6 @@ def _checked(path: Path) -> dict[str, Any]:
 def _line(one: dict[str, Any]) -> str:
     if one["ok"]:
         unloaded = "" if one["model_loaded"] else " (no MuJoCo here: its model was not loaded)"
-        return f"ok: {one['file']}: {one['steps']} steps, {one['status']}{unloaded}"
+        why = f" ({one['reason']})" if one["reason"] else ""
+        return f"ok: {one['file']}: {one['steps']} steps, {one['status']}{why}{unloaded}"
     return f"error: {one['error']}"

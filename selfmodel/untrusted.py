@@ -6,14 +6,14 @@ ask for a billion bodies.
 
 import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from math import prod
 from types import MappingProxyType
 from xml.etree import ElementTree as ET  # _Checker refuses what makes it unsafe
 from xml.parsers import expat  # the same
 
-from selfmodel.logs.attached import cells_of
+from selfmodel.attached import cells_of
 
 LARGEST = 2 * 2**20
 """Characters of text that a model may have: ours have under 10,000. Points that stand in it take
@@ -95,19 +95,27 @@ class CheckedModel:
     files: Mapping[str, bytes]
 
 
-def checked_model(mjcf: str, attached: Mapping[str, bytes]) -> CheckedModel:
+def checked_model(
+    mjcf: str,
+    attached: Mapping[str, bytes],
+    *,
+    allowed: Collection[str] = (),
+    largest_files: int = LARGEST_FILES,
+) -> CheckedModel:
     """Returns a model once nothing in it asks for what a model in a log may not have.
 
     Args:
         mjcf: The model, as it stands in a log.
         attached: The files that came with it.
+        allowed: Elements of ``REFUSED`` that it may have all the same.
+        largest_files: Bytes that the files may have which it names, each as often as it does.
 
     Raises:
         ValueError: It asks for more; the sentence names what.
     """
     if len(mjcf) > LARGEST:
         raise ValueError(f"the model has {len(mjcf)} characters, more than {LARGEST}")
-    checker = _Checker(attached)
+    checker = _Checker(attached, allowed, largest_files)
     try:
         checker.check(mjcf)
         text = ET.tostring(ET.fromstring(mjcf), encoding="unicode")  # noqa: S314  # checked
@@ -119,9 +127,13 @@ def checked_model(mjcf: str, attached: Mapping[str, bytes]) -> CheckedModel:
 class _Checker:
     """Looks at each element as it is parsed, so that nothing large is ever built."""
 
-    def __init__(self, attached: Mapping[str, bytes]) -> None:
+    def __init__(
+        self, attached: Mapping[str, bytes], allowed: Collection[str], largest_files: int
+    ) -> None:
         self.files: dict[str, bytes] = {}
         self._attached = attached
+        self._allowed = allowed
+        self._largest_files = largest_files
         self._within: list[str] = []
         self._counts: Counter[str] = Counter()
         self._elements = self._cells = self._bytes = 0
@@ -143,7 +155,7 @@ class _Checker:
         if not self._within and tag != "mujoco":
             raise ValueError(f"expected a model in <mujoco>, got <{tag}>")
         # <model> within <asset> reads a file; at the top it would be no MJCF.
-        if tag in REFUSED:
+        if tag in REFUSED and tag not in self._allowed:
             named = attributes.get("file") or attributes.get("plugin") or attributes.get("name")
             raise ValueError(
                 f"the model has <{tag}>{f' ({named!r})' if named else ''}, which "
@@ -187,8 +199,8 @@ class _Checker:
             self.files[name] = data
         # Each mention is read again, and takes its memory again.
         self._bytes += len(data)
-        if self._bytes > LARGEST_FILES:
-            raise ValueError(f"the model's files have more than {LARGEST_FILES} bytes")
+        if self._bytes > self._largest_files:
+            raise ValueError(f"the model's files have more than {self._largest_files} bytes")
         self._add(cells_of(name, data))
 
     def _weigh(self, tag: str, attributes: Mapping[str, str]) -> None:

@@ -1,0 +1,126 @@
+"""How well degrees of faults and environments are found, from the rows of an ablation.
+
+``python -m benchmarks.degrees FOLDER`` prints the tables that ``docs/comparators.md`` has;
+``selfmodel ablate --damages ... --out FOLDER`` makes the rows.
+"""
+
+import csv
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from math import degrees
+from pathlib import Path
+
+from selfmodel.faults import WORLD, Fault
+from selfmodel.hypothesis import Hypothesis
+from selfmodel.intervals import proportion
+from selfmodel.notation import parse
+from selfmodel.tasks import ROBOTS
+
+ROUGHNESSES = (0.0, 0.02, 0.04)
+"""The classes of roughness, m: a degree is of the nearest."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """How a diagnosis compares with the truth.
+
+    Attributes:
+        truth: In notation.
+        trials: Trials that it explains.
+        named: Whether it names the same faults and environments, whatever their degrees.
+        near: Whether it does, and every degree is as near as it is asked to be.
+        side: Whether it says rightly whether the robot, its world, both or nothing changed.
+        verdict: What it says of itself.
+    """
+
+    truth: str
+    trials: int
+    named: bool
+    near: bool
+    side: bool
+    verdict: str
+
+
+def main() -> None:
+    """Prints a table a number of trials."""
+    rows = _rows(Path(sys.argv[1]))
+    for trials in sorted({row.trials for row in rows}):
+        mine = [row for row in rows if row.trials == trials]
+        print(f"After {trials} trial{'s' if trials > 1 else ''}:\n")
+        print("| truth | named | and degree near | robot or world | verdicts |")
+        print("|---|---|---|---|---|")
+        for truth in dict.fromkeys(row.truth for row in mine):
+            _print_line(f"`{truth}`", [row for row in mine if row.truth == truth])
+        _print_line("all", mine)
+        print()
+
+
+def compared(best: Hypothesis, truth: Hypothesis) -> tuple[bool, bool, bool]:
+    """Returns whether faults are named, whether degrees are near too, and ``Found.side``."""
+    mine, theirs = _by_place(best.faults), _by_place(truth.faults)
+    named = mine.keys() == theirs.keys()
+    near = named and all(_near(mine[place], fault) for place, fault in theirs.items())
+    return named, near, _sides(best) == _sides(truth)
+
+
+def _rows(folder: Path) -> list[Found]:
+    with (folder / "results.csv").open(encoding="utf-8", newline="") as file:
+        return [_found(row) for row in csv.DictReader(file)]
+
+
+def _found(row: Mapping[str, str]) -> Found:
+    anatomy = ROBOTS[row["robot"]].robot().anatomy
+    named, near, side = compared(parse(row["best"], anatomy), parse(row["truth"], anatomy))
+    return Found(row["truth"], int(row["trials"]), named, near, side, row["verdict"])
+
+
+def _by_place(faults: Iterable[Fault]) -> dict[tuple[str, str, str], Fault]:
+    return {(fault.kind.word, fault.kind.prefix, fault.part): fault for fault in faults}
+
+
+def _near(said: Fault, true: Fault) -> bool:
+    if said.degree is None and true.degree is None:
+        return True
+    return _NEAR.get(true.kind.name, _within)(said.degree or 0.0, true.degree or 0.0)
+
+
+def _within(said: float, true: float) -> bool:
+    return abs(said - true) <= 0.15
+
+
+_NEAR: Mapping[str, Callable[[float, float], bool]] = {
+    "friction": lambda said, true: abs(said / true - 1) <= 0.15,
+    "slope": lambda said, true: abs(degrees(said - true)) <= 1.5,
+    "wind": lambda said, true: abs(said / true - 1) <= 0.2,
+    "crosswind": lambda said, true: abs(said / true - 1) <= 0.2,
+    "roughness": lambda said, true: _class(said) == _class(true),
+}
+
+
+def _class(roughness: float) -> float:
+    return min(ROUGHNESSES, key=lambda level: abs(level - roughness))
+
+
+def _sides(hypothesis: Hypothesis) -> set[bool]:
+    return {fault.part == WORLD for fault in hypothesis.faults}
+
+
+def _print_line(name: str, rows: list[Found]) -> None:
+    verdicts = [row.verdict for row in rows]
+    said = ", ".join(f"{verdicts.count(one)} {one}" for one in sorted(set(verdicts)))
+    parts = [
+        _share([row.named for row in rows]),
+        _share([row.near for row in rows]),
+        _share([row.side for row in rows]),
+    ]
+    print(f"| {name} | {' | '.join(parts)} | {said} |")
+
+
+def _share(right: list[bool]) -> str:
+    interval = proportion(sum(right), len(right))
+    return f"{sum(right)} of {len(right)} ({interval.low:.0%} to {interval.high:.0%})"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,117 @@
+"""Runs a trial of a robot behind a TCP socket, 50 times a second: a driver to begin yours with.
+
+Usage: python examples/drive_a_robot.py HOST PORT TRIAL.mcap
+"""
+
+import dataclasses
+import socket
+import struct
+import sys
+import time
+from pathlib import Path
+
+import dm_env
+import numpy as np
+
+from selfmodel.behaviour import Signal
+from selfmodel.controller import Controller, draw_weights
+from selfmodel.environment_robot import EnvironmentRobot
+from selfmodel.errors import TrialError
+from selfmodel.limits import joint_limits, tilt_limit
+from selfmodel.logs.writer import write_trial
+from selfmodel.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.tasks import ROBOTS
+from selfmodel.trial import Plan
+
+OBSERVED: tuple[Signal, ...] = (
+    *("sensors", "joint_positions", "joint_velocities", "base_position", "base_orientation"),
+    *("base_linear_velocity", "base_angular_velocity"),
+)
+"""What the robot tells of itself, as float64 numbers in this order."""
+
+START, STOP = 0, -1
+"""Numbers of messages with a meaning of their own; the targets of step k have the number k."""
+
+SILENCE = 0.1
+"""Seconds after which an observation is given up."""
+
+
+# The driver begins here: the docs show it.
+class SocketRobot(dm_env.Environment):
+    """Sends numbered targets, and waits for what was observed once the robot had followed them."""
+
+    def __init__(self, address: tuple[str, int], robot: Robot) -> None:
+        self._address, self._motors = address, len(robot.anatomy.motors)
+        self._widths = {signal: robot.anatomy.names.width(signal) for signal in OBSERVED}
+        self._targets = struct.Struct(f"<q{self._motors}d")
+        self._observed = struct.Struct(f"<q{sum(self._widths.values())}d")
+
+    def reset(self) -> dm_env.TimeStep:
+        """Has the robot take its start pose, at rest."""
+        self._link = socket.create_connection(self._address, timeout=1.0)
+        self._number, self._heard = START, b""
+        return dm_env.restart(self._exchange(np.zeros(self._motors), silence=10.0))
+
+    def step(self, action: np.ndarray) -> dm_env.TimeStep:
+        """Gives the targets of a control time step, which the robot's own clock ends."""
+        self._number += 1
+        return dm_env.transition(0.0, self._exchange(action, silence=SILENCE))
+
+    def _exchange(self, targets: np.ndarray, silence: float) -> dict[str, np.ndarray]:
+        self._link.settimeout(silence)
+        self._link.sendall(self._targets.pack(self._number, *targets))
+        until = time.monotonic() + silence
+        number = None
+        while number != self._number:  # what comes too late for its step is passed over
+            while len(self._heard) < self._observed.size:
+                self._link.settimeout(max(until - time.monotonic(), 1e-3))
+                if not (heard := self._link.recv(4096)):
+                    raise ConnectionError("the robot hung up")
+                self._heard += heard
+            number, *values = self._observed.unpack(self._heard[: self._observed.size])
+            self._heard = self._heard[self._observed.size :]
+        ends = np.cumsum(list(self._widths.values()))
+        return dict(zip(OBSERVED, np.split(np.array(values), ends[:-1]), strict=True))
+
+    def stop(self) -> None:
+        """Has the robot stand, by a connection of its own: the other may be what failed."""
+        with socket.create_connection(self._address, timeout=1.0) as link:
+            link.sendall(self._targets.pack(STOP, *np.zeros(self._motors)))
+            if not link.recv(1):  # it says when it has heard
+                raise ConnectionError("the robot hung up")
+
+    def action_spec(self) -> dm_env.specs.Array:
+        """Returns what ``step`` takes: each motor's target, rad."""
+        return dm_env.specs.Array((self._motors,), np.float64)
+
+    def observation_spec(self) -> dict[str, dm_env.specs.Array]:
+        """Returns what ``reset`` and ``step`` observe."""
+        widths = self._widths.items()
+        return {name: dm_env.specs.Array((width,), np.float64) for name, width in widths}
+
+
+# The driver ends here.
+
+
+def main(host: str, port: int, path: Path) -> None:
+    """Runs five seconds of a random controller, and logs them."""
+    robot = dataclasses.replace(ROBOTS["quadruped"].robot(), control_timestep=0.02)
+    weights = draw_weights(np.random.default_rng(0), (robot.network.weights,))
+    plan = Plan(path.stem, "single", Controller(robot.network, weights), steps=250, seed=0)
+    driver = SocketRobot((host, port), robot)
+    physical = EnvironmentRobot(
+        driver, robot, stop=driver.stop, limits=[joint_limits(robot, 0.2), tilt_limit(1.0)]
+    )
+    samples = physical.run(plan.controller, plan.steps)
+    try:
+        write_trial(path, robot, plan, samples, timed=True, settings=Settings())
+    except TrialError as error:
+        sys.exit(f"{error}; what was observed until then is in {path}")
+    print(f"{plan.steps} steps: {path}")
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 4:
+        sys.exit(__doc__)
+    main(sys.argv[1], int(sys.argv[2]), Path(sys.argv[3]))

@@ -1,0 +1,1 @@
+"""Pictures of a trial: the logged motion beside that of a model."""

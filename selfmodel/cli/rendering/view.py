@@ -1,0 +1,64 @@
+"""From where a robot is looked at, the same for every kind of picture."""
+
+import mujoco
+import numpy as np
+
+from selfmodel.arrays import FloatArray
+from selfmodel.cli.rendering.film import Film, Shot
+
+ASIDE, ELEVATION = 65.0, -22.0
+"""How far to the side of the robot's heading the camera looks, and how far up, degrees: from the
+side, a little from behind and above."""
+
+STEADY = 0.5
+"""Seconds over which the camera's way is averaged, so that it does not sway with each step."""
+
+
+def gaze(film: Film, shot: Shot) -> FloatArray:
+    """Returns where the camera looks in each frame, ``(frames, 3)``, m.
+
+    It follows the base, but in height only where the ground would be out of sight.
+    """
+    data = mujoco.MjData(film.model)
+    way = np.empty((len(film.time), 3))
+    for point, qpos in zip(way, shot.qpos, strict=True):
+        data.qpos = qpos
+        mujoco.mj_kinematics(film.model, data)
+        point[:] = data.xpos[film.root]
+    step = np.median(np.diff(film.time)) if len(film.time) > 1 else STEADY
+    reach = round(STEADY / step / 2)
+    padded = np.pad(way, ((reach, reach), (0, 0)), mode="edge")
+    window = np.ones(2 * reach + 1) / (2 * reach + 1)
+    smooth = [np.convolve(padded[:, axis], window, mode="valid") for axis in range(3)]
+    return np.stack(smooth, axis=1)
+
+
+def size(film: Film) -> float:
+    """Returns how far the robot reaches from its root in its reference pose, m."""
+    model, data = film.model, mujoco.MjData(film.model)
+    mujoco.mj_kinematics(model, data)
+    own = model.body_rootid[model.geom_bodyid] == model.body_rootid[film.root]
+    distance = np.linalg.norm(data.geom_xpos[own] - data.xpos[film.root], axis=1)
+    return float((distance + model.geom_rbound[own]).max(initial=0.1))
+
+
+def azimuth(film: Film) -> float:
+    """Returns the heading of the camera, degrees from the world's x axis.
+
+    It stands where what is lost or jammed is in sight: on the robot's left, or else on its right,
+    where forward is to the right.
+    """
+    model, data = film.model, mujoco.MjData(film.model)
+    mujoco.mj_kinematics(model, data)
+    wrong = sorted(film.lost | film.jammed)
+    left = float((data.xipos[wrong, 1] - data.xpos[film.root, 1]).sum())
+    return -ASIDE if left > 0 else ASIDE
+
+
+def axes(film: Film) -> tuple[FloatArray, FloatArray]:
+    """Returns the directions that are to the right and up in a picture, ``(3,)`` each."""
+    heading, elevation = np.radians(azimuth(film)), np.radians(ELEVATION)
+    right = np.array([np.sin(heading), -np.cos(heading), 0.0])
+    ahead = np.array([np.cos(heading), np.sin(heading), 0.0]) * np.cos(elevation)
+    ahead[2] = np.sin(elevation)
+    return right, np.cross(right, ahead)

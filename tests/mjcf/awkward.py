@@ -1,0 +1,237 @@
+"""MJCF files that are malformed or awkward, and what becomes of each."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+LEG = """<body name="{0}" pos="{1} 0 -.1"><joint name="{0}_hip" axis="0 1 0" range="-40 40"/>
+<geom name="{0}_geom" type="capsule" size=".03" fromto="0 0 0 0 0 -.2"/></body>"""
+LEGS = LEG.format("left", ".1") + LEG.format("right", "-.1")
+MOTORS = """<motor name="left_motor" joint="left_hip" ctrlrange="-1 1"/>
+<motor name="right_motor" joint="right_hip" ctrlrange="-1 1"/>"""
+GROUND = '<geom name="floor" type="plane" size="0 0 1"/>'
+TORSO = '<geom type="box" size=".2 .1 .05"/>'
+
+
+def mjcf(
+    *,
+    root: str = "<freejoint/>",
+    torso: str = TORSO,
+    legs: str = LEGS,
+    motors: str = MOTORS,
+    world: str = GROUND,
+    more: str = "",
+) -> str:
+    """Returns a two-legged robot, with some of it in another way."""
+    return f"""<mujoco>{more}<worldbody>{world}
+    <body name="torso" pos="0 0 .35">{root}{torso}{legs}</body></worldbody>
+    <actuator>{motors}</actuator></mujoco>"""
+
+
+@dataclass(frozen=True)
+class Awkward:
+    """A file and what is expected of it.
+
+    Attributes:
+        text: The file, or its bytes.
+        sentence: What its refusal says, or "" where a robot comes of it.
+        files: Others, by their paths from its folder.
+    """
+
+    text: str | bytes
+    sentence: str = ""
+    files: dict[str, str | bytes] = field(default_factory=dict)
+
+    def write(self, folder: Path) -> Path:
+        """Writes it all into a folder, and returns the path of the MJCF."""
+        home = folder / "home"
+        for name, content in {"robot.xml": self.text, **self.files}.items():
+            path = home / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content.encode() if isinstance(content, str) else content)
+        return home / "robot.xml"
+
+
+def _deep(levels: int) -> str:
+    return "<mujoco><worldbody>" + "<body>" * levels + "</body>" * levels + "</worldbody></mujoco>"
+
+
+CUBE = """v 0 0 0\nv .1 0 0\nv 0 .1 0\nv 0 0 .1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"""
+MESH = '<asset><mesh name="{0}" file="{1}"/></asset>'
+MESHED = '<geom type="mesh" mesh="m"/>'
+KEY = '<keyframe><key name="home" qpos="{}"/></keyframe>'
+BOMB = """<!DOCTYPE lolz [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;&a;&a;">
+<!ENTITY c "&b;&b;&b;&b;&b;&b;&b;&b;&b;&b;">]><mujoco model="&c;"/>"""
+BALL = """<body name="ball" pos="1 0 1"><freejoint/><geom size=".1"/></body>"""
+
+AWKWARD: dict[str, Awkward] = {
+    # What is no MJCF.
+    "an empty file": Awkward("", "no XML"),
+    "binary junk": Awkward(bytes(range(256)) * 40, "no XML"),
+    "cut off": Awkward(mjcf()[:200], "no XML"),
+    "a URDF": Awkward('<robot name="r"><link name="l"/></robot>', "got a URDF"),
+    "other XML": Awkward("<html><body/></html>", "got <html>"),
+    "an entity bomb": Awkward(BOMB, "<!DOCTYPE>"),
+    "deep nesting": Awkward(_deep(5000), "200 within each other"),
+    "an element that MJCF has not": Awkward(mjcf(more="<leg/>"), "MuJoCo cannot load it"),
+    "UTF-16": Awkward(f'<?xml version="1.0" encoding="utf-16"?>{mjcf()}'.encode("utf-16")),
+    # Files.
+    "a missing mesh": Awkward(mjcf(more=MESH.format("m", "m.obj")), "'m.obj'"),
+    "a mesh outside the folder": Awkward(
+        mjcf(more=MESH.format("m", "../m.obj")), "outside its own folder", {"../m.obj": CUBE}
+    ),
+    "a mesh below the folder": Awkward(
+        mjcf(more=MESH.format("m", "parts/m.obj"), torso=MESHED), "", {"parts/m.obj": CUBE}
+    ),
+    "a mesh that is junk": Awkward(
+        mjcf(more=MESH.format("m", "m.stl"), torso=MESHED), "MuJoCo cannot load it", {"m.stl": "x"}
+    ),
+    "an include": Awkward(
+        mjcf(motors="", more='<include file="motors.xml"/>'),
+        "",
+        {"motors.xml": f"<mujocoinclude><actuator>{MOTORS}</actuator></mujocoinclude>"},
+    ),
+    "a missing include": Awkward(mjcf(more='<include file="no.xml"/>'), "'no.xml'"),
+    "an include outside the folder": Awkward(
+        mjcf(more='<include file="../o.xml"/>'), "outside its own folder", {"../o.xml": "<mujoco/>"}
+    ),
+    "an include of itself": Awkward(mjcf(more='<include file="robot.xml"/>'), "twice"),
+    "a device as mesh": Awkward(mjcf(more=MESH.format("m", "/dev/zero")), "outside its own folder"),
+    # The root.
+    "no free joint": Awkward(mjcf(root=""), "its base is fixed"),
+    "two floating bases": Awkward(mjcf(world=GROUND + BALL), "ball, torso"),
+    "a planar root": Awkward(
+        mjcf(root='<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>')
+    ),
+    "a motor on the root": Awkward(
+        mjcf(
+            root='<joint name="x" type="slide" axis="1 0 0"/>',
+            motors=MOTORS + '<motor joint="x" ctrlrange="-1 1"/>',
+        ),
+        "no motor moves",
+    ),
+    "a mocap body": Awkward(
+        mjcf(world=GROUND + '<body name="hand" mocap="true"><geom size=".05"/></body>')
+    ),
+    # Joints.
+    "no actuator": Awkward(mjcf(motors=""), "no actuators"),
+    "unnamed joints and bodies": Awkward(
+        mjcf(motors='<motor joint="left_hip" ctrlrange="-1 1"/>').replace('name="right_hip"', "")
+    ),
+    "a ball joint in a limb": Awkward(
+        mjcf(legs=LEGS.replace("<geom", '<joint type="ball"/><geom', 1)), "ball"
+    ),
+    "a slide in a limb": Awkward(
+        mjcf(legs=LEGS.replace('name="left_hip"', 'name="left_hip" type="slide"')), "left_hip"
+    ),
+    "an unlimited joint": Awkward(mjcf(legs=LEGS.replace('range="-40 40"', ""))),
+    "duplicate names": Awkward(mjcf(legs=LEGS + LEG.format("left", "0")), "repeated name"),
+    # Actuators.
+    "an actuator on a tendon": Awkward(
+        mjcf(
+            motors='<motor name="both" tendon="t" ctrlrange="-1 1"/>',
+            more='<tendon><fixed name="t"><joint joint="left_hip" coef="1"/>'
+            '<joint joint="right_hip" coef="1"/></fixed></tendon>',
+        )
+    ),
+    "an actuator on a site": Awkward(
+        mjcf(
+            torso=TORSO + '<site name="s"/>', motors=MOTORS + '<general site="s" ctrlrange="0 1"/>'
+        )
+    ),
+    "a muscle": Awkward(mjcf(motors='<muscle name="m" joint="left_hip"/>'), "muscle"),
+    "an actuator of nothing": Awkward(mjcf(motors='<motor joint="tail"/>'), "tail"),
+    "a motor without a range": Awkward(
+        mjcf(motors='<motor name="m" joint="left_hip"/>'), "ctrlrange=[-1, 1]"
+    ),
+    # Other parts of MuJoCo.
+    "an equality constraint": Awkward(
+        mjcf(more='<equality><joint joint1="left_hip" joint2="right_hip"/></equality>')
+    ),
+    "a plugin": Awkward(
+        mjcf(more='<extension><plugin plugin="mujoco.elasticity.cable"/></extension>'),
+        "<extension>",
+    ),
+    "a flex": Awkward(
+        mjcf(torso=TORSO + '<flexcomp name="f" type="grid" count="3 3 1" spacing=".1 .1 .1"/>'),
+        "<flexcomp>",
+    ),
+    "a composite": Awkward(
+        mjcf(
+            legs=LEGS + '<composite type="cable" curve="s" count="9 1 1" size="1">'
+            '<joint kind="main"/><geom type="capsule" size=".01"/></composite>'
+        ),
+        "ball",
+    ),
+    "a billion copies": Awkward(
+        mjcf(
+            legs='<replicate count="1000"><replicate count="1000"><replicate count="1000">'
+            f"{LEGS}</replicate></replicate></replicate>"
+        ),
+        "20000 elements",
+    ),
+    "an attached model": Awkward(
+        mjcf(more='<asset><model name="o" file="o.xml"/></asset>'), "<model>", {"o.xml": mjcf()}
+    ),
+    "a height field as ground": Awkward(
+        mjcf(
+            more='<asset><hfield name="h" nrow="4" ncol="4" size="2 2 .1 .1"/></asset>',
+            world='<geom type="hfield" hfield="h"/>',
+        )
+    ),
+    "a height field without end": Awkward(
+        mjcf(more='<asset><hfield name="h" nrow="90000" ncol="90000" size="2 2 .1 .1"/></asset>'),
+        "nrow",
+    ),
+    "frames and copies": Awkward(
+        mjcf(legs=f'<frame pos="0 0 .01" euler="0 0 5">{LEGS}</frame>', more="")
+    ),
+    # Bodies and numbers.
+    "no geoms": Awkward(
+        mjcf(torso="", legs=LEGS.replace("<geom", "<site").replace("_geom", "_site")), "mass"
+    ),
+    "nothing that can touch": Awkward(
+        mjcf(more='<default><geom contype="0" conaffinity="0"/></default>'), "touch"
+    ),
+    "no ground": Awkward(mjcf(world="")),
+    "ten thousand bodies": Awkward(
+        mjcf(legs=LEGS + '<body><geom size=".01"/></body>' * 10_000), "20000 elements"
+    ),
+    "two thousand joints": Awkward(
+        mjcf(legs="".join(LEG.format(f"leg{k}", f"{k / 100}") for k in range(2000))), "<joint>"
+    ),
+    "NaN inertia": Awkward(
+        mjcf(torso='<inertial pos="0 0 0" mass="1" diaginertia="nan 1 1"/>' + TORSO),
+        "MuJoCo cannot load it",
+    ),
+    "NaN position": Awkward(mjcf().replace('pos="0 0 .35"', 'pos="0 nan .35"'), "finite"),
+    "zero mass": Awkward(mjcf(torso='<geom size=".1" mass="0"/>', legs=LEGS), "mass"),
+    "huge numbers": Awkward(mjcf(torso='<geom size="1e200"/>'), "finite"),
+    "a negative time step": Awkward(mjcf(more='<option timestep="-0.01"/>'), "timestep"),
+    "a time step of nothing": Awkward(mjcf(more='<option timestep="1e-9"/>'), "time"),
+    "a model that blows up": Awkward(
+        mjcf(
+            more='<option timestep="0.05" integrator="Euler"/>'
+            '<default><joint stiffness="1e7" springref="30"/></default>'
+        ),
+        "blows up",
+    ),
+    "a huge memory": Awkward(mjcf(more='<size memory="900G"/>'), "memory"),
+    # Keyframes and names.
+    "a keyframe that is too long": Awkward(mjcf(more=KEY.format("1 " * 30)), "qpos"),
+    "a keyframe that MuJoCo fills up": Awkward(mjcf(more=KEY.format("0 0 1"))),
+    "a keyframe": Awkward(mjcf(more=KEY.format("0 0 .4 1 0 0 0 .2 -.2"))),
+    "names of notation": Awkward(mjcf().replace("left", "le+ft = a:b")),
+    "names that are alike once plain": Awkward(
+        mjcf().replace("left", "leg+").replace("right", "leg=")
+    ),
+    "unicode names": Awkward(mjcf().replace("left", "linkes_Bein_β")),
+    "two touch sensors": Awkward(
+        mjcf(
+            legs=LEGS.replace("</body>", '<site name="a"/><site name="b"/></body>', 1),
+            more='<sensor><touch name="heel" site="a"/><touch name="toe" site="b"/></sensor>',
+        )
+    ),
+    "a sensor of another kind": Awkward(mjcf(more='<sensor><clock name="time"/></sensor>')),
+    "settotalmass": Awkward(mjcf(more='<compiler settotalmass="7" inertiafromgeom="true"/>')),
+}
+"""By what is awkward in it."""
