@@ -50,11 +50,14 @@ def body(request: pytest.FixtureRequest) -> Robot:
 
 
 def damages(robot: Robot) -> list[Hypothesis]:
-    """Nothing, a distal and a proximal joint broken and jammed, and a weak motor."""
+    """Nothing, a distal and a proximal joint broken and jammed, a weak motor, and a slope."""
     names = [joint.name for joint in robot.anatomy.joints]
     weak = next(joint.name for joint in robot.anatomy.joints if joint.motors)
     texts = [f"{kind}:{name}" for kind in ("break", "jam") for name in (names[0], names[-1])]
-    return [INTACT, *(parse(text, robot.anatomy) for text in (*texts, f"motor:{weak}=0.5"))]
+    return [
+        INTACT,
+        *(parse(text, robot.anatomy) for text in (*texts, f"motor:{weak}=0.5", "slope=0.2")),
+    ]
 
 
 def happened(robot: Robot, hypothesis: Hypothesis) -> Behaviour:
