@@ -7,6 +7,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.logs.topics import WORLD
 from selfmodel.places import fields_of, writer
 from selfmodel.robot import Robot
+from selfmodel.rotation import product
 
 _POSITION_XYZW = [0, 1, 2, 4, 5, 6, 3]
 
@@ -96,17 +97,4 @@ def _relative(parents: FloatArray, children: FloatArray) -> FloatArray:
     """The poses of children in the frames of their parents, each ``(..., 7)``, w x y z last."""
     back = parents[..., 3:] * (1.0, -1.0, -1.0, -1.0)
     moved = into_child_frame(children[..., :3] - parents[..., :3], parents[..., 3:])
-    return np.concatenate([moved, _product(back, children[..., 3:])], axis=-1)
-
-
-def _product(first: FloatArray, second: FloatArray) -> FloatArray:
-    """The product of quaternions, each ``(..., 4)``, w x y z."""
-    scalar, axis = first[..., :1], first[..., 1:]
-    other, turned = second[..., :1], second[..., 1:]
-    return np.concatenate(
-        [
-            scalar * other - np.sum(axis * turned, axis=-1, keepdims=True),
-            scalar * turned + other * axis + np.cross(axis, turned),
-        ],
-        axis=-1,
-    )
+    return np.concatenate([moved, product(back, children[..., 3:])], axis=-1)

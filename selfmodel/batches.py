@@ -22,12 +22,14 @@ def new_batch(model: mujoco.MjModel, embodiments: Sequence[Embodiment], threads:
     return batch
 
 
-def live_signals(robot: Robot, batch: Batch, record: Sequence[Signal]) -> dict[Signal, Reader]:
+def live_signals(
+    robot: Robot, batch: Batch, embodiments: Sequence[Embodiment], record: Sequence[Signal]
+) -> dict[Signal, Reader]:
     """Returns for each signal of the state what reads its present value.
 
     What the controllers receive and give is not part of MuJoCo's state, and is left out.
     """
-    state = places(robot)
+    state = places(robot, *(embodiment.model for embodiment in embodiments))
     return {
         signal: state[signal].reader(batch.bind)
         for signal in record

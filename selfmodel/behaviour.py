@@ -164,6 +164,15 @@ class Behaviour:
         """How many control steps were recorded."""
         return len(self.time)
 
+    def first(self, steps: int) -> "Behaviour":
+        """Returns the first steps of it, or all of it if it has no more."""
+        return Behaviour(
+            names=self.names,
+            time=self.time[:steps],
+            signals={name: values[..., :steps, :] for name, values in self.signals.items()},
+            late=None if self.late is None else self.late[:steps],
+        )
+
 
 def collect(names: Names, samples: Iterable[Sample]) -> Behaviour:
     """Returns the behaviour that ``samples`` make up, for a run that needs no log.

@@ -1,7 +1,9 @@
 """The diagnostic EA: evolves hypotheses that explain all trials."""
 
-from collections.abc import Sequence
-from functools import partial
+import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -9,6 +11,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.comparator import Comparator, Screened
 from selfmodel.degrees import coarse_candidates
 from selfmodel.diagnosis import Candidate, Diagnosis, Verdict
+from selfmodel.errors import InputError
 from selfmodel.evidence import Evidence
 from selfmodel.evolution import Evolution, Observe, evolve
 from selfmodel.faults import PAPER_KINDS, Kind
@@ -22,6 +25,13 @@ from selfmodel.trial import Trial
 
 KNOWN = 2
 """Of what the EA found closest, how much is refined."""
+
+OPENING = 1 / 3
+"""The part of a whole trial that is simulated to tell what is far from what is near. It is the most
+telling: later, contact has made any two simulations differ."""
+
+FEWEST = 100
+"""Control steps below which no opening is cut."""
 
 EQUAL = "equal distances"
 """The test of a comparator that gives one number for a trial."""
@@ -56,11 +66,7 @@ class Diagnose:
         self._kinds = tuple(kinds)
         self._intact = tuple(intact)
         self.evidence = Evidence(simulator, comparator)
-        self._screen = (
-            Evidence(simulator, comparator.screen)
-            if isinstance(comparator, Screened)
-            else self.evidence
-        )
+        self._screen = _screen_of(comparator, simulator, self.evidence)
         self.evaluations = 0
 
     def __call__(
@@ -103,12 +109,12 @@ class Diagnose:
             InputError: It cannot; the sentence names every trial that it cannot judge, and why.
         """
         self.evidence.check([*self._intact, *trials])
-        self._screen.check(trials)
+        self._screen.evidence.check(self._screen.of(trials))
 
     @property
     def distinct_hypotheses(self) -> int:
         """How many hypotheses were ever simulated."""
-        return len(self.evidence.hypotheses | self._screen.hypotheses)
+        return len(self.evidence.hypotheses | self._screen.evidence.hypotheses)
 
     def _evolved(
         self,
@@ -119,11 +125,12 @@ class Diagnose:
     ) -> list[Hypothesis]:
         """The hypotheses that the EA looked at, closest first."""
         genes, anatomy = self._settings.genes, self._anatomy
+        looked_at = self._screen.of(trials)
         totals: dict[Hypothesis, float] = {}
 
         def fitness(genomes: FloatArray) -> FloatArray:
             hypotheses = [decode(genome, anatomy, self._kinds) for genome in genomes]
-            distances = self._screen.distances(hypotheses, trials)
+            distances = self._screen.evidence.distances(hypotheses, looked_at)
             totals.update(zip(hypotheses, map(float, distances), strict=True))
             return 0.0 - distances  # not -distances: a perfect fitness reads 0, not -0
 
@@ -146,7 +153,7 @@ class Diagnose:
             self._settings.genes,
             partial(self.evidence.losses, trials=trials),
             self._anatomy,
-            screen=partial(self._screen.losses, trials=trials),
+            screen=partial(self._screen.evidence.losses, trials=self._screen.of(trials)),
         )
 
     def _rivals(
@@ -171,6 +178,45 @@ class Diagnose:
             if is_worse_than_ever(mine, usual):
                 return "unexplained"
         return "ambiguous" if rivals else "explained"
+
+
+@dataclass(frozen=True)
+class _Screen:
+    """What tells more cheaply what is far from what is near.
+
+    Attributes:
+        evidence: Judges hypotheses.
+        look: Gives the part of a trial that it looks at.
+    """
+
+    evidence: Evidence
+    look: Callable[[Trial], Trial]
+
+    def of(self, trials: Sequence[Trial]) -> list[Trial]:
+        return [self.look(trial) for trial in trials]
+
+
+def _screen_of(comparator: Comparator, simulator: Simulator, evidence: Evidence) -> _Screen:
+    """A comparator's own screen; without one, the same comparator of the openings of the trials.
+
+    One that does not judge in pieces is not refined, and all there is decides.
+    """
+    if isinstance(comparator, Screened):
+        return _Screen(Evidence(simulator, comparator.screen), lambda trial: trial)
+    if evidence.in_pieces:
+        return _Screen(Evidence(simulator, comparator), lru_cache(partial(_opening, comparator)))
+    return _Screen(evidence, lambda trial: trial)
+
+
+def _opening(comparator: Comparator, trial: Trial) -> Trial:
+    """The first part of a trial; all of it where that does not tell enough by itself."""
+    steps = max(round(OPENING * trial.behaviour.steps), min(FEWEST, trial.behaviour.steps))
+    opening = dataclasses.replace(trial, behaviour=trial.behaviour.first(steps))
+    try:
+        comparator.request(opening)
+    except InputError:
+        return trial
+    return opening
 
 
 def _without_degrees(hypothesis: Hypothesis) -> set[tuple[Kind, str]]:

@@ -14,7 +14,7 @@ Writer = Callable[[Mapping[Signal, FloatArray]], None]
 """Puts signals of the state, ``(n, width)`` each, into it; what is not given stays."""
 
 
-def places(robot: Robot, model: mujoco.MjModel | None = None) -> dict[Signal, Place | Derived]:
+def places(robot: Robot, *models: mujoco.MjModel) -> dict[Signal, Place | Derived]:
     """Returns where each signal stands that is part of the physics' state.
 
     The commands are the controls; what the sensors read is not among them, because a controller
@@ -22,30 +22,31 @@ def places(robot: Robot, model: mujoco.MjModel | None = None) -> dict[Signal, Pl
 
     Args:
         robot: The robot, whose parts the signals tell of.
-        model: A model that has all its parts, if not the robot's own: a physical robot may have
-            more of them.
+        models: What the states are of, if not of the robot's own: one for all of them, or one for
+            each, of one layout. It has all of the robot's parts; a physical robot may have more.
     """
-    model = robot.model if model is None else model
+    models = models or (robot.model,)
+    model = models[0]
     motors = columns([int(model.actuator(name).id) for name in robot.anatomy.motors])
     return {
         "commands": Place("ctrl", motors),
         **_joints(robot, model),
-        **root_of(model, robot.root).places(),
+        **root_of(models, robot.root).places(),
     }
 
 
-def writer(robot: Robot, bind: Bind, model: mujoco.MjModel | None = None) -> Writer:
+def writer(robot: Robot, bind: Bind, *models: mujoco.MjModel) -> Writer:
     """Returns what writes joints and base into a state.
 
     Args:
         robot: The robot, whose parts the signals tell of.
         bind: Gives the fields that are written.
-        model: As for ``places``.
+        models: As for ``places``.
     """
-    model = robot.model if model is None else model
+    models = models or (robot.model,)
     qpos, qvel = bind("qpos"), bind("qvel")
     fields = {"qpos": qpos, "qvel": qvel}
-    root, joints = root_of(model, robot.root), _joints(robot, model)
+    root, joints = root_of(models, robot.root), _joints(robot, models[0])
 
     def write(state: Mapping[Signal, FloatArray]) -> None:
         for signal in ("joint_positions", "joint_velocities"):

@@ -59,13 +59,14 @@ def predict(
     whole = "base_position" in segments.states
     stages: list[IndexArray] = np.split(np.arange(count), 1 if whole else count)
     together = len(stages[0])
-    batch = new_batch(robot.model, _repeated(moving, together), threads)
+    bodies = _repeated(moving, together)
+    batch = new_batch(robot.model, bodies, threads)
     qpos, sensordata = batch.bind("qpos"), batch.bind("sensordata")
     senses = Senses(robot.model, robot.anatomy, _repeated(embodiments, together))
     readings = np.empty((n * together, len(robot.anatomy.sensors)))
     # Where in the batch each row of the result is found.
     place = (source_of[:, np.newaxis] * together + np.arange(together)).ravel()
-    live = live_signals(robot, batch, segments.record)
+    live = live_signals(robot, batch, bodies, segments.record)
     kept = {
         signal: np.empty(
             (n, count, horizon + 1, robot.anatomy.names.width(signal)), dtype=np.float64
@@ -114,7 +115,8 @@ class _Start:
         self, robot: Robot, batch: mujoco.batch.Batch, embodiments: Sequence[Embodiment]
     ) -> None:
         self._n = len(embodiments)
-        self._write = writer(robot, batch.bind)
+        models = [one.model for one in embodiments for _ in range(batch.nsim // len(embodiments))]
+        self._write = writer(robot, batch.bind, *models)
         self._ctrl = batch.bind("ctrl")
         self._act = batch.bind("act")
         self._qpos, self._qvel = batch.bind("qpos"), batch.bind("qvel")

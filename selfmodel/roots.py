@@ -4,7 +4,7 @@ A root floats freely, or in a part of the directions: one that slides along fixe
 turns about one hinge at most, such as the planar walkers of the dm_control suite.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -12,6 +12,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.behaviour import Signal
+from selfmodel.rotation import product, rotated
 
 Bind = Callable[[str], FloatArray]
 """Gives the array that holds a field of MuJoCo's state of many robots, ``(n, width)``."""
@@ -104,10 +105,11 @@ class SlidingRoot:
     """A body with slides, and after them a hinge or none, between itself and the world.
 
     Attributes:
-        position: Of the body in the reference configuration, ``(3,)`` m.
-        orientation: Of the body there, ``(4,)`` w x y z.
+        position: Of the body in the reference configuration, ``(1, 3)`` m, or ``(n, 3)`` where it
+            stands differently in each of many models, as on slopes.
+        orientation: Of the body there, ``(1, 4)`` or ``(n, 4)``, w x y z.
         slides: At least one.
-        axes: Of the slides, ``(slides, 3)`` in the world's frame.
+        axes: Of the slides, ``(slides, 3)`` in the body's frame there.
         hinge: The hinge, or None.
         axis: Of the hinge, ``(3,)`` in the body's frame.
         anchor: The point about which it turns, ``(3,)`` in the body's frame.
@@ -146,28 +148,28 @@ class SlidingRoot:
             turning = (base["base_angular_velocity"] * self.axis).sum(axis=1)
             qvel[:, self.hinge.velocity] = turning
         lever, swing = self._lever(qpos, qvel)
-        way, speed = position - self.position - lever, velocity - swing
+        back = self.orientation * (1.0, -1.0, -1.0, -1.0)
+        way = rotated(position - self.position, back) - lever
+        speed = rotated(velocity, back) - swing
         for slide, along in zip(self.slides, np.linalg.pinv(self.axes).T, strict=True):
             qpos[:, slide.position] = slide.reference + (way * along).sum(axis=1)
             qvel[:, slide.velocity] = (speed * along).sum(axis=1)
 
     def _position(self, qpos: FloatArray, qvel: FloatArray) -> FloatArray:
-        place = self.position + self._lever(qpos, qvel)[0]
+        way = self._lever(qpos, qvel)[0]
         for slide, axis in zip(self.slides, self.axes, strict=True):
-            place = place + (qpos[:, slide.position, np.newaxis] - slide.reference) * axis
-        return place
+            way = way + (qpos[:, slide.position, np.newaxis] - slide.reference) * axis
+        return np.asarray(self.position + rotated(way, self.orientation))
 
     def _linear_velocity(self, qpos: FloatArray, qvel: FloatArray) -> FloatArray:
         velocity = self._lever(qpos, qvel)[1]
         for slide, axis in zip(self.slides, self.axes, strict=True):
             velocity = velocity + qvel[:, slide.velocity, np.newaxis] * axis
-        return velocity
+        return rotated(velocity, self.orientation)
 
     def _orientation(self, qpos: FloatArray, _qvel: FloatArray) -> FloatArray:
         half = self._angle(qpos)[:, np.newaxis] / 2
-        about = np.empty(4)
-        mujoco.mju_mulQuat(about, self.orientation, np.concatenate([[0.0], self.axis]))
-        return np.asarray(np.cos(half) * self.orientation + np.sin(half) * about)
+        return product(self.orientation, np.hstack([np.cos(half), np.sin(half) * self.axis]))
 
     def _angular_velocity(self, _qpos: FloatArray, qvel: FloatArray) -> FloatArray:
         if self.hinge is None:
@@ -182,22 +184,21 @@ class SlidingRoot:
 
     def _angle_of(self, orientation: FloatArray) -> FloatArray:
         """How far a body of that orientation is turned about the axis, ``(n,)`` rad."""
-        w, x, y, z = self.orientation
-        away = np.array([[w, x, y, z], [-x, w, z, -y], [-y, -z, w, x], [-z, y, -x, w]])
-        turn = (orientation[:, np.newaxis] * away).sum(axis=2)
+        turn = product(self.orientation * (1.0, -1.0, -1.0, -1.0), orientation)
         half = np.arctan2((turn[:, 1:] * self.axis).sum(axis=1), turn[:, 0])
         # A quaternion and its negative are one rotation.
         return np.asarray(np.remainder(2 * half + np.pi, 2 * np.pi) - np.pi)
 
     def _lever(self, qpos: FloatArray, qvel: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """How far, and how fast, turning has moved the body's origin, ``(n, 3)`` each."""
+        """How far, and how fast, turning has moved the body's origin, ``(n, 3)`` each.
+
+        In the frame in which the axes of the slides are told.
+        """
         angle = self._angle(qpos)[:, np.newaxis]
         if self.hinge is None or not self.anchor.any():
             return np.zeros((len(angle), 3)), np.zeros((len(angle), 3))
-        outward, across = np.empty(3), np.empty(3)
-        rest = self.anchor - self.axis * (self.axis @ self.anchor)
-        mujoco.mju_rotVecQuat(outward, rest, self.orientation)
-        mujoco.mju_rotVecQuat(across, np.cross(self.axis, self.anchor), self.orientation)
+        outward = self.anchor - self.axis * (self.axis @ self.anchor)
+        across = np.cross(self.axis, self.anchor)
         cosine, sine = np.cos(angle), np.sin(angle)
         speed = qvel[:, self.hinge.velocity, np.newaxis]
         return (
@@ -209,22 +210,25 @@ class SlidingRoot:
 Root = FreeRoot | SlidingRoot
 
 
-def root_of(model: mujoco.MjModel, name: str) -> Root:
-    """Returns the root that is the body of that name; see ``find_root``."""
+def root_of(models: Sequence[mujoco.MjModel], name: str) -> Root:
+    """Returns the root that is the body of that name; see ``find_root``.
+
+    Args:
+        models: One for all rows of a state, or one for each; they share one layout.
+        name: The body's.
+    """
+    model = models[0]
     body = model.body(name)
     joints = joints_of(model, int(body.id))
     if model.jnt_type[joints[0]] == _FREE:
         return FreeRoot(int(model.jnt_qposadr[joints[0]]), int(model.jnt_dofadr[joints[0]]))
     slides = [j for j in joints if model.jnt_type[j] == _SLIDE]
     hinge = joints[-1] if model.jnt_type[joints[-1]] == _HINGE else None
-    axes = np.empty((len(slides), 3))
-    for axis, slide in zip(axes, slides, strict=True):
-        mujoco.mju_rotVecQuat(axis, model.jnt_axis[slide], body.quat)
     return SlidingRoot(
-        position=body.pos.copy(),
-        orientation=body.quat.copy(),
+        position=np.array([each.body_pos[body.id] for each in models]),
+        orientation=np.array([each.body_quat[body.id] for each in models]),
         slides=tuple(_degree(model, slide) for slide in slides),
-        axes=axes,
+        axes=model.jnt_axis[slides],
         hinge=None if hinge is None else _degree(model, hinge),
         axis=np.array([0.0, 0.0, 1.0]) if hinge is None else model.jnt_axis[hinge].copy(),
         anchor=np.zeros(3) if hinge is None else model.jnt_pos[hinge].copy(),

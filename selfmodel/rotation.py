@@ -38,3 +38,30 @@ def directions(orientation: FloatArray) -> FloatArray:
     forward = (1 - 2 * (y * y + z * z), 2 * (x * y + w * z))
     upward = (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y))
     return np.stack([*forward, *upward], axis=-1)
+
+
+def product(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Returns the rotations that turn by the second and then by the first.
+
+    Args:
+        first: ``(..., 4)``, w x y z.
+        second: The same, of a shape that broadcasts to that of the first.
+    """
+    scalar, axis = first[..., :1], first[..., 1:]
+    other, turned = second[..., :1], second[..., 1:]
+    real = scalar * other - (axis * turned).sum(axis=-1, keepdims=True)
+    vector = scalar * turned + other * axis + np.cross(axis, turned)
+    return np.concatenate([real, vector], axis=-1)
+
+
+def rotated(vectors: FloatArray, orientation: FloatArray) -> FloatArray:
+    """Returns vectors of a body's frame as the world has them.
+
+    Args:
+        vectors: ``(..., 3)``.
+        orientation: Of the body, ``(..., 4)``, w x y z.
+    """
+    twice = 2 * np.cross(orientation[..., 1:], vectors)
+    return np.asarray(
+        vectors + orientation[..., :1] * twice + np.cross(orientation[..., 1:], twice)
+    )

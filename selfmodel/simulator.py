@@ -118,7 +118,7 @@ class Simulator:
         )
         sensordata, qpos, ctrl = (batch.bind(field) for field in ("sensordata", "qpos", "ctrl"))
         motors = _DelayLine(ctrl, robot.control_delay)
-        live = live_signals(robot, batch, record)
+        live = live_signals(robot, batch, embodiments, record)
         live |= {"sensors": lambda: brains.readings, "commands": lambda: motors.inlet}
         # By step while it runs, so that a step is written in one piece.
         kept = {

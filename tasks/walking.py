@@ -85,7 +85,7 @@ class Walk(base.Task):
         self._robot = robot
         self._embodiment = embodiment
         self._senses = Senses(embodiment.model, robot.anatomy, [embodiment])
-        self._places = places(robot)
+        self._places = places(robot, embodiment.model)
         self._start = self._end = 0.0
 
     def initialize_episode(self, physics: mujoco.Physics) -> None:

@@ -12,9 +12,12 @@ import pytest
 
 from selfmodel.anatomy import Joint
 from selfmodel.behaviour import SIGNALS, Behaviour, collect
+from selfmodel.calibrate import prediction_error
 from selfmodel.comparator import Past, Segments
+from selfmodel.comparators.segment_prediction import SEGMENT_PREDICTION
 from selfmodel.disagreement import first_falls
 from selfmodel.estimate import STATE
+from selfmodel.evidence import Evidence
 from selfmodel.gap import draw_gap
 from selfmodel.hypothesis import INTACT, Hypothesis
 from selfmodel.logs import read_log
@@ -28,10 +31,13 @@ from selfmodel.robot import Robot
 from selfmodel.rotation import rotation_between
 from selfmodel.settings import Settings
 from selfmodel.simulator import Simulator
+from selfmodel.tasks import walking
+from selfmodel.trial import Plan, Trial
 from tests.bodies import BODIES, swinging, swung
 from tests.logs.conftest import plan_of
 
 STEPS, HORIZON = 50, 10
+UP = np.array([0.0, 0.0, 1.0])
 EXACT, LOOSELY = 1e-6, 2e-3
 """How far a prediction may be from what happened, relative to 1 of each unit. Of the dog, whose
 solver stops at its tolerance with 79 degrees of freedom, and begins a segment without the solution
@@ -44,11 +50,14 @@ def body(request: pytest.FixtureRequest) -> Robot:
 
 
 def damages(robot: Robot) -> list[Hypothesis]:
-    """Nothing, a distal and a proximal joint broken and jammed, and a weak motor."""
+    """Nothing, a distal and a proximal joint broken and jammed, a weak motor, and a slope."""
     names = [joint.name for joint in robot.anatomy.joints]
     weak = next(joint.name for joint in robot.anatomy.joints if joint.motors)
     texts = [f"{kind}:{name}" for kind in ("break", "jam") for name in (names[0], names[-1])]
-    return [INTACT, *(parse(text, robot.anatomy) for text in (*texts, f"motor:{weak}=0.5"))]
+    return [
+        INTACT,
+        *(parse(text, robot.anatomy) for text in (*texts, f"motor:{weak}=0.5", "slope=0.2")),
+    ]
 
 
 def happened(robot: Robot, hypothesis: Hypothesis) -> Behaviour:
@@ -70,6 +79,23 @@ def test_the_physical_robot_moves_like_the_simulator_to_the_bit(body: Robot):
             np.testing.assert_array_equal(outcome.behaviour[signal][row], run[signal], signal)
     paths = outcome.behaviour["base_position"][:, -1]
     assert len(np.unique(paths, axis=0)) == len(hypotheses)
+
+
+def test_it_walks_in_dm_control_s_world_like_in_the_simulator_to_the_bit(body: Robot):
+    told = ("base_position", "base_orientation", "base_linear_velocity", "joint_positions")
+    runs = [(INTACT, swung(body, 20))]
+    truth = Simulator(body, 1).run(runs, 20, told).behaviour
+    environment = walking.environment(body, "intact", 9.0, None, None)
+    rows = [environment.reset()]
+    rows += [environment.step(commands) for commands in swinging(body, 20)[:-1]]
+
+    for signal in told[1:]:
+        seen = [row.observation[signal] for row in rows]
+        np.testing.assert_array_equal(seen, truth[signal][0], signal)
+    heights = [row.observation["base_height"][0] for row in rows]
+    np.testing.assert_array_equal(heights, truth["base_position"][0, :, 2])
+    went = sum(row.reward for row in rows[1:]) * body.control_timestep
+    assert went == pytest.approx(np.ptp(truth["base_position"][0, [0, -1], 0]) * np.sign(went))
 
 
 def test_each_segment_of_a_trial_is_predicted_from_its_first_state(body: Robot):
@@ -96,6 +122,19 @@ def test_each_segment_of_a_trial_is_predicted_from_its_first_state(body: Robot):
             scale = np.maximum(1, np.abs(logged).max())
             limit = LOOSELY if body.name == "dog" else EXACT
             assert np.abs(apart).max() / scale < limit, f"{hypothesis}: {signal}"
+
+
+def test_a_trial_speaks_for_what_is_true_of_the_body(body: Robot):
+    intact, *others = damages(body)
+    trial = Trial(
+        Plan("trial", "before", swung(body, STEPS), STEPS, 0), body.name, happened(body, intact), ""
+    )
+    evidence = Evidence(Simulator(body, 1), SEGMENT_PREDICTION)
+    losses = evidence.losses([intact, *others], [trial]).mean(axis=1)
+
+    assert losses[0] < (1e-4 if body.name == "dog" else 1e-8)
+    assert losses[1:].min() > 1e3 * losses[0]
+    assert prediction_error(body, [trial], 1) < 0.01  # so that calibration leaves it as it is
 
 
 def test_a_log_holds_the_robot_and_its_trial(body: Robot, tmp_path: Path):
@@ -147,9 +186,9 @@ def test_a_calibrated_model_of_it_has_its_parts(body: Robot):
 def test_nobody_has_fallen_at_the_start_and_a_swimmer_never_does(body: Robot):
     run = happened(body, INTACT)
 
-    assert first_falls(run, body.standing_height) > 0
+    assert first_falls(run, UP, body.standing_height) > 0
     if body.name == "swimmer":
-        assert first_falls(run, body.standing_height) == STEPS
+        assert first_falls(run, UP, body.standing_height) == STEPS
 
 
 def without_limb(robot: Robot, joint: Joint) -> mujoco.MjModel:

@@ -172,6 +172,26 @@ def test_a_base_has_fallen_when_it_leans_by_more_than_sixty_degrees_whatever_its
         assert falls == (1 if lean > np.pi / 3 else 2)
 
 
+@pytest.mark.parametrize("height", [0.0, -0.1])
+def test_a_base_that_begins_on_the_ground_has_no_height_to_fall_from(height: float):
+    signals = {"base_position": np.full((2, 3), height), "base_orientation": np.eye(4)[[0, 0]]}
+    signals["base_position"][1] -= 0.01
+
+    assert first_falls(Behaviour(NAMES, np.array([0, 0.01]), signals), UP, height) == 2
+
+
+@given(start=st.integers(0, 2**31), lean=st.floats(0, np.pi))
+def test_a_base_leans_from_where_it_started(start: int, lean: float):
+    lying = Rotation.random(random_state=start)
+    about = Rotation.from_rotvec(lean * np.array([0.6, 0.8, 0]))
+    turns = Rotation.concatenate([lying, about * lying]).as_quat(scalar_first=True)
+    signals = {"base_position": np.full((2, 3), HEIGHT), "base_orientation": turns}
+    falls = first_falls(Behaviour(NAMES, np.array([0, 0.01]), signals), UP, HEIGHT)
+
+    if abs(lean - np.pi / 3) > 1e-6:
+        assert falls == (1 if lean > np.pi / 3 else 2)
+
+
 @given(way=st.floats(-10, 10), height=st.floats(0, 2), slope=st.floats(-0.3, 0.3))
 def test_a_base_has_fallen_when_it_is_near_the_ground_however_far_up_or_down_a_slope_it_is(
     way: float, height: float, slope: float

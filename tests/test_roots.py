@@ -74,7 +74,7 @@ def test_it_is_told_where_the_physics_has_it(seed: int, slides: int, turns: bool
     of_body = mujoco.mjtObj.mjOBJ_XBODY
     mujoco.mj_objectVelocity(robot.model, data, of_body, int(body.id), velocity, 1)
 
-    assert isinstance(root_of(robot.model, "torso"), SlidingRoot)
+    assert isinstance(root_of([robot.model], "torso"), SlidingRoot)
     np.testing.assert_allclose(told["base_position"], body.xpos, atol=1e-9)
     turned = Rotation.from_quat(told["base_orientation"], scalar_first=True).as_matrix()
     np.testing.assert_allclose(turned, body.xmat.reshape(3, 3), atol=1e-9)

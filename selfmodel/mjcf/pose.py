@@ -169,7 +169,7 @@ def _check_equalities(model: mujoco.MjModel, data: mujoco.MjData) -> None:
 
 
 def _write_tendons(document: Document, model: mujoco.MjModel) -> None:
-    """Keeps the lengths at which tendons are slack, which MuJoCo finds in the reference pose."""
+    """Keeps the lengths at which tendons are slack: to the world, as the root's pose makes them."""
     for tendon, element in enumerate(document.children("tendon")):
         if model.tendon_stiffness[tendon]:
             element.set("springlength", numbers(model.tendon_lengthspring[tendon]))

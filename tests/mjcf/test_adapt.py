@@ -15,7 +15,7 @@ from selfmodel.mjcf import MjcfSettings, adapt, parse_setting, read_settings
 from selfmodel.robot import Robot
 from selfmodel.simulator import Simulator
 from tests.conftest import random_controllers
-from tests.mjcf.awkward import GROUND, LEGS, MOTORS, TORSO, mjcf
+from tests.mjcf.awkward import GROUND, LEGS, MOTORS, mjcf
 from tests.mjcf.samples import SAMPLES
 
 SPRUNG = """<tendon><spatial name="band" stiffness="40"><site site="a"/><site site="b"/></spatial>
@@ -100,7 +100,7 @@ def test_a_robot_starts_and_goes_on_as_from_its_keyframe(
     legs = SPRUNG_LEGS.replace('range="-40 40"', 'pos="0 0 .02" ref=".1" limited="false"')
     text = mjcf(
         more=f'{unit}{SPRUNG}<keyframe><key name="home" qpos="{pose}"/></keyframe>',
-        torso=TORSO + '<site name="b"/>',
+        world=GROUND + '<site name="b" pos="0 0 3"/>',
         legs=legs,
     )
     path = written(tmp_path_factory.mktemp("key"), text)
