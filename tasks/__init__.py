@@ -42,9 +42,9 @@ def entry(name: str) -> Entry:
     """
     if name in ROBOTS:
         return ROBOTS[name]
-    if name not in suite_bodies.names():
-        raise unknown_name("robot", name, (*ROBOTS, *suite_bodies.names()))
-    return suite_bodies.entry(*suite_bodies.parse_name(name))
+    if name.removeprefix(suite_bodies.PREFIX).partition("-")[0] in suite_bodies.DOMAINS:
+        return suite_bodies.entry(*suite_bodies.parse_name(name))
+    raise unknown_name("robot", name, (*ROBOTS, "suite-DOMAIN-TASK"))
 
 
 def load(

@@ -135,7 +135,16 @@ def test_every_task_of_a_domain_is_known_but_those_with_more_than_the_body():
     }
 
 
-@pytest.mark.parametrize("name", ["suite-walker-fly", "suite-walke-run", "suite-walker"])
-def test_a_robot_that_the_suite_has_not_is_refused_with_the_nearest(name: str):
-    with pytest.raises(InputError, match="suite-walker-"):
+@pytest.mark.parametrize(
+    ("name", "nearest"),
+    [
+        ("suite-walker-fly", "suite-walker-"),
+        ("suite-walker", "suite-walker-"),
+        ("walker", "suite-walker-"),
+        ("suite-walke-run", "suite-DOMAIN-TASK"),
+        ("hexapd", "did you mean hexapod"),
+    ],
+)
+def test_a_robot_that_there_is_not_is_refused_with_the_nearest(name: str, nearest: str):
+    with pytest.raises(InputError, match=nearest):
         entry(name)
