@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from selfmodel.cli.suite.bodies import DOMAINS, bodies
-from selfmodel.cli.suite.plan import Study, check
+from selfmodel.cli.suite.plan import Study, check, gait_jobs, gait_path, recovery_jobs
 from selfmodel.cli.suite.rows import Row, summarise
 from selfmodel.cli.suite.work import run_study
 from selfmodel.comparators import DEFAULT
@@ -172,6 +172,32 @@ def test_what_cannot_be_run_is_refused_before_anything_is(
     with pytest.raises(InputError, match=reason):
         run_study(replace(study, **changed), workers=1, watch=lambda _: None)
     assert not (tmp_path / "out").exists()
+
+
+def test_oscillators_have_no_neurons_that_could_be_silent(tmp_path: Path):
+    study = Study(
+        bodies=["quadruped"],
+        cases=[9, 10],
+        seeds=range(1),
+        folder=tmp_path,
+        settings=Settings(),
+        score="displacement",
+        controller="network",
+        comparator=DEFAULT,
+    )
+    put_gaits(study)
+    oscillating = replace(study, controller="cpg")
+
+    assert [job.parameters["case"] for job in recovery_jobs(study)] == [9, 10]
+    assert [job.parameters["case"] for job in recovery_jobs(oscillating)] == [9]
+
+
+def put_gaits(study: Study) -> None:
+    """Something in the place of each gait."""
+    for job in gait_jobs(study):
+        path = gait_path(study.folder, job.key)
+        path.parent.mkdir(parents=True)
+        path.write_bytes(b"a gait")
 
 
 def test_a_domain_that_nobody_has_is_told_from_the_nearest(tmp_path: Path):

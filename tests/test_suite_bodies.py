@@ -126,6 +126,14 @@ def test_time_steps_and_episodes_are_the_suites(domain: str, task: str):
     assert round(env._step_limit) == 1000
 
 
+def test_hypotheses_of_a_body_take_little_memory():
+    walker, dog = (entry(name).robot() for name in ("suite-walker-walk", "suite-dog-walk"))
+    kept = Simulator(dog, 1)._embodiment.cache_parameters()["maxsize"]
+
+    assert walker.model.nbuffer < 2**18  # as the suite has it, 12 MB of sky and floor
+    assert kept * dog.model.nbuffer <= 2**29
+
+
 def test_every_task_of_a_domain_is_known_but_those_with_more_than_the_body():
     left_out = {("quadruped", "escape"), ("quadruped", "fetch"), ("dog", "fetch")}
     known = {(domain, task) for domain, tasks in suite_bodies.DOMAINS.items() for task in tasks}

@@ -10,9 +10,13 @@ from typing import Any
 
 from selfmodel import __version__
 from selfmodel.cli import resolve
+from selfmodel.controller import Network
 from selfmodel.errors import InputError, unknown_name
+from selfmodel.faults.neuron import SILENT_NEURON
 from selfmodel.grid import Job, difference, parameters_of, runs
+from selfmodel.notation import parse
 from selfmodel.settings import Settings
+from selfmodel.tasks import Entry
 
 OF_DIAGNOSIS = ("trials", "genes", "kept")
 """Settings that no gait depends on."""
@@ -24,7 +28,8 @@ class Study:
 
     Attributes:
         bodies: Names of robots, and paths of MJCF files.
-        cases: Numbers of failures like those of Table I; a body that cannot have one has none.
+        cases: Numbers of failures like those of Table I; a body that cannot have one is left out of
+            it, and so are silent neurons where there are none.
         seeds: A run for each.
         folder: Where all of it is kept.
         settings: The paper's numbers.
@@ -118,9 +123,17 @@ def recovery_jobs(study: Study) -> list[Job]:
                 parts=("recovery",),
             )
             for case in study.cases
-            if case in entry.cases
+            if case in entry.cases and _means_something(study, entry, case)
         ]
     return found
+
+
+def _means_something(study: Study, entry: Entry, case: int) -> bool:
+    """Whether a failure is one as the study drives the robot: oscillators have no neurons."""
+    robot = entry.robot()
+    faults = parse(entry.cases[case], robot.anatomy).faults
+    drives = resolve.design(study.controller, robot)
+    return isinstance(drives, Network) or all(fault.kind is not SILENT_NEURON for fault in faults)
 
 
 def gait_path(folder: Path, key: str) -> Path:
