@@ -16,6 +16,7 @@ from selfmodel.driver import Driver
 from selfmodel.embodiment import Embodiment
 from selfmodel.environment_robot import EnvironmentRobot
 from selfmodel.hypothesis import Hypothesis
+from selfmodel.mjcf.mujoco_errors import told_by_mujoco
 from selfmodel.physical import OWN_SEED
 from selfmodel.places import places, present, writer
 from selfmodel.robot import Robot
@@ -113,7 +114,8 @@ def episode_parts(domain: str, task: str) -> tuple[Callable[[mujoco.MjModel], An
     # When it is needed, because dm_control's physics looks for a display as it is imported.
     suite = importlib.import_module("dm_control.suite")
     wrapper = importlib.import_module("dm_control.mujoco.wrapper.core")
-    env = suite.load(domain, task, task_kwargs={"random": 0})
+    with told_by_mujoco():  # of a cheetah it warns
+        env = suite.load(domain, task, task_kwargs={"random": 0})
     env.reset()
     own = type(env.physics)
     return lambda model: own.from_model(wrapper.MjModel(model)), env.task
