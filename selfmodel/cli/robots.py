@@ -75,7 +75,10 @@ def _print_all(facts: list[dict[str, Any]]) -> None:
             one["robot"], *map(str, counts), ", ".join(one["tasks"]), f"1 to {len(one['cases'])}"
         )
     Console().print(table)
-    typer.echo("`selfmodel robots ROBOT` lists its parts and cases.")
+    typer.echo(
+        "`selfmodel robots ROBOT` lists its parts and cases; `selfmodel suite list` the bodies of "
+        "dm_control's suite."
+    )
 
 
 def _print_cases(facts: dict[str, Any]) -> None:
