@@ -16,6 +16,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from selfmodel.comparators.segment_prediction import SEGMENT_PREDICTION
 from selfmodel.logs import read_log
@@ -93,6 +94,9 @@ def test_such_a_trial_is_explained_by_what_is_wrong_with_the_robot(tmp_path: Pat
         _, errors = (process := driver(tmp_path, port)).communicate(timeout=120)
     assert process.returncode == 0, errors
     log = read_log(tmp_path / "trial.mcap")
+    assert log.timing is not None
+    if log.timing.late.mean() > 0.1:
+        pytest.skip("this machine is too busy now to drive a robot at 50 Hz: most steps were late")
     self_model = robot_of(log)
     texts = ("intact", "break:front_left_knee", "jam:back_right_shoulder")
     hypotheses = [parse(text, self_model.anatomy) for text in texts]
