@@ -1,5 +1,6 @@
 """The paper's algorithm: act, log, diagnose, repair, with as few physical trials as possible."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -57,8 +58,12 @@ class Recovery:
 
     @property
     def recovered(self) -> float:
-        """Forward displacement of the best of the recovery trials, m."""
-        return max(trial.displacement for trial in self.trials[2:])
+        """Forward displacement of the best of the recovery trials, m.
+
+        NaN if it was observed in none of them.
+        """
+        ways = [trial.displacement for trial in self.trials[2:]]
+        return max((way for way in ways if not math.isnan(way)), default=math.nan)
 
 
 def recover(

@@ -23,6 +23,9 @@ from selfmodel.roots import find_root
 CONTROL_DELAY = "selfmodel_control_delay"
 """The custom numeric of an MJCF that says how many control steps a command takes to its effect."""
 
+LONGEST_DELAY = 5
+"""Control steps that it may say: as many as segments have commands from before their start."""
+
 
 @dataclass(frozen=True, eq=False)
 class Robot:
@@ -58,6 +61,11 @@ class Robot:
         object.__setattr__(self, "model", model)
         object.__setattr__(self, "anatomy", read_anatomy(model, root, hidden_neurons(model)))
         object.__setattr__(self, "root", str(model.body(root).name))
+        delay = _said_delay(model)
+        if not (delay.is_integer() and 0 <= delay <= LONGEST_DELAY):
+            raise ValueError(
+                f"{CONTROL_DELAY} must be a whole number from 0 to {LONGEST_DELAY}, got {delay:g}"
+            )
         if not np.isclose(self.substeps * model.opt.timestep, self.control_timestep, rtol=1e-9):
             raise ValueError(
                 f"the control time step {self.control_timestep} s must be a multiple of the "
@@ -104,9 +112,7 @@ class Robot:
     @property
     def control_delay(self) -> int:
         """Control steps from a command to its effect, as the model's ``CONTROL_DELAY`` says."""
-        model = self.model
-        found = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, CONTROL_DELAY)
-        return int(model.numeric(found).data[0]) if found >= 0 else 0
+        return int(_said_delay(self.model))
 
     @property
     def network(self) -> Network:
@@ -161,3 +167,8 @@ class Robot:
             if fault.kind.reshape:
                 fault.kind.reshape(spec, fault, seed)
         return spec
+
+
+def _said_delay(model: mujoco.MjModel) -> float:
+    found = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, CONTROL_DELAY)
+    return float(model.numeric(found).data[0]) if found >= 0 else 0.0

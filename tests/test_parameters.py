@@ -16,7 +16,7 @@ from selfmodel.parameters import (
     nominal,
     with_parameters,
 )
-from selfmodel.robot import Robot
+from selfmodel.robot import CONTROL_DELAY, Robot
 
 FIELDS = (
     *("body_mass", "body_inertia", "body_ipos", "body_iquat", "body_subtreemass"),
@@ -157,3 +157,12 @@ def test_the_robot_stays_as_it_was(quadruped: Robot):
 
     np.testing.assert_array_equal(quadruped.model.body_mass, before[0])
     np.testing.assert_array_equal(quadruped.model.dof_damping, before[1])
+
+
+@pytest.mark.parametrize("said", ["-3", "nan", "1e300", "2.5", "6"])
+def test_a_delay_that_cannot_be_is_refused(quadruped: Robot, said: str):
+    numeric = f'<custom><numeric name="{CONTROL_DELAY}" data="{said}"/></custom></mujoco>'
+    mjcf = quadruped.mjcf.replace("</mujoco>", numeric)
+
+    with pytest.raises(ValueError, match="must be a whole number from 0 to 5"):
+        Robot(quadruped.name, mjcf, quadruped.control_timestep)

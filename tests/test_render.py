@@ -14,12 +14,12 @@ import pytest
 from matplotlib.figure import Figure
 from PIL import Image
 
-from selfmodel.behaviour import Behaviour
+from selfmodel.behaviour import SIGNALS, Behaviour
 from selfmodel.cli.rendering import camera, gl, video, view
 from selfmodel.cli.rendering.diagnosed import diagnosed
-from selfmodel.cli.rendering.film import Film, film_of
+from selfmodel.cli.rendering.film import Film, evenly, film_of
 from selfmodel.cli.rendering.filmstrip import stick_frames, strip
-from selfmodel.cli.rendering.sticks import draw, lines_of, plane_of
+from selfmodel.cli.rendering.sticks import draw, draw_ground, lines_of, plane_of
 from selfmodel.errors import InputError, WorkError
 from selfmodel.hypothesis import INTACT
 from selfmodel.logs.writer import write_trial
@@ -273,7 +273,7 @@ def test_a_trial_of_few_steps_shows_each_once(quadruped: Robot, steps: int):
     (controller,) = random_controllers(quadruped, 1)
     batch = Simulator(quadruped, 1).run([(INTACT, controller)], steps, POSE).behaviour
     seen = Behaviour(batch.names, batch.time, {signal: batch[signal][0] for signal in POSE})
-    short = film_of(quadruped, INTACT, [("logged", seen)], np.linspace(0, batch.time[-1], 20))
+    short = film_of(quadruped, INTACT, [("logged", seen)], evenly(batch.time, 20))
 
     np.testing.assert_array_equal(short.time, batch.time)
     assert len(list(stick_frames(short))) == steps
@@ -329,3 +329,32 @@ def test_a_failing_ffmpeg_says_why(reads: str, tmp_path: Path, monkeypatch: pyte
     frames = iter([np.zeros((360, 960, 3), dtype=np.uint8)] * 3)
     with pytest.raises(WorkError, match="could not make the film: no such encoder"):
         video.mp4(frames)
+
+
+def test_a_film_takes_as_long_as_the_trial_however_long_a_control_step_is(quadruped: Robot):
+    slow = replace(quadruped, control_timestep=0.1)
+    run = Simulator(slow, 1).run([(INTACT, random_controllers(slow, 1)[0])], 21, SIGNALS).behaviour
+    seen = Behaviour(run.names, run.time, {name: run[name][0] for name in SIGNALS})
+    film = film_of(slow, INTACT, [("seen", seen)], np.arange(51) / 25)
+
+    assert len(film.time) == 51
+    np.testing.assert_allclose(film.time, np.floor(np.arange(51) / 2.5 + 1e-9) * 0.1)
+
+
+def test_the_ground_of_a_stick_figure_slopes_as_the_world_does(quadruped: Robot):
+    slope = parse("slope=0.2", quadruped.anatomy)
+    run = (
+        Simulator(quadruped, 1)
+        .run([(slope, random_controllers(quadruped, 1)[0])], 2, SIGNALS)
+        .behaviour
+    )
+    seen = Behaviour(run.names, run.time, {name: run[name][0] for name in SIGNALS})
+    film = film_of(quadruped, slope, [("seen", seen)], run.time)
+
+    np.testing.assert_allclose(film.normal, [-np.sin(0.2), 0, np.cos(0.2)])
+    axes = Figure().subplots()
+    side = np.array([[1.0, 0], [0, 0], [0, 1.0]])  # x to the right, z up
+    draw_ground(axes, film.normal, np.zeros(3), side, 1.0)
+    (lines,) = axes.collections
+    for line in lines.get_segments():
+        np.testing.assert_allclose(line[:, 1], np.tan(0.2) * line[:, 0], atol=1e-12)

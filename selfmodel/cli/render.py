@@ -71,6 +71,8 @@ def render(
     On the left, or above, is the motion that was logged; beside it the same controller on the
     model. A limb that is taken to be lost is pale, a part that jammed is red, in both.
     """
+    if not file.name:
+        raise InputError(f"expected a trial log, NAME.mcap, got the folder {file}")
     out = file.with_suffix(".gif") if out is None else out
     _check_name(out, stick=stick)
     if hypothesis is not None and diagnosis is not None:
@@ -152,7 +154,7 @@ def _filmed(
     """What is to be drawn, and what there is to say of it."""
     import numpy as np  # noqa: PLC0415  # with the other work
 
-    from selfmodel.cli.rendering.film import film_of  # noqa: PLC0415
+    from selfmodel.cli.rendering.film import evenly, film_of  # noqa: PLC0415
     from selfmodel.cli.rendering.video import RATE  # noqa: PLC0415
     from selfmodel.notation import parse  # noqa: PLC0415
     from selfmodel.replay import replay  # noqa: PLC0415
@@ -161,9 +163,8 @@ def _filmed(
     assumed = parse(notation, robot.anatomy)
     logged = log.trial.behaviour
     found = replay(log.trial, assumed, Simulator(robot, threads))
-    end = float(logged.time[-1])
-    count = int(end * RATE) + 1
-    moments = np.arange(count) / RATE if pictures is None else np.linspace(0, end, pictures)
+    whole = np.arange(int(float(logged.time[-1]) * RATE) + 1) / RATE
+    moments = whole if pictures is None else evenly(logged.time, pictures)
     film = film_of(
         robot,
         assumed,

@@ -59,8 +59,8 @@ def test_settings_are_options_too(ant: Path, tmp_path: Path):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("recover", "ant.xml", "--case", "1"), "--damage break:hip_1"),
-        (("recover", "ant.xml"), "--damage break:hip_1"),
+        (("recover", "ant.xml", "--case", "11"), "unknown case"),
+        (("recover", "ant.xml"), "a notation is like break:ankle_1"),
         (("recover", "ant.xml", "--damage", "break:hipp"), "did you mean hip_"),
         (("recover", "quadruped", "--case", "1", "--set", "forward=y"), "has all that it needs"),
         (("robots", "ant.xml", "--set", "forwards=y"), "did you mean forward"),

@@ -44,6 +44,7 @@ class Film:
         time: ``(frames,)`` seconds since the start.
         shots: The motions.
         missing: What was not observed at all.
+        normal: Unit vector that stands on the ground, ``(3,)``.
     """
 
     model: mujoco.MjModel
@@ -53,6 +54,7 @@ class Film:
     time: FloatArray
     shots: tuple[Shot, ...]
     missing: tuple[str, ...]
+    normal: FloatArray
 
 
 def film_of(
@@ -67,13 +69,13 @@ def film_of(
         robot: The robot with nothing wrong.
         hypothesis: What is taken to be wrong: nothing in a log says so.
         motions: A title and the motion under it, all with the same times.
-        moments: ``(frames,)`` seconds: of each, the last step that was not later is drawn, and
-            none twice.
+        moments: ``(frames,)`` seconds: of each, the last step that was not later is drawn.
     """
-    model = robot.build(hypothesis).model
+    embodiment = robot.build(hypothesis)
+    model = embodiment.model
     time = motions[0][1].time
     # A moment that is a step but for rounding is that step.
-    steps = np.unique(np.searchsorted(time, moments + 1e-9, side="right") - 1)
+    steps = np.searchsorted(time, moments + 1e-9, side="right") - 1
     shots: list[Shot] = []
     missing: list[str] = []
     for title, behaviour in motions:
@@ -91,7 +93,18 @@ def film_of(
         time=time[steps],
         shots=tuple(shots),
         missing=tuple(missing),
+        normal=embodiment.normal,
     )
+
+
+def evenly(time: FloatArray, pictures: int) -> FloatArray:
+    """Returns moments of a trial, evenly spread from its first step to its last, none twice.
+
+    Args:
+        time: ``(steps,)`` seconds.
+        pictures: How many, where there are so many steps.
+    """
+    return np.asarray(time[np.unique(np.linspace(0, len(time) - 1, pictures).astype(int))])
 
 
 def _bodies(

@@ -70,7 +70,7 @@ class _Artist:
         film, data, centre, held = self._film, self._data, self._way[frame], self.shot.held[frame]
         data.qpos = self.shot.qpos[frame]
         mujoco.mj_kinematics(film.model, data)
-        draw_ground(axes, centre, self._plane, self._reach)
+        draw_ground(axes, film.normal, centre, self._plane, self._reach)
         draw(axes, film, lines_of(film, data, centre, self._plane), held=bool(held))
         axes.set_xlim(-1.3 * self._reach, 1.3 * self._reach)
         axes.set_ylim(-1.0 * self._reach, 1.0 * self._reach)

@@ -98,7 +98,9 @@ def draw(axes: Axes, film: Film, lines: Lines, *, held: bool) -> None:
         )
 
 
-def draw_ground(axes: Axes, centre: FloatArray, plane: FloatArray, reach: float) -> None:
+def draw_ground(
+    axes: Axes, normal: FloatArray, centre: FloatArray, plane: FloatArray, reach: float
+) -> None:
     """Draws lines on the ground around a point, which show that the robot moves over it."""
     low = np.floor((centre[:2] - 3 * reach) / GRID) * GRID
     high = centre[:2] + 3 * reach
@@ -106,9 +108,11 @@ def draw_ground(axes: Axes, centre: FloatArray, plane: FloatArray, reach: float)
         [(x, low[1], 0.0), (x, high[1], 0.0)] for x in np.arange(low[0], high[0] + GRID, GRID)
     ]
     along = [[(low[0], y, 0.0), (high[0], y, 0.0)] for y in np.arange(low[1], high[1] + GRID, GRID)]
+    lines = np.array(across + along)
+    lines[..., 2] = -(lines[..., :2] @ normal[:2]) / normal[2]
     axes.add_collection(
         LineCollection(
-            list((np.array(across + along) - centre) @ plane),
+            list((lines - centre) @ plane),
             colors="0.85",
             linewidths=0.6,
             zorder=0,
