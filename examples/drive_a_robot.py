@@ -16,7 +16,7 @@ import numpy as np
 from selfmodel.behaviour import Signal
 from selfmodel.controller import Controller, draw_weights
 from selfmodel.environment_robot import EnvironmentRobot
-from selfmodel.errors import TrialError
+from selfmodel.errors import TrialError, in_words
 from selfmodel.limits import joint_limits, tilt_limit
 from selfmodel.logs.writer import write_trial
 from selfmodel.robot import Robot
@@ -107,7 +107,7 @@ def main(host: str, port: int, path: Path) -> None:
     try:
         write_trial(path, robot, plan, samples, timed=True, settings=Settings())
     except TrialError as error:
-        sys.exit(f"{error}; what was observed until then is in {path}")
+        sys.exit(f"{in_words(error)}; what was observed until then is in {path}")
     print(f"{plan.steps} steps: {path}")
 
 

@@ -10,7 +10,7 @@ from typing import Self
 from selfmodel.atomic import part_of
 from selfmodel.behaviour import Names, Sample
 from selfmodel.driver import Driver
-from selfmodel.errors import InputError
+from selfmodel.errors import InputError, in_words
 from selfmodel.logs.encoder import Encoder, empty_rows, parts_of
 from selfmodel.logs.errors import IncompleteError, salvage_it
 from selfmodel.logs.files import explained
@@ -236,7 +236,7 @@ class TrialWriter:
 
 
 def _in_words(error: BaseException) -> str:
-    return " ".join(f"{type(error).__name__}: {error}".split()).removesuffix(":")
+    return " ".join(f"{type(error).__name__}: {in_words(error)}".split()).removesuffix(":")
 
 
 def _check_ends(robot: str, names: Names, driver: Driver) -> None:

@@ -126,6 +126,15 @@ def test_a_dropped_connection_stops_the_robot_and_leaves_a_whole_log(tmp_path: P
     assert told.stdout == f"ok: trial.mcap: 70 steps, stopped ({log.reason})\n"
 
 
+def test_the_operator_is_told_that_the_robot_could_not_be_stopped(tmp_path: Path):
+    with robot(tmp_path, **{"40": "die"}) as port:
+        _, errors = (process := driver(tmp_path, port)).communicate(timeout=120)
+
+    assert process.returncode == 1
+    assert "the environment failed: ConnectionError: the robot hung up; " in errors
+    assert "the safe command could not be sent: ConnectionRefusedError" in errors
+
+
 def test_ctrl_c_stops_the_robot_and_leaves_a_whole_log(tmp_path: Path):
     with robot(tmp_path) as port:
         process = driver(tmp_path, port)

@@ -149,6 +149,10 @@ def test_a_safe_command_that_fails_is_told_beside_what_ended_the_trial(tmp_path:
     with pytest.raises(TrialError, match="no route") as caught:
         logged(bench, tmp_path)
     assert caught.value.__notes__ == ["the safe command could not be sent: OSError: nor to stop"]
+    assert read_log(tmp_path / "trial.mcap").reason == (
+        "TrialError: the environment failed: OSError: no route; "
+        "the safe command could not be sent: OSError: nor to stop"
+    )
 
 
 def test_a_safe_command_that_fails_at_the_end_is_an_error(tmp_path: Path):
