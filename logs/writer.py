@@ -236,7 +236,9 @@ class TrialWriter:
 
 
 def _in_words(error: BaseException) -> str:
-    return " ".join(f"{type(error).__name__}: {in_words(error)}".split()).removesuffix(":")
+    text = " ".join(f"{type(error).__name__}: {in_words(error)}".split()).removesuffix(":")
+    # A file's name that is no text comes with surrogates, which a log cannot hold.
+    return text.encode("utf-8", "backslashreplace").decode()
 
 
 def _check_ends(robot: str, names: Names, driver: Driver) -> None:

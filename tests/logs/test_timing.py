@@ -152,6 +152,13 @@ def test_a_reason_may_be_long(biped: Robot, tmp_path: Path):
     assert len(read_log(tmp_path / "a.mcap").reason) == LONGEST_TEXT
 
 
+def test_a_reason_that_is_no_text_does_not_cost_the_log(biped: Robot, tmp_path: Path):
+    with pytest.raises(FallError):
+        write(tmp_path / "a.mcap", biped, stopped(biped, 9, FallError("/dev/\udcff")), timed=True)
+
+    assert read_log(tmp_path / "a.mcap").reason == r"FallError: /dev/\udcff"
+
+
 def test_a_reason_that_is_too_long_is_refused(clocked: Path):
     rewritten(clocked, metadata(RESULT, reason="x" * (LONGEST_TEXT + 1)))
     with pytest.raises(SchemaMismatchError, match="at most 1000 characters in reason"):
