@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from selfmodel.behaviour import Sample
+from selfmodel.behaviour import Sample, Signal
 from selfmodel.environment_robot import EnvironmentRobot
 from selfmodel.errors import InputError, TrialError
-from selfmodel.limits import joint_limits, tilt_limit
+from selfmodel.limits import Limit, joint_limits, tilt_limit
 from selfmodel.logs import read_log
 from selfmodel.logs.verify import verify
 from selfmodel.logs.writer import write_trial
@@ -71,6 +71,18 @@ EMERGENCIES: dict[str, tuple[dict[int, object], dict[str, object], type[BaseExce
         TrialError,
         "at step 7: it leans by 1.20 rad, more than 1.1 rad",
     ),
+    "no rotation": (
+        {7: observation(7, base_orientation=np.zeros(4))},
+        {"limits": [tilt_limit(1.1)]},
+        TrialError,
+        "at step 7: base_orientation is no rotation: a quaternion of length 0.00",
+    ),
+    "blind limit": (
+        {k: observation(k, base_orientation=None) for k in range(4, 30)},
+        {"limits": [tilt_limit(1.1)], "patience": 3},
+        TrialError,
+        r"base_orientation \(w, x, y, z\), which a limit needs, for more than 3 .* at step 7",
+    ),
     "another robot": (
         {7: observation(7, sensors=[0.0])},
         {},
@@ -105,6 +117,24 @@ def test_limits_let_a_robot_within_them_go_on():
     limits = [joint_limits(QUADRUPED, 0.1), tilt_limit(1.1)]
 
     assert driven(Bench(happens | {9: None}), limits=limits).steps == STEPS
+
+
+@pytest.mark.parametrize(
+    ("limit", "signal"),
+    [
+        (joint_limits(QUADRUPED, 0.1), "joint_positions"),
+        (tilt_limit(1e-4), "base_orientation"),
+        (Limit(("sensors",), lambda _: ""), "sensors"),
+    ],
+)
+def test_a_robot_that_does_not_observe_what_a_limit_needs_is_not_driven(
+    limit: Limit, signal: Signal
+):
+    bench = Bench({k: observation(k, **{signal: None}) for k in range(STEPS)})
+    driver = Playback(NAMES.motors, np.zeros((5, len(NAMES.motors))))
+    with pytest.raises(TrialError, match="nothing was read of .* at step 0"):
+        list(bench_robot(bench, limits=[limit]).run(driver, STEPS))
+    assert bench.done == ["stop", "reset", "stop"]
 
 
 def test_an_episode_that_ends_too_soon_is_said_so(tmp_path: Path):
