@@ -1,8 +1,8 @@
 """Writes a trial into its log while it runs, so that whatever happens, what happened is kept."""
 
 import itertools
-from collections.abc import Generator, Iterable
-from contextlib import ExitStack
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -10,7 +10,7 @@ from typing import Self
 from selfmodel.atomic import part_of
 from selfmodel.behaviour import Names, Sample
 from selfmodel.driver import Driver
-from selfmodel.errors import InputError, in_words
+from selfmodel.errors import InputError, WorkError, in_words
 from selfmodel.logs.encoder import Encoder, empty_rows, parts_of
 from selfmodel.logs.errors import IncompleteError, salvage_it
 from selfmodel.logs.files import explained
@@ -44,8 +44,9 @@ def write_trial(
         path: The log's name; until the trial is finished, the file is called ``path.part``.
         robot: The robot as its model describes it.
         plan: What is to be done.
-        samples: What happens, as it happens; not more than the plan's steps are asked for, and a
-            generator is closed before the log is, which stops the robot.
+        samples: What happens, as it happens; not more than the plan's steps are asked for, and what
+            has ``close``, as a generator has, is closed before the log is, which stops the robot.
+            To look at them on their way, use ``TrialWriter``: a ``map`` over a generator has none.
         timed: Whether the robot is ``selfmodel.physical.Timed``: its samples have moments.
         settings: The paper's numbers, for the record.
         hidden: What is wrong with a simulated robot, in notation; for ``read_truth`` only.
@@ -70,13 +71,25 @@ def write_trial(
         gap=gap,
         imported=imported,
     )
-    with writer, ExitStack() as robot_stops:
-        # Before the log is closed, and wherever this was interrupted.
-        if isinstance(samples, Generator):
-            robot_stops.callback(samples.close)
+    with writer, _closing(samples):
         for sample in itertools.islice(samples, plan.steps):
             writer.add(sample)
     return path
+
+
+@contextmanager
+def _closing(samples: Iterable[Sample]) -> Iterator[None]:
+    """Closes samples, wherever this was interrupted; what interrupted it comes first."""
+    close = getattr(samples, "close", lambda: None)
+    try:
+        yield
+    except BaseException as reason:
+        try:
+            close()
+        except (OSError, WorkError) as failure:
+            reason.add_note(in_words(failure))
+        raise
+    close()
 
 
 class TrialWriter:

@@ -141,10 +141,17 @@ class EnvironmentRobot:
 
     def _make_safe(self) -> None:
         try:
-            self._halt()
-        except KeyboardInterrupt:
-            self._halt()  # a second Ctrl-C must not keep the first one's from the robot
+            self._send_safe()
+        except KeyboardInterrupt as reason:
+            try:
+                self._send_safe()  # a second Ctrl-C must not keep the first one's from the robot
+            except TrialError as failure:
+                reason.add_note(str(failure))
             raise
+
+    def _send_safe(self) -> None:
+        try:
+            self._halt()
         except Exception as error:
             raise TrialError(f"the safe command could not be sent: {_told(error)}") from error
 
@@ -211,13 +218,10 @@ class EnvironmentRobot:
             columns = self._robot.anatomy.names.columns(signal)
             pairs = zip(columns, counts > patience, strict=True)
             if lacking := ", ".join(name for name, is_silent in pairs if is_silent):
-                of = (
-                    lacking
-                    if signal == "sensors"
-                    else f"{signal} ({lacking}), which a limit needs,"
-                )
+                if signal != "sensors":
+                    lacking = f"{signal} ({lacking}), which a limit needs,"
                 raise TrialError(
-                    f"nothing was read of {of} for more than {patience} steps, at step {k}"
+                    f"nothing was read of {lacking} for more than {patience} steps, at step {k}"
                 )
         for signal, row in values.items():
             if np.any(np.isinf(row)):

@@ -14,7 +14,7 @@ from selfmodel.errors import InputError, TrialError
 from selfmodel.limits import Limit, joint_limits, tilt_limit
 from selfmodel.logs import read_log
 from selfmodel.logs.verify import verify
-from selfmodel.logs.writer import write_trial
+from selfmodel.logs.writer import TrialWriter, write_trial
 from selfmodel.playback import Playback
 from selfmodel.robot import Robot
 from selfmodel.settings import Settings
@@ -132,7 +132,7 @@ def test_a_robot_that_does_not_observe_what_a_limit_needs_is_not_driven(
 ):
     bench = Bench({k: observation(k, **{signal: None}) for k in range(STEPS)})
     driver = Playback(NAMES.motors, np.zeros((5, len(NAMES.motors))))
-    with pytest.raises(TrialError, match="nothing was read of .* at step 0"):
+    with pytest.raises(TrialError, match=r"nothing was read of .* at step 0"):
         list(bench_robot(bench, limits=[limit]).run(driver, STEPS))
     assert bench.done == ["stop", "reset", "stop"]
 
@@ -209,6 +209,31 @@ def test_a_second_ctrl_c_does_not_keep_the_safe_command_from_the_robot():
     with pytest.raises(KeyboardInterrupt):
         driven(bench)
     assert sent == ["", "step"]
+
+
+@pytest.mark.parametrize("ends", ["while the log is written", "while the robot is stopped"])
+def test_ctrl_c_stays_ctrl_c_where_the_robot_cannot_be_stopped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ends: str
+):
+    bench = Bench()
+    if ends == "while the log is written":
+        bench.stop = failing(None, OSError("nor to stop"))
+        add = TrialWriter.add
+
+        def interrupted(writer: TrialWriter, sample: Sample) -> None:
+            add(writer, sample)
+            if writer.steps == 9:
+                raise KeyboardInterrupt
+
+        monkeypatch.setattr(TrialWriter, "add", interrupted)
+    else:
+        bench.stop = failing(None, KeyboardInterrupt(), OSError("nor to stop"))
+    with pytest.raises(KeyboardInterrupt) as caught:
+        logged(bench, tmp_path)
+
+    told = "the safe command could not be sent: OSError: nor to stop"
+    assert caught.value.__notes__ == [told]
+    assert read_log(tmp_path / "trial.mcap").reason == f"KeyboardInterrupt: {told}"
 
 
 def test_without_safe_targets_they_are_those_nearest_to_zero():

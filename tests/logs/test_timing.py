@@ -2,7 +2,7 @@
 
 import errno
 import os
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -209,17 +209,33 @@ def test_a_status_that_nobody_knows_is_refused(clocked: Path):
         read_log(clocked)
 
 
+class Wrapped:
+    """Samples that are looked at on their way; no generator."""
+
+    def __init__(self, samples: Generator[Sample]) -> None:
+        self.samples = samples
+
+    def __iter__(self) -> Iterator[Sample]:
+        """Returns the samples."""
+        return self.samples
+
+    def close(self) -> None:
+        """Closes the samples."""
+        self.samples.close()
+
+
 def test_the_robot_stops_before_the_log_is_closed(biped: Robot, tmp_path: Path):
     order = []
 
-    def samples() -> Iterator[Sample]:
+    def samples(name: str) -> Iterator[Sample]:
         try:
             yield from made_up(biped, STEPS)
             yield Sample(-1.0, {})  # nobody asks for it
         finally:
-            order.append((tmp_path / "a.mcap").exists())
+            order.append((tmp_path / name).exists())
 
-    write(tmp_path / "a.mcap", biped, samples())
-    assert order == [False]
+    write(tmp_path / "a.mcap", biped, samples("a.mcap"))
+    write(tmp_path / "c.mcap", biped, Wrapped(samples("c.mcap")))
+    assert order == [False, False]
     with pytest.raises(LogError):
         read_log(write(tmp_path / "b.mcap", biped, iter([])))
