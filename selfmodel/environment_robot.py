@@ -2,6 +2,8 @@
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from functools import partial
 from typing import Any
 
 import dm_env
@@ -64,7 +66,7 @@ class EnvironmentRobot:
         observe: Turns an observation into our signals.
         stop: Brings the robot to rest, safely, at any time, and again if it is at rest. Without it,
             ``env.step(safe)`` does; before ``reset`` and after the last step of an episode, that
-            begins a new episode, as ``dm_env`` has it.
+            is ``reset`` without targets, as ``dm_env`` has it, so the robot moves to its start.
         safe: The motor targets that are safe, ``(motors,)``; if not given, 0 or what is nearest to
             it that a motor can be commanded.
         limits: What the robot is stopped for; ``selfmodel.limits`` has some. The signals that they
@@ -109,7 +111,7 @@ class EnvironmentRobot:
                     f"({', '.join(robot.anatomy.motors)}), got the shape {shape}"
                 )
         self._env, self._robot, self._observe = env, robot, observe
-        self._halt = stop or (lambda: env.step(targets.copy()))
+        self._halt = stop or partial(_step_to, env, targets)
         self._limits, self._critical = tuple(limits), tuple(critical)
         self._patience, self._tolerance = patience, tolerance
         self._neurons = np.ones(robot.anatomy.neurons) if neurons is None else np.array(neurons)
@@ -231,6 +233,11 @@ class EnvironmentRobot:
         for limit in self._limits:
             if reason := limit.reason(values):
                 raise TrialError(f"a limit was exceeded at step {k}: {reason}")
+
+
+def _step_to(env: dm_env.Environment, targets: FloatArray) -> None:
+    with suppress(TimeoutError):  # they were sent, and nobody asks what is observed
+        env.step(targets.copy())
 
 
 def _nearest_to_zero(robot: Robot) -> FloatArray:

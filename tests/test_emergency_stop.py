@@ -236,6 +236,14 @@ def test_ctrl_c_stays_ctrl_c_where_the_robot_cannot_be_stopped(
     assert read_log(tmp_path / "trial.mcap").reason == f"KeyboardInterrupt: {told}"
 
 
+def test_safe_targets_count_as_sent_where_nothing_is_observed_in_time():
+    bench = Bench({1: TimeoutError("too late")})  # before the trial, and at its first step
+    physical = EnvironmentRobot(bench, QUADRUPED, clock=bench.clock)
+
+    assert len(list(physical.run(CONTROLLER, 4))) == 4
+    assert bench.done == ["step", "reset", "step", "step", "step", "step"]
+
+
 def test_without_safe_targets_they_are_those_nearest_to_zero():
     mjcf = QUADRUPED.mjcf.replace(
         '<position name="front_left_shoulder"',
