@@ -97,8 +97,8 @@ class TrialWriter:
 
     Whatever ends the trial early, from an exception to a kill, leaves a ``.part`` with all steps
     but at most the last ``FLUSH_STEPS``. Only of a robot with a clock of its own, whose trial
-    cannot be made again, an exception leaves a whole log, once there is a step: its status is
-    ``stopped``.
+    cannot be made again, an exception leaves a whole log, whose status is ``stopped``; and none
+    where there is no step yet, so that the trial can be tried again under its name.
 
     Args:
         path: The log's name.
@@ -212,8 +212,11 @@ class TrialWriter:
                 self._flush()
             if error is None and self.steps == self._plan.steps:
                 self._finish(FINISHED)
-            elif error is not None and self._timed and self._sound and self.steps:
-                self._finish(STOPPED, _in_words(error))
+            elif error is not None and self._timed and self._sound:
+                if self.steps:
+                    self._finish(STOPPED, _in_words(error))
+                else:
+                    self._log.abandon()
         except (OSError, InputError) as failure:
             if error is None:
                 raise

@@ -169,7 +169,27 @@ def test_a_trial_that_stops_before_its_first_step_has_no_log(biped: Robot, tmp_p
     with pytest.raises(FallError):
         write(tmp_path / "a.mcap", biped, stopped(biped, 0, FallError()), timed=True)
 
+    assert list(tmp_path.iterdir()) == []
+    write(tmp_path / "a.mcap", biped, timed(made_up(biped, STEPS)), timed=True)
+
+
+def test_ctrl_c_while_steps_are_written_leaves_what_can_be_salvaged(
+    biped: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    def samples() -> Iterator[Sample]:
+        for k, sample in enumerate(timed(made_up(biped, STEPS))):
+            if k == 50:  # the next one is written with the 49 before
+                monkeypatch.setattr(logfile.LogFile, "message", interrupt)
+            yield sample
+
+    with pytest.raises(KeyboardInterrupt):
+        write(tmp_path / "a.mcap", biped, samples(), timed=True)
+    monkeypatch.undo()
     assert [path.name for path in tmp_path.iterdir()] == ["a.mcap.part"]
+    assert salvage(tmp_path / "a.mcap.part", tmp_path / "b.mcap").steps == 1
 
 
 def test_a_disk_that_is_full_as_a_trial_is_stopped_does_not_hide_why(
