@@ -16,7 +16,7 @@ import numpy as np
 from selfmodel.behaviour import Signal
 from selfmodel.controller import Controller, draw_weights
 from selfmodel.environment_robot import EnvironmentRobot
-from selfmodel.errors import TrialError
+from selfmodel.errors import InputError, TrialError, in_words
 from selfmodel.limits import joint_limits, tilt_limit
 from selfmodel.logs.writer import write_trial
 from selfmodel.robot import Robot
@@ -106,8 +106,11 @@ def main(host: str, port: int, path: Path) -> None:
     samples = physical.run(plan.controller, plan.steps)
     try:
         write_trial(path, robot, plan, samples, timed=True, settings=Settings())
+    except InputError as error:
+        sys.exit(in_words(error))
     except TrialError as error:
-        sys.exit(f"{error}; what was observed until then is in {path}")
+        kept = f"what was observed until then is in {path}" if path.exists() else "there is no log"
+        sys.exit(f"{in_words(error)}; {kept}")
     print(f"{plan.steps} steps: {path}")
 
 

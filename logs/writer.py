@@ -1,8 +1,8 @@
 """Writes a trial into its log while it runs, so that whatever happens, what happened is kept."""
 
 import itertools
-from collections.abc import Generator, Iterable
-from contextlib import ExitStack
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -10,7 +10,7 @@ from typing import Self
 from selfmodel.atomic import part_of
 from selfmodel.behaviour import Names, Sample
 from selfmodel.driver import Driver
-from selfmodel.errors import InputError
+from selfmodel.errors import InputError, WorkError, in_words
 from selfmodel.logs.encoder import Encoder, empty_rows, parts_of
 from selfmodel.logs.errors import IncompleteError, salvage_it
 from selfmodel.logs.files import explained
@@ -44,8 +44,9 @@ def write_trial(
         path: The log's name; until the trial is finished, the file is called ``path.part``.
         robot: The robot as its model describes it.
         plan: What is to be done.
-        samples: What happens, as it happens; not more than the plan's steps are asked for, and a
-            generator is closed before the log is, which stops the robot.
+        samples: What happens, as it happens; not more than the plan's steps are asked for, and what
+            has ``close``, as a generator has, is closed before the log is, which stops the robot.
+            To look at them on their way, use ``TrialWriter``: a ``map`` over a generator has none.
         timed: Whether the robot is ``selfmodel.physical.Timed``: its samples have moments.
         settings: The paper's numbers, for the record.
         hidden: What is wrong with a simulated robot, in notation; for ``read_truth`` only.
@@ -70,13 +71,25 @@ def write_trial(
         gap=gap,
         imported=imported,
     )
-    with writer, ExitStack() as robot_stops:
-        # Before the log is closed, and wherever this was interrupted.
-        if isinstance(samples, Generator):
-            robot_stops.callback(samples.close)
+    with writer, _closing(samples):
         for sample in itertools.islice(samples, plan.steps):
             writer.add(sample)
     return path
+
+
+@contextmanager
+def _closing(samples: Iterable[Sample]) -> Iterator[None]:
+    """Closes samples, wherever this was interrupted; what interrupted it comes first."""
+    close = getattr(samples, "close", lambda: None)
+    try:
+        yield
+    except BaseException as reason:
+        try:
+            close()
+        except (OSError, WorkError) as failure:
+            reason.add_note(in_words(failure))
+        raise
+    close()
 
 
 class TrialWriter:
@@ -84,8 +97,8 @@ class TrialWriter:
 
     Whatever ends the trial early, from an exception to a kill, leaves a ``.part`` with all steps
     but at most the last ``FLUSH_STEPS``. Only of a robot with a clock of its own, whose trial
-    cannot be made again, an exception leaves a whole log, once there is a step: its status is
-    ``stopped``.
+    cannot be made again, an exception leaves a whole log, whose status is ``stopped``; and none
+    where there is no step yet, so that the trial can be tried again under its name.
 
     Args:
         path: The log's name.
@@ -199,8 +212,11 @@ class TrialWriter:
                 self._flush()
             if error is None and self.steps == self._plan.steps:
                 self._finish(FINISHED)
-            elif error is not None and self._timed and self._sound and self.steps:
-                self._finish(STOPPED, _in_words(error))
+            elif error is not None and self._timed and self._sound:
+                if self.steps:
+                    self._finish(STOPPED, _in_words(error))
+                else:
+                    self._log.abandon()
         except (OSError, InputError) as failure:
             if error is None:
                 raise
@@ -236,7 +252,9 @@ class TrialWriter:
 
 
 def _in_words(error: BaseException) -> str:
-    return " ".join(f"{type(error).__name__}: {error}".split()).removesuffix(":")
+    text = " ".join(f"{type(error).__name__}: {in_words(error)}".split()).removesuffix(":")
+    # A file's name that is no text comes with surrogates, which a log cannot hold.
+    return text.encode("utf-8", "backslashreplace").decode()
 
 
 def _check_ends(robot: str, names: Names, driver: Driver) -> None:

@@ -2,6 +2,8 @@
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from functools import partial
 from typing import Any
 
 import dm_env
@@ -64,10 +66,11 @@ class EnvironmentRobot:
         observe: Turns an observation into our signals.
         stop: Brings the robot to rest, safely, at any time, and again if it is at rest. Without it,
             ``env.step(safe)`` does; before ``reset`` and after the last step of an episode, that
-            begins a new episode, as ``dm_env`` has it.
+            is ``reset`` without targets, as ``dm_env`` has it, so the robot moves to its start.
         safe: The motor targets that are safe, ``(motors,)``; if not given, 0 or what is nearest to
             it that a motor can be commanded.
-        limits: What the robot is stopped for; ``selfmodel.limits`` has some.
+        limits: What the robot is stopped for; ``selfmodel.limits`` has some. The signals that they
+            need are readings too.
         critical: Signals of which no number may be NaN in an observation that came.
         patience: Steps in a row for which a reading may be missing.
         tolerance: By how much of a control time step a step may be late.
@@ -108,7 +111,7 @@ class EnvironmentRobot:
                     f"({', '.join(robot.anatomy.motors)}), got the shape {shape}"
                 )
         self._env, self._robot, self._observe = env, robot, observe
-        self._halt = stop or (lambda: env.step(targets.copy()))
+        self._halt = stop or partial(_step_to, env, targets)
         self._limits, self._critical = tuple(limits), tuple(critical)
         self._patience, self._tolerance = patience, tolerance
         self._neurons = np.ones(robot.anatomy.neurons) if neurons is None else np.array(neurons)
@@ -140,10 +143,17 @@ class EnvironmentRobot:
 
     def _make_safe(self) -> None:
         try:
-            self._halt()
-        except KeyboardInterrupt:
-            self._halt()  # a second Ctrl-C must not keep the first one's from the robot
+            self._send_safe()
+        except KeyboardInterrupt as reason:
+            try:
+                self._send_safe()  # a second Ctrl-C must not keep the first one's from the robot
+            except TrialError as failure:
+                reason.add_note(str(failure))
             raise
+
+    def _send_safe(self) -> None:
+        try:
+            self._halt()
         except Exception as error:
             raise TrialError(f"the safe command could not be sent: {_told(error)}") from error
 
@@ -152,8 +162,14 @@ class EnvironmentRobot:
         names, timestep = robot.anatomy.names, robot.control_timestep
         brain = drive([controller], self._neurons[np.newaxis], len(names.sensors))
         commands = np.zeros((1, len(names.motors)))
-        silent = np.zeros(len(names.sensors), dtype=np.intp)
-        reads = not isinstance(controller, Playback)
+        needed = {signal for limit in self._limits for signal in limit.signals}
+        if not isinstance(controller, Playback):
+            needed.add("sensors")
+        silent: dict[Signal, IndexArray] = {
+            signal: np.zeros(names.width(signal), dtype=np.intp)
+            for signal in SIGNALS
+            if signal in needed or signal == "sensors"
+        }
         watch = Stopwatch(timestep, self._tolerance)
         ended = False
         for k in range(steps):
@@ -167,10 +183,12 @@ class EnvironmentRobot:
             told = self._observe(seen.observation) if seen is not None else None
             moment = watch.look(self.clock(), told)
             values = _rows(names, {} if moment.missing or told is None else told)
-            unread = np.isnan(values["sensors"])
-            silent = np.where(unread & (reads | moment.missing), silent + 1, 0)
+            for signal, counts in silent.items():
+                unread = np.isnan(values[signal]) & (signal in needed or moment.missing)
+                silent[signal] = np.where(unread, counts + 1, 0)
             self._check(k, values, silent, missing=moment.missing)
-            np.copyto(brain.readings[0], values["sensors"], where=~unread)
+            readings = values["sensors"]
+            np.copyto(brain.readings[0], readings, where=~np.isnan(readings))
             brain.step(commands)
             values["commands"] = commands[0].copy()
             yield Sample(k * timestep, values, moment)
@@ -185,7 +203,12 @@ class EnvironmentRobot:
             raise TrialError(f"the environment failed: {_told(error)}") from error
 
     def _check(
-        self, k: int, values: Mapping[Signal, FloatArray], silent: IndexArray, *, missing: bool
+        self,
+        k: int,
+        values: Mapping[Signal, FloatArray],
+        silent: Mapping[Signal, IndexArray],
+        *,
+        missing: bool,
     ) -> None:
         """Sees whether the robot can go on.
 
@@ -193,20 +216,28 @@ class EnvironmentRobot:
             TrialError: It cannot.
         """
         patience = self._patience if k else 0  # at first there is nothing to go on with
-        if np.any(silent > patience):
-            pairs = zip(self._robot.anatomy.names.sensors, silent > patience, strict=True)
-            lacking = ", ".join(name for name, is_silent in pairs if is_silent)
-            raise TrialError(
-                f"nothing was read of {lacking} for more than {patience} steps, at step {k}"
-            )
+        for signal, counts in silent.items():
+            columns = self._robot.anatomy.names.columns(signal)
+            pairs = zip(columns, counts > patience, strict=True)
+            if lacking := ", ".join(name for name, is_silent in pairs if is_silent):
+                if signal != "sensors":
+                    lacking = f"{signal} ({lacking}), which a limit needs,"
+                raise TrialError(
+                    f"nothing was read of {lacking} for more than {patience} steps, at step {k}"
+                )
         for signal, row in values.items():
             if np.any(np.isinf(row)):
                 raise TrialError(f"{signal} is infinite at step {k}")
             if signal in self._critical and not missing and np.any(np.isnan(row)):
                 raise TrialError(f"{signal} is not a number at step {k}")
         for limit in self._limits:
-            if reason := limit(values):
+            if reason := limit.reason(values):
                 raise TrialError(f"a limit was exceeded at step {k}: {reason}")
+
+
+def _step_to(env: dm_env.Environment, targets: FloatArray) -> None:
+    with suppress(TimeoutError):  # they were sent, and nobody asks what is observed
+        env.step(targets.copy())
 
 
 def _nearest_to_zero(robot: Robot) -> FloatArray:

@@ -20,6 +20,11 @@ class TrialError(WorkError):
     """A physical robot could not finish a trial."""
 
 
+def in_words(error: BaseException) -> str:
+    """Returns what an error says, its notes too: that a robot was not stopped is only in a note."""
+    return "; ".join(filter(None, (str(error), *getattr(error, "__notes__", ()))))
+
+
 def unknown_name(what: str, name: str, known: Iterable[str]) -> InputError:
     """Returns the error for a name that is none of ``known``, with the nearest of them.
 

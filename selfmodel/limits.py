@@ -1,6 +1,7 @@
 """What a robot is stopped for: limits that are looked at in every observation."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -8,9 +9,23 @@ from selfmodel.arrays import FloatArray
 from selfmodel.behaviour import Signal
 from selfmodel.robot import Robot
 
-Limit = Callable[[Mapping[Signal, FloatArray]], str]
-"""Looks at what was observed, ``(width,)`` each with NaN for what was not; returns why the robot
-must be stopped, or "" if it need not be."""
+NORM_TOLERANCE = 0.01
+"""By how much the length of a measured quaternion may differ from 1."""
+
+
+@dataclass(frozen=True)
+class Limit:
+    """What a robot is stopped for.
+
+    Attributes:
+        signals: Those without which it says nothing; a robot that does not observe them is stopped
+            too.
+        reason: Looks at what was observed, ``(width,)`` each with NaN for what was not; returns why
+            the robot must be stopped, or "" if it need not be.
+    """
+
+    signals: tuple[Signal, ...]
+    reason: Callable[[Mapping[Signal, FloatArray]], str]
 
 
 def joint_limits(robot: Robot, margin: float) -> Limit:
@@ -27,7 +42,7 @@ def joint_limits(robot: Robot, margin: float) -> Limit:
     ).reshape(-1, 2)
     lowest, highest = ranges[:, 0] - margin, ranges[:, 1] + margin
 
-    def limit(observed: Mapping[Signal, FloatArray]) -> str:
+    def reason(observed: Mapping[Signal, FloatArray]) -> str:
         angles = observed["joint_positions"]
         beyond = np.flatnonzero((angles < lowest) | (angles > highest))
         if not len(beyond):
@@ -38,7 +53,7 @@ def joint_limits(robot: Robot, margin: float) -> Limit:
             f"{ranges[k, 1]:.3f} and the margin of {margin:g}"
         )
 
-    return limit
+    return Limit(("joint_positions",), reason)
 
 
 def tilt_limit(most: float) -> Limit:
@@ -48,9 +63,12 @@ def tilt_limit(most: float) -> Limit:
         most: The angle that its z axis may have with the world's, rad.
     """
 
-    def limit(observed: Mapping[Signal, FloatArray]) -> str:
-        _, x, y, _ = observed["base_orientation"]
+    def reason(observed: Mapping[Signal, FloatArray]) -> str:
+        _, x, y, _ = orientation = observed["base_orientation"]
+        norm = float(np.linalg.norm(orientation))
+        if abs(norm - 1) > NORM_TOLERANCE:
+            return f"base_orientation is no rotation: a quaternion of length {norm:.2f}, not 1"
         tilt = float(np.arccos(np.clip(1 - 2 * (x * x + y * y), -1, 1)))
         return f"it leans by {tilt:.2f} rad, more than {most:g} rad" if tilt > most else ""
 
-    return limit
+    return Limit(("base_orientation",), reason)

@@ -37,6 +37,8 @@ class Stopwatch:
             told: What was observed; None if nothing was.
         """
         stamp = float("nan" if told is None else told.get(TIME, "nan"))
+        if math.isinf(stamp):  # no time: a log could not hold it
+            stamp = math.nan
         if math.isnan(self._zero):
             self._stamped = not math.isnan(stamp)
             self._zero = stamp if self._stamped else now

@@ -76,6 +76,8 @@ def observation(step: int, **changed: object) -> dict[str, object]:
     """An observation of which no two are alike."""
     rng = np.random.default_rng(step)
     rows = {signal: rng.uniform(-0.2, 0.2, NAMES.width(signal)) for signal in SIGNALS[2:]}
+    orientation = rows["base_orientation"] + [1, 0, 0, 0]
+    rows["base_orientation"] = orientation / np.linalg.norm(orientation)
     rows["sensors"] = rng.uniform(-1, 1, len(NAMES.sensors))
     return rows | changed
 

@@ -7,6 +7,7 @@ number of each message that it hears into a file, one a line, before it does any
 
 import dataclasses
 import json
+import os
 import socketserver
 import struct
 import sys
@@ -39,7 +40,8 @@ class Body:
     Args:
         heard: The file of what it hears.
         failures: By the number of a message, as text: seconds by which the answer is late;
-            "silent" for none; "hang up" for the connection to be closed.
+            "silent" for none; "hang up" for the connection to be closed; "die" for the process to
+            end.
     """
 
     def __init__(self, heard: Path, failures: dict[str, float | str]) -> None:
@@ -63,6 +65,8 @@ class Body:
         failure = self._failures.get(str(number), 0.0)
         if failure == "hang up":
             raise ConnectionAbortedError
+        if failure == "die":
+            os._exit(1)
         if failure == "silent":
             return None
         time.sleep(max(0.0, began + TIMESTEP + float(failure) - time.monotonic()))

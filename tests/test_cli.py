@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from selfmodel import cli
+from selfmodel.errors import TrialError
 from selfmodel.logs import read_log, save_controller
 from selfmodel.logs.journal import read_database
 from selfmodel.robot import Robot
@@ -279,3 +281,18 @@ def test_the_installed_command_is_the_same_as_the_module():
     done = subprocess.run([command, "robots"], capture_output=True, text=True, check=True, cwd=ROOT)
 
     assert "quadruped" in done.stdout
+
+
+def test_what_an_error_s_notes_say_is_told_too(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    def fail() -> None:
+        error = TrialError("the environment failed")
+        error.add_note("the safe command could not be sent")
+        raise error
+
+    monkeypatch.setattr(cli, "app", fail)
+    with pytest.raises(SystemExit, match="1"):
+        cli.main()
+    told = capsys.readouterr().err
+    assert told == "error: the environment failed; the safe command could not be sent\n"

@@ -126,6 +126,32 @@ def test_a_dropped_connection_stops_the_robot_and_leaves_a_whole_log(tmp_path: P
     assert told.stdout == f"ok: trial.mcap: 70 steps, stopped ({log.reason})\n"
 
 
+def test_the_operator_is_told_that_the_robot_could_not_be_stopped(tmp_path: Path):
+    with robot(tmp_path, **{"40": "die"}) as port:
+        _, errors = (process := driver(tmp_path, port)).communicate(timeout=120)
+
+    assert process.returncode == 1
+    # Whether it hangs up, resets or refuses is a matter of the moment.
+    assert re.match(
+        r"the environment failed: Connection\w*Error: .*; "
+        r"the safe command could not be sent: Connection\w*Error: .*; what was observed",
+        errors,
+    )
+
+
+def test_a_robot_that_is_not_there_is_said_so_and_can_be_tried_again(tmp_path: Path):
+    for _ in range(2):
+        _, errors = (process := driver(tmp_path, "1")).communicate(timeout=120)  # nobody is there
+        assert process.returncode == 1
+        assert errors.startswith("the safe command could not be sent: ConnectionRefusedError: ")
+        assert errors.endswith("; there is no log\n")
+        assert list(tmp_path.iterdir()) == []
+    (tmp_path / "trial.mcap").touch()
+    _, errors = driver(tmp_path, "1").communicate(timeout=120)
+    assert errors.endswith("trial.mcap exists, and is not overwritten: choose another name\n")
+    assert "Traceback" not in errors
+
+
 def test_ctrl_c_stops_the_robot_and_leaves_a_whole_log(tmp_path: Path):
     with robot(tmp_path) as port:
         process = driver(tmp_path, port)

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from selfmodel.behaviour import Sample
+from selfmodel.behaviour import Sample, Signal
 from selfmodel.environment_robot import EnvironmentRobot
 from selfmodel.errors import InputError, TrialError
-from selfmodel.limits import joint_limits, tilt_limit
+from selfmodel.limits import Limit, joint_limits, tilt_limit
 from selfmodel.logs import read_log
 from selfmodel.logs.verify import verify
-from selfmodel.logs.writer import write_trial
+from selfmodel.logs.writer import TrialWriter, write_trial
 from selfmodel.playback import Playback
 from selfmodel.robot import Robot
 from selfmodel.settings import Settings
@@ -71,6 +71,18 @@ EMERGENCIES: dict[str, tuple[dict[int, object], dict[str, object], type[BaseExce
         TrialError,
         "at step 7: it leans by 1.20 rad, more than 1.1 rad",
     ),
+    "no rotation": (
+        {7: observation(7, base_orientation=np.zeros(4))},
+        {"limits": [tilt_limit(1.1)]},
+        TrialError,
+        "at step 7: base_orientation is no rotation: a quaternion of length 0.00",
+    ),
+    "blind limit": (
+        {k: observation(k, base_orientation=None) for k in range(4, 30)},
+        {"limits": [tilt_limit(1.1)], "patience": 3},
+        TrialError,
+        r"base_orientation \(w, x, y, z\), which a limit needs, for more than 3 .* at step 7",
+    ),
     "another robot": (
         {7: observation(7, sensors=[0.0])},
         {},
@@ -105,6 +117,24 @@ def test_limits_let_a_robot_within_them_go_on():
     limits = [joint_limits(QUADRUPED, 0.1), tilt_limit(1.1)]
 
     assert driven(Bench(happens | {9: None}), limits=limits).steps == STEPS
+
+
+@pytest.mark.parametrize(
+    ("limit", "signal"),
+    [
+        (joint_limits(QUADRUPED, 0.1), "joint_positions"),
+        (tilt_limit(1e-4), "base_orientation"),
+        (Limit(("sensors",), lambda _: ""), "sensors"),
+    ],
+)
+def test_a_robot_that_does_not_observe_what_a_limit_needs_is_not_driven(
+    limit: Limit, signal: Signal
+):
+    bench = Bench({k: observation(k, **{signal: None}) for k in range(STEPS)})
+    driver = Playback(NAMES.motors, np.zeros((5, len(NAMES.motors))))
+    with pytest.raises(TrialError, match=r"nothing was read of .* at step 0"):
+        list(bench_robot(bench, limits=[limit]).run(driver, STEPS))
+    assert bench.done == ["stop", "reset", "stop"]
 
 
 def test_an_episode_that_ends_too_soon_is_said_so(tmp_path: Path):
@@ -149,6 +179,10 @@ def test_a_safe_command_that_fails_is_told_beside_what_ended_the_trial(tmp_path:
     with pytest.raises(TrialError, match="no route") as caught:
         logged(bench, tmp_path)
     assert caught.value.__notes__ == ["the safe command could not be sent: OSError: nor to stop"]
+    assert read_log(tmp_path / "trial.mcap").reason == (
+        "TrialError: the environment failed: OSError: no route; "
+        "the safe command could not be sent: OSError: nor to stop"
+    )
 
 
 def test_a_safe_command_that_fails_at_the_end_is_an_error(tmp_path: Path):
@@ -175,6 +209,39 @@ def test_a_second_ctrl_c_does_not_keep_the_safe_command_from_the_robot():
     with pytest.raises(KeyboardInterrupt):
         driven(bench)
     assert sent == ["", "step"]
+
+
+@pytest.mark.parametrize("ends", ["while the log is written", "while the robot is stopped"])
+def test_ctrl_c_stays_ctrl_c_where_the_robot_cannot_be_stopped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ends: str
+):
+    bench = Bench()
+    if ends == "while the log is written":
+        bench.stop = failing(None, OSError("nor to stop"))
+        add = TrialWriter.add
+
+        def interrupted(writer: TrialWriter, sample: Sample) -> None:
+            add(writer, sample)
+            if writer.steps == 9:
+                raise KeyboardInterrupt
+
+        monkeypatch.setattr(TrialWriter, "add", interrupted)
+    else:
+        bench.stop = failing(None, KeyboardInterrupt(), OSError("nor to stop"))
+    with pytest.raises(KeyboardInterrupt) as caught:
+        logged(bench, tmp_path)
+
+    told = "the safe command could not be sent: OSError: nor to stop"
+    assert caught.value.__notes__ == [told]
+    assert read_log(tmp_path / "trial.mcap").reason == f"KeyboardInterrupt: {told}"
+
+
+def test_safe_targets_count_as_sent_where_nothing_is_observed_in_time():
+    bench = Bench({1: TimeoutError("too late")})  # before the trial, and at its first step
+    physical = EnvironmentRobot(bench, QUADRUPED, clock=bench.clock)
+
+    assert len(list(physical.run(CONTROLLER, 4))) == 4
+    assert bench.done == ["step", "reset", "step", "step", "step", "step"]
 
 
 def test_without_safe_targets_they_are_those_nearest_to_zero():

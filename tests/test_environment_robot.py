@@ -37,6 +37,7 @@ from tests.bench import (
     Bench,
     bench_robot,
     driven,
+    logged,
     observation,
 )
 from tests.conftest import random_controllers
@@ -203,6 +204,17 @@ def test_an_observation_that_comes_again_is_missing():
     assert [k for k, moment in enumerate(moments) if moment.late] == [20]
     assert np.isnan(samples[11].values["sensors"]).all()
     assert [k for k, moment in enumerate(moments) if np.isnan(moment.elapsed)] == [11, 20, 25]
+
+
+def test_an_infinite_time_is_none_and_leaves_a_log_that_can_be_read(tmp_path: Path):
+    happens: dict[int, object] = {k: observation(k, time=5 + k * TIMESTEP) for k in range(STEPS)}
+    happens |= {9: observation(9, time=np.inf), 15: observation(15, time=-np.inf)}
+    timing = read_log(logged(Bench(happens), tmp_path)).timing
+
+    assert timing is not None
+    assert np.flatnonzero(np.isnan(timing.elapsed)).tolist() == [9, 15]
+    assert np.flatnonzero(timing.late).tolist() == [9, 15]
+    assert not timing.missing.any()
 
 
 @given(st.lists(st.floats(0.0, 5.0), min_size=1, max_size=30))

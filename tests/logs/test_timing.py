@@ -2,7 +2,7 @@
 
 import errno
 import os
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -152,6 +152,13 @@ def test_a_reason_may_be_long(biped: Robot, tmp_path: Path):
     assert len(read_log(tmp_path / "a.mcap").reason) == LONGEST_TEXT
 
 
+def test_a_reason_that_is_no_text_does_not_cost_the_log(biped: Robot, tmp_path: Path):
+    with pytest.raises(FallError):
+        write(tmp_path / "a.mcap", biped, stopped(biped, 9, FallError("/dev/\udcff")), timed=True)
+
+    assert read_log(tmp_path / "a.mcap").reason == r"FallError: /dev/\udcff"
+
+
 def test_a_reason_that_is_too_long_is_refused(clocked: Path):
     rewritten(clocked, metadata(RESULT, reason="x" * (LONGEST_TEXT + 1)))
     with pytest.raises(SchemaMismatchError, match="at most 1000 characters in reason"):
@@ -162,7 +169,27 @@ def test_a_trial_that_stops_before_its_first_step_has_no_log(biped: Robot, tmp_p
     with pytest.raises(FallError):
         write(tmp_path / "a.mcap", biped, stopped(biped, 0, FallError()), timed=True)
 
+    assert list(tmp_path.iterdir()) == []
+    write(tmp_path / "a.mcap", biped, timed(made_up(biped, STEPS)), timed=True)
+
+
+def test_ctrl_c_while_steps_are_written_leaves_what_can_be_salvaged(
+    biped: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    def samples() -> Iterator[Sample]:
+        for k, sample in enumerate(timed(made_up(biped, STEPS))):
+            if k == 50:  # the next one is written with the 49 before
+                monkeypatch.setattr(logfile.LogFile, "message", interrupt)
+            yield sample
+
+    with pytest.raises(KeyboardInterrupt):
+        write(tmp_path / "a.mcap", biped, samples(), timed=True)
+    monkeypatch.undo()
     assert [path.name for path in tmp_path.iterdir()] == ["a.mcap.part"]
+    assert salvage(tmp_path / "a.mcap.part", tmp_path / "b.mcap").steps == 1
 
 
 def test_a_disk_that_is_full_as_a_trial_is_stopped_does_not_hide_why(
@@ -202,17 +229,33 @@ def test_a_status_that_nobody_knows_is_refused(clocked: Path):
         read_log(clocked)
 
 
+class Wrapped:
+    """Samples that are looked at on their way; no generator."""
+
+    def __init__(self, samples: Generator[Sample]) -> None:
+        self.samples = samples
+
+    def __iter__(self) -> Iterator[Sample]:
+        """Returns the samples."""
+        return self.samples
+
+    def close(self) -> None:
+        """Closes the samples."""
+        self.samples.close()
+
+
 def test_the_robot_stops_before_the_log_is_closed(biped: Robot, tmp_path: Path):
     order = []
 
-    def samples() -> Iterator[Sample]:
+    def samples(name: str) -> Iterator[Sample]:
         try:
             yield from made_up(biped, STEPS)
             yield Sample(-1.0, {})  # nobody asks for it
         finally:
-            order.append((tmp_path / "a.mcap").exists())
+            order.append((tmp_path / name).exists())
 
-    write(tmp_path / "a.mcap", biped, samples())
-    assert order == [False]
+    write(tmp_path / "a.mcap", biped, samples("a.mcap"))
+    write(tmp_path / "c.mcap", biped, Wrapped(samples("c.mcap")))
+    assert order == [False, False]
     with pytest.raises(LogError):
         read_log(write(tmp_path / "b.mcap", biped, iter([])))
