@@ -15,6 +15,7 @@ from selfmodel.comparators import DEFAULT
 from selfmodel.errors import InputError
 from selfmodel.settings import Settings
 from tests.command import SMALL, selfmodel
+from tests.mjcf.awkward import CUBE
 
 TINY = (*SMALL, "--steps", "60", "--trials", "1", "--workers", "1")
 
@@ -123,6 +124,36 @@ def test_a_study_that_was_made_otherwise_is_not_mixed_with_another(
 
     assert done.returncode == 2
     assert "holds a study that was made otherwise" in done.stderr
+
+
+@pytest.mark.parametrize("changed", ["biped.toml", "foot.obj"])
+def test_a_body_that_is_another_by_now_is_not_run_into_its_study(
+    changed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(tmp_path)
+    meshed = '<mujoco><asset><mesh name="foot" file="foot.obj"/></asset>'
+    shown = '<freejoint/><geom type="mesh" mesh="foot" contype="0" conaffinity="0" mass="0"/>'
+    mine = BIPED.replace("<mujoco>", meshed).replace("<freejoint/>", shown)
+    (tmp_path / "biped.xml").write_text(mine)
+    (tmp_path / "foot.obj").write_text(CUBE)
+    study = Study(
+        bodies=["biped.xml"],
+        cases=[5],
+        seeds=range(1),
+        folder=tmp_path,
+        settings=Settings(),
+        score="displacement",
+        controller="network",
+        comparator=DEFAULT,
+    )
+    (before,) = gait_jobs(study)
+    assert gait_jobs(study) == [before]
+
+    others = {"biped.toml": "control_timestep = 0.02", "foot.obj": CUBE.replace(".1", ".2")}
+    (tmp_path / changed).write_text(others[changed])
+    (after,) = gait_jobs(study)
+
+    assert after.parameters != before.parameters
 
 
 def test_the_score_may_be_the_tasks_own_rewards(tmp_path: Path):

@@ -148,10 +148,17 @@ def _key(body: str) -> str:
 
 def _body(body: str) -> dict[str, Any]:
     robot = resolve.robot_entry(body).robot()
+    assets = hashlib.sha256()
+    for name, content in sorted(robot.assets.items()):
+        # Of one length each: what ends where is told apart.
+        for part in (name.encode(), content):
+            assets.update(hashlib.sha256(part).digest())
     return {
         "body": body,
         "robot": robot.name,
+        "control_timestep": robot.control_timestep,
         "model": hashlib.sha256(robot.mjcf.encode()).hexdigest(),
+        "assets": assets.hexdigest(),
     }
 
 
