@@ -6,9 +6,19 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from selfmodel.cli import app
+from selfmodel.cli.suite import work
 from selfmodel.cli.suite.bodies import DOMAINS, bodies
-from selfmodel.cli.suite.plan import Study, check, gait_jobs, gait_path, recovery_jobs
+from selfmodel.cli.suite.plan import (
+    Study,
+    check,
+    gait_jobs,
+    gait_path,
+    known_cases,
+    recovery_jobs,
+)
 from selfmodel.cli.suite.rows import Row, summarise
 from selfmodel.cli.suite.work import run_study
 from selfmodel.comparators import DEFAULT
@@ -203,6 +213,19 @@ def test_what_cannot_be_run_is_refused_before_anything_is(
     with pytest.raises(InputError, match=reason):
         run_study(replace(study, **changed), workers=1, watch=lambda _: None)
     assert not (tmp_path / "out").exists()
+
+
+def test_all_cases_are_those_that_the_bodies_have(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    asked: list[Study] = []
+    monkeypatch.setattr(work, "run_study", lambda study, **_: asked.append(study) or ())
+    arguments = ["suite", "run", "--domains", "hopper,swimmer", "--out", str(tmp_path)]
+    told = CliRunner().invoke(app, arguments)
+
+    assert told.exit_code == 0, told.output
+    check(asked[0])
+    assert asked[0].cases == known_cases(("suite-hopper-hop", "suite-swimmer-swimmer6"))
+    assert asked[0].cases
+    assert 8 not in asked[0].cases
 
 
 def test_oscillators_have_no_neurons_that_could_be_silent(tmp_path: Path):

@@ -48,6 +48,11 @@ class Study:
     comparator: str
 
 
+def known_cases(bodies: Sequence[str]) -> tuple[int, ...]:
+    """Returns the numbers of the cases that at least one of some bodies has."""
+    return tuple(sorted({case for body in bodies for case in resolve.robot_entry(body).cases}))
+
+
 def check(study: Study) -> None:
     """Checks all that can be wrong with a study, before anything is run.
 
@@ -56,18 +61,17 @@ def check(study: Study) -> None:
     """
     resolve.comparator(study.comparator)
     keys: dict[str, str] = {}
-    known: set[int] = set()
     for body in study.bodies:
         entry = resolve.robot_entry(body)
         resolve.design(study.controller, entry.robot())
         resolve.score(study.score, body, entry)
-        known |= entry.cases.keys()
         first = keys.setdefault(_key(body), body)
         if first != body:
             raise InputError(f"{first} and {body} would be called alike: rename one of the files")
+    known = known_cases(study.bodies)
     for case in study.cases:
         if case not in known:
-            raise unknown_name("case of these bodies", str(case), map(str, sorted(known)))
+            raise unknown_name("case of these bodies", str(case), map(str, known))
     for run in runs(study.folder / "runs"):
         where = difference(parameters_of(run)["shared"], _shared(study))
         if where:

@@ -71,7 +71,7 @@ def run(
     from selfmodel.cli import lists, resolve  # noqa: PLC0415
     from selfmodel.cli.grid_display import grid_display  # noqa: PLC0415
     from selfmodel.cli.suite.bodies import DOMAINS, bodies  # noqa: PLC0415
-    from selfmodel.cli.suite.plan import Study  # noqa: PLC0415
+    from selfmodel.cli.suite.plan import Study, known_cases  # noqa: PLC0415
     from selfmodel.cli.suite.results import write_results  # noqa: PLC0415
     from selfmodel.cli.suite.work import run_study  # noqa: PLC0415
     from selfmodel.settings import Settings  # noqa: PLC0415
@@ -83,7 +83,7 @@ def run(
     length = steps if steps is not None else 1001 if score == "return" else 1000
     study = Study(
         bodies=chosen,
-        cases=lists.whole_numbers("--cases", cases, range(1, 11)),
+        cases=lists.whole_numbers("--cases", cases, known_cases(chosen)),
         seeds=range(seed, seed + seeds),
         folder=out,
         settings=Settings(steps=length, trials=trials, generations=generations).scaled(population),
