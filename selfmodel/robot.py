@@ -104,9 +104,12 @@ class Robot:
     @property
     def control_delay(self) -> int:
         """Control steps from a command to its effect, as the model's ``CONTROL_DELAY`` says."""
-        model = self.model
-        found = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, CONTROL_DELAY)
-        return int(model.numeric(found).data[0]) if found >= 0 else 0
+        return int(self.model.numeric(CONTROL_DELAY).data[0]) if self.is_calibrated else 0
+
+    @property
+    def is_calibrated(self) -> bool:
+        """Whether a calibration wrote the model, and with it a ``CONTROL_DELAY``."""
+        return mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_NUMERIC, CONTROL_DELAY) >= 0
 
     @property
     def network(self) -> Network:
