@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from selfmodel.commands import command_ranges
 from selfmodel.errors import InputError
 from selfmodel.hypothesis import INTACT
 from selfmodel.mjcf import MjcfSettings, adapt, parse_setting, read_settings
@@ -150,8 +151,11 @@ def test_a_planar_robot_is_not_turned():
         Robot.from_mjcf(SAMPLES["gymnasium walker2d"], MjcfSettings(forward="y"))
 
 
-def test_uneven_ground_is_not_turned_under_a_robot(tmp_path: Path):
-    steps = '<geom type="box" size="1 1 .1" pos="3 0 0"/>'
+STEP = '<geom type="box" size="1 1 .1" pos="3 0 0"/>'
+
+
+@pytest.mark.parametrize("steps", [STEP, f"<body>{STEP}</body>"])
+def test_uneven_ground_is_not_turned_under_a_robot(steps: str, tmp_path: Path):
     with pytest.raises(InputError, match="not the same from all sides"):
         Robot.from_mjcf(written(tmp_path, mjcf(world=GROUND + steps)), MjcfSettings(forward="y"))
 
@@ -295,6 +299,17 @@ def test_the_file_beside_is_read_and_options_count_before_it(tmp_path: Path):
     assert read_settings(path, extra).forward == "-x"
     assert read_settings(path, extra).touch == ("left",)
     assert read_settings(path).forward == "y"
+
+
+def test_a_motor_that_says_its_range_in_another_way_keeps_it(tmp_path: Path):
+    motors = '<motor joint="left_hip"/><position joint="right_hip" kp="5"/>'
+    path = written(tmp_path, mjcf(motors=motors))
+
+    model = Robot.from_mjcf(path, MjcfSettings(ctrlrange=(-1, 1))).model
+
+    assert model.actuator_ctrllimited.tolist() == [1, 0]
+    (_, left), (_, right) = command_ranges(model)
+    assert (left, right) == (1, pytest.approx(np.radians(40)))
 
 
 def test_a_control_step_is_a_multiple_of_the_physics_step(tmp_path: Path):
