@@ -190,11 +190,13 @@ def _check_pose(before: mujoco.MjData, model: mujoco.MjModel) -> None:
 
 def _is_flat(model: mujoco.MjModel) -> bool:
     """Whether all that stands in the world and can be touched is level ground."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
     for geom in range(model.ngeom):
         moves = model.body_weldid[model.geom_bodyid[geom]] != 0
         if moves or not model.geom_contype[geom] | model.geom_conaffinity[geom]:
             continue
-        level = abs(model.geom_quat[geom, 1]) + abs(model.geom_quat[geom, 2]) < _SAME
+        level = np.allclose(data.geom_xmat[geom, 2::3], (0, 0, 1), rtol=0, atol=_SAME)
         if model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_PLANE or not level:
             return False
     return True

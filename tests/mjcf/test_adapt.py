@@ -16,7 +16,7 @@ from selfmodel.mjcf import MjcfSettings, adapt, parse_setting, read_settings
 from selfmodel.robot import Robot
 from selfmodel.simulator import Simulator
 from tests.conftest import random_controllers
-from tests.mjcf.awkward import GROUND, LEGS, MOTORS, mjcf
+from tests.mjcf.awkward import GROUND, LEGS, MOTORS, TORSO, mjcf
 from tests.mjcf.samples import SAMPLES
 
 SPRUNG = """<tendon><spatial name="band" stiffness="40"><site site="a"/><site site="b"/></spatial>
@@ -152,9 +152,10 @@ def test_a_planar_robot_is_not_turned():
 
 
 STEP = '<geom type="box" size="1 1 .1" pos="3 0 0"/>'
+SLOPE = '<body euler="0 3 0"><geom type="plane" size="0 0 1"/></body>'
 
 
-@pytest.mark.parametrize("steps", [STEP, f"<body>{STEP}</body>"])
+@pytest.mark.parametrize("steps", [STEP, f"<body>{STEP}</body>", SLOPE])
 def test_uneven_ground_is_not_turned_under_a_robot(steps: str, tmp_path: Path):
     with pytest.raises(InputError, match="not the same from all sides"):
         Robot.from_mjcf(written(tmp_path, mjcf(world=GROUND + steps)), MjcfSettings(forward="y"))
@@ -331,6 +332,28 @@ def test_copies_and_frames_are_written_out(tmp_path: Path):
 
     assert robot.anatomy.hinges == ("hip-0", "hip-1", "hip-2")
     assert "<replicate" not in robot.mjcf
+
+
+@pytest.mark.parametrize("inertia", ["true", "false", "auto"])
+def test_masses_that_are_written_out_are_those_of_the_model(inertia: str, tmp_path: Path):
+    given = '<inertial pos="0 0 0" mass="2" diaginertia=".01 .01 .01"/>'
+    limbs = LEGS.replace('<joint name="left', f'{given}<joint name="left')
+    limbs = limbs.replace('<joint name="right', f'{given}<joint name="right')
+    # Bodies that may be without mass: they cannot move by themselves.
+    plate = '<body><geom size=".1" pos="0 .2 0"/></body>'
+    hollow = '<body><inertial pos="0 0 0" mass="0"/><geom size=".1" pos="0 .2 0"/></body>'
+    ghost = f'<body>{given}<geom size=".1" mass="0"/></body>'
+    text = mjcf(
+        torso=given + TORSO + plate + hollow + ghost,
+        legs=limbs,
+        more=f'<compiler settotalmass="7" inertiafromgeom="{inertia}"/>',
+    )
+    path = written(tmp_path, text)
+
+    model, robot = theirs(path), Robot.from_mjcf(path)
+
+    assert robot.model.body_mass == pytest.approx(model.body_mass, rel=1e-9)
+    assert robot.model.body_inertia == pytest.approx(model.body_inertia, rel=1e-9)
 
 
 def test_a_broken_limb_of_somebodys_robot_is_lost():
