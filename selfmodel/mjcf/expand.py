@@ -76,6 +76,8 @@ def write_masses(document: Document, model: mujoco.MjModel) -> None:
     for compiler in document.root.iter("compiler"):
         compiler.attrib.pop("settotalmass", None)
         compiler.attrib.pop("inertiafromgeom", None)
+    # A body that is not told its mass has none, whatever its geoms are made of.
+    document.section("compiler").set("inertiafromgeom", "false")
 
 
 def numbers(values: np.ndarray) -> str:
