@@ -268,6 +268,10 @@ def test_sensors_of_what_no_motor_drives_are_left_out(tmp_path: Path):
     [
         ("forwards = 'x'", "unknown setting 'forwards': did you mean forward"),
         ("forward = 'z'", "forward needs one of x, y, -x, -y, got 'z'"),
+        ("forward = ['-x']", "got ['-x']"),
+        (f"control_timestep = 1{'0' * 400}", "from above 0 to 10 s, got 1000"),
+        (f"control_timestep = 1{'0' * 5000}", "in TOML"),
+        (f"touch = {'[' * 3000}", "in TOML"),
         ("control_timestep = -1", "from above 0 to 10 s, got -1"),
         ("control_timestep = true", "got True"),
         ("touch = 'left'", "needs a list of names"),
@@ -285,6 +289,11 @@ def test_a_setting_that_means_nothing_is_refused(text: str, said: str, tmp_path:
         Robot.from_mjcf(path)
 
     assert said in str(refusal.value)
+
+
+def test_brackets_without_end_are_no_list_of_names(tmp_path: Path):
+    with pytest.raises(InputError, match="needs a list of names"):
+        read_settings(written(tmp_path, mjcf()), parse_setting(f"touch={'[' * 3000}"))
 
 
 def test_the_file_beside_is_read_and_options_count_before_it(tmp_path: Path):
