@@ -58,6 +58,7 @@ def _deep(levels: int) -> str:
 CUBE = """v 0 0 0\nv .1 0 0\nv 0 .1 0\nv 0 0 .1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"""
 MESH = '<asset><mesh name="{0}" file="{1}"/></asset>'
 MESHED = '<geom type="mesh" mesh="m"/>'
+SEEN = '<geom type="mesh" mesh="m" contype="0" conaffinity="0" mass="0"/>'
 KEY = '<keyframe><key name="home" qpos="{}"/></keyframe>'
 BOMB = """<!DOCTYPE lolz [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;&a;&a;">
 <!ENTITY c "&b;&b;&b;&b;&b;&b;&b;&b;&b;&b;">]><mujoco model="&c;"/>"""
@@ -184,6 +185,20 @@ AWKWARD: dict[str, Awkward] = {
     ),
     "frames and copies": Awkward(
         mjcf(legs=f'<frame pos="0 0 .01" euler="0 0 5">{LEGS}</frame>', more="")
+    ),
+    "static bodies that MuJoCo fuses": Awkward(
+        mjcf(
+            torso=TORSO + '<body><geom size=".02"/></body>',
+            more='<compiler fusestatic="true" settotalmass="7"/>',
+        )
+    ),
+    "what is only seen and MuJoCo discards, with files too large for a log": Awkward(
+        mjcf(
+            torso=f'<geom size=".02" contype="0" conaffinity="0" mass="0"/>{TORSO}{SEEN}',
+            more=MESH.format("m", "m.obj") + '<compiler discardvisual="true"/>',
+        ),
+        "",
+        {"m.obj": CUBE + "# only seen\n" * 2**19},
     ),
     # Bodies and numbers.
     "no geoms": Awkward(
