@@ -1,5 +1,6 @@
 """MJCF files that are malformed or awkward, and what becomes of each."""
 
+import struct
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -91,6 +92,15 @@ AWKWARD: dict[str, Awkward] = {
         "",
         {"motors.xml": f"<mujocoinclude><actuator>{MOTORS}</actuator></mujocoinclude>"},
     ),
+    "a height field in the folder of the meshes": Awkward(
+        mjcf(
+            more='<compiler meshdir="parts"/>'
+            '<asset><hfield name="h" file="h.bin" size="2 2 .1 .1"/></asset>',
+            world='<geom type="hfield" hfield="h"/>',
+        ),
+        "",
+        {"parts/h.bin": struct.pack("<2i4f", 2, 2, 0, 0, 0, 0)},
+    ),
     "a missing include": Awkward(mjcf(more='<include file="no.xml"/>'), "'no.xml'"),
     "an include outside the folder": Awkward(
         mjcf(more='<include file="../o.xml"/>'), "outside its own folder", {"../o.xml": "<mujoco/>"}
@@ -138,6 +148,10 @@ AWKWARD: dict[str, Awkward] = {
         mjcf(
             torso=TORSO + '<site name="s"/>', motors=MOTORS + '<general site="s" ctrlrange="0 1"/>'
         )
+    ),
+    "an actuator on a site alone": Awkward(
+        mjcf(torso=TORSO + '<site name="s"/>', motors='<general site="s" ctrlrange="0 1"/>'),
+        "drive no joint",
     ),
     "a muscle": Awkward(mjcf(motors='<muscle name="m" joint="left_hip"/>'), "muscle"),
     "an actuator of nothing": Awkward(mjcf(motors='<motor joint="tail"/>'), "tail"),
