@@ -274,6 +274,8 @@ def test_domains_of_the_suite_need_no_prefix_where_we_have_no_robot_of_that_name
     )
     with pytest.raises(InputError, match="has none of the tasks run: it has walk"):
         bodies(["hexapod"], ["run"])
+    with pytest.raises(InputError, match="unknown task of these domains 'rnu': did you mean run"):
+        bodies(["walker", "biped.xml"], ["walk", "rnu"])
 
 
 def test_summaries_are_medians_and_leave_out_ratios_that_mean_nothing():

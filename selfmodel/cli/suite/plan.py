@@ -13,7 +13,7 @@ from selfmodel.cli import resolve
 from selfmodel.controller import Network
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.faults.neuron import SILENT_NEURON
-from selfmodel.grid import Job, difference, parameters_of, runs
+from selfmodel.grid import Job, difference, finished, parameters_of, runs
 from selfmodel.notation import parse
 from selfmodel.settings import Settings
 from selfmodel.tasks import Entry
@@ -104,11 +104,20 @@ def gait_jobs(study: Study) -> list[Job]:
 
 
 def recovery_jobs(study: Study) -> list[Job]:
-    """Returns the recoveries whose gait has been evolved, one seed after another."""
+    """Returns the recoveries whose gait has been evolved, one seed after another.
+
+    Raises:
+        InputError: A gait that was evolved is not there any more.
+    """
     found = []
     for gait in gait_jobs(study):
         path = gait_path(study.folder, gait.key)
         if not path.exists():
+            if any(part.key == gait.key for part in finished(study.folder / "gaits")):
+                raise InputError(
+                    f"{path} is missing, the gait that recoveries begin with: put it back, or "
+                    f"delete {study.folder / 'gaits' / gait.key} to evolve it again"
+                )
             continue
         body = gait.parameters["body"]
         entry = resolve.robot_entry(body)
