@@ -23,6 +23,7 @@ from selfmodel.cli.suite.rows import Row, summarise
 from selfmodel.cli.suite.work import run_study
 from selfmodel.comparators import DEFAULT
 from selfmodel.errors import InputError
+from selfmodel.grid import Job, run_grid
 from selfmodel.settings import Settings
 from tests.command import SMALL, selfmodel
 from tests.mjcf.awkward import CUBE
@@ -252,6 +253,28 @@ def put_gaits(study: Study) -> None:
         path = gait_path(study.folder, job.key)
         path.parent.mkdir(parents=True)
         path.write_bytes(b"a gait")
+
+
+def test_a_gait_that_was_lost_is_told_of_and_not_passed_over(tmp_path: Path):
+    study = Study(
+        bodies=["quadruped"],
+        cases=[2],
+        seeds=range(1),
+        folder=tmp_path,
+        settings=Settings(),
+        score="displacement",
+        controller="network",
+        comparator=DEFAULT,
+    )
+    assert recovery_jobs(study) == []
+    run_grid(tmp_path / "gaits", gait_jobs(study), evolve_nothing, workers=1, watch=lambda _: None)
+
+    with pytest.raises(InputError, match=r"quadruped-seed000\.npz is missing"):
+        run_study(study, workers=1, watch=lambda _: None)
+
+
+def evolve_nothing(_job: Job, _part: str, _run: Path) -> None:
+    """Says that it is done, and keeps no gait."""
 
 
 def test_a_domain_that_nobody_has_is_told_from_the_nearest(tmp_path: Path):
