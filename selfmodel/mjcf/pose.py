@@ -11,6 +11,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.mjcf.document import Document
 from selfmodel.mjcf.expand import numbers
+from selfmodel.mjcf.ground import pairs
 from selfmodel.mjcf.mujoco_errors import compiled, told_by_mujoco
 from selfmodel.mjcf.settings import DIRECTIONS, NO_KEYFRAME, MjcfSettings
 
@@ -192,9 +193,11 @@ def _is_flat(model: mujoco.MjModel) -> bool:
     """Whether all that stands in the world and can be touched is level ground."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
+    paired = {geom for pair in pairs(model) for geom in pair}
     for geom in range(model.ngeom):
         moves = model.body_weldid[model.geom_bodyid[geom]] != 0
-        if moves or not model.geom_contype[geom] | model.geom_conaffinity[geom]:
+        touched = geom in paired or model.geom_contype[geom] | model.geom_conaffinity[geom]
+        if moves or not touched:
             continue
         level = np.allclose(data.geom_xmat[geom, 2::3], (0, 0, 1), rtol=0, atol=_SAME)
         if model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_PLANE or not level:

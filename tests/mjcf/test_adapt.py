@@ -175,6 +175,23 @@ def test_ground_is_laid_where_the_robot_stands(tmp_path: Path):
     assert min(gaps) == pytest.approx(0, abs=1e-9)
 
 
+PAIRED = """<default><geom contype="0" conaffinity="0"/></default>
+<contact><pair geom1="floor" geom2="left_geom"/><pair geom1="right_geom" geom2="floor"/></contact>"""
+
+
+def test_ground_may_be_met_by_pairs_alone(tmp_path: Path):
+    path = written(tmp_path, mjcf(more=PAIRED))
+    robot = Robot.from_mjcf(path)
+
+    assert robot.model.ngeom == theirs(path).ngeom, "there is ground already"
+    touching = [sensor.name for sensor in robot.anatomy.sensors if sensor.kind == "touch"]
+    assert touching == ["left_touch", "right_touch"]
+
+    sloping = mjcf(more=PAIRED, world=GROUND.replace("/>", ' euler="0 3 0"/>'))
+    with pytest.raises(InputError, match="not the same from all sides"):
+        Robot.from_mjcf(written(tmp_path, sloping), MjcfSettings(forward="y"))
+
+
 @pytest.mark.parametrize("swims", ['<flag contact="disable"/>', ""])
 def test_who_swims_gets_no_ground(swims: str, tmp_path: Path):
     option = f'<option density="1000" viscosity=".1">{swims}</option>'
@@ -234,7 +251,7 @@ def test_odd_names_are_replaced_wherever_they_stand(tmp_path: Path):
     odd = mjcf(
         motors=MOTORS,
         more='<contact><exclude body1="torso" body2="left"/></contact>'
-        '<sensor><framepos objtype="body" objname="left"/></sensor>',
+        '<sensor><framepos objtype="body" objname="left"/><contact subtree1="left"/></sensor>',
     ).replace("left", "le+ft")
     robot = Robot.from_mjcf(written(tmp_path, odd))
 
