@@ -176,7 +176,8 @@ def test_ground_is_laid_where_the_robot_stands(tmp_path: Path):
 
 
 PAIRED = """<default><geom contype="0" conaffinity="0"/></default>
-<contact><pair geom1="floor" geom2="left_geom"/><pair geom1="right_geom" geom2="floor"/></contact>"""
+<contact><pair geom1="floor" geom2="left_geom"/>
+<pair geom1="right_geom" geom2="floor"/></contact>"""
 
 
 def test_ground_may_be_met_by_pairs_alone(tmp_path: Path):
