@@ -25,11 +25,20 @@ def command_ranges(model: mujoco.MjModel) -> Ranges:
     return tuple(_centred(_range(model, motor)) for motor in range(model.nu))
 
 
-def _range(model: mujoco.MjModel, motor: int) -> Range:
+def says_its_range(model: mujoco.MjModel, motor: int) -> bool:
+    """Returns whether a motor says what it may be commanded, in one of these ways."""
+    return _found(model, motor) is not None
+
+
+def _found(model: mujoco.MjModel, motor: int) -> Range | None:
     if model.actuator_ctrllimited[motor]:
         low, high = model.actuator_ctrlrange[motor]
         return float(low), float(high)
-    found = _of_position(model, motor) or _of_force(model, motor)
+    return _of_position(model, motor) or _of_force(model, motor)
+
+
+def _range(model: mujoco.MjModel, motor: int) -> Range:
+    found = _found(model, motor)
     if found is None:
         raise InputError(
             f"the motor {model.actuator(motor).name or motor} does not say what it may be "

@@ -115,6 +115,11 @@ class Robot:
         return int(_said_delay(self.model))
 
     @property
+    def is_calibrated(self) -> bool:
+        """Whether a calibration wrote the model, and with it a ``CONTROL_DELAY``."""
+        return mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_NUMERIC, CONTROL_DELAY) >= 0
+
+    @property
     def network(self) -> Network:
         """The network that controls it.
 

@@ -6,15 +6,27 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from selfmodel.cli import app
+from selfmodel.cli.suite import work
 from selfmodel.cli.suite.bodies import DOMAINS, bodies
-from selfmodel.cli.suite.plan import Study, check, gait_jobs, gait_path, recovery_jobs
+from selfmodel.cli.suite.plan import (
+    Study,
+    check,
+    gait_jobs,
+    gait_path,
+    known_cases,
+    recovery_jobs,
+)
 from selfmodel.cli.suite.rows import Row, summarise
 from selfmodel.cli.suite.work import run_study
 from selfmodel.comparators import DEFAULT
 from selfmodel.errors import InputError
+from selfmodel.grid import Job, run_grid
 from selfmodel.settings import Settings
 from tests.command import SMALL, selfmodel
+from tests.mjcf.awkward import CUBE
 
 TINY = (*SMALL, "--steps", "60", "--trials", "1", "--workers", "1")
 
@@ -125,6 +137,36 @@ def test_a_study_that_was_made_otherwise_is_not_mixed_with_another(
     assert "holds a study that was made otherwise" in done.stderr
 
 
+@pytest.mark.parametrize("changed", ["biped.toml", "foot.obj"])
+def test_a_body_that_is_another_by_now_is_not_run_into_its_study(
+    changed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(tmp_path)
+    meshed = '<mujoco><asset><mesh name="foot" file="foot.obj"/></asset>'
+    shown = '<freejoint/><geom type="mesh" mesh="foot" contype="0" conaffinity="0" mass="0"/>'
+    mine = BIPED.replace("<mujoco>", meshed).replace("<freejoint/>", shown)
+    (tmp_path / "biped.xml").write_text(mine)
+    (tmp_path / "foot.obj").write_text(CUBE)
+    study = Study(
+        bodies=["biped.xml"],
+        cases=[5],
+        seeds=range(1),
+        folder=tmp_path,
+        settings=Settings(),
+        score="displacement",
+        controller="network",
+        comparator=DEFAULT,
+    )
+    (before,) = gait_jobs(study)
+    assert gait_jobs(study) == [before]
+
+    others = {"biped.toml": "control_timestep = 0.02", "foot.obj": CUBE.replace(".1", ".2")}
+    (tmp_path / changed).write_text(others[changed])
+    (after,) = gait_jobs(study)
+
+    assert after.parameters != before.parameters
+
+
 def test_the_score_may_be_the_tasks_own_rewards(tmp_path: Path):
     arguments = ["suite", "run", "--domains", "suite-walker", "--tasks", "stand", "--cases", "3"]
     done = selfmodel(*arguments, *TINY, "--score", "return", "--out", "out", "--json", cwd=tmp_path)
@@ -174,6 +216,19 @@ def test_what_cannot_be_run_is_refused_before_anything_is(
     assert not (tmp_path / "out").exists()
 
 
+def test_all_cases_are_those_that_the_bodies_have(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    asked: list[Study] = []
+    monkeypatch.setattr(work, "run_study", lambda study, **_: asked.append(study) or ())
+    arguments = ["suite", "run", "--domains", "hopper,swimmer", "--out", str(tmp_path)]
+    told = CliRunner().invoke(app, arguments)
+
+    assert told.exit_code == 0, told.output
+    check(asked[0])
+    assert asked[0].cases == known_cases(("suite-hopper-hop", "suite-swimmer-swimmer6"))
+    assert asked[0].cases
+    assert 8 not in asked[0].cases
+
+
 def test_oscillators_have_no_neurons_that_could_be_silent(tmp_path: Path):
     study = Study(
         bodies=["quadruped"],
@@ -200,6 +255,28 @@ def put_gaits(study: Study) -> None:
         path.write_bytes(b"a gait")
 
 
+def test_a_gait_that_was_lost_is_told_of_and_not_passed_over(tmp_path: Path):
+    study = Study(
+        bodies=["quadruped"],
+        cases=[2],
+        seeds=range(1),
+        folder=tmp_path,
+        settings=Settings(),
+        score="displacement",
+        controller="network",
+        comparator=DEFAULT,
+    )
+    assert recovery_jobs(study) == []
+    run_grid(tmp_path / "gaits", gait_jobs(study), evolve_nothing, workers=1, watch=lambda _: None)
+
+    with pytest.raises(InputError, match=r"quadruped-seed000\.npz is missing"):
+        run_study(study, workers=1, watch=lambda _: None)
+
+
+def evolve_nothing(_job: Job, _part: str, _run: Path) -> None:
+    """Says that it is done, and keeps no gait."""
+
+
 def test_a_domain_that_nobody_has_is_told_from_the_nearest(tmp_path: Path):
     done = selfmodel("suite", "run", "--domains", "walkr", "--out", "out", cwd=tmp_path)
 
@@ -220,6 +297,8 @@ def test_domains_of_the_suite_need_no_prefix_where_we_have_no_robot_of_that_name
     )
     with pytest.raises(InputError, match="has none of the tasks run: it has walk"):
         bodies(["hexapod"], ["run"])
+    with pytest.raises(InputError, match="unknown task of these domains 'rnu': did you mean run"):
+        bodies(["walker", "biped.xml"], ["walk", "rnu"])
 
 
 def test_summaries_are_medians_and_leave_out_ratios_that_mean_nothing():

@@ -46,3 +46,7 @@ def test_a_bad_list_is_refused_in_a_sentence_before_anything_is_run(
 @given(st.lists(st.text("abc:._", min_size=1), min_size=1))
 def test_a_list_is_what_stands_between_the_commas_each_once(items: list[str]):
     assert lists.texts("--any", " , ".join(items)) == tuple(dict.fromkeys(items))
+
+
+def test_a_number_is_one_number_however_it_is_written():
+    assert lists.whole_numbers("--any", "2,02,1,+2", ()) == (2, 1)

@@ -25,19 +25,20 @@ def texts(option: str, given: str, every: Iterable[str] | None = None) -> tuple[
 
 
 def whole_numbers(option: str, given: str, every: Iterable[int]) -> tuple[int, ...]:
-    """Returns the whole numbers between the commas; see ``texts``.
+    """Returns the whole numbers between the commas, each once; see ``texts``.
 
     Raises:
         InputError: One is not a whole number.
     """
     try:
-        return tuple(int(text) for text in texts(option, given, map(str, every)))
+        found = [int(text) for text in texts(option, given, map(str, every))]
     except ValueError as error:
         if isinstance(error, InputError):
             raise
         raise InputError(
             f"{option} needs whole numbers with commas between them, or 'all', got {given!r}"
         ) from None
+    return tuple(dict.fromkeys(found))
 
 
 def numbers(option: str, given: str) -> tuple[float, ...]:

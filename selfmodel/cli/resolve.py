@@ -327,17 +327,22 @@ def robot_of_logs(found: Sequence[TrialLog], override: str | None) -> Robot:
 
 
 def _override(name: str, own: Robot) -> Robot:
-    """The model to take in the place of a log's: as it stands, or made ready as the log's was."""
+    """The model to take in the place of a log's: made ready as the log's was, or as it stands."""
     if not is_model(name):
         return robot_entry(name).robot()
     try:
-        chosen = robot(name, own.control_timestep)
+        raw = robot(name, own.control_timestep)
     except InputError:
-        chosen = None
-    if chosen is not None and chosen.anatomy.names == own.anatomy.names:
-        return chosen
+        raw = None
+    if raw is not None and raw.is_calibrated:
+        return raw
     path = Path(name)
-    return Robot.from_mjcf(path, read_settings(path, {"control_timestep": own.control_timestep}))
+    settings = read_settings(path, {"control_timestep": own.control_timestep})
+    ready = Robot.from_mjcf(path, settings)
+    names = own.anatomy.names
+    if raw is not None and ready.anatomy.names != names == raw.anatomy.names:
+        return raw
+    return ready
 
 
 def is_model(name: str) -> bool:

@@ -4,7 +4,7 @@ from xml.etree import ElementTree as ET  # of texts that were checked
 
 import mujoco
 
-from selfmodel.commands import command_ranges
+from selfmodel.commands import command_ranges, says_its_range
 from selfmodel.errors import InputError
 from selfmodel.mjcf.document import Document
 from selfmodel.mjcf.mujoco_errors import compiled
@@ -13,7 +13,7 @@ from selfmodel.neurons import NEURONS
 
 
 def add_commands(document: Document, model: mujoco.MjModel, settings: MjcfSettings) -> None:
-    """Gives motors without a ``ctrlrange`` the wanted one, and the network its hidden neurons.
+    """Gives motors without a range of commands the wanted one, and the network its hidden neurons.
 
     Raises:
         InputError: A motor does not say what it may be commanded, and nothing is wanted.
@@ -27,7 +27,7 @@ def add_commands(document: Document, model: mujoco.MjModel, settings: MjcfSettin
     if settings.ctrlrange is not None:
         ends = f"{settings.ctrlrange[0]!r} {settings.ctrlrange[1]!r}"
         for motor, element in enumerate(document.children("actuator")):
-            if not model.actuator_ctrllimited[motor]:
+            if not says_its_range(model, motor):
                 element.set("ctrlrange", ends)
                 element.set("ctrllimited", "true")
     try:

@@ -14,7 +14,7 @@ from selfmodel.untrusted import DEEPEST, LARGEST, MOST_ELEMENTS
 LARGEST_READ = 64 * 2**20
 """Bytes of all files that a model names, before what is only seen is taken out of it."""
 
-_FOLDERS = {"meshdir": ("mesh", "skin", "flex"), "texturedir": ("texture",)}
+_FOLDERS = {"meshdir": ("mesh", "skin", "flex", "hfield"), "texturedir": ("texture",)}
 _NAMED_BY_FILE = ("mesh", "texture", "hfield")
 _UNUSUAL = re.compile(r"[^A-Za-z0-9_.-]")
 

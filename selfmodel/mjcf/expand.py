@@ -32,7 +32,11 @@ def refuse_unloggable(document: Document) -> None:
 
 
 def expand(document: Document) -> None:
-    """Writes out copies and frames of reference, and the masses of a model whose sum is given."""
+    """Writes out copies and frames of reference, and the masses of a model whose sum is given.
+
+    The model then has each body and geom that stands in the text, in the same order.
+    """
+    _keep_all(document)
     tags = {element.tag for element in document.root.iter()}
     used = [tag for tag in (*COPIES, "frame") if tag in tags]
     if used:
@@ -49,6 +53,13 @@ def expand(document: Document) -> None:
     if any(compiler.get("settotalmass") for compiler in compilers):
         write_masses(document, compiled(document.text, document.assets))
         document.notes.append("its masses are written out, as settotalmass scales them")
+
+
+def _keep_all(document: Document) -> None:
+    for compiler in document.root.iter("compiler"):
+        for attribute in ("fusestatic", "discardvisual"):
+            if compiler.attrib.pop(attribute, "false") == "true":
+                document.notes.append(f"{attribute} is left out: each part of the text is kept")
 
 
 def _size(element: ET.Element) -> int:
@@ -76,6 +87,8 @@ def write_masses(document: Document, model: mujoco.MjModel) -> None:
     for compiler in document.root.iter("compiler"):
         compiler.attrib.pop("settotalmass", None)
         compiler.attrib.pop("inertiafromgeom", None)
+    # A body that is not told its mass has none, whatever its geoms are made of.
+    document.section("compiler").set("inertiafromgeom", "false")
 
 
 def numbers(values: np.ndarray) -> str:

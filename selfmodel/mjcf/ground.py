@@ -33,8 +33,20 @@ def world_masks(model: mujoco.MjModel) -> tuple[int, int]:
 def meets_ground(model: mujoco.MjModel) -> list[int]:
     """Returns the moving geoms that can touch what stands still."""
     masks = world_masks(model)
-    moving = np.flatnonzero(model.body_weldid[model.geom_bodyid] != 0)
-    return [int(geom) for geom in moving if can_touch(model, int(geom), *masks)]
+    moves = model.body_weldid[model.geom_bodyid] != 0
+    paired = {
+        one
+        for pair in pairs(model)
+        for one, other in (pair, pair[::-1])
+        if moves[one] and not moves[other]
+    }
+    moving = map(int, np.flatnonzero(moves))
+    return [geom for geom in moving if geom in paired or can_touch(model, geom, *masks)]
+
+
+def pairs(model: mujoco.MjModel) -> list[tuple[int, int]]:
+    """Returns the geoms that can touch each other by a ``<pair>``, whatever their masks."""
+    return list(zip(model.pair_geom1.tolist(), model.pair_geom2.tolist(), strict=True))
 
 
 def add_ground(document: Document, model: mujoco.MjModel) -> None:

@@ -10,7 +10,7 @@ _UNUSUAL = re.compile(r"[^\w.-]")
 _HINGE_TAGS = ("joint", "freejoint")
 
 _REFERENCES: Mapping[str, tuple[str, ...]] = {
-    "body": ("body", "body1", "body2", "target"),
+    "body": ("body", "body1", "body2", "subtree1", "subtree2", "target"),
     "joint": ("joint", "joint1", "joint2", "jointinparent"),
     "actuator": ("actuator",),
     "sensor": (),

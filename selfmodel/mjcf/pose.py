@@ -11,6 +11,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.mjcf.document import Document
 from selfmodel.mjcf.expand import numbers
+from selfmodel.mjcf.ground import pairs
 from selfmodel.mjcf.mujoco_errors import compiled, told_by_mujoco
 from selfmodel.mjcf.settings import DIRECTIONS, NO_KEYFRAME, MjcfSettings
 
@@ -190,10 +191,15 @@ def _check_pose(before: mujoco.MjData, model: mujoco.MjModel) -> None:
 
 def _is_flat(model: mujoco.MjModel) -> bool:
     """Whether all that stands in the world and can be touched is level ground."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    paired = {geom for pair in pairs(model) for geom in pair}
     for geom in range(model.ngeom):
-        if model.geom_bodyid[geom] or not model.geom_contype[geom] | model.geom_conaffinity[geom]:
+        moves = model.body_weldid[model.geom_bodyid[geom]] != 0
+        touched = geom in paired or model.geom_contype[geom] | model.geom_conaffinity[geom]
+        if moves or not touched:
             continue
-        level = abs(model.geom_quat[geom, 1]) + abs(model.geom_quat[geom, 2]) < _SAME
+        level = np.allclose(data.geom_xmat[geom, 2::3], (0, 0, 1), rtol=0, atol=_SAME)
         if model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_PLANE or not level:
             return False
     return True

@@ -31,8 +31,14 @@ def refuse_unusable(model: mujoco.MjModel) -> None:
             "drive one in <actuator>"
         )
     _refuse_trees(model)
+    driven = driven_joints(model)
+    if not driven:
+        raise InputError(
+            "its motors drive no joint, and nothing of it could be diagnosed: give the joints of "
+            "its limbs motors in <actuator>"
+        )
     try:
-        root = find_root(model, driven_joints(model))
+        root = find_root(model, driven)
         check_carried(model, root)
     except ValueError as error:
         raise InputError(str(error)) from error

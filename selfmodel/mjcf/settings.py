@@ -1,6 +1,6 @@
 """What a user says about a robot's MJCF where the file itself does not tell."""
 
-import math
+import sys
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -58,9 +58,10 @@ def read_settings(path: Path, extra: Mapping[str, Any] | None = None) -> MjcfSet
     beside = path.with_suffix(".toml")
     found: dict[str, Any] = {}
     if beside.exists():
+        data = read_file(beside, "a file of settings", LARGEST)
         try:
-            found = tomllib.loads(read_file(beside, "a file of settings", LARGEST).decode())
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            found = tomllib.loads(data.decode())
+        except (ValueError, RecursionError) as error:  # also of numbers and brackets without end
             raise InputError(f"{beside}: expected a file of settings in TOML: {error}") from error
     try:
         return checked_settings({**found, **(extra or {})})
@@ -79,7 +80,7 @@ def parse_setting(text: str) -> dict[str, Any]:
         raise InputError(f"expected a setting such as forward=-x, got {text!r}")
     try:
         return {key.strip(): tomllib.loads(f"value = {value}")["value"]}
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):
         return {key.strip(): value.strip()}  # a word without quotes
 
 
@@ -99,7 +100,7 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
     if neurons is not None and not (type(neurons) is int and 1 <= neurons <= MOST):
         raise InputError(f"neurons needs a whole number from 1 to {MOST}, got {neurons!r}")
     forward, keyframe = given.get("forward", "x"), given.get("keyframe", "")
-    if forward not in DIRECTIONS:
+    if not isinstance(forward, str) or forward not in DIRECTIONS:
         raise InputError(f"forward needs one of {', '.join(DIRECTIONS)}, got {forward!r}")
     if not isinstance(keyframe, str):
         raise InputError(f"keyframe needs the name of a keyframe, or none, got {keyframe!r}")
@@ -115,7 +116,9 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return False
+    return abs(value) <= sys.float_info.max  # a whole number of Python may be larger
 
 
 def _range(given: Mapping[str, Any]) -> tuple[float, float] | None:

@@ -1,5 +1,6 @@
 """MJCF files that are malformed or awkward, and what becomes of each."""
 
+import struct
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -58,6 +59,7 @@ def _deep(levels: int) -> str:
 CUBE = """v 0 0 0\nv .1 0 0\nv 0 .1 0\nv 0 0 .1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"""
 MESH = '<asset><mesh name="{0}" file="{1}"/></asset>'
 MESHED = '<geom type="mesh" mesh="m"/>'
+SEEN = '<geom type="mesh" mesh="m" contype="0" conaffinity="0" mass="0"/>'
 KEY = '<keyframe><key name="home" qpos="{}"/></keyframe>'
 BOMB = """<!DOCTYPE lolz [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;&a;&a;">
 <!ENTITY c "&b;&b;&b;&b;&b;&b;&b;&b;&b;&b;">]><mujoco model="&c;"/>"""
@@ -89,6 +91,15 @@ AWKWARD: dict[str, Awkward] = {
         mjcf(motors="", more='<include file="motors.xml"/>'),
         "",
         {"motors.xml": f"<mujocoinclude><actuator>{MOTORS}</actuator></mujocoinclude>"},
+    ),
+    "a height field in the folder of the meshes": Awkward(
+        mjcf(
+            more='<compiler meshdir="parts"/>'
+            '<asset><hfield name="h" file="h.bin" size="2 2 .1 .1"/></asset>',
+            world='<geom type="hfield" hfield="h"/>',
+        ),
+        "",
+        {"parts/h.bin": struct.pack("<2i4f", 2, 2, 0, 0, 0, 0)},
     ),
     "a missing include": Awkward(mjcf(more='<include file="no.xml"/>'), "'no.xml'"),
     "an include outside the folder": Awkward(
@@ -138,6 +149,10 @@ AWKWARD: dict[str, Awkward] = {
             torso=TORSO + '<site name="s"/>', motors=MOTORS + '<general site="s" ctrlrange="0 1"/>'
         )
     ),
+    "an actuator on a site alone": Awkward(
+        mjcf(torso=TORSO + '<site name="s"/>', motors='<general site="s" ctrlrange="0 1"/>'),
+        "drive no joint",
+    ),
     "a muscle": Awkward(mjcf(motors='<muscle name="m" joint="left_hip"/>'), "muscle"),
     "an actuator of nothing": Awkward(mjcf(motors='<motor joint="tail"/>'), "tail"),
     "a motor without a range": Awkward(
@@ -184,6 +199,20 @@ AWKWARD: dict[str, Awkward] = {
     ),
     "frames and copies": Awkward(
         mjcf(legs=f'<frame pos="0 0 .01" euler="0 0 5">{LEGS}</frame>', more="")
+    ),
+    "static bodies that MuJoCo fuses": Awkward(
+        mjcf(
+            torso=TORSO + '<body><geom size=".02"/></body>',
+            more='<compiler fusestatic="true" settotalmass="7"/>',
+        )
+    ),
+    "what is only seen and MuJoCo discards, with files too large for a log": Awkward(
+        mjcf(
+            torso=f'<geom size=".02" contype="0" conaffinity="0" mass="0"/>{TORSO}{SEEN}',
+            more=MESH.format("m", "m.obj") + '<compiler discardvisual="true"/>',
+        ),
+        "",
+        {"m.obj": CUBE + "# only seen\n" * 2**19},
     ),
     # Bodies and numbers.
     "no geoms": Awkward(

@@ -9,13 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from selfmodel.commands import command_ranges
 from selfmodel.errors import InputError
 from selfmodel.hypothesis import INTACT
 from selfmodel.mjcf import MjcfSettings, adapt, parse_setting, read_settings
 from selfmodel.robot import Robot
 from selfmodel.simulator import Simulator
 from tests.conftest import random_controllers
-from tests.mjcf.awkward import GROUND, LEGS, MOTORS, mjcf
+from tests.mjcf.awkward import GROUND, LEGS, MOTORS, TORSO, mjcf
 from tests.mjcf.samples import SAMPLES
 
 SPRUNG = """<tendon><spatial name="band" stiffness="40"><site site="a"/><site site="b"/></spatial>
@@ -150,8 +151,12 @@ def test_a_planar_robot_is_not_turned():
         Robot.from_mjcf(SAMPLES["gymnasium walker2d"], MjcfSettings(forward="y"))
 
 
-def test_uneven_ground_is_not_turned_under_a_robot(tmp_path: Path):
-    steps = '<geom type="box" size="1 1 .1" pos="3 0 0"/>'
+STEP = '<geom type="box" size="1 1 .1" pos="3 0 0"/>'
+SLOPE = '<body euler="0 3 0"><geom type="plane" size="0 0 1"/></body>'
+
+
+@pytest.mark.parametrize("steps", [STEP, f"<body>{STEP}</body>", SLOPE])
+def test_uneven_ground_is_not_turned_under_a_robot(steps: str, tmp_path: Path):
     with pytest.raises(InputError, match="not the same from all sides"):
         Robot.from_mjcf(written(tmp_path, mjcf(world=GROUND + steps)), MjcfSettings(forward="y"))
 
@@ -168,6 +173,24 @@ def test_ground_is_laid_where_the_robot_stands(tmp_path: Path):
     ]
 
     assert min(gaps) == pytest.approx(0, abs=1e-9)
+
+
+PAIRED = """<default><geom contype="0" conaffinity="0"/></default>
+<contact><pair geom1="floor" geom2="left_geom"/>
+<pair geom1="right_geom" geom2="floor"/></contact>"""
+
+
+def test_ground_may_be_met_by_pairs_alone(tmp_path: Path):
+    path = written(tmp_path, mjcf(more=PAIRED))
+    robot = Robot.from_mjcf(path)
+
+    assert robot.model.ngeom == theirs(path).ngeom, "there is ground already"
+    touching = [sensor.name for sensor in robot.anatomy.sensors if sensor.kind == "touch"]
+    assert touching == ["left_touch", "right_touch"]
+
+    sloping = mjcf(more=PAIRED, world=GROUND.replace("/>", ' euler="0 3 0"/>'))
+    with pytest.raises(InputError, match="not the same from all sides"):
+        Robot.from_mjcf(written(tmp_path, sloping), MjcfSettings(forward="y"))
 
 
 @pytest.mark.parametrize("swims", ['<flag contact="disable"/>', ""])
@@ -229,7 +252,7 @@ def test_odd_names_are_replaced_wherever_they_stand(tmp_path: Path):
     odd = mjcf(
         motors=MOTORS,
         more='<contact><exclude body1="torso" body2="left"/></contact>'
-        '<sensor><framepos objtype="body" objname="left"/></sensor>',
+        '<sensor><framepos objtype="body" objname="left"/><contact subtree1="left"/></sensor>',
     ).replace("left", "le+ft")
     robot = Robot.from_mjcf(written(tmp_path, odd))
 
@@ -263,6 +286,10 @@ def test_sensors_of_what_no_motor_drives_are_left_out(tmp_path: Path):
     [
         ("forwards = 'x'", "unknown setting 'forwards': did you mean forward"),
         ("forward = 'z'", "forward needs one of x, y, -x, -y, got 'z'"),
+        ("forward = ['-x']", "got ['-x']"),
+        (f"control_timestep = 1{'0' * 400}", "from above 0 to 10 s, got 1000"),
+        (f"control_timestep = 1{'0' * 5000}", "in TOML"),
+        (f"touch = {'[' * 3000}", "in TOML"),
         ("control_timestep = -1", "from above 0 to 10 s, got -1"),
         ("control_timestep = true", "got True"),
         ("touch = 'left'", "needs a list of names"),
@@ -282,6 +309,11 @@ def test_a_setting_that_means_nothing_is_refused(text: str, said: str, tmp_path:
     assert said in str(refusal.value)
 
 
+def test_brackets_without_end_are_no_list_of_names(tmp_path: Path):
+    with pytest.raises(InputError, match="needs a list of names"):
+        read_settings(written(tmp_path, mjcf()), parse_setting(f"touch={'[' * 3000}"))
+
+
 def test_the_file_beside_is_read_and_options_count_before_it(tmp_path: Path):
     path = written(tmp_path, mjcf(motors=MOTORS.replace('ctrlrange="-1 1"', "")))
     beside = 'forward = "y"\ncontrol_timestep = 0.02\nctrlrange = [-2, 2]\nneurons = 5\n'
@@ -295,6 +327,17 @@ def test_the_file_beside_is_read_and_options_count_before_it(tmp_path: Path):
     assert read_settings(path, extra).forward == "-x"
     assert read_settings(path, extra).touch == ("left",)
     assert read_settings(path).forward == "y"
+
+
+def test_a_motor_that_says_its_range_in_another_way_keeps_it(tmp_path: Path):
+    motors = '<motor joint="left_hip"/><position joint="right_hip" kp="5"/>'
+    path = written(tmp_path, mjcf(motors=motors))
+
+    model = Robot.from_mjcf(path, MjcfSettings(ctrlrange=(-1, 1))).model
+
+    assert model.actuator_ctrllimited.tolist() == [1, 0]
+    (_, left), (_, right) = command_ranges(model)
+    assert (left, right) == (1, pytest.approx(np.radians(40)))
 
 
 def test_a_control_step_is_a_multiple_of_the_physics_step(tmp_path: Path):
@@ -316,6 +359,28 @@ def test_copies_and_frames_are_written_out(tmp_path: Path):
 
     assert robot.anatomy.hinges == ("hip-0", "hip-1", "hip-2")
     assert "<replicate" not in robot.mjcf
+
+
+@pytest.mark.parametrize("inertia", ["true", "false", "auto"])
+def test_masses_that_are_written_out_are_those_of_the_model(inertia: str, tmp_path: Path):
+    given = '<inertial pos="0 0 0" mass="2" diaginertia=".01 .01 .01"/>'
+    limbs = LEGS.replace('<joint name="left', f'{given}<joint name="left')
+    limbs = limbs.replace('<joint name="right', f'{given}<joint name="right')
+    # Bodies that may be without mass: they cannot move by themselves.
+    plate = '<body><geom size=".1" pos="0 .2 0"/></body>'
+    hollow = '<body><inertial pos="0 0 0" mass="0"/><geom size=".1" pos="0 .2 0"/></body>'
+    ghost = f'<body>{given}<geom size=".1" mass="0"/></body>'
+    text = mjcf(
+        torso=given + TORSO + plate + hollow + ghost,
+        legs=limbs,
+        more=f'<compiler settotalmass="7" inertiafromgeom="{inertia}"/>',
+    )
+    path = written(tmp_path, text)
+
+    model, robot = theirs(path), Robot.from_mjcf(path)
+
+    assert robot.model.body_mass == pytest.approx(model.body_mass, rel=1e-9)
+    assert robot.model.body_inertia == pytest.approx(model.body_inertia, rel=1e-9)
 
 
 def test_a_broken_limb_of_somebodys_robot_is_lost():

@@ -23,16 +23,14 @@ def bodies(domains: Sequence[str], tasks: Sequence[str] | None) -> tuple[str, ..
         tasks: Of each domain those of them that it has; None for its first.
 
     Raises:
-        InputError: There is no such domain, or it has none of the tasks.
+        InputError: There is no such domain, it has none of the tasks, or no domain has one of them.
     """
     found: list[str] = []
     for given in domains:
         if is_model(given):
             found.append(given)
             continue
-        domain = given if given in DOMAINS else f"{suite_bodies.PREFIX}{given}"
-        if domain not in DOMAINS:
-            raise unknown_name("domain", given, DOMAINS)
+        domain = _domain(given)
         every = DOMAINS[domain]
         chosen = every[:1] if tasks is None else [task for task in every if task in tasks]
         if not chosen:
@@ -41,4 +39,21 @@ def bodies(domains: Sequence[str], tasks: Sequence[str] | None) -> tuple[str, ..
                 f"{', '.join(every)}"
             )
         found += [domain] if domain in ROBOTS else [f"{domain}-{task}" for task in chosen]
+    known = tasks_of(domains)
+    for task in tasks or ():
+        if task not in known:
+            raise unknown_name("task of these domains", task, known)
     return tuple(dict.fromkeys(found))
+
+
+def tasks_of(domains: Sequence[str]) -> tuple[str, ...]:
+    """Returns the names of the tasks of some domains; see ``bodies``."""
+    own = [DOMAINS[_domain(given)] for given in domains if not is_model(given)]
+    return tuple(sorted({task for tasks in own for task in tasks}))
+
+
+def _domain(given: str) -> str:
+    domain = given if given in DOMAINS else f"{suite_bodies.PREFIX}{given}"
+    if domain not in DOMAINS:
+        raise unknown_name("domain", given, DOMAINS)
+    return domain

@@ -13,7 +13,7 @@ from selfmodel.cli import resolve
 from selfmodel.controller import Network
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.faults.neuron import SILENT_NEURON
-from selfmodel.grid import Job, difference, parameters_of, runs
+from selfmodel.grid import Job, difference, finished, parameters_of, runs
 from selfmodel.notation import parse
 from selfmodel.settings import Settings
 from selfmodel.tasks import Entry
@@ -48,6 +48,11 @@ class Study:
     comparator: str
 
 
+def known_cases(bodies: Sequence[str]) -> tuple[int, ...]:
+    """Returns the numbers of the cases that at least one of some bodies has."""
+    return tuple(sorted({case for body in bodies for case in resolve.robot_entry(body).cases}))
+
+
 def check(study: Study) -> None:
     """Checks all that can be wrong with a study, before anything is run.
 
@@ -56,18 +61,17 @@ def check(study: Study) -> None:
     """
     resolve.comparator(study.comparator)
     keys: dict[str, str] = {}
-    known: set[int] = set()
     for body in study.bodies:
         entry = resolve.robot_entry(body)
         resolve.design(study.controller, entry.robot())
         resolve.score(study.score, body, entry)
-        known |= entry.cases.keys()
         first = keys.setdefault(_key(body), body)
         if first != body:
             raise InputError(f"{first} and {body} would be called alike: rename one of the files")
+    known = known_cases(study.bodies)
     for case in study.cases:
         if case not in known:
-            raise unknown_name("case of these bodies", str(case), map(str, sorted(known)))
+            raise unknown_name("case of these bodies", str(case), map(str, known))
     for run in runs(study.folder / "runs"):
         where = difference(parameters_of(run)["shared"], _shared(study))
         if where:
@@ -100,11 +104,20 @@ def gait_jobs(study: Study) -> list[Job]:
 
 
 def recovery_jobs(study: Study) -> list[Job]:
-    """Returns the recoveries whose gait has been evolved, one seed after another."""
+    """Returns the recoveries whose gait has been evolved, one seed after another.
+
+    Raises:
+        InputError: A gait that was evolved is not there any more.
+    """
     found = []
     for gait in gait_jobs(study):
         path = gait_path(study.folder, gait.key)
         if not path.exists():
+            if any(part.key == gait.key for part in finished(study.folder / "gaits")):
+                raise InputError(
+                    f"{path} is missing, the gait that recoveries begin with: put it back, or "
+                    f"delete {study.folder / 'gaits' / gait.key} to evolve it again"
+                )
             continue
         body = gait.parameters["body"]
         entry = resolve.robot_entry(body)
@@ -148,10 +161,17 @@ def _key(body: str) -> str:
 
 def _body(body: str) -> dict[str, Any]:
     robot = resolve.robot_entry(body).robot()
+    assets = hashlib.sha256()
+    for name, content in sorted(robot.assets.items()):
+        # Of one length each: what ends where is told apart.
+        for part in (name.encode(), content):
+            assets.update(hashlib.sha256(part).digest())
     return {
         "body": body,
         "robot": robot.name,
+        "control_timestep": robot.control_timestep,
         "model": hashlib.sha256(robot.mjcf.encode()).hexdigest(),
+        "assets": assets.hexdigest(),
     }
 
 

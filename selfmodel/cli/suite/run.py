@@ -70,20 +70,20 @@ def run(
     # Whatever brings MuJoCo waits until the command runs.
     from selfmodel.cli import lists, resolve  # noqa: PLC0415
     from selfmodel.cli.grid_display import grid_display  # noqa: PLC0415
-    from selfmodel.cli.suite.bodies import DOMAINS, bodies  # noqa: PLC0415
-    from selfmodel.cli.suite.plan import Study  # noqa: PLC0415
+    from selfmodel.cli.suite.bodies import DOMAINS, bodies, tasks_of  # noqa: PLC0415
+    from selfmodel.cli.suite.plan import Study, known_cases  # noqa: PLC0415
     from selfmodel.cli.suite.results import write_results  # noqa: PLC0415
     from selfmodel.cli.suite.work import run_study  # noqa: PLC0415
     from selfmodel.settings import Settings  # noqa: PLC0415
 
-    every = {task for known in DOMAINS.values() for task in known}
-    wanted = None if tasks is None else lists.texts("--tasks", tasks, sorted(every))
-    chosen = bodies(lists.texts("--domains", domains, DOMAINS), wanted)
+    asked = lists.texts("--domains", domains, DOMAINS)
+    wanted = None if tasks is None else lists.texts("--tasks", tasks, tasks_of(asked))
+    chosen = bodies(asked, wanted)
     # A last sample without a consequence: an episode of the suite has 1000 rewards.
     length = steps if steps is not None else 1001 if score == "return" else 1000
     study = Study(
         bodies=chosen,
-        cases=lists.whole_numbers("--cases", cases, range(1, 11)),
+        cases=lists.whole_numbers("--cases", cases, known_cases(chosen)),
         seeds=range(seed, seed + seeds),
         folder=out,
         settings=Settings(steps=length, trials=trials, generations=generations).scaled(population),
