@@ -117,7 +117,8 @@ class Robot:
     @property
     def is_calibrated(self) -> bool:
         """Whether a calibration wrote the model, and with it a ``CONTROL_DELAY``."""
-        return mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_NUMERIC, CONTROL_DELAY) >= 0
+        found: int = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_NUMERIC, CONTROL_DELAY)
+        return found >= 0
 
     @property
     def network(self) -> Network:
