@@ -83,7 +83,7 @@ class _Worker:
         """What it says of its task."""
         try:
             return self.pipe.recv()
-        except EOFError:
+        except (EOFError, ConnectionError):
             self.process.join()
             return Died(self.process.exitcode or 0)
 

@@ -28,6 +28,8 @@ from selfmodel.settings import Settings
 from tests.command import SMALL, selfmodel
 from tests.mjcf.awkward import CUBE
 
+ROOT = Path(__file__).parents[1]
+
 TINY = (*SMALL, "--steps", "60", "--trials", "1", "--workers", "1")
 
 BIPED = """
@@ -255,7 +257,10 @@ def put_gaits(study: Study) -> None:
         path.write_bytes(b"a gait")
 
 
-def test_a_gait_that_was_lost_is_told_of_and_not_passed_over(tmp_path: Path):
+def test_a_gait_that_was_lost_is_told_of_and_not_passed_over(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.syspath_prepend(str(ROOT))  # the grid's processes find the function there
     study = Study(
         bodies=["quadruped"],
         cases=[2],
