@@ -83,7 +83,7 @@ def _closing(samples: Iterable[Sample]) -> Iterator[None]:
     close = getattr(samples, "close", lambda: None)
     try:
         yield
-    except BaseException as reason:
+    except BaseException as reason:  # Ctrl-C too: whatever ends a trial, the robot is stopped
         try:
             close()
         except (OSError, WorkError) as failure:

@@ -201,11 +201,11 @@ def _screen_of(comparator: Comparator, simulator: Simulator, evidence: Evidence)
 
     One that does not judge in pieces is not refined, and all there is decides.
     """
+    if not evidence.in_pieces:
+        return _Screen(evidence, lambda trial: trial)
     if isinstance(comparator, Screened):
         return _Screen(Evidence(simulator, comparator.screen), lambda trial: trial)
-    if evidence.in_pieces:
-        return _Screen(Evidence(simulator, comparator), lru_cache(partial(_opening, comparator)))
-    return _Screen(evidence, lambda trial: trial)
+    return _Screen(Evidence(simulator, comparator), lru_cache(partial(_opening, comparator)))
 
 
 def _opening(comparator: Comparator, trial: Trial) -> Trial:

@@ -133,7 +133,7 @@ class EnvironmentRobot:
         except GeneratorExit:
             self._make_safe()
             raise
-        except BaseException as reason:
+        except BaseException as reason:  # Ctrl-C and bugs too: no robot goes on by itself
             try:
                 self._make_safe()
             except TrialError as failure:
@@ -154,7 +154,7 @@ class EnvironmentRobot:
     def _send_safe(self) -> None:
         try:
             self._halt()
-        except Exception as error:
+        except Exception as error:  # a driver is somebody else's, and may raise anything
             raise TrialError(f"the safe command could not be sent: {_told(error)}") from error
 
     def _steps(self, controller: Driver, steps: int) -> Iterator[Sample]:
@@ -199,7 +199,7 @@ class EnvironmentRobot:
             return self._env.reset() if targets is None else self._env.step(targets.copy())
         except TimeoutError:
             return None
-        except Exception as error:
+        except Exception as error:  # an environment is somebody else's, and may raise anything
             raise TrialError(f"the environment failed: {_told(error)}") from error
 
     def _check(

@@ -178,6 +178,25 @@ def parameters_of(run: Path) -> Mapping[str, Any]:
     return parameters
 
 
+def check_shared(folder: Path, shared: Mapping[str, Any], what: str) -> None:
+    """Checks that all runs of a study share what those that are asked for do.
+
+    Args:
+        folder: Of the study; its runs are in ``runs``.
+        shared: What they are to share, as each says it in its parameter ``shared``.
+        what: What the study is called.
+
+    Raises:
+        InputError: A run was made otherwise; the sentence says in what.
+    """
+    for run in runs(folder / "runs"):
+        where = difference(parameters_of(run)["shared"], shared)
+        if where:
+            raise InputError(
+                f"{folder} holds {what} that was made otherwise ({where}): choose another folder"
+            )
+
+
 def difference(there: Any, asked: Any, name: str = "") -> str | None:  # noqa: ANN401  # JSON
     """Returns where two JSON values first differ, as a clause; None where they do not."""
     if isinstance(there, dict) and isinstance(asked, dict):

@@ -32,6 +32,17 @@ ROOT = Path(__file__).parents[1]
 
 TINY = (*SMALL, "--steps", "60", "--trials", "1", "--workers", "1")
 
+STUDY = Study(
+    bodies=[],
+    cases=[],
+    seeds=range(1),
+    folder=Path(),
+    settings=Settings(),
+    score="displacement",
+    controller="network",
+    comparator=DEFAULT,
+)
+
 BIPED = """
 <mujoco>
   <worldbody>
@@ -149,16 +160,7 @@ def test_a_body_that_is_another_by_now_is_not_run_into_its_study(
     mine = BIPED.replace("<mujoco>", meshed).replace("<freejoint/>", shown)
     (tmp_path / "biped.xml").write_text(mine)
     (tmp_path / "foot.obj").write_text(CUBE)
-    study = Study(
-        bodies=["biped.xml"],
-        cases=[5],
-        seeds=range(1),
-        folder=tmp_path,
-        settings=Settings(),
-        score="displacement",
-        controller="network",
-        comparator=DEFAULT,
-    )
+    study = replace(STUDY, bodies=["biped.xml"], cases=[5], folder=tmp_path)
     (before,) = gait_jobs(study)
     assert gait_jobs(study) == [before]
 
@@ -201,16 +203,7 @@ def test_what_cannot_be_run_is_refused_before_anything_is(
     (tmp_path / "other").mkdir()
     for name in ("biped.xml", "other/biped.xml"):
         (tmp_path / name).write_text(BIPED)
-    study = Study(
-        bodies=["biped.xml"],
-        cases=[2],
-        seeds=range(1),
-        folder=tmp_path / "out",
-        settings=Settings(),
-        score="displacement",
-        controller="network",
-        comparator=DEFAULT,
-    )
+    study = replace(STUDY, bodies=["biped.xml"], cases=[2], folder=tmp_path / "out")
     check(study)
 
     with pytest.raises(InputError, match=reason):
@@ -232,16 +225,7 @@ def test_all_cases_are_those_that_the_bodies_have(tmp_path: Path, monkeypatch: p
 
 
 def test_oscillators_have_no_neurons_that_could_be_silent(tmp_path: Path):
-    study = Study(
-        bodies=["quadruped"],
-        cases=[9, 10],
-        seeds=range(1),
-        folder=tmp_path,
-        settings=Settings(),
-        score="displacement",
-        controller="network",
-        comparator=DEFAULT,
-    )
+    study = replace(STUDY, bodies=["quadruped"], cases=[9, 10], folder=tmp_path)
     put_gaits(study)
     oscillating = replace(study, controller="cpg")
 
@@ -261,16 +245,7 @@ def test_a_gait_that_was_lost_is_told_of_and_not_passed_over(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.syspath_prepend(str(ROOT))  # the grid's processes find the function there
-    study = Study(
-        bodies=["quadruped"],
-        cases=[2],
-        seeds=range(1),
-        folder=tmp_path,
-        settings=Settings(),
-        score="displacement",
-        controller="network",
-        comparator=DEFAULT,
-    )
+    study = replace(STUDY, bodies=["quadruped"], cases=[2], folder=tmp_path)
     assert recovery_jobs(study) == []
     run_grid(tmp_path / "gaits", gait_jobs(study), evolve_nothing, workers=1, watch=lambda _: None)
 

@@ -71,11 +71,10 @@ def ablate(
 ) -> None:
     """Compare comparators on the same trials: robots x cases x gaps x seeds, with intervals."""
     # Whatever brings MuJoCo waits until the command runs.
-    from selfmodel.cli import lists, resolve  # noqa: PLC0415
+    from selfmodel.cli import grid_command, lists, resolve  # noqa: PLC0415
     from selfmodel.cli.ablation import Ablation, write_results  # noqa: PLC0415
     from selfmodel.cli.ablation import ablate as run  # noqa: PLC0415
     from selfmodel.cli.ablation.results import as_object  # noqa: PLC0415
-    from selfmodel.cli.grid_display import grid_display  # noqa: PLC0415
     from selfmodel.comparators import COMPARATORS  # noqa: PLC0415
     from selfmodel.settings import Settings  # noqa: PLC0415
     from selfmodel.tasks import ROBOTS  # noqa: PLC0415
@@ -97,30 +96,19 @@ def ablate(
         bank=bank,
     )
     part = lists.share("--only", only)
-    with grid_display() as watch:
-        try:
-            failed = run(ablation, workers=resolve.threads(workers), watch=watch, only=part)
-        except KeyboardInterrupt:
-            typer.echo(
-                f"interrupted: {watch.done} of {watch.total} are done and kept in {out}; the same "
-                f"command goes on with the rest",
-                err=True,
-            )
-            raise typer.Exit(130) from None
+    failed = grid_command.run_shown(
+        lambda watch: run(ablation, workers=resolve.threads(workers), watch=watch, only=part), out
+    )
     results = write_results(out)
     if as_json:
-        failures = [{"run": one.key, "part": one.part, "error": one.error} for one in failed]
-        found = {**as_object(results.rows, results.scores), "failures": failures}
+        found = {
+            **as_object(results.rows, results.scores),
+            "failures": grid_command.as_objects(failed),
+        }
         typer.echo(json.dumps(found, indent=1, allow_nan=False))
     else:
         _print(results)
-    if failed:
-        typer.echo(
-            f"{len(failed)} failed, the first of them {failed[0].key} {failed[0].part}: "
-            f"{failed[0].error}; the same command tries them again",
-            err=True,
-        )
-        raise typer.Exit(1)
+    grid_command.end(failed)
 
 
 def _print(results: "Results") -> None:

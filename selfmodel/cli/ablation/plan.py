@@ -14,7 +14,7 @@ from selfmodel import __version__
 from selfmodel.cli import resolve
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.faults import PAPER_KINDS, Kind, known
-from selfmodel.grid import Job, difference, parameters_of, runs
+from selfmodel.grid import Job, check_shared
 from selfmodel.notation import parse
 from selfmodel.settings import Settings
 
@@ -125,7 +125,7 @@ def check(ablation: Ablation) -> None:
             f"a trial is chosen by the first diagnosis: with --next-trial {ablation.next_trial} "
             f"there are at least 2 trials, got 1"
         )
-    _check_folder(ablation)
+    check_shared(ablation.folder, _shared(ablation), "an ablation")
 
 
 def cells(ablation: Ablation, only: tuple[int, int] = (1, 1)) -> list[Cell]:
@@ -215,16 +215,6 @@ def _check_names(ablation: Ablation) -> None:
         resolve.comparator(comparator)
     if ablation.next_trial not in NEXT_TRIAL:
         raise unknown_name("way to choose the next trial", ablation.next_trial, NEXT_TRIAL)
-
-
-def _check_folder(ablation: Ablation) -> None:
-    for run in runs(ablation.folder / "runs"):
-        where = difference(parameters_of(run)["shared"], _shared(ablation))
-        if where:
-            raise InputError(
-                f"{ablation.folder} holds an ablation that was made otherwise ({where}): choose "
-                f"another folder"
-            )
 
 
 def _shared(ablation: Ablation) -> dict[str, Any]:

@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Iterator
+from contextlib import ExitStack, suppress
 from io import BytesIO
 from pathlib import Path
 
@@ -74,16 +75,15 @@ def mp4(frames: Frames) -> bytes:
 def _feed(encoder: subprocess.Popen[bytes], first: NDArray[np.uint8], frames: Frames) -> None:
     if encoder.stdin is None:
         raise WorkError("ffmpeg takes no frames")
-    try:
-        encoder.stdin.write(first.tobytes())
-        for frame in frames:
-            encoder.stdin.write(frame.tobytes())
-        encoder.stdin.close()
-    except BrokenPipeError:
-        return  # it has ended, and its status and its words say why
-    except BaseException:
-        encoder.kill()
-        raise
+    with ExitStack() as unfinished:
+        unfinished.callback(encoder.kill)
+        # Where it has ended before, its status and its words say why.
+        with suppress(BrokenPipeError):
+            encoder.stdin.write(first.tobytes())
+            for frame in frames:
+                encoder.stdin.write(frame.tobytes())
+            encoder.stdin.close()
+        unfinished.pop_all()
 
 
 def ffmpeg() -> str:

@@ -13,7 +13,7 @@ from selfmodel.cli import resolve
 from selfmodel.controller import Network
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.faults.neuron import SILENT_NEURON
-from selfmodel.grid import Job, difference, finished, parameters_of, runs
+from selfmodel.grid import Job, check_shared, finished
 from selfmodel.notation import parse
 from selfmodel.settings import Settings
 from selfmodel.tasks import Entry
@@ -72,13 +72,7 @@ def check(study: Study) -> None:
     for case in study.cases:
         if case not in known:
             raise unknown_name("case of these bodies", str(case), map(str, known))
-    for run in runs(study.folder / "runs"):
-        where = difference(parameters_of(run)["shared"], _shared(study))
-        if where:
-            raise InputError(
-                f"{study.folder} holds a study that was made otherwise ({where}): choose another "
-                f"folder"
-            )
+    check_shared(study.folder, _shared(study), "a study")
 
 
 def gait_jobs(study: Study) -> list[Job]:

@@ -68,8 +68,7 @@ def run(
 ) -> None:
     """Let bodies of the suite, ours and your own fail and recover: bodies x cases x seeds."""
     # Whatever brings MuJoCo waits until the command runs.
-    from selfmodel.cli import lists, resolve  # noqa: PLC0415
-    from selfmodel.cli.grid_display import grid_display  # noqa: PLC0415
+    from selfmodel.cli import grid_command, lists, resolve  # noqa: PLC0415
     from selfmodel.cli.suite.bodies import DOMAINS, bodies, tasks_of  # noqa: PLC0415
     from selfmodel.cli.suite.plan import Study, known_cases  # noqa: PLC0415
     from selfmodel.cli.suite.results import write_results  # noqa: PLC0415
@@ -91,32 +90,18 @@ def run(
         controller=controller,
         comparator=comparator,
     )
-    with grid_display() as watch:
-        try:
-            failed = run_study(study, workers=resolve.threads(workers), watch=watch)
-        except KeyboardInterrupt:
-            typer.echo(
-                f"interrupted: {watch.done} of {watch.total} are done and kept in {out}; the same "
-                f"command goes on with the rest",
-                err=True,
-            )
-            raise typer.Exit(130) from None
+    failed = grid_command.run_shown(
+        lambda watch: run_study(study, workers=resolve.threads(workers), watch=watch), out
+    )
     results = write_results(out)
     if as_json:
-        failures = [{"run": one.key, "part": one.part, "error": one.error} for one in failed]
-        found = {**results.as_object(), "failures": failures}
+        found = {**results.as_object(), "failures": grid_command.as_objects(failed)}
         typer.echo(json.dumps(found, indent=1, allow_nan=False))
     else:
         _print(results.summaries)
         for path in results.files:
             typer.echo(str(path))
-    if failed:
-        typer.echo(
-            f"{len(failed)} failed, the first of them {failed[0].key} {failed[0].part}: "
-            f"{failed[0].error}; the same command tries them again",
-            err=True,
-        )
-        raise typer.Exit(1)
+    grid_command.end(failed)
 
 
 def _print(summaries: "tuple[Summary, ...]") -> None:
