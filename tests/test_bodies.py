@@ -31,7 +31,7 @@ from selfmodel.robot import Robot
 from selfmodel.rotation import rotation_between
 from selfmodel.settings import Settings
 from selfmodel.simulator import Simulator
-from selfmodel.tasks import walking
+from selfmodel.tasks import suite_bodies, walking
 from selfmodel.trial import Plan, Trial
 from tests.bodies import BODIES, swinging, swung
 from tests.logs.conftest import plan_of
@@ -138,8 +138,8 @@ def test_a_trial_speaks_for_what_is_true_of_the_body(body: Robot):
 
 
 def test_a_log_holds_the_robot_and_its_trial(body: Robot, tmp_path: Path):
-    if body.assets:
-        pytest.skip("more files than a log takes")
+    if body.assets:  # more than a log takes, until the body is made ready as anybody's MJCF is
+        body = suite_bodies.robot(body.name, "walk")
     samples = list(SimulatedRobot(body).run(plan_of(body, 20).controller, 20))
     path = tmp_path / "a.mcap"
     write_trial(path, body, plan_of(body, 20), samples, settings=Settings())
