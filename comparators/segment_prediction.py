@@ -12,6 +12,7 @@ from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.behaviour import Behaviour, Signal
 from selfmodel.comparator import Past, Segments
 from selfmodel.comparators.arithmetic import command_errors, command_spans
+from selfmodel.comparators.trembling import trembling_loss
 from selfmodel.differences import difference
 from selfmodel.errors import InputError
 from selfmodel.estimate import IMU, JOINTS, STATE, estimated_states
@@ -190,7 +191,8 @@ def _readings(predicted: FloatArray, logged: FloatArray, starts: IndexArray) -> 
     graded = np.log1p(np.square((predicted - told) / SCALES["sensors"]))
     switched = np.abs(predicted - told) * np.where(never, CONTRADICTION, 1.0)[:, None, None]
     switched[:, starts > 0, 0] = 0.0
-    return _mean(np.where(switches[:, None, None], switched, graded))
+    each = _mean(np.where(switches[:, None, None], switched, graded))
+    return each + trembling_loss(predicted, told, ~switches)[:, np.newaxis]
 
 
 def _mean(values: FloatArray) -> FloatArray:

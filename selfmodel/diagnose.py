@@ -1,23 +1,22 @@
 """The diagnostic EA: evolves hypotheses that explain all trials."""
 
-import dataclasses
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import lru_cache, partial
+from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
+from selfmodel import outside
 from selfmodel.arrays import FloatArray
-from selfmodel.comparator import Comparator, Screened
+from selfmodel.comparator import Comparator
 from selfmodel.degrees import coarse_candidates
 from selfmodel.diagnosis import Candidate, Diagnosis, Verdict
-from selfmodel.errors import InputError
 from selfmodel.evidence import Evidence
 from selfmodel.evolution import Evolution, Observe, evolve
 from selfmodel.faults import PAPER_KINDS, Kind
 from selfmodel.genome import VALUES, decode, encode
 from selfmodel.hypothesis import INTACT, Hypothesis
 from selfmodel.refine import refined
+from selfmodel.screen import screen_of
 from selfmodel.settings import Settings
 from selfmodel.significance import TEST, is_better, is_worse_than_ever
 from selfmodel.simulator import Simulator
@@ -25,13 +24,6 @@ from selfmodel.trial import Trial
 
 KNOWN = 2
 """Of what the EA found closest, how much is refined."""
-
-OPENING = 1 / 3
-"""The part of a whole trial that is simulated to tell what is far from what is near. It is the most
-telling: later, contact has made any two simulations differ."""
-
-FEWEST = 100
-"""Control steps below which no opening is cut."""
 
 EQUAL = "equal distances"
 """The test of a comparator that gives one number for a trial."""
@@ -66,7 +58,10 @@ class Diagnose:
         self._kinds = tuple(kinds)
         self._intact = tuple(intact)
         self.evidence = Evidence(simulator, comparator)
-        self._screen = _screen_of(comparator, simulator, self.evidence)
+        self._screen = screen_of(comparator, simulator, self.evidence)
+        # What is not considered is never ranked: it is remembered apart.
+        self._aside = Evidence(simulator, comparator)
+        self._screen_aside = screen_of(comparator, simulator, self._aside)
         self.evaluations = 0
 
     def __call__(
@@ -92,14 +87,16 @@ class Diagnose:
         totals = dict(zip(judged, map(float, self.evidence.distances(judged, trials)), strict=True))
         others = [one for one in _ranked(totals) if one != best]
         rivals = self._rivals(best, others, trials)
+        better = self._outside(best, trials)
         kept = self._settings.kept
         return Diagnosis(
             ranked=tuple(Candidate(one, totals[one]) for one in [best, *others][:kept]),
             trials=len(trials),
             intact_distance=totals[INTACT],
             rivals=rivals[:kept],
-            verdict=self._verdict(best, rivals, trials),
+            verdict=self._verdict(best, rivals, better, trials),
             test=TEST if self.evidence.in_pieces else EQUAL,
+            outside=better,
         )
 
     def check(self, trials: Sequence[Trial]) -> None:
@@ -113,7 +110,7 @@ class Diagnose:
 
     @property
     def distinct_hypotheses(self) -> int:
-        """How many hypotheses were ever simulated."""
+        """How many hypotheses of the considered kinds were ever simulated."""
         return len(self.evidence.hypotheses | self._screen.evidence.hypotheses)
 
     def _evolved(
@@ -153,7 +150,7 @@ class Diagnose:
             self._settings.genes,
             partial(self.evidence.losses, trials=trials),
             self._anatomy,
-            screen=partial(self._screen.evidence.losses, trials=self._screen.of(trials)),
+            screen=partial(self._screen.losses, trials=trials),
         )
 
     def _rivals(
@@ -169,54 +166,31 @@ class Diagnose:
             told = [bool(losses.sum() != mine.sum()) for losses in theirs]
         return tuple(other for other, apart in zip(candidates, told, strict=True) if not apart)
 
+    def _outside(self, best: Hypothesis, trials: Sequence[Trial]) -> Hypothesis | None:
+        if not self._intact or not self.evidence.in_pieces:
+            return None
+        losses = outside.Losses(
+            after=partial(self._aside.losses, trials=trials),
+            screen=partial(self._screen_aside.losses, trials=trials),
+            before=partial(self._aside.losses, trials=self._intact),
+        )
+        return outside.better_outside(best, self._kinds, self._anatomy, losses)
+
     def _verdict(
-        self, best: Hypothesis, rivals: Sequence[Hypothesis], trials: Sequence[Trial]
+        self,
+        best: Hypothesis,
+        rivals: Sequence[Hypothesis],
+        better: Hypothesis | None,
+        trials: Sequence[Trial],
     ) -> Verdict:
+        if better is not None:
+            return "unexplained"
         if self._intact:
             mine = self.evidence.losses([best], trials)[0]
             usual = self.evidence.losses([INTACT], self._intact)[0]
             if is_worse_than_ever(mine, usual):
                 return "unexplained"
         return "ambiguous" if rivals else "explained"
-
-
-@dataclass(frozen=True)
-class _Screen:
-    """What tells more cheaply what is far from what is near.
-
-    Attributes:
-        evidence: Judges hypotheses.
-        look: Gives the part of a trial that it looks at.
-    """
-
-    evidence: Evidence
-    look: Callable[[Trial], Trial]
-
-    def of(self, trials: Sequence[Trial]) -> list[Trial]:
-        return [self.look(trial) for trial in trials]
-
-
-def _screen_of(comparator: Comparator, simulator: Simulator, evidence: Evidence) -> _Screen:
-    """A comparator's own screen; without one, the same comparator of the openings of the trials.
-
-    One that does not judge in pieces is not refined, and all there is decides.
-    """
-    if not evidence.in_pieces:
-        return _Screen(evidence, lambda trial: trial)
-    if isinstance(comparator, Screened):
-        return _Screen(Evidence(simulator, comparator.screen), lambda trial: trial)
-    return _Screen(Evidence(simulator, comparator), lru_cache(partial(_opening, comparator)))
-
-
-def _opening(comparator: Comparator, trial: Trial) -> Trial:
-    """The first part of a trial; all of it where that does not tell enough by itself."""
-    steps = max(round(OPENING * trial.behaviour.steps), min(FEWEST, trial.behaviour.steps))
-    opening = dataclasses.replace(trial, behaviour=trial.behaviour.first(steps))
-    try:
-        comparator.request(opening)
-    except InputError:
-        return trial
-    return opening
 
 
 def _without_degrees(hypothesis: Hypothesis) -> set[tuple[Kind, str]]:

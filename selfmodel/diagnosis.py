@@ -8,8 +8,9 @@ from selfmodel.hypothesis import Hypothesis
 Verdict = Literal["explained", "ambiguous", "unexplained"]
 """``explained``: the best hypothesis predicts the trials about as well as the self-model predicts
 the intact robot, and no other does. ``ambiguous``: others cannot be told from it.
-``unexplained``: it predicts significantly worse, so something is wrong that it does not say; only
-where a trial of the intact robot is known."""
+``unexplained``: it predicts significantly worse, or significantly worse than with a fault of a kind
+that was not considered, so something is wrong that it does not say; only where a trial of the
+intact robot is known."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,8 @@ class Diagnosis:
         rivals: Other hypotheses that the trials cannot tell from the best, closest first.
         verdict: Whether the best hypothesis explains the trials.
         test: By which test the rivals were told from the others.
+        outside: The best hypothesis with a fault of a kind that was not considered, where that
+            predicts the trials significantly better; see ``outside.better_outside``.
     """
 
     ranked: tuple[Candidate, ...]
@@ -47,6 +50,7 @@ class Diagnosis:
     rivals: tuple[Hypothesis, ...]
     verdict: Verdict
     test: str
+    outside: Hypothesis | None = None
 
     @property
     def best(self) -> Hypothesis:

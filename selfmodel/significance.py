@@ -56,6 +56,30 @@ def paired_z(larger: FloatArray, smaller: FloatArray) -> float:
     return float(difference.mean() / error) if error > 0 else 0.0
 
 
+def has_become_better(
+    one: FloatArray, other: FloatArray, one_before: FloatArray, other_before: FloatArray
+) -> bool:
+    """Returns whether a hypothesis predicts significantly better since something is wrong.
+
+    What helps as much where nothing was wrong only mends the model. It is asked of hundreds of
+    hypotheses, so ``WORSE`` standard errors are wanted.
+
+    Args:
+        one: The losses of the hypothesis, ``(pieces,)``.
+        other: Those of the hypothesis to beat, on the same pieces.
+        one_before: As ``one``, of other trials, from before.
+        other_before: As ``other``, of these.
+    """
+    if not all(np.isfinite(losses).all() for losses in (one, other, one_before, other_before)):
+        return False
+    gain, before = other - one, other_before - one_before
+    if min(len(gain), len(before)) < 2 or not gain.mean() > NEGLIGIBLE:
+        return False
+    variance = gain.var(ddof=1) / len(gain) + before.var(ddof=1) / len(before)
+    more = gain.mean() - before.mean()
+    return bool(paired_z(other, one) >= WORSE and more >= WORSE * np.sqrt(variance))
+
+
 def is_worse_than_ever(losses: FloatArray, usual: FloatArray) -> bool:
     """Returns whether losses are significantly higher than those of a model that was right.
 

@@ -103,7 +103,16 @@ LAYERS = (
         *("limits", "environment_robot", "score"),
     ),
     (
-        *("database", "evidence", "refine", "degrees", "diagnose", "repair", "calibrate"),
+        *(
+            "database",
+            "evidence",
+            "refine",
+            "degrees",
+            "outside",
+            "diagnose",
+            "repair",
+            "calibrate",
+        ),
         "next_trial",
     ),
     ("recover", "explain"),

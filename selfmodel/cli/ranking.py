@@ -27,6 +27,7 @@ def sureness(diagnosis: Diagnosis) -> dict[str, Any]:
         "verdict": diagnosis.verdict,
         "rivals": [str(rival) for rival in diagnosis.rivals],
         "test": diagnosis.test,
+        "outside": None if diagnosis.outside is None else str(diagnosis.outside),
         "intact_distance": intact if math.isfinite(intact) else None,
     }
 
@@ -44,6 +45,11 @@ def in_words(found: Mapping[str, Any]) -> str:
         case "ambiguous":
             rivals = ", ".join(found["rivals"])
             return f"Ambiguous: the trials cannot tell {best} from {rivals} ({found['test']})."
+    if found["outside"] is not None:
+        return (
+            f"Unexplained: {found['outside']}, which is of a kind that was not considered "
+            f"(--kinds), predicts the trials significantly better than {best}."
+        )
     return (
         f"Unexplained: even {best} predicts the trials significantly worse than the self-model "
         f"predicts the intact robot; something else is wrong, or what is wrong is of a kind that "

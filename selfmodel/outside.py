@@ -1,0 +1,93 @@
+"""What was not considered: whether a kind outside the considered ones explains what is left."""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from selfmodel.anatomy import Anatomy
+from selfmodel.arrays import FloatArray
+from selfmodel.degrees import coarse_candidates
+from selfmodel.faults import ALL_KINDS, Fault, Kind
+from selfmodel.hypothesis import INTACT, Hypothesis, canonical
+from selfmodel.significance import NEGLIGIBLE, has_become_better, paired_z
+
+SHORTLIST = 8
+"""Hypotheses that are looked at closely, of those that the screen likes."""
+
+
+class Losses(NamedTuple):
+    """How badly hypotheses predict each piece of some trials, ``(n, pieces)`` each.
+
+    Attributes:
+        after: The trials to explain.
+        screen: The same, from fewer pieces and cheaper.
+        before: Trials of the robot with nothing wrong.
+    """
+
+    after: Callable[[Sequence[Hypothesis]], FloatArray]
+    screen: Callable[[Sequence[Hypothesis]], FloatArray]
+    before: Callable[[Sequence[Hypothesis]], FloatArray]
+
+
+def better_outside(
+    best: Hypothesis, considered: Sequence[Kind], anatomy: Anatomy, losses: Losses
+) -> Hypothesis | None:
+    """Returns the best hypothesis with a fault that was not considered, if that explains more.
+
+    One fault of one kind that comes with selfmodel is added to the best hypothesis, or takes the
+    place of one at the same part. The result has to predict the trials significantly better; and
+    its fault alone must not do the same to trials of the intact robot, for then it mends the
+    self-model and nothing has changed.
+
+    Args:
+        best: The best hypothesis of the considered kinds.
+        considered: These kinds.
+        anatomy: The robot's parts.
+        losses: How badly hypotheses predict the trials.
+
+    Returns:
+        The one that predicts best; None where nothing outside explains more.
+    """
+    mine = losses.after([best])[0]
+    if not np.isfinite(mine).all() or mine.mean() <= NEGLIGIBLE:
+        return None
+    candidates = _candidates(best, considered, anatomy)
+    for candidate in _shortlist(best, candidates, losses):
+        alone = canonical([candidates[candidate]], anatomy)
+        usual, with_it = losses.before([INTACT, alone])
+        if has_become_better(losses.after([candidate])[0], mine, with_it, usual):
+            return candidate
+    return None
+
+
+def _candidates(
+    best: Hypothesis, considered: Sequence[Kind], anatomy: Anatomy
+) -> dict[Hypothesis, Fault]:
+    """Hypotheses, and what each says that was not considered.
+
+    What reshapes the model, such as rough terrain, is left out: each needs a model of its own.
+    """
+    outside = [kind for kind in ALL_KINDS if kind not in considered and kind.reshape is None]
+    found: dict[Hypothesis, Fault] = {}
+    for fault in coarse_candidates(outside, anatomy):
+        others = [other for other in best.faults if other.part != fault.part]
+        for faults in ((*best.faults, fault), (*others, fault)):
+            found.setdefault(canonical(faults, anatomy), fault)
+    found.pop(best, None)
+    return found
+
+
+def _shortlist(
+    best: Hypothesis, candidates: dict[Hypothesis, Fault], losses: Losses
+) -> list[Hypothesis]:
+    """Those that the screen likes most, the closest first."""
+    if not candidates:
+        return []
+    asked = list(candidates)
+    mine, *theirs = losses.screen([best, *asked])
+    finite = np.isfinite(mine).all()
+    z = [paired_z(mine, row) if finite and np.isfinite(row).all() else -np.inf for row in theirs]
+    few = [asked[i] for i in np.argsort(z, kind="stable")[::-1][:SHORTLIST]]
+    order = np.argsort(losses.after(few).sum(axis=1), kind="stable")
+    return [few[i] for i in order]
