@@ -16,10 +16,12 @@ class SensorNoise:
     tell hypotheses apart.
 
     Args:
-        embodiments: One a robot, with the standard deviations of its sensors.
+        embodiments: With the standard deviations of their sensors.
+        copies: Robots of each embodiment, side by side; each copy has a sequence of its own.
     """
 
-    def __init__(self, embodiments: Sequence[Embodiment]) -> None:
+    def __init__(self, embodiments: Sequence[Embodiment], copies: int = 1) -> None:
+        self._copies = copies
         deviations = np.array([embodiment.noise for embodiment in embodiments])
         noisy: dict[tuple[int, int], list[int]] = {}
         for row, column in zip(*np.nonzero(deviations), strict=True):
@@ -30,6 +32,8 @@ class SensorNoise:
         ]
 
     def add(self, readings: FloatArray) -> None:
-        """Adds the next step's noise to the readings, ``(n, sensors)``."""
+        """Adds the next step's noise to the readings, ``(embodiments * copies, sensors)``."""
+        by_copy = readings.reshape(-1, self._copies, readings.shape[1])
         for stream, rows, column, deviations in self._noisy:
-            readings[rows, column] += deviations * stream.standard_normal()
+            drawn = stream.standard_normal(self._copies)
+            by_copy[rows, :, column] += np.outer(deviations, drawn)

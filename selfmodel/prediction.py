@@ -62,7 +62,8 @@ def predict(
     bodies = _repeated(moving, together)
     batch = new_batch(robot.model, bodies, threads)
     qpos, sensordata = batch.bind("qpos"), batch.bind("sensordata")
-    senses = Senses(robot.model, robot.anatomy, _repeated(embodiments, together))
+    # Noise of its own for each segment: of a few numbers nobody sees how much there is.
+    senses = Senses(robot.model, robot.anatomy, embodiments, together)
     readings = np.empty((n * together, len(robot.anatomy.sensors)))
     # Where in the batch each row of the result is found.
     place = (source_of[:, np.newaxis] * together + np.arange(together)).ravel()

@@ -20,11 +20,16 @@ class Senses:
     Args:
         model: Any of the robots' models; they share one layout.
         anatomy: The robots' parts.
-        embodiments: One a robot: what is wrong with its sensors.
+        embodiments: What is wrong with their sensors.
+        copies: Robots of each embodiment, side by side.
     """
 
     def __init__(
-        self, model: mujoco.MjModel, anatomy: Anatomy, embodiments: Sequence[Embodiment]
+        self,
+        model: mujoco.MjModel,
+        anatomy: Anatomy,
+        embodiments: Sequence[Embodiment],
+        copies: int = 1,
     ) -> None:
         touches = [sensor for sensor in anatomy.sensors if sensor.kind == "touch"]
         angles = [sensor for sensor in anatomy.sensors if sensor.kind == "angle"]
@@ -36,8 +41,9 @@ class Senses:
         gain = np.array([embodiment.gain for embodiment in embodiments])
         offset = np.array([embodiment.offset + embodiment.bias for embodiment in embodiments])
         self._faulty = bool(np.any(gain != 1) or np.any(offset != 0))
-        self._gain, self._offset = gain, offset
-        self._noise = SensorNoise(embodiments)
+        self._gain = np.repeat(gain, copies, axis=0)
+        self._offset = np.repeat(offset, copies, axis=0)
+        self._noise = SensorNoise(embodiments, copies)
 
     def read(self, sensordata: FloatArray, qpos: FloatArray, readings: FloatArray) -> None:
         """Writes the readings of the next control step.
