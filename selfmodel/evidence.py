@@ -147,6 +147,6 @@ def simulate(
             runs = [(hypothesis, driver) for hypothesis in hypotheses]
             return simulator.run(runs, steps, request.record)
         case Segments():
-            return simulator.predict(hypotheses, request)
+            return simulator.predict(hypotheses, request, trial.behaviour)
         case Ensemble():
             return simulator.run_ensemble(hypotheses, driver, steps, request)

@@ -1,5 +1,7 @@
 """The self-model in motion: many robots, each with its hypothesis and driver, in one batch."""
 
+import copy
+import dataclasses
 from collections.abc import Sequence
 from functools import lru_cache, partial
 from time import perf_counter
@@ -12,6 +14,7 @@ from selfmodel.behaviour import Behaviour, Signal
 from selfmodel.comparator import Ensemble, Segments
 from selfmodel.driver import Driver, drive
 from selfmodel.embodiment import Embodiment, embody
+from selfmodel.felt import felt_points
 from selfmodel.gap import perturbed_models
 from selfmodel.hypothesis import Hypothesis
 from selfmodel.prediction import predict
@@ -24,6 +27,9 @@ Run = tuple[Hypothesis, Driver]
 
 REMEMBERED_EMBODIMENTS = 1024
 """Built models that are kept, where they are small."""
+
+REMEMBERED_TRIALS = 16
+"""Trials whose felt ground is kept."""
 
 REMEMBERED_BYTES = 2**29
 """What they may take: one of our robots' takes 0.3 MB, a dog's with its meshes 5 MB."""
@@ -44,6 +50,7 @@ class Simulator:
         self.tally = Tally() if tally is None else tally
         room = REMEMBERED_BYTES // int(robot.model.nbuffer)
         self._embodiment = lru_cache(max(1, min(REMEMBERED_EMBODIMENTS, room)))(robot.build)
+        self._felt = lru_cache(REMEMBERED_TRIALS)(partial(felt_points, robot))
         self._members = lru_cache(partial(perturbed_models, robot))
 
     def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> Simulated:
@@ -57,9 +64,27 @@ class Simulator:
         embodiments = [self._embodiment(hypothesis) for hypothesis, _ in runs]
         return self._run(embodiments, [driver for _, driver in runs], steps, record)
 
-    def predict(self, hypotheses: Sequence[Hypothesis], segments: Segments) -> Simulated:
-        """Predicts segments of a trial under each hypothesis; see ``prediction.predict``."""
+    def predict(
+        self,
+        hypotheses: Sequence[Hypothesis],
+        segments: Segments,
+        observed: Behaviour | None = None,
+    ) -> Simulated:
+        """Predicts segments of a trial under each hypothesis; see ``prediction.predict``.
+
+        Args:
+            hypotheses: At least one.
+            segments: Where to begin and what was commanded.
+            observed: The trial, from which the ground is felt where a hypothesis says that it is
+                not known; without it, or where the base's place is not part of the segments'
+                state, the self-model's own is taken.
+        """
         embodiments = [self._embodiment(hypothesis) for hypothesis in hypotheses]
+        if observed is not None and "base_position" in segments.states:
+            embodiments = [
+                self._on_felt_ground(embodiment, hypothesis, observed)
+                for embodiment, hypothesis in zip(embodiments, hypotheses, strict=True)
+            ]
         first: dict[Hypothesis, int] = {}
         moves_as = [
             first.setdefault(hypothesis.motion, i) for i, hypothesis in enumerate(hypotheses)
@@ -72,6 +97,17 @@ class Simulator:
             threads=self.threads,
             tally=self.tally,
         )
+
+    def _on_felt_ground(
+        self, embodiment: Embodiment, hypothesis: Hypothesis, observed: Behaviour
+    ) -> Embodiment:
+        ways = [(fault.kind.feel, fault) for fault in hypothesis.faults if fault.kind.feel]
+        if not ways:
+            return embodiment
+        own = dataclasses.replace(embodiment, model=copy.copy(embodiment.model))
+        for feel, fault in ways:
+            feel(own, fault, self._felt(observed))
+        return own
 
     def run_ensemble(
         self,

@@ -41,10 +41,15 @@ class CountingSimulator(Simulator):
         self.times.update(runs)
         return super().run(runs, steps, record)
 
-    def predict(self, hypotheses: Sequence[Hypothesis], segments: Segments) -> Simulated:
+    def predict(
+        self,
+        hypotheses: Sequence[Hypothesis],
+        segments: Segments,
+        observed: Behaviour | None = None,
+    ) -> Simulated:
         """Predicts as ever."""
         self.times.update((one, segments.commands.tobytes()) for one in hypotheses)
-        return super().predict(hypotheses, segments)
+        return super().predict(hypotheses, segments, observed)
 
     def run_ensemble(
         self, hypotheses: Sequence[Hypothesis], driver: Driver, steps: int, ensemble: Ensemble

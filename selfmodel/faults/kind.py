@@ -6,6 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
 from selfmodel.anatomy import Anatomy
+from selfmodel.arrays import FloatArray
 
 if TYPE_CHECKING:
     from mujoco import MjSpec
@@ -58,6 +59,9 @@ class Kind:
         reshape: Works the fault into the robot's specification before that is compiled, given the
             seed of what is random: for what a compiled model cannot be edited into. What MjData
             holds must keep its sizes all the same.
+        feel: Works into an embodiment what the feet of a robot felt of the ground in a trial, given
+            the points, ``(n, 3)``, world frame, m: for what is random, and known only where the
+            robot has been. It is asked when stretches of that trial are predicted.
         parts: The names of the parts it can strike, in the order of the genome's third value; an
             environment strikes ``WORLD`` alone.
         absorbs: Whether the first fault, of this kind, leaves the second without any effect.
@@ -77,6 +81,9 @@ class Kind:
     word: str = field(compare=False)
     strike: Callable[["Embodiment", Anatomy, "Fault"], None] = field(compare=False, repr=False)
     reshape: Callable[["MjSpec", "Fault", int], None] | None = field(
+        default=None, compare=False, repr=False
+    )
+    feel: Callable[["Embodiment", "Fault", FloatArray], None] | None = field(
         default=None, compare=False, repr=False
     )
     parts: Callable[[Anatomy], tuple[str, ...]] = field(

@@ -1,0 +1,73 @@
+"""Where feet met the ground: felt by touch, and known by the joints and the base above it."""
+
+import mujoco
+import numpy as np
+
+from selfmodel.arrays import FloatArray
+from selfmodel.behaviour import Behaviour
+from selfmodel.estimate import STATE, estimated_states
+from selfmodel.places import fields_of, writer
+from selfmodel.robot import Robot
+
+FAR = 10.0
+"""How far a foot may be from where the model has its level ground, m."""
+
+
+def felt_points(robot: Robot, behaviour: Behaviour) -> FloatArray:
+    """Returns where something with a touch sensor met the ground.
+
+    It is the place of a body that is lowest, at each step at which the sensor of that body said
+    that it touches. A sensor that errs gives points in the air.
+
+    Args:
+        robot: The robot with nothing wrong.
+        behaviour: What was observed in a trial.
+
+    Returns:
+        ``(n, 3)`` in the world's frame, m; none where the model has no level ground.
+    """
+    model = robot.model
+    grounds = np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE)
+    feet = _feet(robot)
+    if not len(grounds) or not feet:
+        return np.empty((0, 3))
+    states = estimated_states(behaviour, STATE)
+    known = np.logical_and.reduce([np.isfinite(values).all(axis=1) for values in states.values()])
+    data = mujoco.MjData(model)
+    write = writer(robot, fields_of(data))
+    points = []
+    for step in np.flatnonzero(known & (behaviour["sensors"][:, list(feet)] == 1).any(axis=1)):
+        write({signal: values[[step]] for signal, values in states.items()})
+        mujoco.mj_kinematics(model, data)
+        points += [
+            _lowest(model, data, int(grounds[0]), geoms)
+            for column, geoms in feet.items()
+            if behaviour["sensors"][step, column] == 1
+        ]
+    return np.array(points)
+
+
+def _feet(robot: Robot) -> dict[int, list[int]]:
+    """For the column of each touch sensor the geoms of its body that can touch something."""
+    model = robot.model
+    solid = (model.geom_contype | model.geom_conaffinity) != 0
+    feet = {}
+    for column, sensor in enumerate(robot.anatomy.sensors):
+        if sensor.kind == "touch":
+            site = int(model.sensor(sensor.name).objid[0])
+            geoms = np.flatnonzero(solid & (model.geom_bodyid == model.site_bodyid[site]))
+            feet[column] = geoms.tolist()
+    return {column: geoms for column, geoms in feet.items() if geoms}
+
+
+def _lowest(
+    model: mujoco.MjModel, data: mujoco.MjData, ground: int, geoms: list[int]
+) -> FloatArray:
+    """The point of some geoms that is nearest to the level ground, or furthest below it."""
+    nearest, between = np.inf, np.empty(6)
+    lowest = np.empty(3)
+    for geom in geoms:
+        distance = mujoco.mj_geomDistance(model, data, ground, geom, FAR, between)
+        if distance < nearest:
+            nearest, lowest = distance, between[3:].copy()
+    return lowest
