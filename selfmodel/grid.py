@@ -265,7 +265,9 @@ def _is_done(run: Path, part: str) -> bool:
 
 
 def _keep(run: Path, part: str, kept: Mapping[str, Any]) -> None:
-    put(_path(run, part), json.dumps(kept, indent=1, allow_nan=False).encode())
+    path = _path(run, part)
+    path.parent.mkdir(exist_ok=True)  # who wants a run made anew may have deleted its results
+    put(path, json.dumps(kept, indent=1, allow_nan=False).encode())
 
 
 def _path(run: Path, part: str) -> Path:

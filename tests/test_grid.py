@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -142,6 +143,14 @@ def test_what_failed_is_tried_again(tmp_path: Path):
     (tmp_path / "run-00" / "mended").touch()
 
     assert run_grid(tmp_path, jobs(1, fails="foreseen"), work, workers=1, watch=silent) == ()
+
+
+def test_a_run_whose_results_were_deleted_is_made_again(tmp_path: Path):
+    run_grid(tmp_path, jobs(2), work, workers=1, watch=silent)
+    shutil.rmtree(tmp_path / "run-01" / "parts")
+
+    assert run_grid(tmp_path, jobs(2), work, workers=1, watch=silent) == ()
+    assert calls(tmp_path) == {"run-00": ["result"], "run-01": ["result", "result"]}
 
 
 def test_a_run_made_of_something_else_is_refused_before_anything_is_done(tmp_path: Path):
