@@ -111,7 +111,7 @@ class SegmentPrediction:
             logged, predicted = cut.states[signal][rows], simulated[signal][:, :, looks]
             error = difference(signal, predicted, logged) / SCALES[signal]
             total += _mean(np.log1p(np.square(error)))
-        total += _readings(simulated["sensors"], trial.behaviour["sensors"], cut.starts)
+        total += _readings(simulated["sensors"], trial.behaviour["sensors"], cut)
         return total if cut.steady.all() else np.ascontiguousarray(total[:, cut.steady])
 
     def distances(self, simulated: Behaviour, trial: Trial) -> FloatArray:
@@ -176,12 +176,14 @@ def _known_all_along(commands: FloatArray, starts: IndexArray, horizon: int) -> 
     return np.asarray(np.isfinite(commands[rows]).all(axis=(1, 2)))
 
 
-def _readings(predicted: FloatArray, logged: FloatArray, starts: IndexArray) -> FloatArray:
+def _readings(predicted: FloatArray, logged: FloatArray, cut: _Cut) -> FloatArray:
     """How badly the readings are predicted, ``(n, segments)``.
 
     The first row of a segment follows from the state alone: there an angle's reading is sure, and
     a touch is not, because millimetres decide. Only at the start of the trial the robot stands.
+    How much a sensor trembles, only all segments together tell; it counts in each of them.
     """
+    starts = cut.starts
     rows = starts[:, np.newaxis] + np.arange(predicted.shape[2])
     told = logged[rows]
     binary = np.isin(logged, (0.0, 1.0)) | np.isnan(logged)
@@ -192,7 +194,8 @@ def _readings(predicted: FloatArray, logged: FloatArray, starts: IndexArray) -> 
     switched = np.abs(predicted - told) * np.where(never, CONTRADICTION, 1.0)[:, None, None]
     switched[:, starts > 0, 0] = 0.0
     each = _mean(np.where(switches[:, None, None], switched, graded))
-    return each + trembling_loss(predicted, told, ~switches)[:, np.newaxis]
+    noise = trembling_loss(predicted[:, cut.steady], told[cut.steady], ~switches)
+    return each + noise[:, np.newaxis]
 
 
 def _mean(values: FloatArray) -> FloatArray:

@@ -31,8 +31,11 @@ def trembling_loss(predicted: FloatArray, logged: FloatArray, graded: BoolArray)
 
     Returns:
         The mean over the sensors of ``log(1 + (e / SCALE)^2)``, e in a reading's unit; exactly 0
-        where no sensor trembles more than the others, in the log or in the prediction.
+        where no sensor trembles more than the others, in the log or in the prediction, and where
+        segments have no more than ``ORDER`` rows.
     """
+    if logged.shape[1] <= ORDER:
+        return np.zeros(len(predicted))
     found = _excess(logged[np.newaxis], graded)
     error = (_excess(predicted, graded) - found) / SCALE
     return np.asarray(np.log1p(np.square(error)).mean(axis=1))

@@ -9,7 +9,7 @@ from typing import Any, get_args
 
 from selfmodel.anatomy import Anatomy
 from selfmodel.database import Database
-from selfmodel.diagnosis import Candidate, Diagnosis, Verdict
+from selfmodel.diagnosis import Candidate, Diagnosis, Outside, Verdict
 from selfmodel.errors import InputError
 from selfmodel.faults import KINDS, Kind
 from selfmodel.logs.errors import CorruptError, SchemaMismatchError
@@ -161,6 +161,7 @@ def _as_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "rivals": [str(rival) for rival in diagnosis.rivals],
         "verdict": diagnosis.verdict,
         "test": diagnosis.test,
+        "outside": diagnosis.outside.as_object() if diagnosis.outside else None,
         "ranked": [
             {
                 "hypothesis": str(candidate.hypothesis),
@@ -178,6 +179,12 @@ def _finite(distance: float) -> float | None:
 
 def _read_finite(distance: float | None) -> float:
     return math.inf if distance is None else float(distance)
+
+
+def _read_outside(item: Any, anatomy: Anatomy, kinds: Sequence[Kind]) -> Outside | None:  # noqa: ANN401  # JSON
+    if item is None:
+        return None
+    return Outside(parse(item["hypothesis"], anatomy, kinds), str(item["kind"]))
 
 
 def _read_verdict(text: str) -> Verdict:
@@ -206,6 +213,7 @@ def _read_diagnoses(folder: Path, anatomy: Anatomy, kinds: Sequence[Kind]) -> tu
                 rivals=tuple(parse(rival, anatomy, kinds) for rival in item["rivals"]),
                 verdict=_read_verdict(item["verdict"]),
                 test=str(item["test"]),
+                outside=_read_outside(item.get("outside"), anatomy, kinds),
             )
             for item in items
         )

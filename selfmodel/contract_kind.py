@@ -41,6 +41,8 @@ def check_kind(kind: Kind, robot: Robot) -> None:
             raise ValueError(f"{fault} absorbs itself, so it can never be said")
     _check_edits(kind, candidates, robot)
     _check_batch(kind, robot)
+    if kind.feel is not None:
+        _check_feel(kind, candidates, robot)
 
 
 def _check_degree(fault: Fault, robot: Robot) -> None:
@@ -95,6 +97,19 @@ def _check_batch(kind: Kind, robot: Robot) -> None:
             for signal in SIGNALS
         ):
             raise ValueError(f"a robot with {run[0]} moves differently in a batch and alone")
+
+
+def _check_feel(kind: Kind, candidates: tuple[Fault, ...], robot: Robot) -> None:
+    """On ground that was felt, and on ground that was not."""
+    on_a_step = np.array([[x, 0.0, 0.02 * (x > 2)] for x in np.linspace(1.5, 3, 200)])
+    for fault in candidates:
+        for points in (on_a_step, np.empty((0, 3))):
+            before, own = points.copy(), robot.build(Hypothesis((fault,)))
+            size = mujoco.mj_sizeModel(own.model)
+            if kind.feel is not None:
+                kind.feel(own, fault, points)
+            if mujoco.mj_sizeModel(own.model) != size or not np.array_equal(points, before):
+                raise ValueError(f"{kind.name} changes the points it is given, or a model's layout")
 
 
 def _contents(embodiment: Embodiment) -> tuple[bytes, ...]:

@@ -9,7 +9,7 @@ from selfmodel import outside
 from selfmodel.arrays import FloatArray
 from selfmodel.comparator import Comparator
 from selfmodel.degrees import coarse_candidates
-from selfmodel.diagnosis import Candidate, Diagnosis, Verdict
+from selfmodel.diagnosis import Candidate, Diagnosis, Outside, Verdict
 from selfmodel.evidence import Evidence
 from selfmodel.evolution import Evolution, Observe, evolve
 from selfmodel.faults import PAPER_KINDS, Kind
@@ -166,8 +166,10 @@ class Diagnose:
             told = [bool(losses.sum() != mine.sum()) for losses in theirs]
         return tuple(other for other, apart in zip(candidates, told, strict=True) if not apart)
 
-    def _outside(self, best: Hypothesis, trials: Sequence[Trial]) -> Hypothesis | None:
-        if not self._intact or not self.evidence.in_pieces:
+    def _outside(self, best: Hypothesis, trials: Sequence[Trial]) -> Outside | None:
+        # Pieces of a whole trial, closed loop, hang together: the luckiest of hundreds would win.
+        segments = self.evidence.in_pieces and self.evidence.in_segments(trials)
+        if not self._intact or not segments:
             return None
         losses = outside.Losses(
             after=partial(self._aside.losses, trials=trials),
@@ -180,7 +182,7 @@ class Diagnose:
         self,
         best: Hypothesis,
         rivals: Sequence[Hypothesis],
-        better: Hypothesis | None,
+        better: Outside | None,
         trials: Sequence[Trial],
     ) -> Verdict:
         if better is not None:

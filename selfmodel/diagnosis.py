@@ -27,6 +27,23 @@ class Candidate:
 
 
 @dataclass(frozen=True)
+class Outside:
+    """A hypothesis with a fault that was not considered.
+
+    Attributes:
+        hypothesis: All that it says.
+        kind: The name of the kind that was not considered.
+    """
+
+    hypothesis: Hypothesis
+    kind: str
+
+    def as_object(self) -> dict[str, str]:
+        """Returns it as JSON has it."""
+        return {"hypothesis": str(self.hypothesis), "kind": self.kind}
+
+
+@dataclass(frozen=True)
 class Diagnosis:
     """Hypotheses, best first.
 
@@ -50,7 +67,7 @@ class Diagnosis:
     rivals: tuple[Hypothesis, ...]
     verdict: Verdict
     test: str
-    outside: Hypothesis | None = None
+    outside: Outside | None = None
 
     @property
     def best(self) -> Hypothesis:

@@ -43,6 +43,10 @@ class Evidence:
         """Whether the comparator judges in pieces, so that two hypotheses can be tested."""
         return isinstance(self._comparator, Piecewise)
 
+    def in_segments(self, trials: Sequence[Trial]) -> bool:
+        """Returns whether the comparator judges all trials by short predictions."""
+        return all(isinstance(self._comparator.request(trial), Segments) for trial in trials)
+
     @property
     def hypotheses(self) -> set[Hypothesis]:
         """The hypotheses that were ever simulated."""

@@ -8,6 +8,7 @@ from selfmodel.behaviour import Behaviour
 from selfmodel.estimate import STATE, estimated_states
 from selfmodel.places import fields_of, writer
 from selfmodel.robot import Robot
+from selfmodel.rotation import directions
 
 FAR = 10.0
 """How far a foot may be from where the model has its level ground, m."""
@@ -24,27 +25,36 @@ def felt_points(robot: Robot, behaviour: Behaviour) -> FloatArray:
         behaviour: What was observed in a trial.
 
     Returns:
-        ``(n, 3)`` in the world's frame, m; none where the model has no level ground.
+        ``(n, 3)`` in the world's frame, m, read only; none where the model has no level ground.
     """
     model = robot.model
-    grounds = np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE)
-    feet = _feet(robot)
-    if not len(grounds) or not feet:
+    ground, feet = _level_ground(model), _feet(robot)
+    if ground is None or not feet:
         return np.empty((0, 3))
     states = estimated_states(behaviour, STATE)
     known = np.logical_and.reduce([np.isfinite(values).all(axis=1) for values in states.values()])
     data = mujoco.MjData(model)
     write = writer(robot, fields_of(data))
-    points = []
+    points: list[FloatArray] = []
     for step in np.flatnonzero(known & (behaviour["sensors"][:, list(feet)] == 1).any(axis=1)):
         write({signal: values[[step]] for signal, values in states.items()})
         mujoco.mj_kinematics(model, data)
-        points += [
-            _lowest(model, data, int(grounds[0]), geoms)
-            for column, geoms in feet.items()
-            if behaviour["sensors"][step, column] == 1
-        ]
-    return np.array(points)
+        for column, geoms in feet.items():
+            if behaviour["sensors"][step, column] == 1:
+                points += _lowest(model, data, ground, geoms)
+    felt = np.array(points).reshape(-1, 3)
+    felt.flags.writeable = False  # it is remembered
+    return felt
+
+
+def _level_ground(model: mujoco.MjModel) -> int | None:
+    """The plane of the world that lies most level, if there is one."""
+    planes = (model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE) & (model.geom_bodyid == 0)
+    numbers = np.flatnonzero(planes)
+    if not len(numbers):
+        return None
+    upward = directions(model.geom_quat[numbers])[:, -1]
+    return int(numbers[np.argmax(upward)])
 
 
 def _feet(robot: Robot) -> dict[int, list[int]]:
@@ -62,12 +72,12 @@ def _feet(robot: Robot) -> dict[int, list[int]]:
 
 def _lowest(
     model: mujoco.MjModel, data: mujoco.MjData, ground: int, geoms: list[int]
-) -> FloatArray:
-    """The point of some geoms that is nearest to the level ground, or furthest below it."""
-    nearest, between = np.inf, np.empty(6)
-    lowest = np.empty(3)
+) -> list[FloatArray]:
+    """The point of some geoms that is nearest to the level ground; none where all are far."""
+    nearest, between = FAR, np.empty(6)
+    lowest: list[FloatArray] = []
     for geom in geoms:
         distance = mujoco.mj_geomDistance(model, data, ground, geom, FAR, between)
         if distance < nearest:
-            nearest, lowest = distance, between[3:].copy()
+            nearest, lowest = distance, [between[3:].copy()]
     return lowest

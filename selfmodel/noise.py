@@ -33,7 +33,8 @@ class SensorNoise:
 
     def add(self, readings: FloatArray) -> None:
         """Adds the next step's noise to the readings, ``(embodiments * copies, sensors)``."""
-        by_copy = readings.reshape(-1, self._copies, readings.shape[1])
+        robots, sensors = readings.shape
+        by_copy = readings.reshape(robots // self._copies, self._copies, sensors)
         for stream, rows, column, deviations in self._noisy:
             drawn = stream.standard_normal(self._copies)
             by_copy[rows, :, column] += np.outer(deviations, drawn)

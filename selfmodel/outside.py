@@ -8,6 +8,7 @@ import numpy as np
 from selfmodel.anatomy import Anatomy
 from selfmodel.arrays import FloatArray
 from selfmodel.degrees import coarse_candidates
+from selfmodel.diagnosis import Outside
 from selfmodel.faults import ALL_KINDS, Fault, Kind
 from selfmodel.hypothesis import INTACT, Hypothesis, canonical
 from selfmodel.significance import NEGLIGIBLE, has_become_better, paired_z
@@ -32,13 +33,13 @@ class Losses(NamedTuple):
 
 def better_outside(
     best: Hypothesis, considered: Sequence[Kind], anatomy: Anatomy, losses: Losses
-) -> Hypothesis | None:
+) -> Outside | None:
     """Returns the best hypothesis with a fault that was not considered, if that explains more.
 
     One fault of one kind that comes with selfmodel is added to the best hypothesis, or takes the
-    place of one at the same part. The result has to predict the trials significantly better; and
-    its fault alone must not do the same to trials of the intact robot, for then it mends the
-    self-model and nothing has changed.
+    place of all that is said of the same part. The result has to predict the trials significantly
+    better; and its fault alone must not do the same to trials of the intact robot, for then it
+    mends the self-model and nothing has changed.
 
     Args:
         best: The best hypothesis of the considered kinds.
@@ -57,7 +58,7 @@ def better_outside(
         alone = canonical([candidates[candidate]], anatomy)
         usual, with_it = losses.before([INTACT, alone])
         if has_become_better(losses.after([candidate])[0], mine, with_it, usual):
-            return candidate
+            return Outside(candidate, candidates[candidate].kind.name)
     return None
 
 

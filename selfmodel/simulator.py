@@ -1,7 +1,6 @@
 """The self-model in motion: many robots, each with its hypothesis and driver, in one batch."""
 
 import copy
-import dataclasses
 from collections.abc import Sequence
 from functools import lru_cache, partial
 from time import perf_counter
@@ -104,7 +103,7 @@ class Simulator:
         ways = [(fault.kind.feel, fault) for fault in hypothesis.faults if fault.kind.feel]
         if not ways:
             return embodiment
-        own = dataclasses.replace(embodiment, model=copy.copy(embodiment.model))
+        own = copy.deepcopy(embodiment)  # the other is remembered
         for feel, fault in ways:
             feel(own, fault, self._felt(observed))
         return own

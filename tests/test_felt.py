@@ -114,12 +114,13 @@ def test_where_too_little_was_felt_the_ground_is_level():
 
 def test_a_touch_that_errs_does_not_raise_the_ground():
     rng = np.random.default_rng(3)
-    places = np.repeat(rng.uniform((-3, -1), (3, 1), (500, 2)), 9, axis=0)
-    right = np.column_stack([places, 0.03 * height(*places.T)])
-    wrong = right.copy()
-    wrong[::9, 2] += 0.2
+    cells = np.round(rng.uniform((-30, -10), (30, 10), (500, 2))) * CELL
+    right = np.column_stack([cells, 0.03 * height(*cells.T)]).repeat(9, axis=0)
+    wrong, once = right.copy(), np.array([[3.4, 1.4, 5.0]])
+    wrong[: len(wrong) // 2 : 9, 2] += 0.5
 
-    np.testing.assert_allclose(felt_heights(wrong), felt_heights(right), atol=0.2)
+    np.testing.assert_array_equal(felt_heights(wrong), felt_heights(right))
+    np.testing.assert_array_equal(felt_heights(np.vstack([right, once])), felt_heights(right))
 
 
 def test_what_was_not_observed_is_not_felt(quadruped: Robot, walk: Oscillators):
@@ -130,7 +131,36 @@ def test_what_was_not_observed_is_not_felt(quadruped: Robot, walk: Oscillators):
     silent["sensors"][:, :4] = np.nan
 
     assert 0 < len(felt_points(quadruped, dataclasses.replace(whole, signals=blind))) <= 400
-    assert len(felt_points(quadruped, dataclasses.replace(whole, signals=silent))) == 0
+    assert felt_points(quadruped, dataclasses.replace(whole, signals=silent)).shape == (0, 3)
+
+
+def test_a_robot_on_its_back_or_far_away_feels_nothing_and_is_diagnosed_all_the_same(
+    quadruped: Robot, walk: Oscillators
+):
+    whole = observed(quadruped, "intact", walk)
+    in_the_air = {signal: values.copy() for signal, values in whole.signals.items()}
+    in_the_air["base_position"][:, 2] += 20
+    on_its_back = {signal: values.copy() for signal, values in whole.signals.items()}
+    on_its_back["sensors"][:, :4] = 0
+    plan = Plan("00-after", "after", walk, STEPS, 0)
+    for number, signals in enumerate((in_the_air, on_its_back)):
+        behaviour = dataclasses.replace(whole, signals=signals)
+        trial = Trial(plan, quadruped.name, behaviour, f"{number}.mcap")
+        evidence = Evidence(Simulator(quadruped, 1), SEGMENT_PREDICTION)
+        rough = parse("roughness=0.02", quadruped.anatomy)
+
+        assert felt_points(quadruped, behaviour).shape == (0, 3)
+        assert np.isfinite(evidence.distances([rough], [trial])).all()
+
+
+def test_the_ground_is_the_plane_that_lies_level_not_a_wall(quadruped: Robot, walk: Oscillators):
+    wall = '<worldbody><geom type="plane" size="5 5 1" pos="9 0 0" euler="0 -90 0"/>'
+    walled = dataclasses.replace(quadruped, mjcf=quadruped.mjcf.replace("<worldbody>", wall, 1))
+    behaviour = observed(quadruped, "intact", walk)
+
+    np.testing.assert_allclose(
+        felt_points(walled, behaviour), felt_points(quadruped, behaviour), atol=1e-9
+    )
 
 
 def test_a_robot_without_touch_feels_nothing():

@@ -115,6 +115,7 @@ GRADED = Kind(
         ({"absorbs": lambda _fault, _other, _anatomy: True}, "absorbs itself"),
         ({"strike": nothing}, "changes nothing about a robot"),
         ({"strike": heavier_each_time}, "does not make the same robot every time"),
+        ({"feel": lambda _own, _fault, points: points.fill(0)}, "changes the points"),
     ],
 )
 def test_the_contract_kit_sees_each_way_to_break_it(change: dict, said: str, quadruped: Robot):

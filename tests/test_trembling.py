@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from selfmodel.comparators.trembling import LEAST, trembling_loss
+from selfmodel.comparators.trembling import LEAST, ORDER, trembling_loss
 
 SEGMENTS, ROWS, SENSORS = 80, 13, 4
 ALL = np.ones((1, SENSORS), dtype=bool)
@@ -51,8 +51,20 @@ def test_the_right_noise_of_the_right_sensor_is_nearest(deviation: float):
 
 
 @pytest.mark.parametrize("radians_per_step", [0.02, 0.3, 0.6])
-def test_a_motion_is_no_noise_however_fast(radians_per_step: float):
-    assert loss(np.zeros((SEGMENTS, ROWS, SENSORS)), moving(radians_per_step)) == 0
+def test_a_joint_that_swings_alone_is_no_noisy_one_up_to_ten_steps_a_swing(
+    radians_per_step: float,
+):
+    logged = moving(radians_per_step)
+    logged[..., 1:] = 0
+
+    assert loss(np.zeros((SEGMENTS, ROWS, SENSORS)), logged) == 0
+
+
+def test_segments_too_short_to_tremble_in_have_no_loss():
+    logged = noisy(moving(0.1), 0, 0, 0.5, 0)
+
+    assert loss(moving(0.1)[:, :ORDER], logged[:, :ORDER]) == 0
+    assert loss(moving(0.1)[:, : ORDER + 1], logged[:, : ORDER + 1]) > 0
 
 
 @pytest.mark.parametrize("level", [0.05, 0.2])

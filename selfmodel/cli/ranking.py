@@ -27,7 +27,7 @@ def sureness(diagnosis: Diagnosis) -> dict[str, Any]:
         "verdict": diagnosis.verdict,
         "rivals": [str(rival) for rival in diagnosis.rivals],
         "test": diagnosis.test,
-        "outside": None if diagnosis.outside is None else str(diagnosis.outside),
+        "outside": diagnosis.outside.as_object() if diagnosis.outside else None,
         "intact_distance": intact if math.isfinite(intact) else None,
     }
 
@@ -46,9 +46,10 @@ def in_words(found: Mapping[str, Any]) -> str:
             rivals = ", ".join(found["rivals"])
             return f"Ambiguous: the trials cannot tell {best} from {rivals} ({found['test']})."
     if found["outside"] is not None:
+        better, kind = found["outside"]["hypothesis"], found["outside"]["kind"]
         return (
-            f"Unexplained: {found['outside']}, which is of a kind that was not considered "
-            f"(--kinds), predicts the trials significantly better than {best}."
+            f"Unexplained: {better} predicts the trials significantly better than {best}; add "
+            f"{kind} to --kinds."
         )
     return (
         f"Unexplained: even {best} predicts the trials significantly worse than the self-model "

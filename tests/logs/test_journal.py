@@ -8,7 +8,7 @@ import pytest
 
 from selfmodel.behaviour import Sample
 from selfmodel.controller import Controller
-from selfmodel.diagnosis import Candidate, Diagnosis
+from selfmodel.diagnosis import Candidate, Diagnosis, Outside
 from selfmodel.errors import InputError
 from selfmodel.faults import WORLD, Fault, Kind, known
 from selfmodel.hypothesis import INTACT, canonical
@@ -61,7 +61,13 @@ def test_a_journal_reads_what_it_recorded(journal: FolderJournal, biped: Robot):
     ]
     first = diagnosis(biped)
     second = dataclasses.replace(
-        first, ranked=first.ranked[1:], trials=4, intact_distance=math.inf, rivals=()
+        first,
+        ranked=first.ranked[1:],
+        trials=4,
+        intact_distance=math.inf,
+        rivals=(),
+        verdict="unexplained",
+        outside=Outside(parse("wind=12", biped.anatomy), "wind"),
     )
     journal.note(first)
     journal.note(second)
