@@ -28,13 +28,14 @@ def test_recover_prints_one_json_object_with_everything_promised(recovered: tupl
         *("robot", "case", "truth", "comparator", "kinds", "gap", "structure", "seed", "trials"),
         *("diagnosis", "verdict", "rivals", "test", "intact_distance", "calibration", "correct"),
         *("displacement", "recovery", "physical_trials", "evaluations", "seconds", "next_trial"),
-        *("controller", "neurons"),
+        *("controller", "neurons", "outside"),
     }
     assert (told["robot"], told["case"], told["seed"], told["gap"]) == ("quadruped", 4, 0, 0)
     assert told["truth"] == "break:front_left_shoulder+sensor:front_right_touch"
     assert told["comparator"] == "segment-prediction"
     assert (told["controller"], told["neurons"]) == ("network", 3)
     assert told["verdict"] in {"explained", "ambiguous", "unexplained"}
+    assert told["outside"] is None, "without a gap, a fault that is considered explains all"
     assert set(told["calibration"]) >= {"deviations", "error_before", "error"}
     assert told["intact_distance"] >= told["diagnosis"][0]["distance"] >= 0
     stages = [trial["stage"] for trial in told["trials"]]

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 import pytest
 
+from selfmodel.cli.ranking import as_values, in_words, sureness
 from selfmodel.cli.reality import draw_reality
 from selfmodel.comparators import SEGMENT_PREDICTION, SENSOR_SERIES
 from selfmodel.controller import Controller
@@ -129,6 +130,9 @@ def test_a_weak_failure_of_another_kind_is_unexplained_and_named_across_a_gap(
 
     assert (found.verdict == "unexplained") == (kind is not None)
     assert (found.outside.kind if found.outside else None) == kind
+    told = in_words({"diagnosis": as_values(found.ranked), **sureness(found)})
+    assert told.startswith(f"Unexplained: {found.outside.hypothesis}" if found.outside else "Expl")
+    assert (f"add {kind} to --kinds" in told) == (kind is not None)
     assert all(fault.kind in PAPER_KINDS for one in found.ranked for fault in one.hypothesis.faults)
 
 
