@@ -9,13 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from selfmodel.behaviour import collect
 from selfmodel.commands import command_ranges
 from selfmodel.errors import InputError
 from selfmodel.hypothesis import INTACT
 from selfmodel.mjcf import MjcfSettings, adapt, parse_setting, read_settings
-from selfmodel.oscillators import Oscillators
-from selfmodel.physical import SimulatedRobot
 from selfmodel.robot import Robot
 from selfmodel.simulator import Simulator
 from tests.conftest import random_controllers
@@ -394,14 +391,3 @@ def test_a_broken_limb_of_somebodys_robot_is_lost():
     ran = simulator.run([(INTACT, controller)], 30, ("base_position",)).behaviour
 
     assert np.isfinite(ran["base_position"]).all()
-
-
-def test_a_robot_without_any_sensor_moves_as_a_physical_and_as_a_simulated_one(tmp_path: Path):
-    robot = Robot.from_mjcf(written(tmp_path, mjcf()), MjcfSettings(touch=(), angle=()))
-    driver = Oscillators(robot.cpg, np.full(robot.cpg.weights, 0.5))
-    simulated = Simulator(robot, 1).run([(INTACT, driver)], 20, ["joint_positions"]).behaviour
-    physical = collect(robot.anatomy.names, SimulatedRobot(robot).run(driver, 20))
-
-    assert robot.anatomy.sensors == ()
-    np.testing.assert_array_equal(simulated["joint_positions"][0], physical["joint_positions"])
-    assert np.ptp(physical["joint_positions"]) > 0
