@@ -155,8 +155,9 @@ def test_what_needs_no_simulator_imports_without_mujoco(module: str):
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def test_help_imports_neither_mujoco_nor_dm_control():
-    code = "import sys, selfmodel.cli; assert not {'mujoco', 'dm_control'} & set(sys.modules)"
+def test_help_imports_neither_mujoco_nor_dm_control_nor_scipy():
+    slow = "{'mujoco', 'dm_control', 'scipy'}"
+    code = f"import sys, selfmodel.cli; assert not {slow} & set(sys.modules)"
 
     subprocess.run([sys.executable, "-c", code], check=True)
 

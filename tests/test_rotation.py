@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from selfmodel.rotation import rotation_between
+from selfmodel.rotation import cross, rotation_between
 
 
 def quaternion(rotation: Rotation) -> np.ndarray:
@@ -78,3 +78,13 @@ def test_a_start_is_shared_by_all_that_broadcast(shape: tuple[int, ...]):
     ]
 
     np.testing.assert_array_equal(rotation_between(to, start), expected)
+
+
+@pytest.mark.parametrize(
+    "shapes", [((3,), (3,)), ((3,), (7, 3)), ((7, 3), (7, 3)), ((5, 1, 3), (7, 3))]
+)
+def test_cross_products_are_numpy_s_to_the_bit(shapes: tuple[tuple[int, ...], tuple[int, ...]]):
+    rng = np.random.default_rng(0)
+    first, second = (rng.normal(size=shape) for shape in shapes)
+
+    np.testing.assert_array_equal(cross(first, second), np.cross(first, second))
