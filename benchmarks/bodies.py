@@ -4,10 +4,9 @@
 ``docs/figures/bodies.png``.
 """
 
-import csv
+import json
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
@@ -17,82 +16,48 @@ mpl.use("Agg")  # a figure in a file needs no display
 
 from matplotlib import pyplot as plt
 
+from selfmodel.cli.suite.rows import SINGLE, Row, Summary, summarise
+
 FIGURE = Path("docs/figures/bodies.png")
-CASES = ("1", "2", "3", "5", "6")
-"""The cases that are one fault."""
-
-SCORES = ("before", "after", "recovered")
-
-
-@dataclass(frozen=True)
-class Recovery:
-    """One recovery from a single fault.
-
-    Attributes:
-        body: The robot.
-        case: Which failure.
-        correct: Whether the last diagnosis is right.
-        before: Score before the failure.
-        after: Score of the same controller after it.
-        recovered: Score of the best recovery trial.
-    """
-
-    body: str
-    case: str
-    correct: bool
-    before: float
-    after: float
-    recovered: float
-
-    @property
-    def part(self) -> float:
-        """What is recovered of the score before the failure."""
-        return self.recovered / self.before
 
 
 def main() -> None:
     """Prints the tables and draws the figure."""
-    rows = [row for folder in sys.argv[1:] for row in _rows(Path(folder))]
-    bodies = sorted({row.body for row in rows})
+    rows = [row for folder in sys.argv[1:] for row in _single_faults(Path(folder))]
+    rows.sort(key=lambda row: row.robot)
+    found = {(one.robot, one.case): one for one in summarise(rows)}
+    bodies = list(dict.fromkeys(row.robot for row in rows))
     print("| body | before | after | recovered | recovered ÷ before | right |")
     print("|---|---:|---:|---:|---:|---:|")
     for body in bodies:
-        own = [row for row in rows if row.body == body]
-        scores = (median(getattr(row, name) for row in own) for name in SCORES)
-        told = " | ".join(f"{score:.2f}" for score in scores)
-        print(f"| `{body}` | {told} | {median(r.part for r in own):.2f} | {_right(own)} |")
-    print(f"| all | | | | {median(r.part for r in rows):.2f} | {_right(rows)} |\n")
-    print(f"| body | {' | '.join(f'case {case}' for case in CASES)} |")
-    print(f"|---|{'---:|' * len(CASES)}")
+        one = found[body, None]
+        told = f"{one.before:.2f} | {one.after:.2f} | {one.recovered:.2f} | {_recovery(one)}"
+        print(f"| `{body}` | {told} | {one.right} of {one.runs} |")
+    right, parts = sum(row.correct for row in rows), [row.recovered / row.before for row in rows]
+    print(f"| all | | | | {median(parts):.2f} | {right} of {len(rows)} |\n")
+    print(f"| body | {' | '.join(f'case {case}' for case in SINGLE)} |")
+    print(f"|---|{'---:|' * len(SINGLE)}")
     for body in bodies:
-        of_case = [[r.part for r in rows if (r.body, r.case) == (body, case)] for case in CASES]
-        told = " | ".join(f"{median(parts):.2f}" if parts else "" for parts in of_case)
-        print(f"| `{body}` | {told} |")
+        print(f"| `{body}` | {' | '.join(_recovery(found.get((body, case))) for case in SINGLE)} |")
     _draw(rows, bodies)
 
 
-def _rows(folder: Path) -> list[Recovery]:
-    with (folder / "results.csv").open(encoding="utf-8", newline="") as file:
-        return [
-            Recovery(
-                row["robot"],
-                row["case"],
-                row["correct"] == "true",
-                *(float(row[name]) for name in SCORES),
-            )
-            for row in csv.DictReader(file)
-            if row["case"] in CASES
-        ]
+def _single_faults(folder: Path) -> list[Row]:
+    found = json.loads((folder / "results.json").read_text(encoding="utf-8"))
+    rows = [Row(**row) for row in found["rows"]]
+    return [row for row in rows if row.case in SINGLE]
 
 
-def _right(rows: Sequence[Recovery]) -> str:
-    return f"{sum(row.correct for row in rows)} of {len(rows)}"
+def _recovery(summary: Summary | None) -> str:
+    if summary is None or summary.recovery is None:
+        return ""
+    return f"{summary.recovery:.2f}"
 
 
-def _draw(rows: Sequence[Recovery], bodies: Sequence[str]) -> None:
+def _draw(rows: Sequence[Row], bodies: Sequence[str]) -> None:
     figure, axes = plt.subplots(figsize=(8, 0.4 * len(bodies) + 1.2), layout="constrained")
     for y, body in enumerate(reversed(bodies)):
-        own = [row for row in rows if row.body == body]
+        own = [row for row in rows if row.robot == body]
         for shift, name, colour in ((0.15, "after", "tab:red"), (-0.15, "recovered", "tab:blue")):
             parts = [getattr(row, name) / row.before for row in own]
             heights = [y + shift] * len(parts)
