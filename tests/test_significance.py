@@ -12,6 +12,7 @@ from selfmodel.significance import (
     RATIO,
     WORSE,
     Z,
+    has_become_better,
     is_better,
     is_worse_than_ever,
     paired_z,
@@ -140,3 +141,41 @@ def test_the_order_of_the_pieces_does_not_matter(pair: np.ndarray, order: list[i
     z = paired_z(other, one) if np.isfinite(pair).all() else 0.0
     if abs(z - Z) > 1e-6:  # where rounding does not decide
         assert is_better(one[order], other[order]) == is_better(one, other)
+
+
+@pytest.mark.parametrize(("errors", "told"), [(WORSE * 1.01, True), (WORSE * 0.99, False)])
+def test_what_became_better_did_so_by_five_standard_errors(errors: float, told: bool):  # noqa: FBT001  # what is expected
+    one, before = np.full(100, 10.0), np.full(100, 10.0)
+    other = one + of_mean_and_error(errors * 0.1, 0.1)
+
+    assert has_become_better(one, other, before, before) == told
+    assert not has_become_better(other, one, before, before)
+
+
+def test_what_was_better_before_has_to_be_better_by_more_since():
+    rng = np.random.default_rng(2)
+    one, gain, earlier = rng.normal(10, 1, 80), rng.normal(1, 0.3, 80), rng.normal(0.9, 0.3, 40)
+    before = np.full(40, 10.0)
+    z = stats.ttest_ind(gain, earlier, equal_var=False).statistic
+    lift = (WORSE - z) * (gain.mean() - earlier.mean()) / z
+
+    assert paired_z(one + gain, one) > WORSE > z
+    assert not has_become_better(one, one + gain + 0.99 * lift, before, before + earlier)
+    assert has_become_better(one, one + gain + 1.01 * lift, before, before + earlier)
+
+
+def test_what_made_it_worse_before_has_to_help_all_the_same():
+    one, before = np.full(100, 10.0), np.full(100, 10.0)
+    hardly = one + of_mean_and_error(0.2, 0.1)
+
+    assert not has_become_better(one, hardly, before, before - 1)
+
+
+def test_what_diverged_or_has_a_single_piece_has_not_become_better():
+    one, other = np.zeros(5), np.linspace(1.0, 1.1, 5)
+
+    assert has_become_better(one, other, one, one)
+    assert not has_become_better(one, DIVERGED, one, one)
+    assert not has_become_better(one, other, one, DIVERGED)
+    assert not has_become_better(one[:1], other[:1], one, one)
+    assert not has_become_better(one, other * NEGLIGIBLE / 2, one, one)
