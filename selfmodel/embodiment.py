@@ -39,6 +39,7 @@ class Embodiment:
         noise: Standard deviation of what is added last, ``(sensors,)``; see ``selfmodel.noise``.
         neurons: 1 for each hidden neuron that works, 0 for a silent one, ``(hidden,)``.
         held: Of each hinge that is held still its places in ``qpos`` and ``qvel`` and its angle.
+        lost: The bodies that are ghosts.
         seed: Of what is random in it: the noise, and the shape of rough terrain.
         normal: Unit vector that stands on the ground, world frame, ``(3,)``.
     """
@@ -50,11 +51,13 @@ class Embodiment:
     noise: FloatArray
     neurons: FloatArray
     held: list[tuple[int, int, float]] = field(default_factory=list)
+    lost: set[str] = field(default_factory=set)
     seed: int = 0
     normal: FloatArray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
 
     def lose_body(self, name: str) -> None:
         """Makes a body a ghost: no mass, no collisions, no force from its motors and couplings."""
+        self.lost.add(name)
         model, body = self.model, self.model.body(name).id
         model.body_mass[body] = 0.0
         model.body_inertia[body] = 0.0

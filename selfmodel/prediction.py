@@ -34,7 +34,8 @@ def predict(
     not say where the base is and how fast, each begins there where the one before it ended: what
     was logged is put into one long simulation again and again.
 
-    What an embodiment holds still, such as a jammed joint, begins where it is held.
+    What an embodiment holds still, such as a jammed joint, begins where it is held. Nothing moves
+    the hinges of a lost limb: they begin at rest, at their median angle over all segments.
 
     Args:
         robot: The robot with nothing wrong.
@@ -74,7 +75,7 @@ def predict(
         )
         for signal in segments.record
     }
-    start = _Start(robot, batch, moving)
+    start = _Start(robot, batch, moving, segments)
     late = robot.control_delay if delay is None else delay
     activations = starting_activations(robot, segments, late)
     batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE)
@@ -82,7 +83,7 @@ def predict(
     first = segments.lead - late
     with counted_not_printed():
         for stage in stages:
-            start.write(segments, activations, stage)
+            start.write(activations, stage)
             clock = perf_counter()
             alive.forward()
             tally.physics_seconds += perf_counter() - clock
@@ -113,27 +114,32 @@ class _Start:
     """Writes logged states and commands into a batch, the same for each of the embodiments."""
 
     def __init__(
-        self, robot: Robot, batch: mujoco.batch.Batch, embodiments: Sequence[Embodiment]
+        self,
+        robot: Robot,
+        batch: mujoco.batch.Batch,
+        embodiments: Sequence[Embodiment],
+        segments: Segments,
     ) -> None:
+        self._segments = segments
         self._n = len(embodiments)
         models = [one.model for one in embodiments for _ in range(batch.nsim // len(embodiments))]
         self._write = writer(robot, batch.bind, *models)
         self._ctrl = batch.bind("ctrl")
         self._act = batch.bind("act")
         self._qpos, self._qvel = batch.bind("qpos"), batch.bind("qvel")
-        self._held = [
-            (number, *held)
-            for number, embodiment in enumerate(embodiments)
-            for held in embodiment.held
+        loose = _resting(robot, segments)
+        self._still = [
+            (number, *still)
+            for number, one in enumerate(embodiments)
+            for still in (*one.held, *(place for body, place in loose if body in one.lost))
         ]
 
-    def write(self, segments: Segments, activations: FloatArray, stage: IndexArray) -> None:
+    def write(self, activations: FloatArray, stage: IndexArray) -> None:
         """Begins the segments of these numbers."""
-        self._write(
-            {signal: self._for_all(values[stage]) for signal, values in segments.states.items()}
-        )
+        states = self._segments.states
+        self._write({signal: self._for_all(values[stage]) for signal, values in states.items()})
         self._act[:] = self._for_all(activations[stage])
-        for number, position, velocity, angle in self._held:
+        for number, position, velocity, angle in self._still:
             mine = slice(number * len(stage), (number + 1) * len(stage))
             self._qpos[mine, position] = angle
             self._qvel[mine, velocity] = 0.0
@@ -144,3 +150,16 @@ class _Start:
 
     def _for_all(self, values: FloatArray) -> FloatArray:
         return np.tile(values, (self._n, 1))
+
+
+def _resting(robot: Robot, segments: Segments) -> list[tuple[str, tuple[int, int, float]]]:
+    """Of each hinge whose angle is known its body, its places in the state, and its usual angle."""
+    angles = segments.states.get("joint_positions")
+    if angles is None:
+        return []
+    model = robot.model
+    hinges = [model.joint(name) for name in robot.anatomy.hinges]
+    return [
+        (model.body(hinge.bodyid[0]).name, (int(hinge.qposadr[0]), int(hinge.dofadr[0]), angle))
+        for hinge, angle in zip(hinges, np.median(angles, axis=0).tolist(), strict=True)
+    ]
