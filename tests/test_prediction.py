@@ -100,6 +100,32 @@ def test_a_jammed_joint_begins_where_it_is_held(quadruped: Robot):
     np.testing.assert_allclose(outcome.behaviour["joint_velocities"][..., knee], 0, atol=1e-4)
 
 
+@pytest.mark.parametrize("signals", [STATE, ONBOARD], ids=["whole", "onboard"])
+def test_the_joints_of_a_lost_limb_rest_where_noise_hides_them(
+    robot: Robot, signals: tuple[Signal, ...]
+):
+    joint = robot.anatomy.joints[0]
+    broken = parse(f"break:{joint.name}", robot.anatomy)
+    segments = cut(trial(robot, broken), range(0, STEPS - HORIZON, 15), signals)
+    rng = np.random.default_rng(0)
+    shifted = segments.states["joint_positions"] + rng.normal(
+        0.2, 0.1, segments.states["joint_positions"].shape
+    )
+    noisy = {**segments.states, "joint_positions": shifted, "joint_velocities": shifted}
+    outcome = Simulator(robot, 1).predict(
+        [INTACT, broken], dataclasses.replace(segments, states=noisy)
+    )
+    lost = [robot.anatomy.hinges.index(hinge) for hinge in joint.hinges]
+    positions = outcome.behaviour["joint_positions"][..., lost]
+    velocities = outcome.behaviour["joint_velocities"][..., lost]
+
+    np.testing.assert_allclose(
+        positions[1], np.broadcast_to(np.median(shifted[:, lost], axis=0), positions[1].shape)
+    )
+    np.testing.assert_array_equal(velocities[1], 0)
+    np.testing.assert_allclose(positions[0, :, 0], shifted[:, lost])
+
+
 @pytest.mark.parametrize("delay", [1, 2, 5])
 def test_a_delay_is_the_same_in_a_run_a_prediction_and_a_physical_robot(
     quadruped: Robot, delay: int
