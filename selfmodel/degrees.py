@@ -9,6 +9,7 @@ from selfmodel.anatomy import Anatomy
 from selfmodel.arrays import FloatArray
 from selfmodel.faults import Fault, Kind
 from selfmodel.hypothesis import Hypothesis, canonical
+from selfmodel.significance import is_better, paired_z
 
 COARSE = 4
 """Levels of a part that a search looks at before it knows what is wrong; the degree comes later."""
@@ -62,6 +63,53 @@ def with_fitted_degrees(
     return current
 
 
+def with_mean_degrees(
+    hypothesis: Hypothesis,
+    losses: Callable[[Sequence[Hypothesis]], FloatArray],
+    anatomy: Anatomy,
+) -> Hypothesis:
+    """Returns the hypothesis with the means of the degrees that cannot be told from the best.
+
+    Contact makes losses rugged over a degree, and where they are lowest is luck. A degree that
+    predicts worse than the best by z standard errors, paired over the pieces, weighs exp(-z^2 / 2).
+
+    Args:
+        hypothesis: With fitted degrees.
+        losses: As for ``with_fitted_degrees``.
+        anatomy: The robot's parts.
+    """
+    current = hypothesis
+    for place in range(len(hypothesis)):
+        mean = _averaged(current, place, losses, anatomy)
+        if len(mean) == len(current) and not is_better(*losses([current, mean])):
+            current = mean
+    return current
+
+
+def _averaged(
+    hypothesis: Hypothesis,
+    place: int,
+    losses: Callable[[Sequence[Hypothesis]], FloatArray],
+    anatomy: Anatomy,
+) -> Hypothesis:
+    fault = hypothesis.faults[place]
+    limits = _limits(fault, anatomy)
+    if limits is None or fault.kind.reshape:
+        return hypothesis
+    known = [fault.degree, *fault.kind.levels(anatomy, fault.part)]
+    degrees = sorted({*known, *_around(fault.degree, known, limits)})
+    if len(degrees) == 1:
+        return hypothesis
+    rows = losses([_with(hypothesis, place, degree, anatomy) for degree in degrees])
+    best = rows[np.argmin(rows.sum(axis=1))]
+    weights = np.array(
+        [0.0 if is_better(best, row) else np.exp(-(paired_z(row, best) ** 2) / 2) for row in rows]
+    )
+    weights *= np.gradient(degrees)  # they lie closer to each other around the best
+    mean = float(np.average(degrees, weights=weights))
+    return _with(hypothesis, place, round(mean, DECIMALS), anatomy)
+
+
 def _fitted(
     hypothesis: Hypothesis,
     place: int,
@@ -69,20 +117,29 @@ def _fitted(
     anatomy: Anatomy,
 ) -> Hypothesis:
     fault = hypothesis.faults[place]
-    if fault.kind.degrees is None:
+    limits = _limits(fault, anatomy)
+    if limits is None:
         return hypothesis
-    low, high = fault.kind.degrees(anatomy, fault.part)
     degrees = [fault.degree, *fault.kind.levels(anatomy, fault.part)]
     # What reshapes the model, such as rough terrain, has classes and no degrees in between.
     for _ in range(1 if fault.kind.reshape else 1 + ZOOMS):
         tried = [_with(hypothesis, place, degree, anatomy) for degree in degrees]
         chosen = int(np.argmin(losses(tried).sum(axis=1)))
         degree, best = degrees[chosen], tried[chosen]
-        below = [other for other in degrees if other < degree]
-        above = [other for other in degrees if other > degree]
-        around = np.linspace(max(below, default=low), min(above, default=high), POINTS)
-        degrees = [degree, *around.round(DECIMALS).tolist()]
+        degrees = [degree, *_around(degree, degrees, limits)]
     return best
+
+
+def _limits(fault: Fault, anatomy: Anatomy) -> tuple[float, float] | None:
+    return fault.kind.degrees(anatomy, fault.part) if fault.kind.degrees else None
+
+
+def _around(degree: float, known: Sequence[float], limits: tuple[float, float]) -> list[float]:
+    """Degrees from the next smaller one that is known to the next larger one, or to a limit."""
+    low = max((other for other in known if other < degree), default=limits[0])
+    high = min((other for other in known if other > degree), default=limits[1])
+    around: list[float] = np.linspace(low, high, POINTS).round(DECIMALS).tolist()
+    return around
 
 
 def _with(hypothesis: Hypothesis, place: int, degree: float, anatomy: Anatomy) -> Hypothesis:

@@ -151,7 +151,18 @@ class Diagnose:
             partial(self.evidence.losses, trials=trials),
             self._anatomy,
             screen=partial(self._screen.losses, trials=trials),
+            before=partial(self._aside.losses, trials=self._intact)
+            if self._can_look_back(trials)
+            else None,
         )
+
+    def _can_look_back(self, trials: Sequence[Trial]) -> bool:
+        """Whether what helps since something is wrong can be compared with what helped before.
+
+        Pieces of a whole trial, closed loop, hang together: the luckiest of hundreds would win.
+        """
+        segments = self.evidence.in_pieces and self.evidence.in_segments(trials)
+        return bool(self._intact) and segments
 
     def _rivals(
         self, best: Hypothesis, others: Sequence[Hypothesis], trials: Sequence[Trial]
@@ -167,9 +178,7 @@ class Diagnose:
         return tuple(other for other, apart in zip(candidates, told, strict=True) if not apart)
 
     def _outside(self, best: Hypothesis, trials: Sequence[Trial]) -> Outside | None:
-        # Pieces of a whole trial, closed loop, hang together: the luckiest of hundreds would win.
-        segments = self.evidence.in_pieces and self.evidence.in_segments(trials)
-        if not self._intact or not segments:
+        if not self._can_look_back(trials):
             return None
         losses = outside.Losses(
             after=partial(self._aside.losses, trials=trials),

@@ -11,10 +11,10 @@ import numpy as np
 
 from selfmodel.anatomy import Anatomy
 from selfmodel.arrays import FloatArray
-from selfmodel.degrees import with_fitted_degrees
+from selfmodel.degrees import with_fitted_degrees, with_mean_degrees
 from selfmodel.faults import Fault, Kind
 from selfmodel.hypothesis import INTACT, Hypothesis, canonical
-from selfmodel.significance import is_better
+from selfmodel.significance import helped_before, is_better
 
 Losses = Callable[[Sequence[Hypothesis]], FloatArray]
 """How badly hypotheses predict each piece of the trials, ``(n, pieces)``."""
@@ -34,13 +34,14 @@ def refined(
     anatomy: Anatomy,
     *,
     screen: Losses | None = None,
+    before: Losses | None = None,
 ) -> Hypothesis:
     """Returns the hypothesis with the fewest faults that no other predicts better than.
 
     From each start, the best change of one fault (one more, one less, another in its place) is
     made, and its degrees fitted, until none helps; then faults go that are not worth it. Of
     what the starts lead to, a hypothesis with more faults wins only where it is significantly
-    better.
+    better. Its degrees are the means of those that the trials cannot tell from the best.
 
     Args:
         known: Hypotheses to start from, beside the best single faults and ``INTACT``.
@@ -50,16 +51,18 @@ def refined(
         anatomy: The robot's parts.
         screen: The same, from fewer pieces and cheaper: of many hypotheses those are looked at
             that it finds closest. Without it, all are.
+        before: How badly they predict trials of the robot with nothing wrong. A fault that would
+            have helped there as much is not worth it: it mends the self-model.
     """
-    search = _Search(faults, most, losses, screen or losses, anatomy)
+    search = _Search(faults, most, losses, screen or losses, anatomy, before=before)
     starts = dict.fromkeys([*known, INTACT, *_closest_parts(search)[:STARTS]])
-    found = {search.settled(search.fitted(start)) for start in starts}
+    found = {end for start in starts for end in search.settled(search.fitted(start))}
     finest = {search.spared(search.fitted_finely(one)) for one in found}
     best = INTACT
     for hypothesis in sorted(finest, key=lambda one: (len(one), search.total(one), one)):
         if search.is_better(hypothesis, best):
             best = hypothesis
-    return best
+    return with_mean_degrees(best, losses, anatomy)
 
 
 def _closest_parts(search: "_Search") -> list[Hypothesis]:
@@ -89,9 +92,11 @@ class _Search:
         losses: Losses,
         screen: Losses,
         anatomy: Anatomy,
+        *,
+        before: Losses | None,
     ) -> None:
         self._faults, self._most, self._anatomy = faults, most, anatomy
-        self._losses, self._screen = losses, screen
+        self._losses, self._screen, self._before = losses, screen, before
 
     def total(self, hypothesis: Hypothesis) -> float:
         return float(self._losses([hypothesis])[0].sum())
@@ -114,15 +119,18 @@ class _Search:
         few = hypotheses if len(hypotheses) <= SHORTLIST else self.ordered(hypotheses)[:SHORTLIST]
         return _ordered(few, self._losses)
 
-    def settled(self, start: Hypothesis) -> Hypothesis:
-        """Where a search ends: no change helps, and no fault can be spared."""
-        current = self._descended(start, self._neighbours)
-        seen = {current}
+    def settled(self, start: Hypothesis) -> list[Hypothesis]:
+        """Where a search ends, no fault of which can be spared: by one more or less, then in place.
+
+        Another fault in its place may predict better and mend no more than the model.
+        """
+        current = self.spared(self._descended(start, self._neighbours))
+        ends = dict.fromkeys([current])
         while True:
-            current = self._descended(self.spared(current), self._others_in_place)
-            if current in seen:
-                return self.spared(current)
-            seen.add(current)
+            current = self.spared(self._descended(current, self._others_in_place))
+            if current in ends:
+                return list(ends)
+            ends[current] = None
 
     def with_one_more(self, hypothesis: Hypothesis) -> list[Hypothesis]:
         return self._distinct(hypothesis, [(*hypothesis.faults, fault) for fault in self._faults])
@@ -145,11 +153,21 @@ class _Search:
             spared = [
                 fewer
                 for fewer in self.closest(self._with_one_less(current))
-                if not self.is_better(current, fewer)
+                if not self._is_worth_it(current, fewer)
             ]
             if not spared:
                 return current
             current = spared[0]
+
+    def _is_worth_it(self, hypothesis: Hypothesis, fewer: Hypothesis) -> bool:
+        """Whether what a hypothesis says more than another tells what has changed."""
+        if not self.is_better(hypothesis, fewer):
+            return False
+        if self._before is None:
+            return True
+        more = [fault for fault in hypothesis.faults if fault not in fewer.faults]
+        alone = canonical(more, self._anatomy)
+        return not helped_before(*self._losses([hypothesis, fewer]), *self._before([alone, INTACT]))
 
     def _neighbours(self, hypothesis: Hypothesis) -> list[Hypothesis]:
         return (

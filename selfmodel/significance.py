@@ -75,9 +75,30 @@ def has_become_better(
     gain, before = other - one, other_before - one_before
     if min(len(gain), len(before)) < 2 or not gain.mean() > NEGLIGIBLE:
         return False
-    variance = gain.var(ddof=1) / len(gain) + before.var(ddof=1) / len(before)
-    more = gain.mean() - before.mean()
-    return bool(paired_z(other, one) >= WORSE and more >= WORSE * np.sqrt(variance))
+    more, error = _unpaired(gain, before)
+    return paired_z(other, one) >= WORSE and more >= WORSE * error
+
+
+def helped_before(
+    one: FloatArray, other: FloatArray, one_before: FloatArray, other_before: FloatArray
+) -> bool:
+    """Returns whether what predicts better would have done so before anything was wrong.
+
+    What helped then, and does not help significantly more now, only mends the model.
+
+    Args:
+        one: The losses of the better hypothesis, ``(pieces,)``.
+        other: Those of the other, on the same pieces.
+        one_before: As ``one``, of other trials, from before.
+        other_before: As ``other``, of these.
+    """
+    if not all(np.isfinite(losses).all() for losses in (one, other, one_before, other_before)):
+        return False
+    gain, before = other - one, other_before - one_before
+    if min(len(gain), len(before)) < 2 or not before.mean() > NEGLIGIBLE:
+        return False
+    more, error = _unpaired(gain, before)
+    return more < Z * error
 
 
 def is_worse_than_ever(losses: FloatArray, usual: FloatArray) -> bool:
@@ -91,6 +112,11 @@ def is_worse_than_ever(losses: FloatArray, usual: FloatArray) -> bool:
     larger = bool(losses.mean() > RATIO * usual.mean() + NEGLIGIBLE)
     if min(len(losses), len(usual)) < 2 or not np.isfinite([losses.mean(), usual.mean()]).all():
         return larger
-    variance = losses.var(ddof=1) / len(losses) + usual.var(ddof=1) / len(usual)
-    difference = losses.mean() - usual.mean()
-    return larger or bool(difference > WORSE * np.sqrt(variance) + NEGLIGIBLE)
+    difference, error = _unpaired(losses, usual)
+    return larger or difference > WORSE * error + NEGLIGIBLE
+
+
+def _unpaired(one: FloatArray, other: FloatArray) -> tuple[float, float]:
+    """By how much the first mean is larger, and the standard error of that (Welch)."""
+    variance = one.var(ddof=1) / len(one) + other.var(ddof=1) / len(other)
+    return float(one.mean() - other.mean()), float(np.sqrt(variance))

@@ -5,7 +5,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pytest
 
-from selfmodel.degrees import COARSE, coarse_candidates, with_fitted_degrees
+from selfmodel.degrees import (
+    COARSE,
+    coarse_candidates,
+    with_fitted_degrees,
+    with_mean_degrees,
+)
 from selfmodel.faults import FRICTION, KINDS, PAPER_KINDS, WORLD, Fault
 from selfmodel.hypothesis import Hypothesis
 from selfmodel.refine import Losses
@@ -65,3 +70,72 @@ def test_a_fit_of_degrees_never_makes_it_worse_and_a_degree_that_is_nothing_goes
     assert losses([fitted]).sum() < losses([useless]).sum()
     assert find(losses, useless, faults=DEGREES) == find(losses, faults=DEGREES)
     assert [fault.kind for fault in find(losses, useless, faults=DEGREES).faults] == [FRICTION]
+
+
+def rugged(truth: float, noise: float, lucky: float) -> Losses:
+    """Losses of frictions: a bowl in noise of its own for every degree, and one that is lucky.
+
+    Args:
+        truth: Where the bowl is lowest.
+        noise: Standard deviation of what a piece differs by from one degree to another.
+        lucky: A degree that predicts a little better than the truth.
+    """
+
+    def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        rows = []
+        for hypothesis in hypotheses:
+            degree = hypothesis.faults[0].degree if hypothesis.faults else 1.5
+            rng = np.random.default_rng(round(degree * 1e4))
+            ripple = rng.normal(size=PIECES)
+            ripple -= ripple.mean()
+            luck = 1.0 if degree == lucky else 0.0
+            rows.append(5 + (degree - truth) ** 2 - luck * LUCK + noise * ripple)
+        return np.array(rows)
+
+    return losses
+
+
+LUCK = 0.03
+
+
+def friction(degree: float) -> Hypothesis:
+    return Hypothesis((Fault(FRICTION, WORLD, degree),))
+
+
+def degree_of(hypothesis: Hypothesis) -> float:
+    (fault,) = hypothesis.faults
+    return fault.degree
+
+
+def test_a_lucky_degree_does_not_win_where_its_neighbours_cannot_be_told_from_it():
+    losses = rugged(truth=0.4, noise=0.3, lucky=0.32)
+    fitted = with_fitted_degrees(friction(0.6), losses, ANATOMY)
+    mean = with_mean_degrees(fitted, losses, ANATOMY)
+
+    assert degree_of(fitted) == 0.32
+    assert degree_of(mean) == pytest.approx(0.4, abs=0.04)
+
+
+def test_a_degree_that_is_told_from_its_neighbours_stays():
+    losses = rugged(truth=0.4, noise=1e-6, lucky=0.4)
+
+    assert with_mean_degrees(friction(0.4), losses, ANATOMY) == friction(0.4)
+
+
+def test_a_mean_is_not_taken_across_what_predicts_worse():
+    # Two valleys: the mean of their degrees lies on the hill between them.
+    def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        rng = np.random.default_rng(0)
+        ripple = rng.normal(scale=0.01, size=PIECES)
+        return np.array(
+            [1 + min(abs(degree_of(h) - 0.2), abs(degree_of(h) - 1.2)) + ripple for h in hypotheses]
+        )
+
+    assert with_mean_degrees(friction(0.2), losses, ANATOMY) == friction(0.2)
+
+
+def test_classes_of_what_reshapes_the_model_have_no_mean():
+    rough = Hypothesis((Fault(KINDS["roughness"], WORLD, 0.02),))
+    flat = with_mean_degrees(rough, lambda asked: np.ones((len(asked), PIECES)), ANATOMY)
+
+    assert flat == rough

@@ -74,8 +74,9 @@ def find(
     *known: Hypothesis,
     faults: Sequence[Fault] = FAULTS,
     most: int = MOST,
+    before: Losses | None = None,
 ) -> Hypothesis:
-    return refined(known, faults, most, losses, ANATOMY)
+    return refined(known, faults, most, losses, ANATOMY, before=before)
 
 
 @pytest.mark.parametrize(
@@ -352,3 +353,13 @@ def test_a_screen_that_prefers_what_is_wrong_does_not_decide():
     screen = counted({"intact": 1.5, one: 1.0, right: 0.5, wrong: 0.1}, otherwise=2.0)
 
     assert refined([], FAULTS, MOST, losses, ANATOMY, screen=screen) == said(right)
+
+
+def test_a_fault_that_would_have_helped_as_much_before_only_mends_the_model():
+    truth, mends = said("break:back_left_knee"), said("jam:front_left_knee")
+    both = canonical((*truth.faults, *mends.faults), ANATOMY)
+    after = additive(both)
+
+    assert find(after, before=additive(truth)) == mends
+    assert find(after, before=additive(INTACT)) == both
+    assert find(after, before=additive(mends)) == truth
