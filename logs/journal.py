@@ -159,6 +159,7 @@ def _as_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "trials": diagnosis.trials,
         "intact_distance": _finite(diagnosis.intact_distance),
         "rivals": [str(rival) for rival in diagnosis.rivals],
+        "unseen": [str(one) for one in diagnosis.unseen],
         "verdict": diagnosis.verdict,
         "test": diagnosis.test,
         "outside": diagnosis.outside.as_object() if diagnosis.outside else None,
@@ -214,6 +215,7 @@ def _read_diagnoses(folder: Path, anatomy: Anatomy, kinds: Sequence[Kind]) -> tu
                 verdict=_read_verdict(item["verdict"]),
                 test=str(item["test"]),
                 outside=_read_outside(item.get("outside"), anatomy, kinds),
+                unseen=tuple(parse(one, anatomy, kinds) for one in item.get("unseen", ())),
             )
             for item in items
         )

@@ -21,6 +21,7 @@ from selfmodel.settings import Settings
 from selfmodel.significance import TEST, is_better, is_worse_than_ever
 from selfmodel.simulator import Simulator
 from selfmodel.trial import Trial
+from selfmodel.unseen import unseen
 
 KNOWN = 2
 """Of what the EA found closest, how much is refined."""
@@ -59,7 +60,7 @@ class Diagnose:
         self._intact = tuple(intact)
         self.evidence = Evidence(simulator, comparator)
         self._screen = screen_of(comparator, simulator, self.evidence)
-        # What is not considered is never ranked: it is remembered apart.
+        # What is looked at once the best is known is never ranked: it is remembered apart.
         self._aside = Evidence(simulator, comparator)
         self._screen_aside = screen_of(comparator, simulator, self._aside)
         self.evaluations = 0
@@ -97,6 +98,7 @@ class Diagnose:
             verdict=self._verdict(best, rivals, better, trials),
             test=TEST if self.evidence.in_pieces else EQUAL,
             outside=better,
+            unseen=tuple(self._unseen(best, trials)[:kept]),
         )
 
     def check(self, trials: Sequence[Trial]) -> None:
@@ -186,6 +188,13 @@ class Diagnose:
             before=partial(self._aside.losses, trials=self._intact),
         )
         return outside.better_outside(best, self._kinds, self._anatomy, losses)
+
+    def _unseen(self, best: Hypothesis, trials: Sequence[Trial]) -> list[Hypothesis]:
+        if not self.evidence.in_pieces:
+            return []
+        losses = partial(self._aside.losses, trials=trials)
+        screen = partial(self._screen_aside.losses, trials=trials)
+        return unseen(best, self._kinds, self._anatomy, losses, screen)
 
     def _verdict(
         self,

@@ -55,6 +55,8 @@ class Diagnosis:
         trials: How many trials they had to explain.
         intact_distance: The distance that "nothing changed" gets.
         rivals: Other hypotheses that the trials cannot tell from the best, closest first.
+        unseen: The best hypothesis with one fault more, each that the trials neither show nor rule
+            out, closest first; see ``unseen.unseen``.
         verdict: Whether the best hypothesis explains the trials.
         test: By which test the rivals were told from the others.
         outside: The best hypothesis with a fault of a kind that was not considered, where that
@@ -68,6 +70,7 @@ class Diagnosis:
     verdict: Verdict
     test: str
     outside: Outside | None = None
+    unseen: tuple[Hypothesis, ...] = ()
 
     @property
     def best(self) -> Hypothesis:

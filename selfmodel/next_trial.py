@@ -99,12 +99,12 @@ def telling_apart(
 def in_the_running(diagnosis: Diagnosis) -> tuple[Hypothesis, ...]:
     """Returns the best hypothesis and those that a trial should tell from it, five at most.
 
-    They are its rivals; where it has none, those that follow it in the ranking.
+    They are its rivals, and what may be wrong besides; where there is none of either, those that
+    follow it in the ranking.
     """
-    followers = diagnosis.rivals or tuple(
-        one.hypothesis for one in diagnosis.ranked[1:] if math.isfinite(one.distance)
-    )
-    return (diagnosis.best, *followers)[:MOST]
+    untold = (*diagnosis.rivals, *diagnosis.unseen)
+    followers = (one.hypothesis for one in diagnosis.ranked[1:] if math.isfinite(one.distance))
+    return (diagnosis.best, *(untold or followers))[:MOST]
 
 
 def candidates(

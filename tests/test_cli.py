@@ -26,7 +26,16 @@ def test_recover_prints_one_json_object_with_everything_promised(recovered: tupl
 
     assert set(told) == {
         *("robot", "case", "truth", "comparator", "kinds", "gap", "structure", "seed", "trials"),
-        *("diagnosis", "verdict", "rivals", "test", "intact_distance", "calibration", "correct"),
+        *(
+            "diagnosis",
+            "verdict",
+            "rivals",
+            "unseen",
+            "test",
+            "intact_distance",
+            "calibration",
+            "correct",
+        ),
         *("displacement", "recovery", "physical_trials", "evaluations", "seconds", "next_trial"),
         *("controller", "neurons", "outside"),
     }

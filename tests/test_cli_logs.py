@@ -232,7 +232,15 @@ def test_diagnosis_from_logs_alone_says_what_the_run_said_that_wrote_them(
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
 
-    for said in ("diagnosis", "verdict", "rivals", "test", "intact_distance", "calibration"):
+    for said in (
+        "diagnosis",
+        "verdict",
+        "rivals",
+        "unseen",
+        "test",
+        "intact_distance",
+        "calibration",
+    ):
         assert found[said] == told[said], said
     assert found["logs"] == logs[1:]
     assert found["intact"] == logs[:1]

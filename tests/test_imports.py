@@ -103,7 +103,7 @@ LAYERS = (
         *("limits", "environment_robot", "score"),
     ),
     (
-        *("database", "evidence", "screen", "refine", "degrees", "outside", "diagnose"),
+        *("database", "evidence", "screen", "refine", "degrees", "outside", "unseen", "diagnose"),
         *("repair", "calibrate", "next_trial"),
     ),
     ("recover", "explain"),

@@ -240,6 +240,16 @@ def test_the_rivals_are_in_the_running_and_without_any_those_that_follow(quadrup
     assert running(7) == running(0) == tuple(known[:5])
 
 
+def test_what_may_be_wrong_besides_is_in_the_running_after_the_rivals(quadruped: Robot):
+    texts = ("intact", "break:front_left_knee", "jam:front_left_knee")
+    found = diagnosis(*texts, robot=quadruped, rivals=1, verdict="ambiguous")
+    touch = parse("sensor:front_left_touch", quadruped.anatomy)
+    best, rival, _ = (one.hypothesis for one in found.ranked)
+
+    assert in_the_running(dataclasses.replace(found, unseen=(touch,))) == (best, rival, touch)
+    assert in_the_running(dataclasses.replace(found, rivals=(), unseen=(touch,))) == (best, touch)
+
+
 def test_a_hypothesis_that_diverges_is_not_in_the_running(quadruped: Robot):
     found = diagnosis("intact", "break:front_left_knee", robot=quadruped, verdict="explained")
     apart = dataclasses.replace(found.ranked[1], distance=float("inf"))

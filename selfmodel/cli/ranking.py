@@ -7,6 +7,7 @@ from typing import Any
 from rich.table import Table
 
 from selfmodel.diagnosis import Candidate, Diagnosis
+from selfmodel.hypothesis import Hypothesis
 
 
 def as_values(ranked: Sequence[Candidate]) -> list[dict[str, Any]]:
@@ -26,18 +27,28 @@ def sureness(diagnosis: Diagnosis) -> dict[str, Any]:
     return {
         "verdict": diagnosis.verdict,
         "rivals": [str(rival) for rival in diagnosis.rivals],
+        "unseen": [_besides(one, diagnosis.best) for one in diagnosis.unseen],
         "test": diagnosis.test,
         "outside": diagnosis.outside.as_object() if diagnosis.outside else None,
         "intact_distance": intact if math.isfinite(intact) else None,
     }
 
 
+def _besides(one: Hypothesis, best: Hypothesis) -> str:
+    return str(Hypothesis(tuple(fault for fault in one.faults if fault not in best.faults)))
+
+
 def in_words(found: Mapping[str, Any]) -> str:
-    """Returns how sure a diagnosis is, as a sentence.
+    """Returns how sure a diagnosis is, as a sentence or two.
 
     Args:
         found: What ``sureness`` says, and under ``diagnosis`` what ``as_values`` does.
     """
+    besides = ", ".join(found["unseen"])
+    return _verdict(found) + (f" Not ruled out besides: {besides}." if besides else "")
+
+
+def _verdict(found: Mapping[str, Any]) -> str:
     best = found["diagnosis"][0]["hypothesis"]
     match found["verdict"]:
         case "explained":

@@ -68,6 +68,7 @@ def test_a_journal_reads_what_it_recorded(journal: FolderJournal, biped: Robot):
         rivals=(),
         verdict="unexplained",
         outside=Outside(parse("wind=12", biped.anatomy), "wind"),
+        unseen=(parse("break:left_hip+jam:right_hip", biped.anatomy),),
     )
     journal.note(first)
     journal.note(second)

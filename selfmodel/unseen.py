@@ -1,0 +1,50 @@
+"""What may be wrong besides: faults that the trials neither show nor rule out."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from selfmodel.anatomy import Anatomy
+from selfmodel.arrays import FloatArray
+from selfmodel.faults import Kind
+from selfmodel.hypothesis import Hypothesis, canonical
+from selfmodel.significance import is_better
+
+Losses = Callable[[Sequence[Hypothesis]], FloatArray]
+"""How badly hypotheses predict each piece of the trials, ``(n, pieces)``."""
+
+
+def unseen(
+    best: Hypothesis, kinds: Sequence[Kind], anatomy: Anatomy, losses: Losses, screen: Losses
+) -> list[Hypothesis]:
+    """Returns the hypotheses of one fault more that the trials cannot tell from the best.
+
+    A dead touch sensor is one, in a foot that the gait never put down. Faults of degree are left
+    out: of each there is one that is too slight to be seen.
+
+    Args:
+        best: The best hypothesis.
+        kinds: What is considered.
+        anatomy: The robot's parts.
+        losses: How badly hypotheses predict the trials.
+        screen: The same, from fewer pieces and cheaper: what it can tell is not looked at closely.
+
+    Returns:
+        Closest first.
+    """
+    exact = [kind for kind in kinds if kind.degrees is None]
+    faults = [fault for kind in exact for fault in kind.candidates(anatomy)]
+    made = dict.fromkeys(canonical([*best.faults, fault], anatomy) for fault in faults)
+    more = [one for one in made if len(one) > len(best)]
+    few = _untold(best, _untold(best, more, screen), losses)
+    order = np.argsort(losses(few).sum(axis=1), kind="stable") if few else ()
+    return [few[i] for i in order]
+
+
+def _untold(best: Hypothesis, others: Sequence[Hypothesis], losses: Losses) -> list[Hypothesis]:
+    mine, *theirs = losses([best, *others])
+    return [
+        other
+        for other, row in zip(others, theirs, strict=True)
+        if not is_better(mine, row) and not is_better(row, mine)
+    ]
