@@ -1,7 +1,7 @@
 """How severe the faults of a hypothesis are: their degrees, fitted between a genome's levels."""
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from selfmodel.anatomy import Anatomy
 from selfmodel.arrays import FloatArray
 from selfmodel.faults import Fault, Kind
 from selfmodel.hypothesis import Hypothesis, canonical
-from selfmodel.significance import is_better, paired_z
+from selfmodel.significance import NEGLIGIBLE, Losses, is_better, paired_z
 
 COARSE = 4
 """Levels of a part that a search looks at before it knows what is wrong; the degree comes later."""
@@ -40,7 +40,7 @@ def coarse_candidates(kinds: Sequence[Kind], anatomy: Anatomy) -> list[Fault]:
 
 def with_fitted_degrees(
     hypothesis: Hypothesis,
-    losses: Callable[[Sequence[Hypothesis]], FloatArray],
+    losses: Losses,
     anatomy: Anatomy,
 ) -> Hypothesis:
     """Returns the hypothesis with those degrees by which it predicts best.
@@ -65,13 +65,14 @@ def with_fitted_degrees(
 
 def with_mean_degrees(
     hypothesis: Hypothesis,
-    losses: Callable[[Sequence[Hypothesis]], FloatArray],
+    losses: Losses,
     anatomy: Anatomy,
 ) -> Hypothesis:
     """Returns the hypothesis with the means of the degrees that cannot be told from the best.
 
     Contact makes losses rugged over a degree, and where they are lowest is luck. A degree that
-    predicts worse than the best by z standard errors, paired over the pieces, weighs exp(-z^2 / 2).
+    predicts worse than the best by z standard errors, paired over the pieces, weighs exp(-z^2 / 2);
+    one that lies beyond a degree that is ruled out, nothing.
 
     Args:
         hypothesis: With fitted degrees.
@@ -89,7 +90,7 @@ def with_mean_degrees(
 def _averaged(
     hypothesis: Hypothesis,
     place: int,
-    losses: Callable[[Sequence[Hypothesis]], FloatArray],
+    losses: Losses,
     anatomy: Anatomy,
 ) -> Hypothesis:
     fault = hypothesis.faults[place]
@@ -101,19 +102,29 @@ def _averaged(
     if len(degrees) == 1:
         return hypothesis
     rows = losses([_with(hypothesis, place, degree, anatomy) for degree in degrees])
-    best = rows[np.argmin(rows.sum(axis=1))]
-    weights = np.array(
-        [0.0 if is_better(best, row) else np.exp(-(paired_z(row, best) ** 2) / 2) for row in rows]
-    )
-    weights *= np.gradient(degrees)  # they lie closer to each other around the best
-    mean = float(np.average(degrees, weights=weights))
-    return _with(hypothesis, place, round(mean, DECIMALS), anatomy)
+    weights = _weights(rows)
+    # They lie closer to each other around the best.
+    mean = np.trapezoid(weights * degrees, degrees) / np.trapezoid(weights, degrees)
+    return _with(hypothesis, place, round(float(mean), DECIMALS), anatomy)
+
+
+def _weights(rows: FloatArray) -> FloatArray:
+    """How much neighbouring degrees count, ``(n,)``: beyond one that is ruled out, none does."""
+    best = int(np.argmin(rows.sum(axis=1)))
+    z = np.array([paired_z(row, rows[best]) if np.isfinite(row).all() else 0.0 for row in rows])
+    worse = rows.mean(axis=1) > rows[best].mean() + NEGLIGIBLE
+    out = np.array([is_better(rows[best], row) for row in rows]) | (worse & (z <= 0))
+    low = max(np.flatnonzero(out[:best]), default=-1)
+    high = best + min(np.flatnonzero(out[best:]), default=len(out))
+    weights: FloatArray = np.exp(-np.square(z) / 2)
+    weights[: low + 1] = weights[high:] = 0.0
+    return weights
 
 
 def _fitted(
     hypothesis: Hypothesis,
     place: int,
-    losses: Callable[[Sequence[Hypothesis]], FloatArray],
+    losses: Losses,
     anatomy: Anatomy,
 ) -> Hypothesis:
     fault = hypothesis.faults[place]

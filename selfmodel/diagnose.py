@@ -15,10 +15,11 @@ from selfmodel.evolution import Evolution, Observe, evolve
 from selfmodel.faults import PAPER_KINDS, Kind
 from selfmodel.genome import VALUES, decode, encode
 from selfmodel.hypothesis import INTACT, Hypothesis
+from selfmodel.mending import mends_in_part
 from selfmodel.refine import refined
 from selfmodel.screen import screen_of
 from selfmodel.settings import Settings
-from selfmodel.significance import TEST, is_better, is_worse_than_ever
+from selfmodel.significance import TEST, Losses, is_better, is_worse_than_ever
 from selfmodel.simulator import Simulator
 from selfmodel.trial import Trial
 from selfmodel.unseen import unseen
@@ -153,18 +154,20 @@ class Diagnose:
             partial(self.evidence.losses, trials=trials),
             self._anatomy,
             screen=partial(self._screen.losses, trials=trials),
-            before=partial(self._aside.losses, trials=self._intact)
-            if self._can_look_back(trials)
-            else None,
+            before=self._before(trials),
         )
 
-    def _can_look_back(self, trials: Sequence[Trial]) -> bool:
-        """Whether what helps since something is wrong can be compared with what helped before.
+    def _before(self, trials: Sequence[Trial]) -> Losses | None:
+        """How badly hypotheses predict the intact robot, if it can be compared with some trials.
 
-        Pieces of a whole trial, closed loop, hang together: the luckiest of hundreds would win.
+        Pieces of a whole trial, closed loop, hang together: what helps there may be luck.
         """
-        segments = self.evidence.in_pieces and self.evidence.in_segments(trials)
-        return bool(self._intact) and segments
+        in_segments = self.evidence.in_pieces and self.evidence.in_segments(
+            [*self._intact, *trials]
+        )
+        if not self._intact or not in_segments:
+            return None
+        return partial(self._aside.losses, trials=self._intact)
 
     def _rivals(
         self, best: Hypothesis, others: Sequence[Hypothesis], trials: Sequence[Trial]
@@ -177,15 +180,21 @@ class Diagnose:
             told = [is_better(mine, losses) for losses in theirs]
         else:
             told = [bool(losses.sum() != mine.sum()) for losses in theirs]
-        return tuple(other for other, apart in zip(candidates, told, strict=True) if not apart)
+        untold = [other for other, apart in zip(candidates, told, strict=True) if not apart]
+        before = self._before(trials)
+        if before is None:
+            return tuple(untold)
+        after = partial(self._aside.losses, trials=trials)
+        return tuple(one for one in untold if not mends_in_part(one, after, before, self._anatomy))
 
     def _outside(self, best: Hypothesis, trials: Sequence[Trial]) -> Outside | None:
-        if not self._can_look_back(trials):
+        before = self._before(trials)
+        if before is None:
             return None
-        losses = outside.Losses(
+        losses = outside.Looks(
             after=partial(self._aside.losses, trials=trials),
             screen=partial(self._screen_aside.losses, trials=trials),
-            before=partial(self._aside.losses, trials=self._intact),
+            before=before,
         )
         return outside.better_outside(best, self._kinds, self._anatomy, losses)
 

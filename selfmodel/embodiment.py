@@ -39,7 +39,7 @@ class Embodiment:
         noise: Standard deviation of what is added last, ``(sensors,)``; see ``selfmodel.noise``.
         neurons: 1 for each hidden neuron that works, 0 for a silent one, ``(hidden,)``.
         held: Of each hinge that is held still its places in ``qpos`` and ``qvel`` and its angle.
-        lost: The bodies that are ghosts.
+        loose: The joints of lost bodies, by name: nothing moves them.
         seed: Of what is random in it: the noise, and the shape of rough terrain.
         normal: Unit vector that stands on the ground, world frame, ``(3,)``.
     """
@@ -51,14 +51,14 @@ class Embodiment:
     noise: FloatArray
     neurons: FloatArray
     held: list[tuple[int, int, float]] = field(default_factory=list)
-    lost: set[str] = field(default_factory=set)
+    loose: set[str] = field(default_factory=set)
     seed: int = 0
     normal: FloatArray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
 
     def lose_body(self, name: str) -> None:
         """Makes a body a ghost: no mass, no collisions, no force from its motors and couplings."""
-        self.lost.add(name)
         model, body = self.model, self.model.body(name).id
+        self.loose.update(model.joint(j).name for j in np.flatnonzero(model.jnt_bodyid == body))
         model.body_mass[body] = 0.0
         model.body_inertia[body] = 0.0
         model.geom_contype[model.geom_bodyid == body] = 0
@@ -67,6 +67,8 @@ class Embodiment:
         model.dof_armature[degrees] = GHOST_ARMATURE
         model.dof_frictionloss[degrees] = 0.0
         model.jnt_stiffness[model.jnt_bodyid == body] = 0.0
+        # A limit pushes, where a robot starts beyond it or an encoder errs.
+        model.jnt_limited[model.jnt_bodyid == body] = 0
         model.jnt_stiffnesspoly[model.jnt_bodyid == body] = 0.0
         for motor in range(model.nu):
             if body in motor_bodies(model, motor):

@@ -1,23 +1,22 @@
 """What was not considered: whether a kind outside the considered ones explains what is left."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from selfmodel.anatomy import Anatomy
-from selfmodel.arrays import FloatArray
 from selfmodel.degrees import coarse_candidates
 from selfmodel.diagnosis import Outside
 from selfmodel.faults import ALL_KINDS, Fault, Kind
 from selfmodel.hypothesis import INTACT, Hypothesis, canonical
-from selfmodel.significance import NEGLIGIBLE, has_become_better, paired_z
+from selfmodel.significance import NEGLIGIBLE, Losses, has_become_better, paired_z
 
 SHORTLIST = 8
 """Hypotheses that are looked at closely, of those that the screen likes."""
 
 
-class Losses(NamedTuple):
+class Looks(NamedTuple):
     """How badly hypotheses predict each piece of some trials, ``(n, pieces)`` each.
 
     Attributes:
@@ -26,13 +25,13 @@ class Losses(NamedTuple):
         before: Trials of the robot with nothing wrong.
     """
 
-    after: Callable[[Sequence[Hypothesis]], FloatArray]
-    screen: Callable[[Sequence[Hypothesis]], FloatArray]
-    before: Callable[[Sequence[Hypothesis]], FloatArray]
+    after: Losses
+    screen: Losses
+    before: Losses
 
 
 def better_outside(
-    best: Hypothesis, considered: Sequence[Kind], anatomy: Anatomy, losses: Losses
+    best: Hypothesis, considered: Sequence[Kind], anatomy: Anatomy, losses: Looks
 ) -> Outside | None:
     """Returns the best hypothesis with a fault that was not considered, if that explains more.
 
@@ -80,7 +79,7 @@ def _candidates(
 
 
 def _shortlist(
-    best: Hypothesis, candidates: dict[Hypothesis, Fault], losses: Losses
+    best: Hypothesis, candidates: dict[Hypothesis, Fault], losses: Looks
 ) -> list[Hypothesis]:
     """Those that the screen likes most, the closest first."""
     if not candidates:

@@ -35,7 +35,8 @@ def predict(
     was logged is put into one long simulation again and again.
 
     What an embodiment holds still, such as a jammed joint, begins where it is held. Nothing moves
-    the hinges of a lost limb: they begin at rest, at their median angle over all segments.
+    the hinges of a lost limb: where the segments say angles, they begin at rest, at their median
+    angle over all segments.
 
     Args:
         robot: The robot with nothing wrong.
@@ -127,11 +128,11 @@ class _Start:
         self._ctrl = batch.bind("ctrl")
         self._act = batch.bind("act")
         self._qpos, self._qvel = batch.bind("qpos"), batch.bind("qvel")
-        loose = _resting(robot, segments)
+        resting = _resting(robot, segments)
         self._still = [
             (number, *still)
             for number, one in enumerate(embodiments)
-            for still in (*one.held, *(place for body, place in loose if body in one.lost))
+            for still in (*one.held, *(resting[name] for name in one.loose & resting.keys()))
         ]
 
     def write(self, activations: FloatArray, stage: IndexArray) -> None:
@@ -152,14 +153,13 @@ class _Start:
         return np.tile(values, (self._n, 1))
 
 
-def _resting(robot: Robot, segments: Segments) -> list[tuple[str, tuple[int, int, float]]]:
-    """Of each hinge whose angle is known its body, its places in the state, and its usual angle."""
+def _resting(robot: Robot, segments: Segments) -> dict[str, tuple[int, int, float]]:
+    """Of each hinge whose angle is known its places in the state and its median angle."""
     angles = segments.states.get("joint_positions")
     if angles is None:
-        return []
-    model = robot.model
-    hinges = [model.joint(name) for name in robot.anatomy.hinges]
-    return [
-        (model.body(hinge.bodyid[0]).name, (int(hinge.qposadr[0]), int(hinge.dofadr[0]), angle))
+        return {}
+    hinges = [robot.model.joint(name) for name in robot.anatomy.hinges]
+    return {
+        hinge.name: (int(hinge.qposadr[0]), int(hinge.dofadr[0]), angle)
         for hinge, angle in zip(hinges, np.median(angles, axis=0).tolist(), strict=True)
-    ]
+    }

@@ -10,14 +10,11 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from selfmodel.anatomy import Anatomy
-from selfmodel.arrays import FloatArray
 from selfmodel.degrees import with_fitted_degrees, with_mean_degrees
 from selfmodel.faults import Fault, Kind
 from selfmodel.hypothesis import INTACT, Hypothesis, canonical
-from selfmodel.significance import helped_before, is_better
-
-Losses = Callable[[Sequence[Hypothesis]], FloatArray]
-"""How badly hypotheses predict each piece of the trials, ``(n, pieces)``."""
+from selfmodel.mending import mends
+from selfmodel.significance import Losses, is_better
 
 SHORTLIST = 8
 """Hypotheses of many that are looked at closely."""
@@ -36,7 +33,7 @@ def refined(
     screen: Losses | None = None,
     before: Losses | None = None,
 ) -> Hypothesis:
-    """Returns the hypothesis with the fewest faults that no other predicts better than.
+    """Returns the best hypothesis of which every fault is worth its while.
 
     From each start, the best change of one fault (one more, one less, another in its place) is
     made, and its degrees fitted, until none helps; then faults go that are not worth it. Of
@@ -62,7 +59,8 @@ def refined(
     for hypothesis in sorted(finest, key=lambda one: (len(one), search.total(one), one)):
         if search.is_better(hypothesis, best):
             best = hypothesis
-    return with_mean_degrees(best, losses, anatomy)
+    mean = with_mean_degrees(best, losses, anatomy)
+    return mean if search.spared(mean) == mean else best
 
 
 def _closest_parts(search: "_Search") -> list[Hypothesis]:
@@ -165,9 +163,7 @@ class _Search:
             return False
         if self._before is None:
             return True
-        more = [fault for fault in hypothesis.faults if fault not in fewer.faults]
-        alone = canonical(more, self._anatomy)
-        return not helped_before(*self._losses([hypothesis, fewer]), *self._before([alone, INTACT]))
+        return not mends(hypothesis, fewer, self._losses, self._before, self._anatomy)
 
     def _neighbours(self, hypothesis: Hypothesis) -> list[Hypothesis]:
         return (

@@ -5,9 +5,15 @@ predict for both does not count. A piece is not independent of the next one, and
 the robot errs everywhere in the same way: so much more is asked for than a textbook would.
 """
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 
 from selfmodel.arrays import FloatArray
+from selfmodel.hypothesis import Hypothesis
+
+Losses = Callable[[Sequence[Hypothesis]], FloatArray]
+"""How badly hypotheses predict each piece of some trials, ``(n, pieces)``."""
 
 Z = 3.0
 """How many standard errors the mean difference of two hypotheses must have. Of some 1,500 faults
@@ -79,12 +85,14 @@ def has_become_better(
     return paired_z(other, one) >= WORSE and more >= WORSE * error
 
 
-def helped_before(
+def only_mends(
     one: FloatArray, other: FloatArray, one_before: FloatArray, other_before: FloatArray
 ) -> bool:
-    """Returns whether what predicts better would have done so before anything was wrong.
+    """Returns whether what predicts better mends the model, and tells of no change.
 
-    What helped then, and does not help significantly more now, only mends the model.
+    It would have helped before anything was wrong, and does not help significantly more since;
+    though what is really wrong would have done as much harm then as it helps now, and that much the
+    trials would have shown.
 
     Args:
         one: The losses of the better hypothesis, ``(pieces,)``.
@@ -98,7 +106,7 @@ def helped_before(
     if min(len(gain), len(before)) < 2 or not before.mean() > NEGLIGIBLE:
         return False
     more, error = _unpaired(gain, before)
-    return more < Z * error
+    return more < Z * error < 2 * float(gain.mean())
 
 
 def is_worse_than_ever(losses: FloatArray, usual: FloatArray) -> bool:

@@ -1,17 +1,13 @@
 """What may be wrong besides: faults that the trials neither show nor rule out."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from selfmodel.anatomy import Anatomy
-from selfmodel.arrays import FloatArray
 from selfmodel.faults import Kind
 from selfmodel.hypothesis import Hypothesis, canonical
-from selfmodel.significance import is_better
-
-Losses = Callable[[Sequence[Hypothesis]], FloatArray]
-"""How badly hypotheses predict each piece of the trials, ``(n, pieces)``."""
+from selfmodel.significance import Losses, is_better
 
 
 def unseen(

@@ -13,7 +13,7 @@ from selfmodel.degrees import (
 )
 from selfmodel.faults import FRICTION, KINDS, PAPER_KINDS, WORLD, Fault
 from selfmodel.hypothesis import Hypothesis
-from selfmodel.refine import Losses
+from selfmodel.significance import Losses
 from tests.test_refine import ANATOMY, FAULTS, PIECES, find
 
 WEAK_MOTOR = KINDS["motor"]
@@ -122,16 +122,43 @@ def test_a_degree_that_is_told_from_its_neighbours_stays():
     assert with_mean_degrees(friction(0.4), losses, ANATOMY) == friction(0.4)
 
 
-def test_a_mean_is_not_taken_across_what_predicts_worse():
-    # Two valleys: the mean of their degrees lies on the hill between them.
-    def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
-        rng = np.random.default_rng(0)
-        ripple = rng.normal(scale=0.01, size=PIECES)
-        return np.array(
-            [1 + min(abs(degree_of(h) - 0.2), abs(degree_of(h) - 1.2)) + ripple for h in hypotheses]
-        )
+def valleys(*bottoms: float, noise: float, pieces: int = PIECES) -> Losses:
+    """Losses of frictions that are lowest at several degrees, in noise of their own for each."""
 
-    assert with_mean_degrees(friction(0.2), losses, ANATOMY) == friction(0.2)
+    def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        rows = []
+        for hypothesis in hypotheses:
+            degree = degree_of(hypothesis)
+            ripple = np.random.default_rng(round(degree * 1e4)).normal(size=pieces)
+            depth = min(abs(degree - bottom) for bottom in bottoms)
+            rows.append(2 + depth + noise * (ripple - ripple.mean()))
+        return np.array(rows)
+
+    return losses
+
+
+def test_a_mean_is_not_taken_across_what_predicts_worse():
+    mean = with_mean_degrees(friction(0.2), valleys(0.2, 1.2, noise=0.2), ANATOMY)
+
+    assert degree_of(mean) == pytest.approx(0.2, abs=0.05)
+
+
+def test_without_pieces_to_compare_the_best_degree_stays():
+    losses = valleys(0.4, noise=0.0, pieces=1)
+
+    assert with_mean_degrees(friction(0.4), losses, ANATOMY) == friction(0.4)
+
+
+def test_where_nothing_can_be_told_the_mean_is_that_of_all_degrees():
+    means = [
+        degree_of(
+            with_mean_degrees(friction(start), lambda asked: np.ones((len(asked), 9)), ANATOMY)
+        )
+        for start in (0.2, 0.5, 0.9)
+    ]
+    levels = FRICTION.levels(ANATOMY, WORLD)
+
+    assert means == pytest.approx([(levels[0] + levels[-1]) / 2] * 3, abs=1e-3)
 
 
 def test_classes_of_what_reshapes_the_model_have_no_mean():

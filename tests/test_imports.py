@@ -103,7 +103,17 @@ LAYERS = (
         *("limits", "environment_robot", "score"),
     ),
     (
-        *("database", "evidence", "screen", "refine", "degrees", "outside", "unseen", "diagnose"),
+        *(
+            "database",
+            "evidence",
+            "screen",
+            "mending",
+            "refine",
+            "degrees",
+            "outside",
+            "unseen",
+            "diagnose",
+        ),
         *("repair", "calibrate", "next_trial"),
     ),
     ("recover", "explain"),

@@ -15,7 +15,7 @@ from selfmodel.diagnosis import Diagnosis, Outside
 from selfmodel.faults import ALL_KINDS, PAPER_KINDS, ROUGHNESS
 from selfmodel.hypothesis import INTACT, Hypothesis
 from selfmodel.notation import parse
-from selfmodel.outside import Losses, better_outside
+from selfmodel.outside import Looks, better_outside
 from selfmodel.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.significance import NEGLIGIBLE
@@ -40,7 +40,7 @@ def of(robot: Robot, means: Mapping[str, float]) -> Callable[[Sequence[Hypothesi
 def test_what_explains_more_is_returned(quadruped: Robot):
     after = of(quadruped, {"wind=12": 0.8, "crosswind=12": 0.9})
     found = better_outside(
-        INTACT, PAPER_KINDS, quadruped.anatomy, Losses(after, after, of(quadruped, {}))
+        INTACT, PAPER_KINDS, quadruped.anatomy, Looks(after, after, of(quadruped, {}))
     )
 
     assert found == Outside(parse("wind=12", quadruped.anatomy), "wind")
@@ -48,7 +48,7 @@ def test_what_explains_more_is_returned(quadruped: Robot):
 
 def test_what_helped_before_as_well_mends_the_model_and_is_no_change(quadruped: Robot):
     after, before = (of(quadruped, {"wind=12": mean}) for mean in (0.8, 0.79))
-    found = better_outside(INTACT, PAPER_KINDS, quadruped.anatomy, Losses(after, after, before))
+    found = better_outside(INTACT, PAPER_KINDS, quadruped.anatomy, Looks(after, after, before))
 
     assert found is None
 
@@ -60,7 +60,7 @@ def test_where_nothing_is_left_to_explain_nothing_is_simulated(quadruped: Robot)
     def perfect(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
         return np.full((len(hypotheses), PIECES), NEGLIGIBLE)
 
-    found = better_outside(INTACT, PAPER_KINDS, quadruped.anatomy, Losses(perfect, never, never))
+    found = better_outside(INTACT, PAPER_KINDS, quadruped.anatomy, Looks(perfect, never, never))
 
     assert found is None
 
@@ -69,7 +69,7 @@ def test_a_best_hypothesis_that_diverges_is_not_compared(quadruped: Robot):
     def diverged(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
         return np.full((len(hypotheses), PIECES), np.inf)
 
-    losses = Losses(diverged, diverged, of(quadruped, {}))
+    losses = Looks(diverged, diverged, of(quadruped, {}))
 
     assert better_outside(INTACT, PAPER_KINDS, quadruped.anatomy, losses) is None
 
@@ -83,7 +83,7 @@ def test_only_what_was_not_considered_is_asked_about_and_nothing_that_reshapes(q
 
     best = parse("sensor:back_left_angle", quadruped.anatomy)
     flat = of(quadruped, {})
-    found = better_outside(best, PAPER_KINDS, quadruped.anatomy, Losses(flat, screen, flat))
+    found = better_outside(best, PAPER_KINDS, quadruped.anatomy, Looks(flat, screen, flat))
     kinds = {fault.kind for one in asked - {best} for fault in one.faults}
 
     assert found is None
@@ -97,7 +97,7 @@ def test_only_what_was_not_considered_is_asked_about_and_nothing_that_reshapes(q
 def test_with_all_kinds_considered_nothing_is_outside(quadruped: Robot):
     flat = of(quadruped, {})
 
-    assert better_outside(INTACT, ALL_KINDS, quadruped.anatomy, Losses(flat, flat, flat)) is None
+    assert better_outside(INTACT, ALL_KINDS, quadruped.anatomy, Looks(flat, flat, flat)) is None
 
 
 def trial(robot: Robot, truth: str, gait: Controller, stage: Stage, number: int) -> Trial:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from selfmodel.behaviour import SIGNALS, Behaviour, Signal, collect
+from selfmodel.cli import resolve
 from selfmodel.comparator import Segments
 from selfmodel.driver import Driver
 from selfmodel.estimate import IMU, JOINTS, STATE
@@ -104,8 +105,9 @@ def test_a_jammed_joint_begins_where_it_is_held(quadruped: Robot):
 def test_the_joints_of_a_lost_limb_rest_where_noise_hides_them(
     robot: Robot, signals: tuple[Signal, ...]
 ):
-    joint = robot.anatomy.joints[0]
-    broken = parse(f"break:{joint.name}", robot.anatomy)
+    anatomy = robot.anatomy
+    joint = anatomy.joints[0]
+    broken = parse(f"break:{joint.name}", anatomy)
     segments = cut(trial(robot, broken), range(0, STEPS - HORIZON, 15), signals)
     rng = np.random.default_rng(0)
     shifted = segments.states["joint_positions"] + rng.normal(
@@ -115,7 +117,8 @@ def test_the_joints_of_a_lost_limb_rest_where_noise_hides_them(
     outcome = Simulator(robot, 1).predict(
         [INTACT, broken], dataclasses.replace(segments, states=noisy)
     )
-    lost = [robot.anatomy.hinges.index(hinge) for hinge in joint.hinges]
+    beyond = [joint, *(other for other in anatomy.joints if other.name in joint.lost)]
+    lost = [anatomy.hinges.index(hinge) for each in beyond for hinge in each.hinges]
     positions = outcome.behaviour["joint_positions"][..., lost]
     velocities = outcome.behaviour["joint_velocities"][..., lost]
 
@@ -123,7 +126,20 @@ def test_the_joints_of_a_lost_limb_rest_where_noise_hides_them(
         positions[1], np.broadcast_to(np.median(shifted[:, lost], axis=0), positions[1].shape)
     )
     np.testing.assert_array_equal(velocities[1], 0)
+    assert len(beyond) > 1
     np.testing.assert_allclose(positions[0, :, 0], shifted[:, lost])
+
+
+def test_a_lost_limb_rests_wherever_it_starts():
+    # The hopper's knee starts beyond its limit, which would push it all through the trial.
+    robot = resolve.robot_entry("suite-hopper-hop").robot()
+    broken = parse("break:knee", robot.anatomy)
+    run, starts = trial(robot, broken), range(0, STEPS - HORIZON, 15)
+    outcome = Simulator(robot, 1).predict([broken], cut(run, starts))
+    knee = robot.anatomy.hinges.index("knee")
+
+    assert run["joint_positions"][0, knee] < robot.anatomy.joint("knee").limits[0][0]
+    assert furthest(outcome.behaviour, run, starts) < EXACT
 
 
 @pytest.mark.parametrize("delay", [1, 2, 5])

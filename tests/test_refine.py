@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 from selfmodel.faults import PAPER_KINDS, Fault
 from selfmodel.hypothesis import INTACT, Hypothesis, canonical
 from selfmodel.notation import parse
-from selfmodel.refine import Losses, refined
-from selfmodel.significance import is_better
+from selfmodel.refine import refined
+from selfmodel.significance import Losses, is_better
 from selfmodel.tasks import ROBOTS
 
 ANATOMY = ROBOTS["quadruped"].robot().anatomy

@@ -11,7 +11,8 @@ from selfmodel.faults import ALL_KINDS, PAPER_KINDS
 from selfmodel.hypothesis import INTACT, Hypothesis
 from selfmodel.notation import parse
 from selfmodel.robot import Robot
-from selfmodel.unseen import Losses, unseen
+from selfmodel.significance import Losses
+from selfmodel.unseen import unseen
 
 PIECES = 60
 
