@@ -67,9 +67,9 @@ class Embodiment:
         model.dof_armature[degrees] = GHOST_ARMATURE
         model.dof_frictionloss[degrees] = 0.0
         model.jnt_stiffness[model.jnt_bodyid == body] = 0.0
+        model.jnt_stiffnesspoly[model.jnt_bodyid == body] = 0.0
         # A limit pushes, where a robot starts beyond it or an encoder errs.
         model.jnt_limited[model.jnt_bodyid == body] = 0
-        model.jnt_stiffnesspoly[model.jnt_bodyid == body] = 0.0
         for motor in range(model.nu):
             if body in motor_bodies(model, motor):
                 self.release_motor(motor)
