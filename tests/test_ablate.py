@@ -17,7 +17,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from selfmodel.cli.ablation import Ablation, Row, ablate, collect, write_results
-from selfmodel.cli.ablation.figures import draw
 from selfmodel.cli.ablation.plan import cells
 from selfmodel.cli.ablation.scores import summarise
 from selfmodel.errors import InputError
@@ -371,17 +370,3 @@ def test_time_is_compared_on_the_runs_that_both_have():
     assert ours.correct.low == pytest.approx(0.0567, abs=1e-4)
     assert ours.time.estimate == 1
     assert other.time.estimate == other.time.low == 1.5
-
-
-def test_a_figure_is_drawn_for_any_subset_of_a_grid():
-    rows = [
-        dataclasses.replace(scored(name, case, 1.0, correct=True), gap=gap, robot=robot)
-        for name, case, gap, robot in itertools.product(
-            ("a", "b"), (1, 3), (0.0, 0.05, 0.1), ("quadruped", "hexapod")
-        )
-        if (name, robot) != ("b", "hexapod")
-    ]
-
-    names = [name for name, _ in draw(rows, summarise(rows))]
-    assert names == ["gap.png", "cases-hexapod-1.png", "cases-quadruped-1.png"]
-    assert list(draw([], [])) == []

@@ -23,7 +23,7 @@ def draw(rows: Sequence[Row], scores: Sequence[Score]) -> Iterator[tuple[str, by
     """Gives each figure's name and its PNG; none where there are no rows."""
     if not rows:
         return
-    yield "gap.png", _png(_by_gap(scores))
+    yield "gap.png", _png(by_gap(scores))
     shown = _first_and_last(sorted({row.trials for row in rows}))
     for robot in sorted({row.robot for row in rows}):
         for trials in shown:
@@ -36,7 +36,7 @@ def _first_and_last(trials: Sequence[int]) -> list[int]:
     return sorted({trials[0], trials[-1]})
 
 
-def _by_gap(scores: Sequence[Score]) -> Figure:
+def by_gap(scores: Sequence[Score]) -> Figure:
     """A panel for each robot and number of trials, a line a comparator with interval bars."""
     robots = sorted({score.robot for score in scores})
     shown = _first_and_last(sorted({score.trials for score in scores}))
@@ -56,7 +56,7 @@ def _by_gap(scores: Sequence[Score]) -> Figure:
                 }
                 if line:
                     shift = spread * (k - (len(comparators) - 1) / 2)
-                    _line(axes, line, comparator, MARKERS[k % len(MARKERS)], shift)
+                    _line(axes, line, comparator, k, shift)
             axes.set_title(f"{robot}, {trials} {'trial' if trials == 1 else 'trials'}")
             axes.set_ylim(-0.03, 1.03)
             axes.set_xticks(gaps)
@@ -80,7 +80,7 @@ def _by_gap(scores: Sequence[Score]) -> Figure:
     return figure
 
 
-def _line(axes: Axes, line: dict[float, Interval], label: str, marker: str, shift: float) -> None:
+def _line(axes: Axes, line: dict[float, Interval], label: str, number: int, shift: float) -> None:
     gaps = sorted(line)
     middle = np.array([line[gap].estimate for gap in gaps])
     ends = np.array([[line[gap].low, line[gap].high] for gap in gaps]).T
@@ -91,7 +91,8 @@ def _line(axes: Axes, line: dict[float, Interval], label: str, marker: str, shif
         middle,
         yerr=bars,
         label=label,
-        marker=marker,
+        marker=MARKERS[number % len(MARKERS)],
+        color=f"C{number}",  # a panel need not have all comparators
         markersize=5,
         capsize=2,
         linewidth=1.5,
