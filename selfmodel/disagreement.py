@@ -13,8 +13,9 @@ import numpy as np
 from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.behaviour import Behaviour, Signal
 from selfmodel.differences import difference
-from selfmodel.driver import Evolved
+from selfmodel.driver import Driver, Evolved
 from selfmodel.hypothesis import Hypothesis
+from selfmodel.playback import Playback
 from selfmodel.robot import Robot
 from selfmodel.rotation import directions
 from selfmodel.simulator import Simulator
@@ -57,17 +58,22 @@ def most_disputed(
     A controller with which the robot falls under any of the hypotheses, or whose simulation
     diverges, is out. Where all are, it is the one with which the first fall comes latest.
 
+    The predictions that are compared are of the same commands, those that the first hypothesis
+    leads to. Through a controller, one reading more makes another motion, and a comparator that is
+    given the commands learns nothing from that.
+
     Args:
-        hypotheses: Those that are still in the running.
+        hypotheses: Those that are still in the running, the best first.
         candidates: At least one; of equals, the first is taken.
         simulator: The self-model.
         steps: Control steps of a trial. Falls are looked for in all of it, disagreement early on.
     """
     early = _predicted(hypotheses, candidates, simulator, min(steps, EARLY))
     falls = _first_of_any(early, hypotheses, simulator.robot)
-    # NaN, of a simulation that diverged, sorts last.
-    order = np.argsort(-disagreements(early.behaviour), kind="stable")
-    for i in map(int, order[falls[order] == early.behaviour.steps]):
+    upright = np.flatnonzero(falls == early.behaviour.steps)
+    names, commands = early.behaviour.names, early.behaviour["commands"][upright, 0]
+    alike = [Playback(names.motors, rows) for rows in commands]
+    for i in map(int, upright[_most_telling_first(hypotheses, alike, simulator)]):
         whole = _predicted(hypotheses, [candidates[i]], simulator, steps)
         falls[i] = _first_of_any(whole, hypotheses, simulator.robot)[0]
         if falls[i] == steps:
@@ -75,16 +81,27 @@ def most_disputed(
     return candidates[int(falls.argmax())]
 
 
+def _most_telling_first(
+    hypotheses: Sequence[Hypothesis], recordings: Sequence[Playback], simulator: Simulator
+) -> IndexArray:
+    """The numbers of recorded commands, those on which the hypotheses disagree most first."""
+    if not recordings:
+        return np.empty(0, dtype=np.intp)
+    found = _predicted(hypotheses, recordings, simulator, len(recordings[0].commands))
+    telling = np.where(found.diverged.any(axis=1), -1.0, disagreements(found.behaviour))
+    return np.argsort(-telling, kind="stable")
+
+
 def _predicted(
     hypotheses: Sequence[Hypothesis],
-    candidates: Sequence[Evolved],
+    drivers: Sequence[Driver],
     simulator: Simulator,
     steps: int,
 ) -> Simulated:
-    """Each candidate under each hypothesis, ``(candidates, hypotheses, steps, width)``."""
-    runs = [(hypothesis, one) for one in candidates for hypothesis in hypotheses]
-    outcome = simulator.run(runs, steps, tuple(SCALES))
-    return outcome.grouped(len(candidates), len(hypotheses))
+    """Each driver under each hypothesis, ``(drivers, hypotheses, steps, width)``."""
+    runs = [(hypothesis, one) for one in drivers for hypothesis in hypotheses]
+    outcome = simulator.run(runs, steps, (*SCALES, "commands"))
+    return outcome.grouped(len(drivers), len(hypotheses))
 
 
 def _first_of_any(

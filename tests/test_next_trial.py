@@ -27,6 +27,7 @@ from selfmodel.next_trial import (
     telling_apart,
 )
 from selfmodel.notation import parse
+from selfmodel.playback import Playback
 from selfmodel.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulator import Run, Simulator
@@ -74,12 +75,16 @@ class Oracle:
 
     def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> Simulated:
         """Predicts what the fates say; only the second hypothesis is not uneventful."""
+        known = dict(enumerate(self.controllers))
         shapes = {signal: (len(runs), steps, NAMES.width(signal)) for signal in record}
         signals = {signal: np.zeros(shape) for signal, shape in shapes.items()}
         signals["base_position"][..., 2] = HEIGHT
         signals["base_orientation"][..., 0] = 1
         diverged = np.zeros(len(runs), dtype=bool)
-        for row, (hypothesis, controller) in enumerate(runs):
+        for row, (hypothesis, driver) in enumerate(runs):
+            # What a controller commands is its number.
+            controller = known[driver.commands[0, 0]] if isinstance(driver, Playback) else driver
+            signals["commands"][row] = self.controllers.index(controller)
             fate = self._fates[controller]
             if hypothesis == INTACT:
                 continue
@@ -129,6 +134,19 @@ def test_the_controller_that_makes_two_hypotheses_differ_is_chosen(quadruped: Ro
 
     one = most_disputed(hypotheses, pool, Simulator(quadruped, 2), 120)
     assert one == moving(quadruped, "front_left_knee")
+
+
+def test_a_dead_sensor_is_asked_for_where_it_would_read_most(quadruped: Robot):
+    # What the controllers would make of the reading, another motion, is not evidence.
+    simulator = Simulator(quadruped, 2)
+    hypotheses = [INTACT, parse("sensor:front_left_touch", quadruped.anatomy)]
+    pool = random_controllers(quadruped, 12)
+    touch = [sensor.name for sensor in quadruped.anatomy.sensors].index("front_left_touch")
+    runs = simulator.run([(INTACT, one) for one in pool], EARLY, ("sensors",))
+    touches = runs.behaviour["sensors"][..., touch].mean(axis=1)
+
+    assert len(set(touches)) > 4
+    assert most_disputed(hypotheses, pool, simulator, EARLY) == pool[int(np.argmax(touches))]
 
 
 def test_what_differs_most_is_chosen_and_of_equals_the_first(quadruped: Robot):
