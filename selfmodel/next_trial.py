@@ -56,11 +56,13 @@ def by_repair(situation: Situation) -> Evolved:
 def by_disagreement(situation: Situation) -> Evolved:
     """Chooses the controller on which hypotheses disagree, and a repair when that is over.
 
-    It is over once a diagnosis is ``explained``, or when only one trial is left: the trials are
-    spent to bring the robot back, and what is never tried restores nothing.
+    It is over once a diagnosis is ``explained`` and nothing may be wrong unseen besides, or when
+    only one trial is left: the trials are spent to bring the robot back, and what is never tried
+    restores nothing.
     """
     diagnosis = situation.known.diagnoses[-1]
-    if diagnosis.verdict == "explained" or situation.trials_left == 1:
+    sure = diagnosis.verdict == "explained" and not diagnosis.unseen
+    if sure or situation.trials_left == 1:
         return situation.repaired()
     situation.watch(Question(in_the_running(diagnosis)))
     return telling_apart(

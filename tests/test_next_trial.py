@@ -320,19 +320,22 @@ def test_the_same_stream_chooses_the_same_at_any_number_of_threads(quadruped: Ro
 
 
 @pytest.mark.parametrize(
-    ("verdict", "trials_left", "asks"),
+    ("verdict", "besides", "trials_left", "asks"),
     [
-        ("ambiguous", 2, True),
-        ("unexplained", 2, True),
-        ("explained", 2, False),
-        ("ambiguous", 1, False),
+        ("ambiguous", [], 2, True),
+        ("unexplained", [], 2, True),
+        ("explained", [], 2, False),
+        ("explained", ["jam:back_left_knee+jam:front_left_knee"], 2, True),
+        ("ambiguous", ["jam:back_left_knee+jam:front_left_knee"], 1, False),
     ],
 )
-def test_hypotheses_are_told_apart_until_one_explains_or_one_trial_is_left(
-    quadruped: Robot, verdict: Verdict, trials_left: int, *, asks: bool
+def test_hypotheses_are_told_apart_until_one_explains_all_or_one_trial_is_left(
+    quadruped: Robot, verdict: Verdict, besides: list[str], trials_left: int, *, asks: bool
 ):
     gait, compensating = random_controllers(quadruped, 2)
     found = diagnosis("jam:front_left_knee", "intact", robot=quadruped, verdict=verdict)
+    unseen = tuple(parse(text, quadruped.anatomy) for text in besides)
+    found = dataclasses.replace(found, unseen=unseen)
     empty = Behaviour(quadruped.anatomy.names, np.zeros(1), {})
     tried = Trial(Plan("01-after", "after", gait, 1, 0), "quadruped", empty, "01-after")
     events: list[Event] = []
