@@ -7,7 +7,7 @@ from selfmodel.hypothesis import Hypothesis
 
 Verdict = Literal["explained", "ambiguous", "unexplained"]
 """``explained``: the best hypothesis predicts the trials about as well as the self-model predicts
-the intact robot, and no other does. ``ambiguous``: others cannot be told from it.
+the intact robot, and no other does, ``unseen`` apart. ``ambiguous``: others cannot be told from it.
 ``unexplained``: it predicts significantly worse, or significantly worse than with a fault of a kind
 that was not considered, so something is wrong that it does not say; only where a trial of the
 intact robot is known."""
@@ -56,7 +56,7 @@ class Diagnosis:
         intact_distance: The distance that "nothing changed" gets.
         rivals: Other hypotheses that the trials cannot tell from the best, closest first.
         unseen: The best hypothesis with one fault more, each that the trials neither show nor rule
-            out, closest first; see ``unseen.unseen``.
+            out, closest first, no more than are ranked; see ``unseen.unseen``.
         verdict: Whether the best hypothesis explains the trials.
         test: By which test the rivals were told from the others.
         outside: The best hypothesis with a fault of a kind that was not considered, where that

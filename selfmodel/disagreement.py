@@ -23,8 +23,9 @@ from selfmodel.tally import Simulated
 
 EARLY = 100
 """Control steps that disagreement is read off. By then contact has made two predictions differ
-whatever they assume: where two hypotheses differed 2.4 times as much as self-models that differ by
-3 % in the first quarter of a second, it was 1.7 times after three quarters, and no more came."""
+whatever they assume: closed loop, where two hypotheses differed 2.4 times as much as self-models
+that differ by 3 % in the first quarter of a second, it was 1.7 times after three quarters, and no
+more came."""
 
 SCALES: Mapping[Signal, float] = MappingProxyType(
     {

@@ -56,12 +56,13 @@ def by_repair(situation: Situation) -> Evolved:
 def by_disagreement(situation: Situation) -> Evolved:
     """Chooses the controller on which hypotheses disagree, and a repair when that is over.
 
-    It is over once a diagnosis is ``explained`` and nothing may be wrong unseen besides, or when
-    only one trial is left: the trials are spent to bring the robot back, and what is never tried
-    restores nothing.
+    It is over once a diagnosis is ``explained``, and nothing may be wrong unseen besides or the
+    trial before could not show it either; and when only one trial is left: the trials are spent to
+    bring the robot back, and what is never tried restores nothing.
     """
-    diagnosis = situation.known.diagnoses[-1]
-    sure = diagnosis.verdict == "explained" and not diagnosis.unseen
+    *earlier, diagnosis = situation.known.diagnoses
+    asked = bool(earlier) and earlier[-1].unseen == diagnosis.unseen
+    sure = diagnosis.verdict == "explained" and (asked or not diagnosis.unseen)
     if sure or situation.trials_left == 1:
         return situation.repaired()
     situation.watch(Question(in_the_running(diagnosis)))
@@ -101,12 +102,13 @@ def telling_apart(
 def in_the_running(diagnosis: Diagnosis) -> tuple[Hypothesis, ...]:
     """Returns the best hypothesis and those that a trial should tell from it, five at most.
 
-    They are its rivals, and what may be wrong besides; where there is none of either, those that
-    follow it in the ranking.
+    They are its rivals, or where it has none and explains too little those that follow it in the
+    ranking; then what may be wrong besides. Where that is nothing, they are those that follow it.
     """
-    untold = (*diagnosis.rivals, *diagnosis.unseen)
-    followers = (one.hypothesis for one in diagnosis.ranked[1:] if math.isfinite(one.distance))
-    return (diagnosis.best, *(untold or followers))[:MOST]
+    followers = tuple(one.hypothesis for one in diagnosis.ranked[1:] if math.isfinite(one.distance))
+    others = diagnosis.rivals or (followers if diagnosis.verdict == "unexplained" else ())
+    untold = dict.fromkeys([*others, *diagnosis.unseen]) or followers
+    return (diagnosis.best, *untold)[:MOST]
 
 
 def candidates(

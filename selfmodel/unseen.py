@@ -16,7 +16,7 @@ def unseen(
     """Returns the hypotheses of one fault more that the trials cannot tell from the best.
 
     A dead touch sensor is one, in a foot that the gait never put down. Faults of degree are left
-    out: of each there is one that is too slight to be seen.
+    out: of most there is one that is too slight to be seen.
 
     Args:
         best: The best hypothesis.
@@ -26,7 +26,7 @@ def unseen(
         screen: The same, from fewer pieces and cheaper: what it can tell is not looked at closely.
 
     Returns:
-        Closest first.
+        Closest first; none where the best itself diverges.
     """
     exact = [kind for kind in kinds if kind.degrees is None]
     faults = [fault for kind in exact for fault in kind.candidates(anatomy)]
@@ -39,6 +39,8 @@ def unseen(
 
 def _untold(best: Hypothesis, others: Sequence[Hypothesis], losses: Losses) -> list[Hypothesis]:
     mine, *theirs = losses([best, *others])
+    if not np.isfinite(mine).all():
+        return []
     return [
         other
         for other, row in zip(others, theirs, strict=True)

@@ -52,7 +52,8 @@ def _verdict(found: Mapping[str, Any]) -> str:
     best = found["diagnosis"][0]["hypothesis"]
     match found["verdict"]:
         case "explained":
-            return f"Explained: {best} predicts the trials, and nothing else as well."
+            alone = "" if found["unseen"] else ", and nothing else as well"
+            return f"Explained: {best} predicts the trials{alone}."
         case "ambiguous":
             rivals = ", ".join(found["rivals"])
             return f"Ambiguous: the trials cannot tell {best} from {rivals} ({found['test']})."

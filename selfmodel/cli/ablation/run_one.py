@@ -2,7 +2,7 @@
 
 import dataclasses
 import shutil
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from urllib.parse import quote
 
@@ -18,16 +18,13 @@ from selfmodel.cli.ablation.trials import (
     calibrated_robot,
 )
 from selfmodel.cli.experiment import Experiment, run
-from selfmodel.database import Database
 from selfmodel.diagnose import Diagnose
 from selfmodel.diagnosis import Diagnosis
-from selfmodel.events import Event, SearchBegins
+from selfmodel.events import Event
 from selfmodel.explain import explain
 from selfmodel.faults import known
-from selfmodel.next_trial import telling_apart
 from selfmodel.notation import parse
 from selfmodel.simulator import Simulator
-from selfmodel.streams import choice_stream, diagnosis_stream
 from selfmodel.trial import Trial
 
 
@@ -67,7 +64,13 @@ def _from_the_bank(setting: Setting) -> list[Row]:
         for number, gait in enumerate(setting.gaits[: setting.spec.settings.trials])
     ]
     simulator = Simulator(calibrated_robot(setting, intact), threads=1)
-    search = _search(setting, simulator, intact)
+    search = Diagnose(
+        simulator,
+        setting.comparator,
+        setting.spec.settings,
+        resolve.kinds(setting.spec.kinds),
+        intact=intact,
+    )
     rows: list[Row] = []
     clock = Clock()
 
@@ -81,7 +84,7 @@ def _from_the_bank(setting: Setting) -> list[Row]:
     return rows
 
 
-def _by_repair(setting: Setting) -> list[Row]:
+def _in_a_recovery(setting: Setting) -> list[Row]:
     """After the first, every comparator has trials of its own: what its diagnosis led to."""
     folder = setting.folder / quote(setting.name, safe="")
     shutil.rmtree(folder, ignore_errors=True)  # what is left of a run that was killed
@@ -119,52 +122,13 @@ def _by_repair(setting: Setting) -> list[Row]:
         gap=cell.gap,
         structure=setting.spec.structure,
         kinds=resolve.kinds(setting.spec.kinds),
+        next_trial=setting.spec.next_trial,
     )
     outcome = run(experiment, watch)
     rows[-1] = dataclasses.replace(
         rows[-1], distinct_hypotheses=outcome.recovery.distinct_hypotheses
     )
     return rows
-
-
-def _by_disagreement(setting: Setting) -> list[Row]:
-    """After the first, every comparator has trials of its own: what its hypotheses disagree on.
-
-    Nothing is repaired, whatever the verdict, so that the trials tell how soon one is right.
-    """
-    folder = setting.folder / quote(setting.name, safe="")
-    shutil.rmtree(folder, ignore_errors=True)  # what is left of a run that was killed
-    own = dataclasses.replace(setting, folder=folder)
-    settings, seed = setting.spec.settings, setting.spec.cell.seed
-    intact = before_failure(setting)
-    trials = [after_failure(setting, 0, setting.gaits[0])]
-    simulator = Simulator(calibrated_robot(setting, intact), threads=1)
-    search = _search(setting, simulator, intact)
-    rows: list[Row] = []
-    known = Database(trials=(*intact, *trials))
-    clock = Clock()
-    for number in range(1, settings.trials + 1):
-        clock(SearchBegins("diagnostic"))
-        diagnosis = search(trials, known.hypotheses, diagnosis_stream(seed, number), clock)
-        clock(diagnosis)
-        rows.append(_counted(row_of(setting, diagnosis, trials, clock), search))
-        if number < settings.trials:
-            chosen = telling_apart(
-                diagnosis, known.controllers, simulator, settings, choice_stream(seed, number)
-            )
-            trials.append(after_failure(own, number, chosen))
-        known = Database((*intact, *trials), (*known.diagnoses, diagnosis))
-    return rows
-
-
-def _search(setting: Setting, simulator: Simulator, intact: Sequence[Trial]) -> Diagnose:
-    return Diagnose(
-        simulator,
-        setting.comparator,
-        setting.spec.settings,
-        resolve.kinds(setting.spec.kinds),
-        intact=intact,
-    )
 
 
 def _counted(row: Row, search: Diagnose) -> Row:
@@ -177,6 +141,6 @@ def _counted(row: Row, search: Diagnose) -> Row:
 
 _WAYS: Mapping[str, Callable[[Setting], list[Row]]] = {
     "bank": _from_the_bank,
-    "repair": _by_repair,
-    "disagreement": _by_disagreement,
+    "repair": _in_a_recovery,
+    "disagreement": _in_a_recovery,
 }
