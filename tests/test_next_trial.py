@@ -268,6 +268,16 @@ def test_what_may_be_wrong_besides_is_in_the_running_after_the_rivals(quadruped:
     assert in_the_running(dataclasses.replace(found, rivals=(), unseen=(touch,))) == (best, touch)
 
 
+def test_what_explains_too_little_is_held_against_what_follows_it_first(quadruped: Robot):
+    found = diagnosis(
+        "intact", "break:front_left_knee", robot=quadruped, rivals=0, verdict="unexplained"
+    )
+    touch = parse("sensor:front_left_touch", quadruped.anatomy)
+    best, follower = (one.hypothesis for one in found.ranked)
+
+    assert in_the_running(dataclasses.replace(found, unseen=(touch,))) == (best, follower, touch)
+
+
 def test_a_hypothesis_that_diverges_is_not_in_the_running(quadruped: Robot):
     found = diagnosis("intact", "break:front_left_knee", robot=quadruped, verdict="explained")
     apart = dataclasses.replace(found.ranked[1], distance=float("inf"))
@@ -320,27 +330,32 @@ def test_the_same_stream_chooses_the_same_at_any_number_of_threads(quadruped: Ro
 
 
 @pytest.mark.parametrize(
-    ("verdict", "besides", "trials_left", "asks"),
+    ("verdict", "unseen", "trials_left", "asks"),
     [
-        ("ambiguous", [], 2, True),
-        ("unexplained", [], 2, True),
-        ("explained", [], 2, False),
-        ("explained", ["jam:back_left_knee+jam:front_left_knee"], 2, True),
-        ("ambiguous", ["jam:back_left_knee+jam:front_left_knee"], 1, False),
+        ("ambiguous", [0], 2, True),
+        ("unexplained", [0], 2, True),
+        ("explained", [0], 2, False),
+        ("explained", [1], 2, True),
+        ("explained", [2, 1], 2, True),
+        ("explained", [1, 1], 2, False),
+        ("ambiguous", [1, 1], 2, True),
+        ("ambiguous", [1], 1, False),
     ],
 )
-def test_hypotheses_are_told_apart_until_one_explains_all_or_one_trial_is_left(
-    quadruped: Robot, verdict: Verdict, besides: list[str], trials_left: int, *, asks: bool
+def test_hypotheses_are_told_apart_until_one_explains_all_or_asking_is_in_vain(
+    quadruped: Robot, verdict: Verdict, unseen: list[int], trials_left: int, *, asks: bool
 ):
+    # How much is unseen after each trial.
     gait, compensating = random_controllers(quadruped, 2)
-    found = diagnosis("jam:front_left_knee", "intact", robot=quadruped, verdict=verdict)
-    unseen = tuple(parse(text, quadruped.anatomy) for text in besides)
-    found = dataclasses.replace(found, unseen=unseen)
+    besides = [parse(f"jam:{joint.name}", quadruped.anatomy) for joint in quadruped.anatomy.joints]
+    told = diagnosis("jam:front_left_knee", "intact", robot=quadruped, verdict=verdict)
+    diagnoses = [dataclasses.replace(told, unseen=tuple(besides[:count])) for count in unseen]
+    found = diagnoses[-1]
     empty = Behaviour(quadruped.anatomy.names, np.zeros(1), {})
     tried = Trial(Plan("01-after", "after", gait, 1, 0), "quadruped", empty, "01-after")
     events: list[Event] = []
     situation = Situation(
-        known=Database((tried,), (found,)),
+        known=Database((tried,), tuple(diagnoses)),
         trials_left=trials_left,
         simulator=Simulator(quadruped, 1),
         settings=SMALL,

@@ -45,6 +45,12 @@ def test_what_diverges_is_ruled_out(quadruped: Robot):
     assert unseen(INTACT, PAPER_KINDS, quadruped.anatomy, losses, losses) == []
 
 
+def test_beside_what_diverges_nothing_is_unseen(quadruped: Robot):
+    losses = of(quadruped, {}, otherwise=np.inf)
+
+    assert unseen(INTACT, PAPER_KINDS, quadruped.anatomy, losses, losses) == []
+
+
 def test_the_closest_comes_first_and_each_says_one_fault_more(quadruped: Robot):
     best = parse(KNEE, quadruped.anatomy)
     # The difference is below what counts as one.
@@ -97,6 +103,6 @@ def test_a_report_names_what_is_unseen(quadruped: Robot, best: str, besides: lis
     found = {"diagnosis": as_values(diagnosis.ranked), **sureness(diagnosis)}
 
     assert found["unseen"] == besides
-    assert in_words(found).endswith(
-        f"Not ruled out besides: {', '.join(besides)}." if besides else "nothing else as well."
-    )
+    sure = ", and nothing else as well." if not besides else "."
+    more_said = f" Not ruled out besides: {', '.join(besides)}." if besides else ""
+    assert in_words(found) == f"Explained: {best} predicts the trials{sure}{more_said}"
