@@ -69,17 +69,46 @@ def most_disputed(
         simulator: The self-model.
         steps: Control steps of a trial. Falls are looked for in all of it, disagreement early on.
     """
-    early = _predicted(hypotheses, candidates, simulator, min(steps, EARLY))
-    falls = _first_of_any(early, hypotheses, simulator.robot)
-    upright = np.flatnonzero(falls == early.behaviour.steps)
-    names, commands = early.behaviour.names, early.behaviour["commands"][upright, 0]
-    alike = [Playback(names.motors, rows) for rows in commands]
-    for i in map(int, upright[_most_telling_first(hypotheses, alike, simulator)]):
+    falls, order = _looked_at(hypotheses, candidates, simulator, min(steps, EARLY))
+    for i in order:
         whole = _predicted(hypotheses, [candidates[i]], simulator, steps)
         falls[i] = _first_of_any(whole, hypotheses, simulator.robot)[0]
         if falls[i] == steps:
             return candidates[i]
     return candidates[int(falls.argmax())]
+
+
+def most_disputed_first(
+    hypotheses: Sequence[Hypothesis], candidates: Sequence[Evolved], simulator: Simulator
+) -> list[Evolved]:
+    """Returns the controllers, those on which hypotheses disagree most first.
+
+    Those with which the robot falls at once come last, the earliest fall at the end.
+
+    Args:
+        hypotheses: As for ``most_disputed``, and so are the others.
+        candidates: At least one.
+        simulator: The self-model.
+    """
+    falls, order = _looked_at(hypotheses, candidates, simulator, EARLY)
+    fallen = np.flatnonzero(falls < EARLY)
+    latest = fallen[np.argsort(-falls[fallen], kind="stable")]
+    return [candidates[i] for i in (*order, *latest.tolist())]
+
+
+def _looked_at(
+    hypotheses: Sequence[Hypothesis],
+    candidates: Sequence[Evolved],
+    simulator: Simulator,
+    steps: int,
+) -> tuple[IndexArray, list[int]]:
+    """When the robot first falls with each, and the numbers of the others, most disputed first."""
+    early = _predicted(hypotheses, candidates, simulator, steps)
+    falls = _first_of_any(early, hypotheses, simulator.robot)
+    upright = np.flatnonzero(falls == steps)
+    names, commands = early.behaviour.names, early.behaviour["commands"][upright, 0]
+    alike = [Playback(names.motors, rows) for rows in commands]
+    return falls, upright[_most_telling_first(hypotheses, alike, simulator)].tolist()
 
 
 def _most_telling_first(

@@ -9,13 +9,17 @@ import numpy as np
 from selfmodel.controller import draw_weights
 from selfmodel.database import Database
 from selfmodel.diagnosis import Diagnosis
-from selfmodel.disagreement import most_disputed
+from selfmodel.disagreement import most_disputed, most_disputed_first
 from selfmodel.driver import Evolved
 from selfmodel.events import Event, Question
 from selfmodel.evolution import varied
 from selfmodel.hypothesis import Hypothesis
 from selfmodel.settings import Settings
 from selfmodel.simulator import Simulator
+
+GENERATIONS = 8
+"""How often offspring is bred of the controllers on which hypotheses disagree most. A gait's first
+children walk as it does."""
 
 MOST = 5
 """Hypotheses that a trial is to tell apart at most: the time grows with their number."""
@@ -91,12 +95,13 @@ def telling_apart(
         settings: The paper's numbers.
         rng: Every random choice comes from it.
     """
-    return most_disputed(
-        in_the_running(diagnosis),
-        candidates(known, settings, rng),
-        simulator,
-        settings.steps,
-    )
+    hypotheses = in_the_running(diagnosis)
+    pool = candidates(known, settings, rng)
+    for _ in range(GENERATIONS):
+        best = most_disputed_first(hypotheses, pool, simulator)[: settings.survivors]
+        children = offspring(best, settings, rng)
+        pool = [one for one in dict.fromkeys([*best, *children]) if one != known[0]]
+    return most_disputed(hypotheses, pool, simulator, settings.steps)
 
 
 def in_the_running(diagnosis: Diagnosis) -> tuple[Hypothesis, ...]:
@@ -124,11 +129,25 @@ def candidates(
     """
     newest = known[0]
     alike = [controller for controller in known if controller.design == newest.design]
-    genomes = np.array([controller.genome for controller in alike])
-    parents = np.resize(genomes, (settings.population, genomes.shape[1]))  # each in turn
-    children = varied(parents, draw_weights, settings, rng)
-    bred = [newest.design.controller(genome) for genome in children]
+    bred = offspring(alike, settings, rng)
     found = [one for one in dict.fromkeys([*alike, *bred]) if one != newest]
     if not found:  # no child is another than its parent, as where nothing mutates
         found = [newest.design.controller(draw_weights(rng, newest.genome.shape))]
     return found
+
+
+def offspring(
+    parents: Sequence[Evolved], settings: Settings, rng: np.random.Generator
+) -> list[Evolved]:
+    """Returns as many children as an EA has genomes.
+
+    Args:
+        parents: At least one, all of one design; each is one in turn.
+        settings: How offspring is bred.
+        rng: Every random choice comes from it.
+    """
+    genomes = np.array([parent.genome for parent in parents])
+    bred = varied(
+        np.resize(genomes, (settings.population, genomes.shape[1])), draw_weights, settings, rng
+    )
+    return [parents[0].design.controller(genome) for genome in bred]

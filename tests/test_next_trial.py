@@ -313,6 +313,22 @@ def test_offspring_is_bred_of_every_controller_that_was_tried(quadruped: Robot):
     assert np.all(np.any(kin, axis=0))
 
 
+def test_what_is_asked_is_bred_to_ask_more(quadruped: Robot):
+    simulator, known = Simulator(quadruped, 2), random_controllers(quadruped, 2)
+    touch = parse("sensor:front_left_touch", quadruped.anatomy)
+    found = diagnosis("intact", robot=quadruped, verdict="explained")
+    found = dataclasses.replace(found, unseen=(touch,))
+    first = candidates(known, SMALL, np.random.default_rng(1))
+    best = most_disputed([INTACT, touch], first, simulator, SMALL.steps)
+    bred = telling_apart(found, known, simulator, SMALL, np.random.default_rng(1))
+
+    column = [sensor.name for sensor in quadruped.anatomy.sensors].index("front_left_touch")
+    runs = simulator.run([(INTACT, one) for one in (best, bred)], EARLY, ("sensors",))
+    less, more = runs.behaviour["sensors"][..., column].mean(axis=1)
+    assert more > less
+    assert bred not in first
+
+
 def test_the_same_stream_chooses_the_same_at_any_number_of_threads(quadruped: Robot):
     found = diagnosis(
         *("jam:front_left_knee", "jam:front_left_shoulder"),
