@@ -9,7 +9,8 @@ from selfmodel.anatomy import Anatomy
 from selfmodel.arrays import FloatArray
 from selfmodel.faults import Fault, Kind
 from selfmodel.hypothesis import Hypothesis, canonical
-from selfmodel.significance import NEGLIGIBLE, Losses, is_better, paired_z
+from selfmodel.losses import Losses
+from selfmodel.significance import NEGLIGIBLE, is_better, paired_z
 
 COARSE = 4
 """Levels of a part that a search looks at before it knows what is wrong; the degree comes later."""
@@ -38,11 +39,7 @@ def coarse_candidates(kinds: Sequence[Kind], anatomy: Anatomy) -> list[Fault]:
     ]
 
 
-def with_fitted_degrees(
-    hypothesis: Hypothesis,
-    losses: Losses,
-    anatomy: Anatomy,
-) -> Hypothesis:
+def with_fitted_degrees(hypothesis: Hypothesis, losses: Losses, anatomy: Anatomy) -> Hypothesis:
     """Returns the hypothesis with those degrees by which it predicts best.
 
     Degrees are fitted one after another: the best of a kind's levels, then closer and closer.
@@ -63,11 +60,7 @@ def with_fitted_degrees(
     return current
 
 
-def with_mean_degrees(
-    hypothesis: Hypothesis,
-    losses: Losses,
-    anatomy: Anatomy,
-) -> Hypothesis:
+def with_mean_degrees(hypothesis: Hypothesis, losses: Losses, anatomy: Anatomy) -> Hypothesis:
     """Returns the hypothesis with the means of the degrees that cannot be told from the best.
 
     Contact makes losses rugged over a degree, and where they are lowest is luck. A degree that
@@ -87,12 +80,7 @@ def with_mean_degrees(
     return current
 
 
-def _averaged(
-    hypothesis: Hypothesis,
-    place: int,
-    losses: Losses,
-    anatomy: Anatomy,
-) -> Hypothesis:
+def _averaged(hypothesis: Hypothesis, place: int, losses: Losses, anatomy: Anatomy) -> Hypothesis:
     fault = hypothesis.faults[place]
     limits = _limits(fault, anatomy)
     if limits is None or fault.kind.reshape:
@@ -121,12 +109,7 @@ def _weights(rows: FloatArray) -> FloatArray:
     return weights
 
 
-def _fitted(
-    hypothesis: Hypothesis,
-    place: int,
-    losses: Losses,
-    anatomy: Anatomy,
-) -> Hypothesis:
+def _fitted(hypothesis: Hypothesis, place: int, losses: Losses, anatomy: Anatomy) -> Hypothesis:
     fault = hypothesis.faults[place]
     limits = _limits(fault, anatomy)
     if limits is None:

@@ -5,7 +5,6 @@ from functools import partial
 
 import numpy as np
 
-from selfmodel import outside
 from selfmodel.arrays import FloatArray
 from selfmodel.comparator import Comparator
 from selfmodel.degrees import coarse_candidates
@@ -15,11 +14,13 @@ from selfmodel.evolution import Evolution, Observe, evolve
 from selfmodel.faults import PAPER_KINDS, Kind
 from selfmodel.genome import VALUES, decode, encode
 from selfmodel.hypothesis import INTACT, Hypothesis
+from selfmodel.losses import Looks
 from selfmodel.mending import mends_in_part
+from selfmodel.outside import better_outside
 from selfmodel.refine import refined
 from selfmodel.screen import screen_of
 from selfmodel.settings import Settings
-from selfmodel.significance import TEST, Losses, is_better, is_worse_than_ever
+from selfmodel.significance import TEST, is_better, is_worse_than_ever
 from selfmodel.simulator import Simulator
 from selfmodel.trial import Trial
 from selfmodel.unseen import unseen
@@ -62,8 +63,7 @@ class Diagnose:
         self.evidence = Evidence(simulator, comparator)
         self._screen = screen_of(comparator, simulator, self.evidence)
         # What is looked at once the best is known is never ranked: it is remembered apart.
-        self._aside = Evidence(simulator, comparator)
-        self._screen_aside = screen_of(comparator, simulator, self._aside)
+        self._aside, self._screen_aside = self.evidence.aside(), self._screen.aside()
         self.evaluations = 0
 
     def __call__(
@@ -82,24 +82,25 @@ class Diagnose:
             observe: Is told of every generation.
         """
         found = self._evolved(trials, seeds, rng, observe)
-        best = found[0]
+        best, aside = found[0], self._looks_aside(trials)
         if self.evidence.in_pieces:
-            best = self._refined(trials, found[:KNOWN])
+            best = self._refined(trials, found[:KNOWN], aside)
         judged = list(self.evidence.judged(trials) | {best, INTACT})
         totals = dict(zip(judged, map(float, self.evidence.distances(judged, trials)), strict=True))
         others = [one for one in _ranked(totals) if one != best]
-        rivals = self._rivals(best, others, trials)
-        better = self._outside(best, trials)
+        rivals = self._rivals(best, others, aside)
+        better = better_outside(best, self._kinds, self._anatomy, aside)
+        besides = unseen(best, self._kinds, self._anatomy, aside) if self.evidence.in_pieces else []
         kept = self._settings.kept
         return Diagnosis(
             ranked=tuple(Candidate(one, totals[one]) for one in [best, *others][:kept]),
             trials=len(trials),
             intact_distance=totals[INTACT],
             rivals=rivals[:kept],
-            verdict=self._verdict(best, rivals, better, trials),
+            verdict=self._verdict(best, rivals, better, aside),
             test=TEST if self.evidence.in_pieces else EQUAL,
             outside=better,
-            unseen=tuple(self._unseen(best, trials)[:kept]),
+            unseen=tuple(besides[:kept]),
         )
 
     def check(self, trials: Sequence[Trial]) -> None:
@@ -145,79 +146,62 @@ class Diagnose:
         self.evaluations += search.evaluations
         return _ranked(totals)
 
-    def _refined(self, trials: Sequence[Trial], known: Sequence[Hypothesis]) -> Hypothesis:
+    def _looks_aside(self, trials: Sequence[Trial]) -> Looks:
+        """How badly hypotheses predict the trials, without a trace in what is ranked.
+
+        Pieces of a whole trial, closed loop, hang together: what helps there may be luck, and is
+        not compared with what helped before.
+        """
+        known = [*self._intact, *trials]
+        comparable = self._intact and self.evidence.in_pieces and self.evidence.in_segments(known)
+        return Looks(
+            after=partial(self._aside.losses, trials=trials),
+            screen=partial(self._screen_aside.losses, trials=trials),
+            before=partial(self._aside.losses, trials=self._intact) if comparable else None,
+        )
+
+    def _refined(
+        self, trials: Sequence[Trial], known: Sequence[Hypothesis], aside: Looks
+    ) -> Hypothesis:
         """The best hypothesis around those known."""
         return refined(
             known,
             coarse_candidates(self._kinds, self._anatomy),
             self._settings.genes,
-            partial(self.evidence.losses, trials=trials),
+            Looks(
+                after=partial(self.evidence.losses, trials=trials),
+                screen=partial(self._screen.losses, trials=trials),
+                before=aside.before,
+            ),
             self._anatomy,
-            screen=partial(self._screen.losses, trials=trials),
-            before=self._before(trials),
         )
-
-    def _before(self, trials: Sequence[Trial]) -> Losses | None:
-        """How badly hypotheses predict the intact robot, if it can be compared with some trials.
-
-        Pieces of a whole trial, closed loop, hang together: what helps there may be luck.
-        """
-        in_segments = self.evidence.in_pieces and self.evidence.in_segments(
-            [*self._intact, *trials]
-        )
-        if not self._intact or not in_segments:
-            return None
-        return partial(self._aside.losses, trials=self._intact)
 
     def _rivals(
-        self, best: Hypothesis, others: Sequence[Hypothesis], trials: Sequence[Trial]
+        self, best: Hypothesis, others: Sequence[Hypothesis], aside: Looks
     ) -> tuple[Hypothesis, ...]:
         """Those that cannot be told from the best, but for those that only say more of the same."""
         said = _without_degrees(best)
         candidates = [other for other in others if not said <= _without_degrees(other)]
-        mine, *theirs = self.evidence.losses([best, *candidates], trials)
+        mine, *theirs = aside.after([best, *candidates])
         if self.evidence.in_pieces:
             told = [is_better(mine, losses) for losses in theirs]
         else:
             told = [bool(losses.sum() != mine.sum()) for losses in theirs]
         untold = [other for other, apart in zip(candidates, told, strict=True) if not apart]
-        before = self._before(trials)
-        if before is None:
-            return tuple(untold)
-        after = partial(self._aside.losses, trials=trials)
-        return tuple(one for one in untold if not mends_in_part(one, after, before, self._anatomy))
-
-    def _outside(self, best: Hypothesis, trials: Sequence[Trial]) -> Outside | None:
-        before = self._before(trials)
-        if before is None:
-            return None
-        losses = outside.Looks(
-            after=partial(self._aside.losses, trials=trials),
-            screen=partial(self._screen_aside.losses, trials=trials),
-            before=before,
-        )
-        return outside.better_outside(best, self._kinds, self._anatomy, losses)
-
-    def _unseen(self, best: Hypothesis, trials: Sequence[Trial]) -> list[Hypothesis]:
-        if not self.evidence.in_pieces:
-            return []
-        losses = partial(self._aside.losses, trials=trials)
-        screen = partial(self._screen_aside.losses, trials=trials)
-        return unseen(best, self._kinds, self._anatomy, losses, screen)
+        return tuple(one for one in untold if not mends_in_part(one, aside, self._anatomy))
 
     def _verdict(
         self,
         best: Hypothesis,
         rivals: Sequence[Hypothesis],
         better: Outside | None,
-        trials: Sequence[Trial],
+        aside: Looks,
     ) -> Verdict:
         if better is not None:
             return "unexplained"
         if self._intact:
-            mine = self.evidence.losses([best], trials)[0]
-            usual = self.evidence.losses([INTACT], self._intact)[0]
-            if is_worse_than_ever(mine, usual):
+            usual = self._aside.losses([INTACT], self._intact)[0]
+            if is_worse_than_ever(aside.after([best])[0], usual):
                 return "unexplained"
         return "ambiguous" if rivals else "explained"
 

@@ -31,12 +31,20 @@ class Evidence:
     Args:
         simulator: The self-model.
         comparator: Says what to simulate and how far it is from a trial.
+        other: What it makes of trials already; hypotheses are remembered apart from those.
     """
 
-    def __init__(self, simulator: Simulator, comparator: Comparator) -> None:
+    def __init__(
+        self, simulator: Simulator, comparator: Comparator, other: "Evidence | None" = None
+    ) -> None:
         self._simulator = simulator
         self._comparator = comparator
+        self._other = other
         self._losses: dict[str, Memo[Hypothesis]] = {}  # by the trial's log
+
+    def aside(self) -> "Evidence":
+        """Returns evidence that remembers apart, and simulates nothing that this one knows."""
+        return Evidence(self._simulator, self._comparator, self)
 
     @property
     def in_pieces(self) -> bool:
@@ -54,8 +62,11 @@ class Evidence:
 
     def judged(self, trials: Sequence[Trial]) -> set[Hypothesis]:
         """Returns the hypotheses that were simulated for every one of some trials."""
-        memos = [self._losses.get(trial.path, Memo()) for trial in trials]
-        return set.intersection(*(set(memo) for memo in memos))
+        return set.intersection(*(set(self.known(trial)) for trial in trials))
+
+    def known(self, trial: Trial) -> Memo[Hypothesis]:
+        """Returns what is remembered of a trial."""
+        return self._losses.setdefault(trial.path, Memo())
 
     def check(self, trials: Sequence[Trial]) -> None:
         """Checks that the comparator can judge all trials, before any search.
@@ -91,7 +102,9 @@ class Evidence:
         return np.concatenate([np.array(self._of(hypotheses, trial)) for trial in trials], axis=1)
 
     def _of(self, hypotheses: Sequence[Hypothesis], trial: Trial) -> list[FloatArray]:
-        memo = self._losses.setdefault(trial.path, Memo())
+        memo = self.known(trial)
+        if self._other is not None:
+            memo.learn(self._other.known(trial), hypotheses)
         return memo.values(hypotheses, partial(self._simulate, trial))
 
     def _simulate(self, trial: Trial, hypotheses: list[Hypothesis]) -> FloatArray:

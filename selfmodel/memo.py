@@ -5,7 +5,7 @@ hypothesis in one trial. Behaviours are not kept, so a controller that was tried
 more for each trial it is compared with; everything else is simulated once.
 """
 
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from typing import Any, Generic, TypeVar
 
 from selfmodel.arrays import FloatArray
@@ -24,6 +24,17 @@ class Memo(Generic[Key]):
 
     def __iter__(self) -> Iterator[Key]:
         return iter(self._known)
+
+    def __contains__(self, key: Key) -> bool:
+        return key in self._known
+
+    def __getitem__(self, key: Key) -> FloatArray:
+        row: FloatArray = self._known[key]
+        return row
+
+    def learn(self, other: "Memo[Key]", keys: Iterable[Key]) -> None:
+        """Takes the rows of those keys that another knows."""
+        self._known.update((key, other[key]) for key in keys if key in other)
 
     def values(
         self, keys: Sequence[Key], compute: Callable[[list[Key]], FloatArray]

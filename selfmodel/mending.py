@@ -4,40 +4,39 @@ from itertools import combinations
 
 from selfmodel.anatomy import Anatomy
 from selfmodel.hypothesis import INTACT, Hypothesis, canonical
-from selfmodel.significance import Losses, only_mends
+from selfmodel.losses import Looks
+from selfmodel.significance import only_mends
 
 
-def mends(
-    hypothesis: Hypothesis, fewer: Hypothesis, after: Losses, before: Losses, anatomy: Anatomy
-) -> bool:
+def mends(hypothesis: Hypothesis, fewer: Hypothesis, looks: Looks, anatomy: Anatomy) -> bool:
     """Returns whether what a hypothesis says more than another would have helped before as well.
 
     Args:
         hypothesis: The one that says more.
         fewer: The other.
-        after: How badly they predict the trials since something is wrong.
-        before: How badly they predict trials of the robot with nothing wrong.
+        looks: How badly they predict the trials.
         anatomy: The robot's parts.
     """
+    if looks.before is None:
+        return False
     more = [fault for fault in hypothesis.faults if fault not in fewer.faults]
-    with_it, without = before([canonical(more, anatomy), INTACT])
+    with_it, without = looks.before([canonical(more, anatomy), INTACT])
     # Most faults would have done harm, and of those nothing is simulated.
     if not with_it.mean() < without.mean():
         return False
-    with_more, with_fewer = after([hypothesis, fewer])
+    with_more, with_fewer = looks.after([hypothesis, fewer])
     return only_mends(with_more, with_fewer, with_it, without)
 
 
-def mends_in_part(hypothesis: Hypothesis, after: Losses, before: Losses, anatomy: Anatomy) -> bool:
+def mends_in_part(hypothesis: Hypothesis, looks: Looks, anatomy: Anatomy) -> bool:
     """Returns whether one of the faults of a hypothesis would have helped before as well.
 
     Args:
         hypothesis: What may be wrong.
-        after: As for ``mends``.
-        before: As for ``mends``.
+        looks: How badly hypotheses predict the trials.
         anatomy: The robot's parts.
     """
     return any(
-        mends(hypothesis, canonical(rest, anatomy), after, before, anatomy)
+        mends(hypothesis, canonical(rest, anatomy), looks, anatomy)
         for rest in combinations(hypothesis.faults, max(len(hypothesis) - 1, 0))
     )

@@ -1,7 +1,6 @@
 """What was not considered: whether a kind outside the considered ones explains what is left."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -10,28 +9,15 @@ from selfmodel.degrees import coarse_candidates
 from selfmodel.diagnosis import Outside
 from selfmodel.faults import ALL_KINDS, Fault, Kind
 from selfmodel.hypothesis import INTACT, Hypothesis, canonical
-from selfmodel.significance import NEGLIGIBLE, Losses, has_become_better, paired_z
+from selfmodel.losses import Looks
+from selfmodel.significance import NEGLIGIBLE, has_become_better, paired_z
 
 SHORTLIST = 8
 """Hypotheses that are looked at closely, of those that the screen likes."""
 
 
-class Looks(NamedTuple):
-    """How badly hypotheses predict each piece of some trials, ``(n, pieces)`` each.
-
-    Attributes:
-        after: The trials to explain.
-        screen: The same, from fewer pieces and cheaper.
-        before: Trials of the robot with nothing wrong.
-    """
-
-    after: Losses
-    screen: Losses
-    before: Losses
-
-
 def better_outside(
-    best: Hypothesis, considered: Sequence[Kind], anatomy: Anatomy, losses: Looks
+    best: Hypothesis, considered: Sequence[Kind], anatomy: Anatomy, looks: Looks
 ) -> Outside | None:
     """Returns the best hypothesis with a fault that was not considered, if that explains more.
 
@@ -44,19 +30,21 @@ def better_outside(
         best: The best hypothesis of the considered kinds.
         considered: These kinds.
         anatomy: The robot's parts.
-        losses: How badly hypotheses predict the trials.
+        looks: How badly hypotheses predict the trials.
 
     Returns:
         The one that predicts best; None where nothing outside explains more.
     """
-    mine = losses.after([best])[0]
+    if looks.before is None:
+        return None
+    mine = looks.after([best])[0]
     if not np.isfinite(mine).all() or mine.mean() <= NEGLIGIBLE:
         return None
     candidates = _candidates(best, considered, anatomy)
-    for candidate in _shortlist(best, candidates, losses):
+    for candidate in _shortlist(best, candidates, looks):
         alone = canonical([candidates[candidate]], anatomy)
-        usual, with_it = losses.before([INTACT, alone])
-        if has_become_better(losses.after([candidate])[0], mine, with_it, usual):
+        usual, with_it = looks.before([INTACT, alone])
+        if has_become_better(looks.after([candidate])[0], mine, with_it, usual):
             return Outside(candidate, candidates[candidate].kind.name)
     return None
 
@@ -79,15 +67,15 @@ def _candidates(
 
 
 def _shortlist(
-    best: Hypothesis, candidates: dict[Hypothesis, Fault], losses: Looks
+    best: Hypothesis, candidates: dict[Hypothesis, Fault], looks: Looks
 ) -> list[Hypothesis]:
     """Those that the screen likes most, the closest first."""
     if not candidates:
         return []
     asked = list(candidates)
-    mine, *theirs = losses.screen([best, *asked])
+    mine, *theirs = looks.screen([best, *asked])
     finite = np.isfinite(mine).all()
     z = [paired_z(mine, row) if finite and np.isfinite(row).all() else -np.inf for row in theirs]
     few = [asked[i] for i in np.argsort(z, kind="stable")[::-1][:SHORTLIST]]
-    order = np.argsort(losses.after(few).sum(axis=1), kind="stable")
+    order = np.argsort(looks.after(few).sum(axis=1), kind="stable")
     return [few[i] for i in order]

@@ -13,8 +13,9 @@ from selfmodel.anatomy import Anatomy
 from selfmodel.degrees import with_fitted_degrees, with_mean_degrees
 from selfmodel.faults import Fault, Kind
 from selfmodel.hypothesis import INTACT, Hypothesis, canonical
+from selfmodel.losses import Looks, Losses
 from selfmodel.mending import mends
-from selfmodel.significance import Losses, is_better
+from selfmodel.significance import is_better
 
 SHORTLIST = 8
 """Hypotheses of many that are looked at closely."""
@@ -27,11 +28,8 @@ def refined(
     known: Iterable[Hypothesis],
     faults: Sequence[Fault],
     most: int,
-    losses: Losses,
+    looks: Looks,
     anatomy: Anatomy,
-    *,
-    screen: Losses | None = None,
-    before: Losses | None = None,
 ) -> Hypothesis:
     """Returns the best hypothesis of which every fault is worth its while.
 
@@ -44,14 +42,12 @@ def refined(
         known: Hypotheses to start from, beside the best single faults and ``INTACT``.
         faults: Those that may be proposed.
         most: Faults that a hypothesis may have.
-        losses: How badly hypotheses predict the trials.
+        looks: How badly hypotheses predict the trials. Of many, those are looked at closely that
+            the screen finds closest. A fault that would have helped as much before anything was
+            wrong is not worth it: it mends the self-model.
         anatomy: The robot's parts.
-        screen: The same, from fewer pieces and cheaper: of many hypotheses those are looked at
-            that it finds closest. Without it, all are.
-        before: How badly they predict trials of the robot with nothing wrong. A fault that would
-            have helped there as much is not worth it: it mends the self-model.
     """
-    search = _Search(faults, most, losses, screen or losses, anatomy, before=before)
+    search = _Search(faults, most, looks, anatomy)
     starts = dict.fromkeys([*known, INTACT, *_closest_parts(search)[:STARTS]])
     found = {end for start in starts for end in search.settled(search.fitted(start))}
     finest = {search.spared(search.fitted_finely(one)) for one in found}
@@ -59,7 +55,7 @@ def refined(
     for hypothesis in sorted(finest, key=lambda one: (len(one), search.total(one), one)):
         if search.is_better(hypothesis, best):
             best = hypothesis
-    mean = with_mean_degrees(best, losses, anatomy)
+    mean = with_mean_degrees(best, looks.after, anatomy)
     return mean if search.spared(mean) == mean else best
 
 
@@ -83,39 +79,30 @@ def _ordered(hypotheses: Sequence[Hypothesis], losses: Losses) -> list[Hypothesi
 class _Search:
     """Changes of one fault, and what they bring."""
 
-    def __init__(
-        self,
-        faults: Sequence[Fault],
-        most: int,
-        losses: Losses,
-        screen: Losses,
-        anatomy: Anatomy,
-        *,
-        before: Losses | None,
-    ) -> None:
+    def __init__(self, faults: Sequence[Fault], most: int, looks: Looks, anatomy: Anatomy) -> None:
         self._faults, self._most, self._anatomy = faults, most, anatomy
-        self._losses, self._screen, self._before = losses, screen, before
+        self._looks = looks
 
     def total(self, hypothesis: Hypothesis) -> float:
-        return float(self._losses([hypothesis])[0].sum())
+        return float(self._looks.after([hypothesis])[0].sum())
 
     def fitted(self, hypothesis: Hypothesis) -> Hypothesis:
-        return with_fitted_degrees(hypothesis, self._screen, self._anatomy)
+        return with_fitted_degrees(hypothesis, self._looks.screen, self._anatomy)
 
     def fitted_finely(self, hypothesis: Hypothesis) -> Hypothesis:
-        return with_fitted_degrees(hypothesis, self._losses, self._anatomy)
+        return with_fitted_degrees(hypothesis, self._looks.after, self._anatomy)
 
     def is_better(self, one: Hypothesis, other: Hypothesis) -> bool:
-        return is_better(*self._losses([one, other]))
+        return is_better(*self._looks.after([one, other]))
 
     def ordered(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
         """The closest first, as the screen has it."""
-        return _ordered(hypotheses, self._screen)
+        return _ordered(hypotheses, self._looks.screen)
 
     def closest(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Those that the screen lets through, the closest first."""
         few = hypotheses if len(hypotheses) <= SHORTLIST else self.ordered(hypotheses)[:SHORTLIST]
-        return _ordered(few, self._losses)
+        return _ordered(few, self._looks.after)
 
     def settled(self, start: Hypothesis) -> list[Hypothesis]:
         """Where a search ends, no fault of which can be spared: by one more or less, then in place.
@@ -159,11 +146,9 @@ class _Search:
 
     def _is_worth_it(self, hypothesis: Hypothesis, fewer: Hypothesis) -> bool:
         """Whether what a hypothesis says more than another tells what has changed."""
-        if not self.is_better(hypothesis, fewer):
-            return False
-        if self._before is None:
-            return True
-        return not mends(hypothesis, fewer, self._losses, self._before, self._anatomy)
+        return self.is_better(hypothesis, fewer) and not mends(
+            hypothesis, fewer, self._looks, self._anatomy
+        )
 
     def _neighbours(self, hypothesis: Hypothesis) -> list[Hypothesis]:
         return (

@@ -37,6 +37,10 @@ class Screen:
         """Returns the parts of trials that are looked at."""
         return [self.look(trial) for trial in trials]
 
+    def aside(self) -> "Screen":
+        """Returns a screen that remembers apart; see ``Evidence.aside``."""
+        return Screen(self.evidence.aside(), self.look)
+
     def losses(self, hypotheses: Sequence[Hypothesis], trials: Sequence[Trial]) -> FloatArray:
         """Returns how badly each hypothesis predicts what is looked at; see ``Evidence.losses``."""
         return self.evidence.losses(hypotheses, self.of(trials))

@@ -5,15 +5,9 @@ predict for both does not count. A piece is not independent of the next one, and
 the robot errs everywhere in the same way: so much more is asked for than a textbook would.
 """
 
-from collections.abc import Callable, Sequence
-
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.hypothesis import Hypothesis
-
-Losses = Callable[[Sequence[Hypothesis]], FloatArray]
-"""How badly hypotheses predict each piece of some trials, ``(n, pieces)``."""
 
 Z = 3.0
 """How many standard errors the mean difference of two hypotheses must have. Of some 1,500 faults
@@ -76,12 +70,10 @@ def has_become_better(
         one_before: As ``one``, of other trials, from before.
         other_before: As ``other``, of these.
     """
-    if not all(np.isfinite(losses).all() for losses in (one, other, one_before, other_before)):
+    gains = _gains(one, other, one_before, other_before)
+    if gains is None or not gains[0].mean() > NEGLIGIBLE:
         return False
-    gain, before = other - one, other_before - one_before
-    if min(len(gain), len(before)) < 2 or not gain.mean() > NEGLIGIBLE:
-        return False
-    more, error = _unpaired(gain, before)
+    more, error = _unpaired(*gains)
     return paired_z(other, one) >= WORSE and more >= WORSE * error
 
 
@@ -95,18 +87,26 @@ def only_mends(
     trials would have shown.
 
     Args:
-        one: The losses of the better hypothesis, ``(pieces,)``.
-        other: Those of the other, on the same pieces.
-        one_before: As ``one``, of other trials, from before.
-        other_before: As ``other``, of these.
+        one: The losses of the better hypothesis; this and the others as for ``has_become_better``.
+        other: Those of the other.
+        one_before: As ``one``, from before.
+        other_before: As ``other``, from before.
     """
-    if not all(np.isfinite(losses).all() for losses in (one, other, one_before, other_before)):
+    gains = _gains(one, other, one_before, other_before)
+    if gains is None or not gains[1].mean() > NEGLIGIBLE:
         return False
-    gain, before = other - one, other_before - one_before
-    if min(len(gain), len(before)) < 2 or not before.mean() > NEGLIGIBLE:
-        return False
-    more, error = _unpaired(gain, before)
-    return more < Z * error < 2 * float(gain.mean())
+    more, error = _unpaired(*gains)
+    return more < Z * error < 2 * float(gains[0].mean())
+
+
+def _gains(
+    one: FloatArray, other: FloatArray, one_before: FloatArray, other_before: FloatArray
+) -> tuple[FloatArray, FloatArray] | None:
+    """By how much the first predicts each piece better, and did before; None where nobody knows."""
+    known = all(np.isfinite(losses).all() for losses in (one, other, one_before, other_before))
+    if not known or min(len(one), len(one_before)) < 2:
+        return None
+    return other - one, other_before - one_before
 
 
 def is_worse_than_ever(losses: FloatArray, usual: FloatArray) -> bool:

@@ -7,11 +7,12 @@ import numpy as np
 from selfmodel.anatomy import Anatomy
 from selfmodel.faults import Kind
 from selfmodel.hypothesis import Hypothesis, canonical
-from selfmodel.significance import Losses, is_better
+from selfmodel.losses import Looks, Losses
+from selfmodel.significance import is_better
 
 
 def unseen(
-    best: Hypothesis, kinds: Sequence[Kind], anatomy: Anatomy, losses: Losses, screen: Losses
+    best: Hypothesis, kinds: Sequence[Kind], anatomy: Anatomy, looks: Looks
 ) -> list[Hypothesis]:
     """Returns the hypotheses of one fault more that the trials cannot tell from the best.
 
@@ -22,8 +23,8 @@ def unseen(
         best: The best hypothesis.
         kinds: What is considered.
         anatomy: The robot's parts.
-        losses: How badly hypotheses predict the trials.
-        screen: The same, from fewer pieces and cheaper: what it can tell is not looked at closely.
+        looks: How badly hypotheses predict the trials. What the screen can tell is not looked at
+            closely.
 
     Returns:
         Closest first; none where the best itself diverges.
@@ -32,8 +33,8 @@ def unseen(
     faults = [fault for kind in exact for fault in kind.candidates(anatomy)]
     made = dict.fromkeys(canonical([*best.faults, fault], anatomy) for fault in faults)
     more = [one for one in made if len(one) > len(best)]
-    few = _untold(best, _untold(best, more, screen), losses)
-    order = np.argsort(losses(few).sum(axis=1), kind="stable") if few else ()
+    few = _untold(best, _untold(best, more, looks.screen), looks.after)
+    order = np.argsort(looks.after(few).sum(axis=1), kind="stable") if few else ()
     return [few[i] for i in order]
 
 

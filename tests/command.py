@@ -7,6 +7,12 @@ from pathlib import Path
 
 SMALL = ("--population", "8", "--generations", "2")
 
+DIAGNOSIS = (
+    *("diagnosis", "verdict", "rivals", "unseen", "test", "intact_distance"),
+    *("outside", "calibration"),
+)
+"""What JSON says of a diagnosis, be it of a recovery's or of logs."""
+
 
 def selfmodel(*arguments: str, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:
     """Runs the command in a folder, with its output piped."""

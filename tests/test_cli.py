@@ -15,7 +15,7 @@ from selfmodel.errors import TrialError
 from selfmodel.logs import read_log, save_controller
 from selfmodel.logs.journal import read_database
 from selfmodel.robot import Robot
-from tests.command import SMALL, selfmodel
+from tests.command import DIAGNOSIS, SMALL, selfmodel
 from tests.conftest import random_controllers
 
 ROOT = Path(__file__).parents[1]
@@ -26,18 +26,9 @@ def test_recover_prints_one_json_object_with_everything_promised(recovered: tupl
 
     assert set(told) == {
         *("robot", "case", "truth", "comparator", "kinds", "gap", "structure", "seed", "trials"),
-        *(
-            "diagnosis",
-            "verdict",
-            "rivals",
-            "unseen",
-            "test",
-            "intact_distance",
-            "calibration",
-            "correct",
-        ),
+        *DIAGNOSIS,
         *("displacement", "recovery", "physical_trials", "evaluations", "seconds", "next_trial"),
-        *("controller", "neurons", "outside"),
+        *("controller", "neurons", "correct"),
     }
     assert (told["robot"], told["case"], told["seed"], told["gap"]) == ("quadruped", 4, 0, 0)
     assert told["truth"] == "break:front_left_shoulder+sensor:front_right_touch"

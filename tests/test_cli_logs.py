@@ -11,7 +11,7 @@ import mujoco
 import pytest
 
 from selfmodel.logs import read_log
-from tests.command import SMALL, selfmodel
+from tests.command import DIAGNOSIS, SMALL, selfmodel
 
 PAPERS = ("--comparator", "forward-displacement", "--no-calibrate")
 
@@ -232,15 +232,7 @@ def test_diagnosis_from_logs_alone_says_what_the_run_said_that_wrote_them(
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
 
-    for said in (
-        "diagnosis",
-        "verdict",
-        "rivals",
-        "unseen",
-        "test",
-        "intact_distance",
-        "calibration",
-    ):
+    for said in DIAGNOSIS:
         assert found[said] == told[said], said
     assert found["logs"] == logs[1:]
     assert found["intact"] == logs[:1]

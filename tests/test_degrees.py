@@ -13,7 +13,7 @@ from selfmodel.degrees import (
 )
 from selfmodel.faults import FRICTION, KINDS, PAPER_KINDS, WORLD, Fault
 from selfmodel.hypothesis import Hypothesis
-from selfmodel.significance import Losses
+from selfmodel.losses import Losses
 from tests.test_refine import ANATOMY, FAULTS, PIECES, find
 
 WEAK_MOTOR = KINDS["motor"]

@@ -16,14 +16,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
-import pytest
 
-from selfmodel.comparators.segment_prediction import SEGMENT_PREDICTION
-from selfmodel.logs import read_log
-from selfmodel.logs.robots import robot_of
 from selfmodel.logs.verify import verify
-from selfmodel.notation import parse
-from selfmodel.simulator import Simulator
 from tests.command import selfmodel
 from tests.socket_robot import STOP, TIMESTEP
 
@@ -87,25 +81,6 @@ def test_delays_and_silence_are_marked_and_the_trial_goes_on(tmp_path: Path):
     assert timing.elapsed[-1] > 249 * TIMESTEP
     assert np.all(np.diff(timing.elapsed)[[29, 89, 90]] > [0.06, 0.1, 0.1])
     assert heard(tmp_path) == [STOP, *range(250), STOP]
-
-
-def test_such_a_trial_is_explained_by_what_is_wrong_with_the_robot(tmp_path: Path):
-    with robot(tmp_path, **{"30": 0.04, "90": "silent"}) as port:
-        _, errors = (process := driver(tmp_path, port)).communicate(timeout=120)
-    assert process.returncode == 0, errors
-    log = read_log(tmp_path / "trial.mcap")
-    assert log.timing is not None
-    if log.timing.late.mean() > 0.1:
-        pytest.skip("this machine is too busy now to drive a robot at 50 Hz: most steps were late")
-    self_model = robot_of(log)
-    texts = ("intact", "break:front_left_knee", "jam:back_right_shoulder")
-    hypotheses = [parse(text, self_model.anatomy) for text in texts]
-
-    asked = SEGMENT_PREDICTION.request(log.trial)
-    predicted = Simulator(self_model, 1).predict(hypotheses, asked).behaviour
-    intact, *others = SEGMENT_PREDICTION.distances(predicted, log.trial)
-    assert intact < 1e-12
-    assert min(others) > 0.1
 
 
 def test_a_dropped_connection_stops_the_robot_and_leaves_a_whole_log(tmp_path: Path):

@@ -124,6 +124,21 @@ def test_nothing_is_simulated_twice(
 
 
 @pytest.mark.parametrize("comparator", REQUESTS)
+def test_what_is_looked_at_aside_is_not_simulated_again_and_is_not_ranked(
+    comparator: Comparator, quadruped: Robot, trials: list[Trial], three: list[Hypothesis]
+):
+    simulator = CountingSimulator(quadruped)
+    evidence = Evidence(simulator, comparator)
+    aside = evidence.aside()
+    ranked = evidence.losses(three[:2], trials)
+    looked_at = aside.losses(three, trials)
+
+    assert np.array_equal(looked_at[:2], ranked)
+    assert set(simulator.times.values()) == {1}
+    assert evidence.hypotheses == evidence.judged(trials) == set(three[:2])
+
+
+@pytest.mark.parametrize("comparator", REQUESTS)
 def test_the_distance_is_the_sum_over_the_trials_of_the_mean_over_the_pieces(
     comparator: Comparator, quadruped: Robot, trials: list[Trial], three: list[Hypothesis]
 ):

@@ -1,6 +1,8 @@
 """Promises about steps that were late: nothing is predicted or averaged across one."""
 
+from collections.abc import Collection
 from dataclasses import replace
+from pathlib import Path
 
 import dm_env
 import numpy as np
@@ -13,7 +15,12 @@ from selfmodel.environment_robot import EnvironmentRobot
 from selfmodel.errors import InputError
 from selfmodel.estimate import estimated_states
 from selfmodel.hypothesis import INTACT
+from selfmodel.logs import read_log
+from selfmodel.logs.robots import robot_of
+from selfmodel.logs.writer import write_trial
+from selfmodel.notation import parse
 from selfmodel.playback import played_back
+from selfmodel.settings import Settings
 from selfmodel.simulator import Simulator
 from selfmodel.tasks import ROBOTS, load
 from selfmodel.tasks.walking import motion_capture
@@ -30,10 +37,11 @@ class Stuttering(dm_env.Environment):
 
     Args:
         env: The robot as it should be.
+        silent: Steps after which nothing is observed.
     """
 
-    def __init__(self, env: dm_env.Environment) -> None:
-        self._env, self._steps = env, 0
+    def __init__(self, env: dm_env.Environment, silent: Collection[int] = ()) -> None:
+        self._env, self._steps, self._silent = env, 0, silent
 
     def reset(self) -> dm_env.TimeStep:
         """Starts again."""
@@ -45,7 +53,10 @@ class Stuttering(dm_env.Environment):
         self._steps += 1
         for _ in range(2 if self._steps in LATE else 0):
             self._env.step(action)
-        return self._env.step(action)
+        told = self._env.step(action)
+        if self._steps in self._silent:
+            raise TimeoutError
+        return told
 
     def action_spec(self) -> dm_env.specs.Array:
         """Returns the robot's."""
@@ -93,6 +104,28 @@ def test_what_moves_as_the_model_says_is_predicted_although_steps_were_late(
     if comparator is SEGMENT_PREDICTION:
         assert distance(trial) < 1e-20
     assert distance(trial) < distance(without_marks(trial))
+
+
+def test_a_log_with_late_and_lost_steps_tells_what_is_wrong(tmp_path: Path):
+    env = load("quadruped", "walk")
+    physical = EnvironmentRobot(Stuttering(env, {90}), QUADRUPED, observe=motion_capture(env))
+    driver = played_back(NAMES.motors, random_motion(QUADRUPED, STEPS))
+    plan = Plan("00", "after", driver, STEPS, 0)
+    path = tmp_path / "trial.mcap"
+    write_trial(path, QUADRUPED, plan, physical.run(driver, STEPS), timed=True, settings=Settings())
+    log = read_log(path)
+    self_model = robot_of(log)
+    texts = ("intact", "break:front_left_knee", "jam:back_right_shoulder")
+    hypotheses = [parse(text, self_model.anatomy) for text in texts]
+
+    asked = SEGMENT_PREDICTION.request(log.trial)
+    predicted = Simulator(self_model, 1).predict(hypotheses, asked).behaviour
+    intact, *others = SEGMENT_PREDICTION.distances(predicted, log.trial)
+    assert log.timing is not None
+    assert np.flatnonzero(log.timing.missing).tolist() == [90]
+    assert np.flatnonzero(log.timing.late).tolist() == list(LATE)
+    assert intact < 1e-12
+    assert min(others) > 0.1
 
 
 def test_a_model_that_is_exact_predicts_it_exactly_for_calibration_too(trial: Trial):

@@ -13,11 +13,11 @@ from selfmodel.diagnose import Diagnose
 from selfmodel.diagnosis import Diagnosis
 from selfmodel.faults import FRICTION, PAPER_KINDS
 from selfmodel.hypothesis import INTACT, Hypothesis
+from selfmodel.losses import Looks, Losses
 from selfmodel.mending import mends, mends_in_part
 from selfmodel.notation import parse
 from selfmodel.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.significance import Losses
 from selfmodel.simulator import Simulator
 from selfmodel.trial import Plan, Stage, Trial
 from tests.conftest import random_controllers
@@ -40,22 +40,22 @@ def test_a_fault_that_alone_would_have_helped_before_mends(quadruped: Robot):
     both, knee = (parse(text, anatomy) for text in (f"{KNEE}+{SLIPPERY}", KNEE))
     slippery = parse(SLIPPERY, anatomy)
     after = of(quadruped, {str(both): 0.5, KNEE: 0.7, SLIPPERY: 0.8})
-    before = of(quadruped, {SLIPPERY: 0.8, KNEE: 2.0})
+    looks = Looks(after, after, of(quadruped, {SLIPPERY: 0.8, KNEE: 2.0}))
 
-    assert mends(both, knee, after, before, anatomy)
-    assert not mends(both, slippery, after, before, anatomy)
-    assert mends_in_part(both, after, before, anatomy)
-    assert not mends_in_part(knee, after, before, anatomy)
-    assert not mends_in_part(INTACT, after, before, anatomy)
+    assert mends(both, knee, looks, anatomy)
+    assert not mends(both, slippery, looks, anatomy)
+    assert mends_in_part(both, looks, anatomy)
+    assert not mends_in_part(knee, looks, anatomy)
+    assert not mends_in_part(INTACT, looks, anatomy)
 
 
 def test_of_what_would_have_done_harm_nothing_else_is_asked(quadruped: Robot):
     def never(_: Sequence[Hypothesis]) -> np.ndarray:
         raise AssertionError
 
-    before = of(quadruped, {KNEE: 2.0})
+    looks = Looks(never, never, of(quadruped, {KNEE: 2.0}))
 
-    assert not mends(parse(KNEE, quadruped.anatomy), INTACT, never, before, quadruped.anatomy)
+    assert not mends(parse(KNEE, quadruped.anatomy), INTACT, looks, quadruped.anatomy)
 
 
 def trial(robot: Robot, truth: str, gait: Controller, stage: Stage, number: int) -> Trial:

@@ -14,8 +14,9 @@ from selfmodel.diagnose import Diagnose
 from selfmodel.diagnosis import Diagnosis, Outside
 from selfmodel.faults import ALL_KINDS, PAPER_KINDS, ROUGHNESS
 from selfmodel.hypothesis import INTACT, Hypothesis
+from selfmodel.losses import Looks
 from selfmodel.notation import parse
-from selfmodel.outside import Looks, better_outside
+from selfmodel.outside import better_outside
 from selfmodel.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.significance import NEGLIGIBLE

@@ -15,9 +15,10 @@ from hypothesis import strategies as st
 
 from selfmodel.faults import PAPER_KINDS, Fault
 from selfmodel.hypothesis import INTACT, Hypothesis, canonical
+from selfmodel.losses import Looks, Losses
 from selfmodel.notation import parse
 from selfmodel.refine import refined
-from selfmodel.significance import Losses, is_better
+from selfmodel.significance import is_better
 from selfmodel.tasks import ROBOTS
 
 ANATOMY = ROBOTS["quadruped"].robot().anatomy
@@ -76,7 +77,7 @@ def find(
     most: int = MOST,
     before: Losses | None = None,
 ) -> Hypothesis:
-    return refined(known, faults, most, losses, ANATOMY, before=before)
+    return refined(known, faults, most, Looks(losses, losses, before), ANATOMY)
 
 
 @pytest.mark.parametrize(
@@ -337,10 +338,10 @@ def test_the_screen_says_what_is_looked_at_and_the_losses_what_is_found():
     def screen(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
         return of(hypotheses)[:, ::3] + 1.0
 
-    assert refined([], FAULTS, MOST, losses, ANATOMY, screen=screen) == truth
+    assert refined([], FAULTS, MOST, Looks(losses, screen, None), ANATOMY) == truth
     few = len(looked_at)
     looked_at.clear()
-    assert refined([], FAULTS, MOST, losses, ANATOMY) == truth
+    assert refined([], FAULTS, MOST, Looks(losses, losses, None), ANATOMY) == truth
     assert few < len(looked_at) / 2
 
 
@@ -352,7 +353,7 @@ def test_a_screen_that_prefers_what_is_wrong_does_not_decide():
     losses = counted({"intact": 1.5, one: 1.0, right: 0.1}, otherwise=2.0)
     screen = counted({"intact": 1.5, one: 1.0, right: 0.5, wrong: 0.1}, otherwise=2.0)
 
-    assert refined([], FAULTS, MOST, losses, ANATOMY, screen=screen) == said(right)
+    assert refined([], FAULTS, MOST, Looks(losses, screen, None), ANATOMY) == said(right)
 
 
 def test_a_fault_that_would_have_helped_as_much_before_only_mends_the_model():

@@ -77,8 +77,13 @@ def _from_the_bank(setting: Setting) -> list[Row]:
     def watch(event: Event) -> None:
         clock(event)
         if isinstance(event, Diagnosis):
-            row = row_of(setting, event, trials[: event.trials], clock)
-            rows.append(_counted(row, search))
+            rows.append(
+                dataclasses.replace(
+                    row_of(setting, event, trials[: event.trials], clock),
+                    evaluations=search.evaluations,
+                    distinct_hypotheses=search.distinct_hypotheses,
+                )
+            )
 
     explain(trials, search, setting.spec.cell.seed, watch, after={1, len(trials)})
     return rows
@@ -129,14 +134,6 @@ def _in_a_recovery(setting: Setting) -> list[Row]:
         rows[-1], distinct_hypotheses=outcome.recovery.distinct_hypotheses
     )
     return rows
-
-
-def _counted(row: Row, search: Diagnose) -> Row:
-    return dataclasses.replace(
-        row,
-        evaluations=search.evaluations,
-        distinct_hypotheses=search.distinct_hypotheses,
-    )
 
 
 _WAYS: Mapping[str, Callable[[Setting], list[Row]]] = {
