@@ -62,7 +62,7 @@ class Diagnose:
         self._intact = tuple(intact)
         self.evidence = Evidence(simulator, comparator)
         self._screen = screen_of(comparator, simulator, self.evidence)
-        # What is looked at once the best is known is never ranked: it is remembered apart.
+        # What is only looked at is remembered apart, so that it is never ranked.
         self._aside, self._screen_aside = self.evidence.aside(), self._screen.aside()
         self.evaluations = 0
 
@@ -153,11 +153,13 @@ class Diagnose:
         not compared with what helped before.
         """
         known = [*self._intact, *trials]
-        comparable = self._intact and self.evidence.in_pieces and self.evidence.in_segments(known)
+        comparable = self.evidence.in_pieces and self.evidence.in_segments(known)
         return Looks(
             after=partial(self._aside.losses, trials=trials),
             screen=partial(self._screen_aside.losses, trials=trials),
-            before=partial(self._aside.losses, trials=self._intact) if comparable else None,
+            before=partial(self._aside.losses, trials=self._intact)
+            if comparable and self._intact
+            else None,
         )
 
     def _refined(

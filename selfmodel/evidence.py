@@ -31,20 +31,20 @@ class Evidence:
     Args:
         simulator: The self-model.
         comparator: Says what to simulate and how far it is from a trial.
-        other: What it makes of trials already; hypotheses are remembered apart from those.
+        beside: Evidence of the same two, whose rows are taken and never added to; see ``aside``.
     """
 
     def __init__(
-        self, simulator: Simulator, comparator: Comparator, other: "Evidence | None" = None
+        self, simulator: Simulator, comparator: Comparator, *, beside: "Evidence | None" = None
     ) -> None:
         self._simulator = simulator
         self._comparator = comparator
-        self._other = other
+        self._beside = beside
         self._losses: dict[str, Memo[Hypothesis]] = {}  # by the trial's log
 
     def aside(self) -> "Evidence":
         """Returns evidence that remembers apart, and simulates nothing that this one knows."""
-        return Evidence(self._simulator, self._comparator, self)
+        return Evidence(self._simulator, self._comparator, beside=self)
 
     @property
     def in_pieces(self) -> bool:
@@ -66,7 +66,7 @@ class Evidence:
 
     def known(self, trial: Trial) -> Memo[Hypothesis]:
         """Returns what is remembered of a trial."""
-        return self._losses.setdefault(trial.path, Memo())
+        return self._losses.get(trial.path, Memo())
 
     def check(self, trials: Sequence[Trial]) -> None:
         """Checks that the comparator can judge all trials, before any search.
@@ -102,9 +102,9 @@ class Evidence:
         return np.concatenate([np.array(self._of(hypotheses, trial)) for trial in trials], axis=1)
 
     def _of(self, hypotheses: Sequence[Hypothesis], trial: Trial) -> list[FloatArray]:
-        memo = self.known(trial)
-        if self._other is not None:
-            memo.learn(self._other.known(trial), hypotheses)
+        memo = self._losses.setdefault(trial.path, Memo())
+        if self._beside is not None:
+            memo.learn(self._beside.known(trial), hypotheses)
         return memo.values(hypotheses, partial(self._simulate, trial))
 
     def _simulate(self, trial: Trial, hypotheses: list[Hypothesis]) -> FloatArray:

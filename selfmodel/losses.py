@@ -1,4 +1,4 @@
-"""How badly hypotheses predict trials: what is asked of a comparator, and of which trials."""
+"""How badly hypotheses predict trials, and which trials a diagnosis looks at."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -11,13 +11,13 @@ Losses = Callable[[Sequence[Hypothesis]], FloatArray]
 
 
 class Looks(NamedTuple):
-    """The trials that a diagnosis looks at.
+    """How badly hypotheses predict the trials that a diagnosis looks at, ``(n, pieces)`` each.
 
     Attributes:
-        after: Those to explain.
-        screen: The same, from fewer pieces and cheaper: it tells what is far from what is near.
-        before: Trials of the robot with nothing wrong; None where there are none, or they cannot be
-            compared with those to explain.
+        after: Of the trials to explain.
+        screen: Of the same, from fewer pieces and cheaper: it tells what is far from what is near.
+        before: Of trials of the robot with nothing wrong; None where there are none, or they cannot
+            be compared with those to explain.
     """
 
     after: Losses

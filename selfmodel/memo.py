@@ -2,7 +2,7 @@
 
 Each of the EAs has its own: a repair keeps the way that a run went, a diagnosis the losses of a
 hypothesis in one trial. Behaviours are not kept, so a controller that was tried is simulated once
-more for each trial it is compared with; everything else is simulated once.
+more for each trial it is compared with. Whatever else one of them has computed, it does not again.
 """
 
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence

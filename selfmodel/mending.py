@@ -16,6 +16,9 @@ def mends(hypothesis: Hypothesis, fewer: Hypothesis, looks: Looks, anatomy: Anat
         fewer: The other.
         looks: How badly they predict the trials.
         anatomy: The robot's parts.
+
+    Returns:
+        False where there is nothing from before to compare with.
     """
     if looks.before is None:
         return False

@@ -33,7 +33,8 @@ def better_outside(
         looks: How badly hypotheses predict the trials.
 
     Returns:
-        The one that predicts best; None where nothing outside explains more.
+        The one that predicts best; None where nothing outside explains more, or where there is
+        nothing from before to compare with.
     """
     if looks.before is None:
         return None

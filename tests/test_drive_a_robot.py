@@ -18,8 +18,9 @@ from pathlib import Path
 import numpy as np
 
 from selfmodel.logs.verify import verify
+from selfmodel.tasks.walking import environment, motion_capture
 from tests.command import selfmodel
-from tests.socket_robot import STOP, TIMESTEP
+from tests.socket_robot import OBSERVED, STOP, TIMESTEP, slow_quadruped
 
 ROOT = Path(__file__).parents[1]
 EXAMPLE = ROOT / "examples" / "drive_a_robot.py"
@@ -81,6 +82,19 @@ def test_delays_and_silence_are_marked_and_the_trial_goes_on(tmp_path: Path):
     assert timing.elapsed[-1] > 249 * TIMESTEP
     assert np.all(np.diff(timing.elapsed)[[29, 89, 90]] > [0.06, 0.1, 0.1])
     assert heard(tmp_path) == [STOP, *range(250), STOP]
+    # The robot moves one step a message, so what it observed can be had again.
+    for k, seen in enumerate(observed(behaviour["commands"])):
+        for name in OBSERVED:
+            assert timing.missing[k] or np.array_equal(behaviour[name][k], seen[name])
+
+
+def observed(commands: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
+    """What the robot observes that follows some targets."""
+    env = environment(slow_quadruped(), "intact", 1e3, None, None)
+    observe = motion_capture(env)
+    yield observe(env.reset().observation)
+    for targets in commands[:-1]:
+        yield observe(env.step(targets).observation)
 
 
 def test_a_dropped_connection_stops_the_robot_and_leaves_a_whole_log(tmp_path: Path):

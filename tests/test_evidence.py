@@ -10,13 +10,16 @@ import pytest
 from selfmodel.behaviour import Behaviour, Signal
 from selfmodel.comparator import ClosedLoop, Comparator, Ensemble, Request, Segments
 from selfmodel.comparators import FORWARD_DISPLACEMENT, SEGMENT_PREDICTION, SENSOR_SERIES
+from selfmodel.diagnose import Diagnose
 from selfmodel.driver import Driver
 from selfmodel.errors import InputError
 from selfmodel.evidence import Evidence
+from selfmodel.faults import PAPER_KINDS
 from selfmodel.hypothesis import INTACT, Hypothesis
 from selfmodel.notation import parse
 from selfmodel.physical import SimulatedRobot
 from selfmodel.robot import Robot
+from selfmodel.settings import Settings
 from selfmodel.simulator import Run, Simulator
 from selfmodel.tally import Simulated
 from selfmodel.trial import Plan, Trial
@@ -24,6 +27,7 @@ from tests.conftest import exploding, random_controllers
 from tests.memory import MemoryJournal
 
 STEPS = 60
+SMALL = dataclasses.replace(Settings().scaled(12), generations=2, steps=600)
 TEXTS = ("intact", "jam:back_left_knee", "break:front_left_knee")
 
 CLOSED_LOOP = ClosedLoop(("base_position",))
@@ -151,6 +155,31 @@ def test_the_distance_is_the_sum_over_the_trials_of_the_mean_over_the_pieces(
         evidence.distances(three, trials), sum(one.mean(axis=1) for one in losses)
     )
     assert not np.array_equal(losses[0], losses[1]) or isinstance(comparator, Plain)
+
+
+def test_a_diagnosis_simulates_nothing_twice_and_ranks_nothing_that_is_not_considered(
+    quadruped: Robot,
+):
+    gait = random_controllers(quadruped, 6)[5]
+    after, before = (
+        MemoryJournal(quadruped).record(
+            SimulatedRobot(quadruped, parse(truth, quadruped.anatomy)),
+            Plan(stage, stage, gait, SMALL.steps, 0),
+        )
+        for truth, stage in (("friction=0.3", "after"), ("intact", "before"))
+    )
+    simulator = CountingSimulator(quadruped)
+    search = Diagnose(simulator, SEGMENT_PREDICTION, SMALL, PAPER_KINDS, intact=[before])
+    found = search([after], [], np.random.default_rng(0), lambda _: None)
+
+    assert found.outside is not None
+    assert found.outside.kind == "friction"
+    assert set(simulator.times.values()) == {1}
+    simulated = {hypothesis for hypothesis, _ in simulator.times}
+    considered = {
+        one for one in simulated if {fault.kind for fault in one.faults} <= {*PAPER_KINDS}
+    }
+    assert search.distinct_hypotheses <= len(considered) < len(simulated)
 
 
 def test_what_is_remembered_is_what_was_simulated_whatever_was_asked_for_in_between(

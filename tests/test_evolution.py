@@ -199,3 +199,13 @@ def test_a_memo_computes_every_key_once():
     assert np.array_equal(memo.values(["bb", "ccc"], compute), [[2, -2], [3, -3]])
     assert list(memo) == computed == ["a", "bb", "ccc"]
     assert len(memo) == 3
+
+
+def test_a_memo_learns_from_another_what_is_asked_for_and_no_more():
+    other: Memo[str] = Memo()
+    other.values(["a", "bb"], lambda keys: np.array([[len(key)] for key in keys]))
+    memo: Memo[str] = Memo()
+    memo.learn(other, ["bb", "ccc"])
+
+    assert list(memo) == ["bb"]
+    assert memo["bb"] == other["bb"] == 2

@@ -1,4 +1,4 @@
-"""Promises about steps that were late: nothing is predicted or averaged across one."""
+"""Promises about steps that were late or lost: nothing is predicted or averaged across one."""
 
 from collections.abc import Collection
 from dataclasses import replace
@@ -106,7 +106,7 @@ def test_what_moves_as_the_model_says_is_predicted_although_steps_were_late(
     assert distance(trial) < distance(without_marks(trial))
 
 
-def test_a_log_with_late_and_lost_steps_tells_what_is_wrong(tmp_path: Path):
+def test_a_log_with_late_and_lost_steps_fits_the_robot_as_it_was_and_no_fault(tmp_path: Path):
     env = load("quadruped", "walk")
     physical = EnvironmentRobot(Stuttering(env, {90}), QUADRUPED, observe=motion_capture(env))
     driver = played_back(NAMES.motors, random_motion(QUADRUPED, STEPS))

@@ -49,10 +49,17 @@ def test_a_fault_that_alone_would_have_helped_before_mends(quadruped: Robot):
     assert not mends_in_part(INTACT, looks, anatomy)
 
 
-def test_of_what_would_have_done_harm_nothing_else_is_asked(quadruped: Robot):
-    def never(_: Sequence[Hypothesis]) -> np.ndarray:
-        raise AssertionError
+def never(_: Sequence[Hypothesis]) -> np.ndarray:
+    raise AssertionError
 
+
+def test_where_nothing_from_before_can_be_compared_nothing_mends(quadruped: Robot):
+    knee = parse(KNEE, quadruped.anatomy)
+
+    assert not mends(knee, INTACT, Looks(never, never, None), quadruped.anatomy)
+
+
+def test_of_what_would_have_done_harm_nothing_else_is_asked(quadruped: Robot):
     looks = Looks(never, never, of(quadruped, {KNEE: 2.0}))
 
     assert not mends(parse(KNEE, quadruped.anatomy), INTACT, looks, quadruped.anatomy)

@@ -54,10 +54,17 @@ def test_what_helped_before_as_well_mends_the_model_and_is_no_change(quadruped: 
     assert found is None
 
 
-def test_where_nothing_is_left_to_explain_nothing_is_simulated(quadruped: Robot):
-    def never(_: Sequence[Hypothesis]) -> np.ndarray:
-        raise AssertionError
+def never(_: Sequence[Hypothesis]) -> np.ndarray:
+    raise AssertionError
 
+
+def test_where_nothing_from_before_can_be_compared_nothing_is_simulated(quadruped: Robot):
+    looks = Looks(never, never, None)
+
+    assert better_outside(INTACT, PAPER_KINDS, quadruped.anatomy, looks) is None
+
+
+def test_where_nothing_is_left_to_explain_nothing_is_simulated(quadruped: Robot):
     def perfect(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
         return np.full((len(hypotheses), PIECES), NEGLIGIBLE)
 

@@ -169,8 +169,8 @@ def test_what_was_better_before_has_to_be_better_by_more_since():
     one, earlier, gain = at_the_edge(WORSE)
 
     assert paired_z(one + gain, one) > WORSE
-    assert not has_become_better(one, one + gain - 0.01, BEFORE, BEFORE + earlier)
-    assert has_become_better(one, one + gain + 0.01, BEFORE, BEFORE + earlier)
+    assert not has_become_better(one, one + gain - 0.002, BEFORE, BEFORE + earlier)
+    assert has_become_better(one, one + gain + 0.002, BEFORE, BEFORE + earlier)
 
 
 def test_what_made_it_worse_before_has_to_help_all_the_same():
@@ -193,8 +193,8 @@ def test_what_diverged_or_has_a_single_piece_has_not_become_better():
 def test_what_helped_before_only_mends_unless_it_helps_significantly_more_since():
     one, earlier, gain = at_the_edge(Z)
 
-    assert only_mends(one, one + gain - 0.01, BEFORE, BEFORE + earlier)
-    assert not only_mends(one, one + gain + 0.01, BEFORE, BEFORE + earlier)
+    assert only_mends(one, one + gain - 0.002, BEFORE, BEFORE + earlier)
+    assert not only_mends(one, one + gain + 0.002, BEFORE, BEFORE + earlier)
 
 
 @pytest.mark.parametrize("harm", [0.0, NEGLIGIBLE / 2, 1.0])
