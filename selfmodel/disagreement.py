@@ -15,8 +15,8 @@ from selfmodel.behaviour import Behaviour, Signal
 from selfmodel.differences import difference
 from selfmodel.driver import Driver, Evolved
 from selfmodel.hypothesis import Hypothesis
+from selfmodel.memo import Memo
 from selfmodel.playback import Playback
-from selfmodel.robot import Robot
 from selfmodel.rotation import directions
 from selfmodel.simulator import Simulator
 from selfmodel.tally import Simulated
@@ -48,16 +48,8 @@ STEEPEST = np.radians(60)
 """A base that leans by more than at the start has fallen, rad."""
 
 
-def most_disputed(
-    hypotheses: Sequence[Hypothesis],
-    candidates: Sequence[Evolved],
-    simulator: Simulator,
-    steps: int,
-) -> Evolved:
-    """Returns the controller whose trial is predicted to tell the hypotheses apart best.
-
-    A controller with which the robot falls under any of the hypotheses, or whose simulation
-    diverges, is out. Where all are, it is the one with which the first fall comes latest.
+class Dispute:
+    """What some hypotheses disagree on; no controller is looked at twice.
 
     The predictions that are compared are of the same commands, those that the first hypothesis
     leads to. Through a controller, one reading more makes another motion, and a comparator that is
@@ -65,82 +57,72 @@ def most_disputed(
 
     Args:
         hypotheses: Those that are still in the running, the best first.
-        candidates: At least one; of equals, the first is taken.
         simulator: The self-model.
         steps: Control steps of a trial. Falls are looked for in all of it, disagreement early on.
     """
-    falls, order = _looked_at(hypotheses, candidates, simulator, min(steps, EARLY))
-    for i in order:
-        whole = _predicted(hypotheses, [candidates[i]], simulator, steps)
-        falls[i] = _first_of_any(whole, hypotheses, simulator.robot)[0]
-        if falls[i] == steps:
-            return candidates[i]
-    return candidates[int(falls.argmax())]
 
+    def __init__(self, hypotheses: Sequence[Hypothesis], simulator: Simulator, steps: int) -> None:
+        self._hypotheses, self._simulator, self._steps = tuple(hypotheses), simulator, steps
+        self._early = min(steps, EARLY)
+        self._seen: Memo[Evolved] = Memo()
 
-def most_disputed_first(
-    hypotheses: Sequence[Hypothesis], candidates: Sequence[Evolved], simulator: Simulator
-) -> list[Evolved]:
-    """Returns the controllers, those on which hypotheses disagree most first.
+    def most_telling(self, candidates: Sequence[Evolved]) -> Evolved:
+        """Returns the controller whose trial is predicted to tell the hypotheses apart best.
 
-    Those with which the robot falls at once come last, the earliest fall at the end.
+        A controller with which the robot falls under any of the hypotheses, or whose simulation
+        diverges, is out. Where all are, it is the one with which the first fall comes latest.
 
-    Args:
-        hypotheses: As for ``most_disputed``, and so are the others.
-        candidates: At least one.
-        simulator: The self-model.
-    """
-    falls, order = _looked_at(hypotheses, candidates, simulator, EARLY)
-    fallen = np.flatnonzero(falls < EARLY)
-    latest = fallen[np.argsort(-falls[fallen], kind="stable")]
-    return [candidates[i] for i in (*order, *latest.tolist())]
+        Args:
+            candidates: At least one; of equals, the first is taken.
+        """
+        falls, order = self._ordered(candidates)
+        for i in order:
+            if falls[i] < self._early:
+                break  # and so it is with the rest
+            whole = self._predicted([candidates[i]], self._steps)
+            falls[i] = self._first_falls(whole)[0]
+            if falls[i] == self._steps:
+                return candidates[i]
+        return candidates[int(falls.argmax())]
 
+    def most_telling_first(self, candidates: Sequence[Evolved]) -> list[Evolved]:
+        """Returns the controllers, those on which the hypotheses disagree most first.
 
-def _looked_at(
-    hypotheses: Sequence[Hypothesis],
-    candidates: Sequence[Evolved],
-    simulator: Simulator,
-    steps: int,
-) -> tuple[IndexArray, list[int]]:
-    """When the robot first falls with each, and the numbers of the others, most disputed first."""
-    early = _predicted(hypotheses, candidates, simulator, steps)
-    falls = _first_of_any(early, hypotheses, simulator.robot)
-    upright = np.flatnonzero(falls == steps)
-    names, commands = early.behaviour.names, early.behaviour["commands"][upright, 0]
-    alike = [Playback(names.motors, rows) for rows in commands]
-    return falls, upright[_most_telling_first(hypotheses, alike, simulator)].tolist()
+        Those with which the robot falls at once come last, the earliest fall at the end.
+        """
+        return [candidates[i] for i in self._ordered(candidates)[1]]
 
+    def _ordered(self, candidates: Sequence[Evolved]) -> tuple[IndexArray, list[int]]:
+        """When the robot first falls with each, and the numbers of all, the most telling first."""
+        falls, telling = np.array(self._seen.values(candidates, self._looked_at)).T
+        return falls.astype(np.intp), np.lexsort((-telling, -falls)).tolist()
 
-def _most_telling_first(
-    hypotheses: Sequence[Hypothesis], recordings: Sequence[Playback], simulator: Simulator
-) -> IndexArray:
-    """The numbers of recorded commands, those on which the hypotheses disagree most first."""
-    if not recordings:
-        return np.empty(0, dtype=np.intp)
-    found = _predicted(hypotheses, recordings, simulator, len(recordings[0].commands))
-    telling = np.where(found.diverged.any(axis=1), -1.0, disagreements(found.behaviour))
-    return np.argsort(-telling, kind="stable")
+    def _looked_at(self, candidates: Sequence[Evolved]) -> FloatArray:
+        """When the robot first falls with each, and how much is disagreed on until then."""
+        early = self._predicted(candidates, self._early)
+        falls = self._first_falls(early)
+        upright = np.flatnonzero(falls == self._early)
+        telling = np.zeros(len(candidates))
+        if upright.size:
+            names, commands = early.behaviour.names, early.behaviour["commands"][upright, 0]
+            alike = [Playback(names.motors, rows) for rows in commands]
+            found = self._predicted(alike, self._early)
+            parted = disagreements(found.behaviour)
+            telling[upright] = np.where(found.diverged.any(axis=1), -1.0, parted)
+        return np.stack([falls, telling], axis=1)
 
+    def _predicted(self, drivers: Sequence[Driver], steps: int) -> Simulated:
+        """Each driver under each hypothesis, ``(drivers, hypotheses, steps, width)``."""
+        runs = [(hypothesis, one) for one in drivers for hypothesis in self._hypotheses]
+        outcome = self._simulator.run(runs, steps, (*SCALES, "commands"))
+        return outcome.grouped(len(drivers), len(self._hypotheses))
 
-def _predicted(
-    hypotheses: Sequence[Hypothesis],
-    drivers: Sequence[Driver],
-    simulator: Simulator,
-    steps: int,
-) -> Simulated:
-    """Each driver under each hypothesis, ``(drivers, hypotheses, steps, width)``."""
-    runs = [(hypothesis, one) for one in drivers for hypothesis in hypotheses]
-    outcome = simulator.run(runs, steps, (*SCALES, "commands"))
-    return outcome.grouped(len(drivers), len(hypotheses))
-
-
-def _first_of_any(
-    simulated: Simulated, hypotheses: Sequence[Hypothesis], robot: Robot
-) -> IndexArray:
-    """When the robot first falls under any of the hypotheses; what diverges falls at once."""
-    normals = np.array([robot.build(hypothesis).normal for hypothesis in hypotheses])
-    falls = first_falls(simulated.behaviour, normals, robot.standing_height)
-    return np.asarray(np.where(simulated.diverged, 0, falls).min(axis=1))
+    def _first_falls(self, simulated: Simulated) -> IndexArray:
+        """When the robot first falls under any of the hypotheses; what diverges falls at once."""
+        robot = self._simulator.robot
+        normals = np.array([robot.build(hypothesis).normal for hypothesis in self._hypotheses])
+        falls = first_falls(simulated.behaviour, normals, robot.standing_height)
+        return np.asarray(np.where(simulated.diverged, 0, falls).min(axis=1))
 
 
 def disagreements(behaviour: Behaviour) -> FloatArray:

@@ -9,7 +9,7 @@ import numpy as np
 from selfmodel.controller import draw_weights
 from selfmodel.database import Database
 from selfmodel.diagnosis import Diagnosis
-from selfmodel.disagreement import most_disputed, most_disputed_first
+from selfmodel.disagreement import Dispute
 from selfmodel.driver import Evolved
 from selfmodel.events import Event, Question
 from selfmodel.evolution import varied
@@ -95,13 +95,13 @@ def telling_apart(
         settings: The paper's numbers.
         rng: Every random choice comes from it.
     """
-    hypotheses = in_the_running(diagnosis)
+    dispute = Dispute(in_the_running(diagnosis), simulator, settings.steps)
     pool = candidates(known, settings, rng)
     for _ in range(GENERATIONS):
-        best = most_disputed_first(hypotheses, pool, simulator)[: settings.survivors]
+        best = dispute.most_telling_first(pool)[: settings.survivors]
         children = offspring(best, settings, rng)
         pool = [one for one in dict.fromkeys([*best, *children]) if one != known[0]]
-    return most_disputed(hypotheses, pool, simulator, settings.steps)
+    return dispute.most_telling(pool)
 
 
 def in_the_running(diagnosis: Diagnosis) -> tuple[Hypothesis, ...]:
