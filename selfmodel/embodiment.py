@@ -183,12 +183,14 @@ def embody(
         return embodiment
     for fault in hypothesis.faults:
         fault.kind.strike(embodiment, anatomy, fault)
-    mujoco.mj_setConst(embodiment.model, mujoco.MjData(embodiment.model))
+    data = mujoco.MjData(model)  # one for all, as all are of one layout: making it costs the most
+    usual = _mean_inertia(model, data)
+    mujoco.mj_setConst(embodiment.model, data)
     # Tendons are as long as ever, though a held joint's angle has become its reference.
     embodiment.model.tendon_length0[:] = model.tendon_length0
     # The solver's tolerance is relative to the mean inertia; a held hinge's would make any answer
     # good enough. Kept absolute, what is left of the robot is solved as exactly as ever.
-    embodiment.model.opt.tolerance *= _mean_inertia(model) / _mean_inertia(embodiment.model)
+    embodiment.model.opt.tolerance *= usual / _mean_inertia(embodiment.model, data)
     return embodiment
 
 
@@ -198,8 +200,8 @@ def _turn(position: FloatArray, orientation: FloatArray, by: FloatArray) -> None
     mujoco.mju_mulQuat(orientation, by, orientation.copy())
 
 
-def _mean_inertia(model: mujoco.MjModel) -> float:
+def _mean_inertia(model: mujoco.MjModel, data: mujoco.MjData) -> float:
     """Mean of the diagonal of the mass matrix in the reference configuration."""
-    data = mujoco.MjData(model)
+    mujoco.mj_resetData(model, data)
     mujoco.mj_fwdPosition(model, data)
     return float(data.M[model.M_rowadr + model.M_rownnz - 1].mean())
