@@ -7,11 +7,11 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, get_args
+from typing import Any
 
 from selfmodel.errors import InputError
 from selfmodel.settings import Settings
-from selfmodel.trial import Stage
+from selfmodel.trial import STAGES, Stage, stage_of
 
 FORMAT = "1"
 """The version of the log's format; a reader refuses others."""
@@ -149,10 +149,9 @@ def trial_record(texts: Mapping[str, str]) -> TrialRecord:
     missing = [name for name in fields if name not in texts]
     if missing:
         raise ValueError(f"it lacks {', '.join(missing)}")
-    stages: tuple[Stage, ...] = get_args(Stage)
-    stage = next((known for known in stages if known == texts["stage"]), None)
+    stage = stage_of(texts["stage"])
     if stage is None:
-        raise ValueError(f"stage must be one of {', '.join(stages)}, got {texts['stage']!r}")
+        raise ValueError(f"stage must be one of {', '.join(STAGES)}, got {texts['stage']!r}")
     long = [name for name in fields if len(texts[name]) > LONGEST_TEXT]
     if long:
         raise ValueError(f"expected at most {LONGEST_TEXT} characters in {', '.join(long)}")

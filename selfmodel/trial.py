@@ -1,7 +1,7 @@
 """A trial: one run of the physical robot with one controller, as its log tells it."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from selfmodel.behaviour import Behaviour, forward_displacement
 from selfmodel.driver import Driver
@@ -9,7 +9,15 @@ from selfmodel.driver import Driver
 Stage = Literal["before", "after", "recovery", "single"]
 """Where in a story a trial stands: the robot walks (``before``), no longer does as its model says
 (``after``), tries a compensating controller (``recovery``), or runs outside a recovery
-(``single``)."""
+(``single``). What was ``before`` is not explained by a diagnosis: it shows how the robot moves with
+nothing wrong."""
+
+STAGES: tuple[Stage, ...] = get_args(Stage)
+
+
+def stage_of(name: str) -> Stage | None:
+    """Returns the stage of that name; None if there is none."""
+    return next((stage for stage in STAGES if stage == name), None)
 
 
 @dataclass(frozen=True)

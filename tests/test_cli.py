@@ -125,6 +125,7 @@ def test_a_folder_that_holds_another_run_is_refused_and_left_alone(recovered: tu
         (["trial", "quadruped", "--out", "a.bag"], "ends in .mcap"),
         (["trial", "quadruped", "--out", "a.mcap", "--controller", "no.npz"], "no.npz"),
         (["trial", "quadruped", "--out", "a.mcap", "--controller", "bad.mcap"], "bad.mcap"),
+        (["trial", "quadruped", "--out", "a.mcap", "--stage", "befor"], "did you mean before"),
         (["robots", "octopod"], "unknown robot 'octopod'"),
     ],
 )

@@ -86,6 +86,27 @@ def test_a_calibrated_model_is_one_for_replay_and_diagnose(folder: Path):
     assert again.returncode == 0, again.stderr
 
 
+def test_a_trial_from_before_the_failure_is_fitted_to_and_not_explained(tmp_path: Path):
+    healthy = selfmodel(
+        *("trial", "quadruped", "--stage", "before", "--out", "healthy.mcap"), cwd=tmp_path
+    )
+    failed = selfmodel(
+        *("trial", "quadruped", "--controller", "healthy.mcap", "--out", "failed.mcap"),
+        *("--damage", "break:front_left_knee"),
+        cwd=tmp_path,
+    )
+    done = selfmodel(
+        *("diagnose", "healthy.mcap", "failed.mcap", "--json"),
+        *("--comparator", "forward-displacement"),
+        cwd=tmp_path,
+    )
+
+    assert [healthy.returncode, failed.returncode, done.returncode] == [0, 0, 0], done.stderr
+    found = json.loads(done.stdout)
+    assert (found["intact"], found["logs"]) == (["healthy.mcap"], ["failed.mcap"])
+    assert found["calibration"] is not None
+
+
 def test_a_table_says_each_factor_and_how_sure_it_is(folder: Path):
     done = selfmodel("calibrate", "exact.mcap", "-o", "same.xml", cwd=folder)
 

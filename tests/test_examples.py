@@ -10,7 +10,7 @@ import numpy as np
 
 from selfmodel.comparator import Piecewise
 from selfmodel.contract import check_comparator
-from tests.command import SMALL, selfmodel
+from tests.command import SMALL
 from tests.gaits import batch, changed, gait, logged
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -61,14 +61,15 @@ def test_a_comparator_of_ones_own_keeps_the_contract():
     )
 
 
-def test_a_comparator_of_ones_own_plugs_in(tmp_path: Path):
-    done = selfmodel(
-        *("recover", "quadruped", "--case", "2", *SMALL, "--trials", "1"),
-        *("--comparator", "heading_comparator:HEADING", "--out", str(tmp_path / "run"), "--json"),
-        cwd=EXAMPLES,
-    )
+def test_a_comparator_of_ones_own_plugs_in_from_the_folder_that_the_command_runs_in(tmp_path: Path):
+    command = [
+        *(Path(sys.executable).with_name("selfmodel"), "recover", "quadruped", "--case", "2"),
+        *(*SMALL, "--trials", "1", "--comparator", "heading_comparator:HEADING"),
+        *("--out", tmp_path / "run", "--json"),
+    ]
 
-    assert done.returncode == 0, done.stderr
+    done = subprocess.run(command, cwd=EXAMPLES, check=True, capture_output=True, text=True)
+
     assert json.loads(done.stdout)["comparator"] == "heading"
 
 

@@ -137,7 +137,7 @@ def write_recording(
     return write_trial(
         path,
         robot,
-        Plan("imported", "single", driver, behaviour.steps, seed=0),
+        Plan("imported", mapping.stage, driver, behaviour.steps, seed=0),
         _samples(behaviour),
         settings=Settings(),
         imported=Imported(recording.facts(), mapping.document.text),

@@ -7,6 +7,7 @@ from types import MappingProxyType
 from typing import Literal
 
 from selfmodel.logs.rosbag.tables import Document
+from selfmodel.trial import Stage
 
 ANGLES: Mapping[str, float] = MappingProxyType({"rad": 1.0, "deg": math.pi / 180})
 LENGTHS: Mapping[str, float] = MappingProxyType({"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0})
@@ -115,6 +116,7 @@ class BagMapping:
         robot: A robot's name, or an MJCF file.
         control_timestep: Seconds; given with an MJCF file only.
         controller: What drove the robot: a file.
+        stage: Where in a story the trial stands: ``before`` where nothing was wrong.
         clock: ``header`` or ``log``.
         start: Seconds after the first moment at which every role has data.
         duration: Seconds; None for as long as every role has data.
@@ -129,6 +131,7 @@ class BagMapping:
     robot: str
     control_timestep: float | None
     controller: str | None
+    stage: Stage
     clock: str
     start: float
     duration: float | None

@@ -19,6 +19,7 @@ from selfmodel.logs.rosbag.mapping import (
     Touch,
 )
 from selfmodel.logs.rosbag.tables import Table, parse_document
+from selfmodel.trial import STAGES
 
 LARGEST = 2**20
 """Bytes that a mapping may have."""
@@ -52,6 +53,7 @@ def parse_mapping(text: str, name: str) -> BagMapping:
         robot=robot,
         control_timestep=_positive(top, "control_timestep"),
         controller=top.text("controller") if top.has("controller") else None,
+        stage=top.choice("stage", STAGES, "single"),
         clock=top.choice("clock", CLOCKS, "header"),
         start=_start(top),
         duration=_positive(top, "duration"),

@@ -46,6 +46,7 @@ def suggest(bag: Bag, robot: Robot, name: str, *, with_timestep: bool) -> str:
         )
     lines += [
         '# controller = "gait.npz"  # what drove the robot, if it is known',
+        '# stage = "before"  # recorded while nothing was wrong with the robot',
         'clock = "header"  # or "log", where the time stamps are of another clock',
         "# start = 0.0      # s after the first moment at which every role has data",
         "# duration = 10.0  # s",

@@ -4,9 +4,11 @@ import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 from selfmodel.errors import InputError, unknown_name
+
+Name = TypeVar("Name", bound=str)
 
 Keys = tuple[str, ...]
 """The names of the tables, and of the key, that lead to an entry."""
@@ -124,13 +126,13 @@ class Table:
             raise self._wrong(key, "a text in quotes", value)
         return value
 
-    def choice(self, key: str, known: Iterable[str], default: str | None = None) -> str:
+    def choice(self, key: str, known: Iterable[Name], default: Name | None = None) -> Name:
         """Takes a text that is one of ``known``."""
         value = self.text(key, default)
         names = list(known)
         if value not in names:
             raise self.document.unknown((*self.path, key), key, value, names)
-        return value
+        return names[names.index(value)]
 
     def number(self, key: str, default: float | None = None) -> float:
         """Takes a finite number."""

@@ -103,8 +103,8 @@ def _notes(logs: "list[TrialLog]") -> list[str]:
     """What a user should know before reading the ranking."""
     first = logs[0]
     notes = [
-        f"{log.trial.path} has no controller: its commands are played back, so no fault of a "
-        f"sensor shows in it"
+        f"{log.trial.path} has no controller: its commands are played back, so a fault of a "
+        f"sensor does not show in how it moves"
         for log in logs
         if _is_played_back(log)
     ]

@@ -7,6 +7,7 @@ import typer
 
 from selfmodel.errors import InputError
 from selfmodel.faults import ALL_KINDS, PAPER_KINDS
+from selfmodel.trial import STAGES
 
 RobotName = Annotated[
     str,
@@ -111,6 +112,15 @@ NextTrialName = Annotated[
         metavar="repair|disagreement",
         help="How the next trial is chosen: to restore the function, or, as long as hypotheses "
         "cannot be told apart, to tell them apart.",
+    ),
+]
+StageName = Annotated[
+    str,
+    typer.Option(
+        "--stage",
+        metavar="|".join(STAGES),
+        help="Where in a story the trial stands; before: the failure. `selfmodel diagnose` fits "
+        "the self-model to those, and explains all others.",
     ),
 ]
 LogFiles = Annotated[list[Path], typer.Argument(metavar="FILE...", help="Trial logs, NAME.mcap.")]

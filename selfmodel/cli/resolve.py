@@ -3,6 +3,7 @@
 import hashlib
 import importlib
 import os
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from operator import attrgetter
 from pathlib import Path
@@ -28,6 +29,7 @@ from selfmodel.playback import Playback
 from selfmodel.robot import Robot
 from selfmodel.score import DISPLACEMENT, Score
 from selfmodel.tasks import Entry, entry
+from selfmodel.trial import STAGES, Stage, stage_of
 
 DESIGNS: Mapping[str, Callable[[Robot], Design]] = MappingProxyType(
     {"network": attrgetter("network"), "cpg": attrgetter("cpg")}
@@ -127,6 +129,18 @@ def next_trial(name: str) -> str:
     return name
 
 
+def stage(name: str) -> Stage:
+    """Returns where in a story a trial stands.
+
+    Raises:
+        InputError: There is no such place; the message names the nearest.
+    """
+    found = stage_of(name)
+    if found is None:
+        raise unknown_name("stage", name, STAGES)
+    return found
+
+
 def kinds(names: str) -> tuple[Kind, ...]:
     """Returns the kinds of fault and of environment that a diagnosis is to consider.
 
@@ -171,6 +185,9 @@ def _plugged_in(what: str, name: str, known: Iterable[str]) -> object:
     module, colon, attribute = name.partition(":")
     if not colon:
         raise unknown_name(what, name, known)
+    # As with ``python -m selfmodel``, which an installed command does not do by itself.
+    if (here := str(Path.cwd())) not in sys.path:
+        sys.path.append(here)
     try:
         return getattr(importlib.import_module(module), attribute)
     except (ImportError, AttributeError, SyntaxError, TypeError, ValueError) as error:

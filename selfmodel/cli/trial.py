@@ -14,6 +14,7 @@ from selfmodel.cli.options import (
     Neurons,
     RobotName,
     Seed,
+    StageName,
     Structural,
     check_log_name,
 )
@@ -44,6 +45,7 @@ def trial(
     neurons: Neurons = None,
     gap: GapLevel = 0.0,
     structure: Structural = False,
+    stage: StageName = "single",
     seed: Seed = 0,
     as_json: Json = False,
 ) -> None:
@@ -77,7 +79,7 @@ def trial(
         driver = resolve.controller(Path(kind), made)
     resolve.check_neurons(hidden, driver)
     settings = Settings()
-    plan = Plan("trial", "single", driver, settings.steps, seed)
+    plan = Plan("trial", resolve.stage(stage), driver, settings.steps, seed)
     samples = reality.robot(made, hidden).run(driver, settings.steps)
     try:
         write_trial(

@@ -205,6 +205,18 @@ def test_a_log_of_an_import_reads_as_what_was_imported(bag: Path, biped: Robot, 
     assert json.loads(told["topics"])["/odom"]["latency"] == pytest.approx(0.015)
 
 
+@pytest.mark.parametrize(("line", "stage"), [("", "single"), ('stage = "before"', "before")])
+def test_a_mapping_says_whether_anything_was_wrong(
+    line: str, stage: str, bag: Path, biped: Robot, tmp_path: Path
+):
+    mapping = parse_mapping(f"{line}\n{MAPPING}", "MAP.toml")
+
+    recording = import_bag(bag, mapping, biped)
+    path = write_recording(tmp_path / "trial.mcap", biped, recording, mapping, None)
+
+    assert read_log(path).trial.plan.stage == stage
+
+
 SIX = ["LF_HAA", "LF_HFE", "LF_KFE", "RF_HAA", "RF_HFE", "RF_KFE"]
 
 

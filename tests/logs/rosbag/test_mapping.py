@@ -43,6 +43,7 @@ MISTAKES = [
     ("control_timestep = 0.01", "control_timestep = 0", "control_timestep must be above 0 s"),
     ("control_timestep = 0.01", "control_timestp = 0.01", "did you mean control_timestep"),
     ("control_timestep = 0.01", 'clock = "sim"', "unknown clock 'sim': .* header, log"),
+    ("control_timestep = 0.01", 'stage = "befor"', "unknown stage 'befor': did you mean before"),
     ("control_timestep = 0.01", "start = -1", "start must be at least 0 s"),
     ("control_timestep = 0.01", "duration = true", "duration must be a number, got True"),
     ('order = ["RHY", "RHX", "LHY", "LHX"]', 'order = ["RHY"]', "RHX.*|name in order"),
