@@ -23,7 +23,7 @@ SLOWEST, FASTEST = 0.5, 4.0
 a second, as a pendulum; animals and robots of that size run at two to three times that."""
 
 GROWTH = 20.0
-"""How fast the amplitudes grow from 0, 1/s: 95 % after half a second. It is the source's."""
+"""How fast the amplitudes grow from 0, 1/s: 96 % after half a second. It is the source's."""
 
 FEEDBACK = 0.5
 """By what part of its speed all sensors together can change the clock, each reading 1: they bend

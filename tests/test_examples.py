@@ -10,7 +10,7 @@ import numpy as np
 
 from selfmodel.comparator import Piecewise
 from selfmodel.contract import check_comparator
-from tests.command import SMALL
+from tests.command import SMALL, selfmodel
 from tests.gaits import batch, changed, gait, logged
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -71,6 +71,15 @@ def test_a_comparator_of_ones_own_plugs_in_from_the_folder_that_the_command_runs
     done = subprocess.run(command, cwd=EXAMPLES, check=True, capture_output=True, text=True)
 
     assert json.loads(done.stdout)["comparator"] == "heading"
+
+
+def test_plugins_of_ones_own_are_checked_in_python(tmp_path: Path):
+    logged = selfmodel("trial", "quadruped", "--out", "intact.mcap", cwd=tmp_path)
+    told = run("check_plugins.py", "intact.mcap", cwd=tmp_path)
+
+    assert logged.returncode == 0, logged.stderr
+    assert told.startswith("heading: [0. ")
+    assert "payload: 12 faults that may be proposed" in told
 
 
 def test_an_ablation_in_python_goes_on_where_it_was(tmp_path: Path):

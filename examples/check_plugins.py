@@ -1,0 +1,34 @@
+"""Do a comparator and a kind of your own keep their contracts? Here those of the other examples.
+
+Usage:
+  selfmodel trial quadruped --out intact.mcap
+  python examples/check_plugins.py intact.mcap
+"""
+
+import sys
+
+from heading_comparator import HEADING
+from payload import PAYLOAD
+
+from selfmodel.contract import check_comparator, shown
+from selfmodel.contract_kind import check_kind
+from selfmodel.evidence import simulate
+from selfmodel.hypothesis import INTACT
+from selfmodel.logs import read_log
+from selfmodel.logs.robots import the_robot_of
+from selfmodel.notation import parse
+from selfmodel.simulator import Simulator
+
+log = read_log(sys.argv[1])
+robot, trial = the_robot_of([log]), log.trial
+request = HEADING.request(trial)
+broken = parse("break:front_left_knee", robot.anatomy)
+
+# First what the trial itself shows, which must be at 0; then what is to be judged beside it.
+check_comparator(HEADING, trial, shown(request, trial))
+simulated = simulate(Simulator(robot, threads=2), request, trial, [INTACT, broken])
+check_comparator(HEADING, trial, simulated.behaviour)
+print(f"{HEADING.name}: {HEADING.distances(simulated.behaviour, trial)}")
+
+check_kind(PAYLOAD, robot)
+print(f"{PAYLOAD.name}: {len(PAYLOAD.candidates(robot.anatomy))} faults that may be proposed")
