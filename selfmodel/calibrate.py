@@ -144,15 +144,26 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
         verbose=mujoco.minimize.Verbosity.SILENT,
     )
     found = from_factors(np.exp(fitted.ravel()), delay)
-    slopes, rest = jacobian(fitted, zero), residual(fitted)
-    spread = np.linalg.inv(slopes.T @ slopes) * np.mean(rest**2) / SHARE**2
     return Calibration(
         robot=with_parameters(robot, found),
         parameters=found,
-        deviations=np.minimum(np.sqrt(np.diag(spread)), PRIOR),
+        deviations=_deviations(jacobian(fitted, zero), residual(fitted)),
         error_before=before,
         error=error(found),
     )
+
+
+def _deviations(slopes: FloatArray, residuals: FloatArray) -> FloatArray:
+    """The deviation of each logarithm, from the curvature of the fit and what errors remain.
+
+    Args:
+        slopes: Of the residuals, ``(residuals, factors)``; the prior's stand last.
+        residuals: Where the fit ended.
+    """
+    count = len(slopes) - slopes.shape[1]
+    errors = max(float(np.mean(residuals[:count] ** 2)), EXACT**2)
+    shown = slopes[:count].T @ slopes[:count] / (count * errors * SHARE**2)
+    return np.asarray(np.sqrt(np.diag(np.linalg.inv(shown + np.eye(len(shown)) / PRIOR**2))))
 
 
 def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> float:

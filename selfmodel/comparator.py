@@ -43,7 +43,8 @@ class Segments:
         commands: What was commanded then, ``(segments, lead + horizon, motors)``: the first
             ``lead`` rows were commanded before the segment begins, and matter to a model whose
             commands take effect late.
-        lead: Rows of ``commands`` from before the segment.
+        lead: Rows of ``commands`` from before the segment: at least the robot's control delay,
+            which is at most ``robot.LONGEST_DELAY``.
         record: The signals that the comparator looks at, ``(n, segments, horizon + 1, width)``
             each; row 0 is the beginning. Any but ``commands``, which are given.
         past: What motors remember that have a state of their own, such as a filter; None: only

@@ -7,6 +7,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.comparator import Comparator
+from selfmodel.considered import considered
 from selfmodel.degrees import coarse_candidates
 from selfmodel.diagnosis import Candidate, Diagnosis, Outside, Verdict
 from selfmodel.evidence import Evidence
@@ -42,9 +43,12 @@ class Diagnose:
         simulator: The self-model.
         comparator: Says what to simulate and how far it is from a trial.
         settings: The numbers of the search.
-        kinds: What is considered.
+        kinds: What is considered, as far as it can strike the robot; see ``considered``.
         intact: Trials of the robot with nothing wrong, which show how well the self-model
             predicts when it is right; without any, no verdict can be ``unexplained``.
+
+    Raises:
+        InputError: None of the kinds can strike the robot.
     """
 
     def __init__(
@@ -58,7 +62,7 @@ class Diagnose:
     ) -> None:
         self._anatomy = simulator.robot.anatomy
         self._settings = settings
-        self._kinds = tuple(kinds)
+        self._kinds = considered(kinds, self._anatomy)
         self._intact = tuple(intact)
         self.evidence = Evidence(simulator, comparator)
         self._screen = screen_of(comparator, simulator, self.evidence)
@@ -209,7 +213,7 @@ class Diagnose:
 
 
 def _without_degrees(hypothesis: Hypothesis) -> set[tuple[Kind, str]]:
-    return {(fault.kind, fault.part) for fault in hypothesis.faults}
+    return {(fault.kind.without_degree, fault.part) for fault in hypothesis.faults}
 
 
 def _ranked(totals: dict[Hypothesis, float]) -> list[Hypothesis]:

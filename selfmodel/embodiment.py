@@ -5,6 +5,7 @@ limb stays as a ghost that touches nothing, a jammed joint stays as one that not
 """
 
 import copy
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import mujoco
@@ -112,13 +113,14 @@ class Embodiment:
         self.model.actuator_gainprm[motor] = 0.0
         self.model.actuator_biasprm[motor] = 0.0
 
-    def weaken_motor(self, motor: int, part: float) -> None:
-        """Leaves the motor of that number a part of its torque, and of its largest torque."""
-        self.model.actuator_gainprm[motor] *= part
-        self.model.actuator_biasprm[motor] *= part
-        self.model.actuator_forcerange[motor] *= part
-        for joint in motor_joints(self.model, motor):
-            self.model.jnt_actfrcrange[joint] *= part
+    def weaken_motors(self, motors: Sequence[int], part: float) -> None:
+        """Leaves the motors of these numbers a part of their torque, and of their largest."""
+        self.model.actuator_gainprm[motors] *= part
+        self.model.actuator_biasprm[motors] *= part
+        self.model.actuator_forcerange[motors] *= part
+        # Once, however many of them pull at a joint.
+        joints = {joint for motor in motors for joint in motor_joints(self.model, motor)}
+        self.model.jnt_actfrcrange[sorted(joints)] *= part
 
     def set_friction(self, coefficient: float) -> None:
         """Sets the sliding friction between the world and everything that can touch it."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
+from selfmodel.hypothesis import Hypothesis
 from selfmodel.robot import Robot
 
 WIDEST = 0.5
@@ -34,7 +35,7 @@ class Gap:
         level: The relative standard deviation that everything is drawn by; 0 is no gap.
         mass: Multiplies each body's mass, by the body's name.
         inertia: Multiplies each body's principal moments of inertia, likewise.
-        friction: Multiplies the sliding friction of every geom.
+        friction: Multiplies the sliding friction of every geom and contact pair.
         damping: Multiplies the damping of every joint.
         motors: Multiplies each motor's torque before its limits, by the motor's name.
         delay: Control steps that a command takes to reach the motors.
@@ -120,7 +121,9 @@ def perturbed(model: mujoco.MjModel, gap: Gap) -> mujoco.MjModel:
         model.body_mass[b] *= gap.mass.get(name, 1.0)
         model.body_inertia[b] *= gap.inertia.get(name, 1.0)
     model.geom_friction[:, 0] *= gap.friction
-    model.dof_damping[:] *= gap.damping
+    model.pair_friction[:, :2] *= gap.friction
+    model.dof_damping *= gap.damping
+    model.dof_dampingpoly *= gap.damping
     for name, factor in gap.motors.items():
         motor = model.actuator(name).id
         # A servo's stiffness stands in both: together they scale the torque, at the same target.
@@ -130,19 +133,22 @@ def perturbed(model: mujoco.MjModel, gap: Gap) -> mujoco.MjModel:
     return model
 
 
-def perturbed_models(robot: Robot, members: int, level: float) -> tuple[mujoco.MjModel, ...]:
+def perturbed_models(
+    robot: Robot, shape: Hypothesis, members: int, level: float
+) -> tuple[mujoco.MjModel, ...]:
     """Returns models of one robot, each perturbed by a gap of its own.
 
-    The same arguments give the same models, so that what is compared on them is compared on the
-    same draws.
+    The gaps are the same whatever the shape, so that what is compared on the models is compared on
+    the same draws.
 
     Args:
         robot: The robot as its model describes it.
+        shape: What reshapes the model; the rest of a hypothesis is for ``embody``.
         members: How many.
         level: Of the gaps.
     """
-    rng = np.random.default_rng(members)
-    return tuple(perturbed(robot.model, draw_gap(robot, level, rng)) for _ in range(members))
+    rng, model = np.random.default_rng(members), robot.reshaped(shape)
+    return tuple(perturbed(model, draw_gap(robot, level, rng)) for _ in range(members))
 
 
 def _factor(spread: float, normal: FloatArray) -> FloatArray:

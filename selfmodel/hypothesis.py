@@ -31,6 +31,11 @@ class Hypothesis:
         """What of it changes how the robot moves under given commands."""
         return Hypothesis(tuple(fault for fault in self.faults if fault.kind.moves))
 
+    @property
+    def shape(self) -> "Hypothesis":
+        """What of it is worked into the model before that is compiled."""
+        return Hypothesis(tuple(fault for fault in self.faults if fault.kind.reshape))
+
 
 INTACT = Hypothesis()
 """Nothing changed."""
@@ -46,6 +51,10 @@ def canonical(faults: Iterable[Fault], anatomy: Anatomy) -> Hypothesis:
     distinct: dict[tuple[Kind, str], Fault] = {}
     for fault in filter(None, (said.settled for said in faults)):
         distinct.setdefault((fault.kind, fault.part), fault)
+    struck = [fault.part for fault in distinct.values()]
+    for (kind, part), fault in list(distinct.items()):
+        if fault.degree in kind.alone and struck.count(part) == 1:
+            distinct[kind, part] = Fault(kind.alone[fault.degree], part)
     kept = [
         fault
         for fault in distinct.values()

@@ -62,6 +62,7 @@ def edited_model(robot: Robot, parameters: Parameters) -> mujoco.MjModel:
     model.body_mass *= masses
     model.body_inertia *= masses[:, np.newaxis]
     model.geom_friction[:, 0] *= parameters.friction
+    model.pair_friction[:, :2] *= parameters.friction
     model.dof_damping *= parameters.damping
     model.dof_dampingpoly *= parameters.damping
     motors = np.array(parameters.motor_gains)[:, np.newaxis]
@@ -101,6 +102,8 @@ def with_model(robot: Robot, model: mujoco.MjModel, delay: int) -> Robot:
         body.ipos, body.iquat = model.body_ipos[body.id], model.body_iquat[body.id]
     for geom in spec.geoms:
         geom.friction = model.geom_friction[geom.id]
+    for pair in spec.pairs:
+        pair.friction = model.pair_friction[pair.id]
     for joint in spec.joints:
         dof = model.jnt_dofadr[joint.id]
         joint.damping = [model.dof_damping[dof], *model.dof_dampingpoly[dof]]

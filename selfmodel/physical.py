@@ -1,5 +1,6 @@
 """Physical robots: what the algorithm may ask of one, and a simulated one that hides its fault."""
 
+import dataclasses
 from collections import deque
 from collections.abc import Callable, Iterator
 from typing import Protocol, runtime_checkable
@@ -10,7 +11,7 @@ import numpy as np
 from selfmodel.behaviour import SIGNALS, Sample
 from selfmodel.debris import add_debris, drop_debris, lost_limbs
 from selfmodel.driver import Driver, drive
-from selfmodel.embodiment import embody
+from selfmodel.embodiment import Embodiment, embody
 from selfmodel.errors import TrialError
 from selfmodel.gap import Gap, perturbed
 from selfmodel.hypothesis import INTACT, Hypothesis
@@ -101,10 +102,16 @@ class SimulatedRobot:
             TrialError: The simulation diverged.
         """
         (child,) = self._noise.spawn(1)
-        return self._run(controller, steps, np.random.default_rng(child))
+        embodiment = self._embodiment
+        if self._gap is not None:
+            (own,) = child.spawn(1)
+            embodiment = dataclasses.replace(embodiment, seed=int(own.generate_state(1)[0]))
+        return self._run(embodiment, controller, steps, np.random.default_rng(child))
 
-    def _run(self, controller: Driver, steps: int, rng: np.random.Generator) -> Iterator[Sample]:
-        robot, embodiment = self._robot, self._embodiment
+    def _run(
+        self, embodiment: Embodiment, controller: Driver, steps: int, rng: np.random.Generator
+    ) -> Iterator[Sample]:
+        robot = self._robot
         model, data = embodiment.model, mujoco.MjData(embodiment.model)
         instruments: Instruments = ExactInstruments()
         delay, substeps = (

@@ -12,8 +12,9 @@ from selfmodel.batches import Alive, counted_not_printed, live_signals, new_batc
 from selfmodel.behaviour import Behaviour
 from selfmodel.comparator import Segments
 from selfmodel.embodiment import Embodiment
+from selfmodel.errors import InputError
 from selfmodel.places import writer
-from selfmodel.robot import Robot
+from selfmodel.robot import LONGEST_DELAY, Robot
 from selfmodel.senses import Senses
 from selfmodel.tally import Simulated, Tally
 
@@ -52,7 +53,16 @@ def predict(
     Returns:
         Signals of ``(n, segments, horizon + 1, width)``; a run has diverged if any of its segments
         has.
+
+    Raises:
+        InputError: The segments do not say the commands that are still on their way.
     """
+    late = robot.control_delay if delay is None else delay
+    if segments.lead < late:
+        raise InputError(
+            f"the robot's commands take effect {late} steps late, and segments have "
+            f"{segments.lead} from before they begin: a comparator needs a lead of {LONGEST_DELAY}"
+        )
     n, count, horizon = len(embodiments), len(segments.commands), segments.horizon
     simulated, source_of = np.unique(
         np.arange(n) if moves_as is None else np.asarray(moves_as), return_inverse=True
@@ -77,7 +87,6 @@ def predict(
         for signal in segments.record
     }
     start = _Start(robot, batch, moving, segments)
-    late = robot.control_delay if delay is None else delay
     activations = starting_activations(robot, segments, late)
     batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE)
     alive = Alive(batch)

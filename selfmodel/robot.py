@@ -156,10 +156,17 @@ class Robot:
         Raises:
             InputError: The model has no place for what the hypothesis says.
         """
-        model = self.model
-        if any(fault.kind.reshape for fault in hypothesis.faults):
-            model = self.specification(hypothesis, seed).compile()
-        return embody(model, self.anatomy, hypothesis, seed)
+        return embody(self.reshaped(hypothesis, seed), self.anatomy, hypothesis, seed)
+
+    def reshaped(self, hypothesis: Hypothesis, seed: int = 0) -> mujoco.MjModel:
+        """Returns the model with what of the hypothesis reshapes it: its own where nothing does.
+
+        Args:
+            hypothesis: In canonical form.
+            seed: Of what is random in that; see ``build``.
+        """
+        shape = hypothesis.shape
+        return self.specification(shape, seed).compile() if shape else self.model
 
     def specification(self, hypothesis: Hypothesis = INTACT, seed: int = 0) -> mujoco.MjSpec:
         """Returns the MJCF as a specification that can be edited before it is compiled.

@@ -30,6 +30,9 @@ REMEMBERED_EMBODIMENTS = 1024
 REMEMBERED_TRIALS = 16
 """Trials whose felt ground is kept."""
 
+REMEMBERED_SHAPES = 16
+"""Shapes of the robot and its world of which the members of an ensemble are kept."""
+
 REMEMBERED_BYTES = 2**29
 """What they may take: one of our robots' takes 0.3 MB, a dog's with its meshes 5 MB."""
 
@@ -50,7 +53,7 @@ class Simulator:
         room = REMEMBERED_BYTES // int(robot.model.nbuffer)
         self._embodiment = lru_cache(max(1, min(REMEMBERED_EMBODIMENTS, room)))(robot.build)
         self._felt = lru_cache(REMEMBERED_TRIALS)(partial(felt_points, robot))
-        self._members = lru_cache(partial(perturbed_models, robot))
+        self._members = lru_cache(REMEMBERED_SHAPES)(partial(perturbed_models, robot))
 
     def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> Simulated:
         """Simulates each run for ``steps`` control steps from its start.
@@ -126,14 +129,13 @@ class Simulator:
         Returns:
             Signals of ``(n, members, steps, width)``; a hypothesis has diverged if any member has.
         """
-        models = self._members(ensemble.members, ensemble.level)
         embodiments = [
             embody(model, self.robot.anatomy, hypothesis)
             for hypothesis in hypotheses
-            for model in models
+            for model in self._members(hypothesis.shape, ensemble.members, ensemble.level)
         ]
         flat = self._run(embodiments, [driver] * len(embodiments), steps, ensemble.record)
-        outcome = flat.grouped(len(hypotheses), len(models))
+        outcome = flat.grouped(len(hypotheses), ensemble.members)
         return Simulated(outcome.behaviour, np.asarray(outcome.diverged.any(axis=1)))
 
     def _run(

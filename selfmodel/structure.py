@@ -126,17 +126,21 @@ def add_structure(spec: mujoco.MjSpec, structure: Structure) -> None:
     _in_series(spec, structure.soft, SOFT_SUFFIX).stiffness[0] = structure.stiffness
     if structure.foot:
         body = spec.body(structure.foot)
-        for geom in body.geoms:
-            if int(geom.type) in ROUND:
-                wider = geom.size[0] * (structure.foot_factor - 1)
-                geom.size[0] += wider
-                # The zone in which touch is felt is the foot's, so it grows as the foot does.
-                for site in body.sites:
-                    site.size[0] += wider
+        geoms = [geom for geom in body.geoms if int(geom.type) in ROUND]
+        wider = max(geom.size[0] for geom in geoms) * (structure.foot_factor - 1)
+        for geom in geoms:
+            geom.size[0] *= structure.foot_factor
+        # The zone in which touch is felt is the foot's, so it grows as the foot does.
+        felt = {sensor.objname for sensor in spec.sensors if sensor.type == TOUCH}
+        for site in body.sites:
+            if site.name in felt:
+                site.size[0] += wider
     if structure.weak:
         motor = spec.actuator(structure.weak)
         motor.forcerange = np.array(motor.forcerange) * structure.saturation
 
+
+TOUCH = mujoco.mjtSensor.mjSENS_TOUCH
 
 ROUND = (int(mujoco.mjtGeom.mjGEOM_SPHERE), int(mujoco.mjtGeom.mjGEOM_CAPSULE))
 """The shapes of geoms whose first size is a radius all around."""

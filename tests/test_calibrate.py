@@ -109,6 +109,26 @@ def test_under_noise_factors_stay_near_nominal_and_within_bounds():
     assert ((found.deviations > 0) & (found.deviations <= PRIOR)).all()
 
 
+def test_what_the_trials_do_not_show_is_as_uncertain_as_before_them_however_many_they_are():
+    """A robot that floats shows nothing of the ground's friction."""
+    mjcf = QUADRUPED.mjcf.replace("<option ", '<option gravity="0 0 0" ', 1)
+    adrift = dataclasses.replace(QUADRUPED, mjcf=mjcf.replace('pos="0 0 0.3245"', 'pos="0 0 3"'))
+    gap = draw_gap(adrift, 0.02, np.random.default_rng(0))
+    friction = factor_names(adrift).index("friction")
+    several = [trial(adrift, SimulatedRobot(adrift, gap=gap, stream=k), k) for k in range(3)]
+    found = [calibrate(adrift, several[:count], threads=1).deviations for count in (1, 3)]
+
+    np.testing.assert_allclose([each[friction] for each in found], PRIOR, rtol=1e-3)
+    assert all((np.delete(each, friction) < PRIOR).all() for each in found)
+
+
+def test_what_the_trials_show_is_less_uncertain_than_before_them():
+    motors = slice(factor_names(QUADRUPED).index("damping") + 1, None)
+
+    assert (fitted().deviations[motors] < PRIOR / 2).all()
+    assert (fitted().deviations > 0.001).all()
+
+
 def without(found: Trial, **changes: np.ndarray) -> Trial:
     run = found.behaviour
     return dataclasses.replace(

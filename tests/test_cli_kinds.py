@@ -56,6 +56,31 @@ def test_the_logs_and_the_kinds_of_a_run_give_its_ranking(heavy: tuple[Path, dic
     assert found["kinds"] == told["kinds"]
 
 
+def test_a_trial_and_its_replay_name_a_kind_of_ones_own(tmp_path: Path):
+    own = ("--kinds", "payload:PAYLOAD")
+    logged = selfmodel(
+        *("trial", "quadruped", "--damage", "payload=2", *own, "--out", "a.mcap"),
+        cwd=tmp_path,
+        PYTHONPATH=PATH,
+    )
+    again = selfmodel(
+        *("replay", "a.mcap", "--hypothesis", "payload=2", *own, "--json"),
+        cwd=tmp_path,
+        PYTHONPATH=PATH,
+    )
+    drawn = selfmodel(
+        *("render", "a.mcap", "--hypothesis", "payload=2", *own, "--out", "a.png"),
+        cwd=tmp_path,
+        PYTHONPATH=PATH,
+    )
+
+    assert logged.returncode == drawn.returncode == 0, logged.stderr + drawn.stderr
+    assert json.loads(again.stdout)["identical"]
+    unknown = selfmodel("replay", "a.mcap", "--hypothesis", "payload=2", cwd=tmp_path)
+    assert unknown.returncode == 2
+    assert "payload" in unknown.stderr
+
+
 def test_the_paper_s_kinds_are_the_default(recovered: tuple[Path, dict]):
     _, told = recovered
 

@@ -16,7 +16,7 @@ from selfmodel.comparators import FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
 from selfmodel.controller import Controller
 from selfmodel.diagnose import EQUAL, Diagnose
 from selfmodel.diagnosis import Diagnosis
-from selfmodel.faults import BROKEN, FRICTION, JAMMED, PAPER_KINDS, Kind
+from selfmodel.faults import BROKEN, FRICTION, JAMMED, KINDS, PAPER_KINDS, Kind
 from selfmodel.hypothesis import INTACT, Hypothesis, canonical
 from selfmodel.notation import parse
 from selfmodel.physical import SimulatedRobot
@@ -63,6 +63,24 @@ def gait(quadruped: Robot) -> Controller:
 @pytest.fixture(scope="module")
 def before(quadruped: Robot, gait: Controller) -> list[Trial]:
     return [trial(quadruped, "intact", gait, "before")]
+
+
+@pytest.mark.parametrize(
+    ("truth", "kinds"),
+    [
+        ("sensor:front_left_touch", "sensor,sensor-gain"),
+        ("jam:front_left_shoulder", "jam,jam-angle"),
+    ],
+)
+def test_a_fault_without_a_degree_is_explained_though_its_degree_is_considered(
+    quadruped: Robot, gait: Controller, before: list[Trial], truth: str, kinds: str
+):
+    """No trial could tell it from the same with a degree of next to nothing."""
+    chosen = tuple(KINDS[name] for name in kinds.split(","))
+    found = diagnosed(quadruped, [trial(quadruped, truth, gait)], before, kinds=chosen)
+
+    assert str(found.best) == truth
+    assert (found.verdict, found.rivals) == ("explained", ())
 
 
 @pytest.mark.parametrize("case", [1, 2, 3, 6, 9])

@@ -43,6 +43,24 @@ def states(robot: Robot, count: int) -> Iterator[mujoco.MjData]:
         yield data
 
 
+def test_a_joint_that_two_motors_pull_at_is_weakened_once():
+    robot = Robot(
+        "pulled",
+        """<mujoco><option timestep="0.005"/><worldbody><geom type="plane" size="0 0 1"/>
+        <body name="trunk" pos="0 0 0.5"><freejoint/><geom type="box" size="0.1 0.1 0.1"/>
+          <body name="leg">
+            <joint name="hip" axis="0 1 0" range="-60 60" actuatorfrcrange="-10 10"/>
+            <geom type="capsule" fromto="0 0 0 0 0 -0.3" size="0.02"/></body></body></worldbody>
+        <actuator><motor name="flexor" joint="hip" ctrlrange="0 1" gear="10"/>
+          <motor name="extensor" joint="hip" ctrlrange="0 1" gear="-10"/></actuator></mujoco>""",
+        0.02,
+    )
+    weak = built(robot, "motor:hip=0.5")
+
+    np.testing.assert_allclose(weak.actuator_gainprm[:, 0], 0.5)
+    np.testing.assert_allclose(weak.jnt_actfrcrange[weak.joint("hip").id], [-5, 5])
+
+
 @pytest.mark.parametrize("part", [0.0, 0.3, 0.7])
 def test_a_weak_motor_has_that_part_of_its_torque_at_any_load(robot: Robot, part: float):
     joint = robot.anatomy.joints[0]
@@ -154,6 +172,15 @@ def test_wind_is_the_model_with_that_wind(robot: Robot):
 
     assert robot.model.opt.density == 0  # a nominal robot walks in a vacuum
     assert_identical_paths(blown, follow(robot, truth, STEPS))
+
+
+def test_what_swims_stays_in_its_water_when_that_moves(quadruped: Robot):
+    swimmer = Robot(
+        "swimmer", quadruped.mjcf.replace("<option ", '<option density="1000" ', 1), 0.01
+    )
+    moved = built(swimmer, "wind=2").opt
+
+    assert (moved.density, moved.viscosity, moved.wind[0]) == (1000, 0, 2)
 
 
 @pytest.mark.parametrize(("word", "axis"), [("wind", 0), ("crosswind", 1)])

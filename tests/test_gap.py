@@ -144,6 +144,24 @@ def test_a_weaker_servo_aims_at_the_same_angle():
     np.testing.assert_allclose(weaker.actuator_force, 0.5 * nominal.actuator_force)
 
 
+def test_contact_pairs_slip_and_curved_damping_damps_as_the_rest_does():
+    mjcf = QUADRUPED.mjcf.replace(
+        "</worldbody>",
+        '</worldbody><contact><pair geom1="ground" geom2="torso" friction="0.8 0.8"/></contact>',
+    ).replace('damping="0.2"', 'damping="0.2 0.02"')
+    robot = Robot("paired", mjcf, QUADRUPED.control_timestep)
+    gap = drawn(0.1, robot=robot)
+    found, model = perturbed(robot.model, gap), robot.model
+
+    assert model.npair
+    assert model.dof_dampingpoly.any()
+    np.testing.assert_allclose(
+        found.pair_friction[:, :2], model.pair_friction[:, :2] * gap.friction
+    )
+    np.testing.assert_array_equal(found.pair_friction[:, 2:], model.pair_friction[:, 2:])
+    np.testing.assert_allclose(found.dof_dampingpoly, model.dof_dampingpoly * gap.damping)
+
+
 def test_derived_numbers_follow_the_masses():
     heavier = dataclasses.replace(drawn(0.0), level=0.1, mass={"torso": 2.0})
     model = perturbed(QUADRUPED.model, heavier)

@@ -132,6 +132,21 @@ def test_logged_signals_have_noise_of_their_full_scale(quadruped: Robot):
         np.testing.assert_allclose(error.std(axis=0), level * scale, rtol=0.06)
 
 
+def test_a_noisy_sensor_has_another_noise_in_every_trial(quadruped: Robot):
+    """Three trials are to show what it does three times, not one draw three times."""
+    truth = parse("sensor:back_left_angle=noise0.3", quadruped.anatomy)
+    driver = played_back(quadruped.anatomy.motors, np.zeros((400, len(quadruped.anatomy.motors))))
+    column = quadruped.anatomy.names.sensors.index("back_left_angle")
+
+    def heard(level: float) -> list[np.ndarray]:
+        physical = SimulatedRobot(quadruped, truth, drawn(quadruped, level))
+        runs = [collect(quadruped.anatomy.names, physical.run(driver, 400)) for _ in range(2)]
+        return [run["sensors"][200:, column] for run in runs]
+
+    assert abs(np.corrcoef(heard(0.05))[0, 1]) < 0.3
+    assert np.array_equal(*heard(0.0))
+
+
 def test_the_controllers_angle_and_the_logged_one_are_two_instruments(quadruped: Robot):
     trial = ran(SimulatedRobot(quadruped, gap=drawn(quadruped, 0.1)), quadruped, 400)
     sensor = quadruped.anatomy.sensor("back_left_angle")

@@ -85,6 +85,7 @@ LAYERS = (
         "faults",
         "hypothesis",
         "notation",
+        "considered",
         "genome",
         "diagnosis",
         "trial",

@@ -20,7 +20,7 @@ from selfmodel.robot import CONTROL_DELAY, Robot
 
 FIELDS = (
     *("body_mass", "body_inertia", "body_ipos", "body_iquat", "body_subtreemass"),
-    *("geom_friction", "dof_damping", "dof_dampingpoly", "dof_invweight0"),
+    *("geom_friction", "pair_friction", "dof_damping", "dof_dampingpoly", "dof_invweight0"),
     *("actuator_gainprm", "actuator_biasprm", "actuator_forcerange", "actuator_gear"),
 )
 
@@ -33,9 +33,9 @@ LEGS = """
     <default class="leg"><joint damping="{damping}"/><geom friction="0.7 0.01 0.001"/></default>
   </default>
   <worldbody>
-    <geom type="plane" size="1 1 1"/>
+    <geom name="floor" type="plane" size="1 1 1"/>
     <body name="base" pos="0 0 1">
-      <freejoint/>{inertial}<geom type="box" size=".1 .2 .05"/>
+      <freejoint/>{inertial}<geom name="base" type="box" size=".1 .2 .05"/>
       <body {upper}>
         <joint name="hip" axis="0 1 0" range="-1 1" class="leg"/>
         <geom class="leg" type="capsule" fromto="0 0 0 .1 0 -.2" size=".02"/>
@@ -47,6 +47,7 @@ LEGS = """
       <body {still} pos="0 .2 0"><geom type="sphere" size=".03"/></body>
     </body>
   </worldbody>
+  <contact><pair geom1="floor" geom2="base" friction="0.6 0.7 0.01"/></contact>
   <actuator>
     <position name="servo" joint="hip" kp="5" kv="0.3"/>
     <motor name="drive" joint="knee" gear="2"/>
@@ -83,10 +84,18 @@ def some(robot: Robot, delay: int = 2) -> Parameters:
 def assert_alike(one: mujoco.MjModel, other: mujoco.MjModel) -> None:
     for field in FIELDS:
         expected = getattr(one, field)
-        tolerance = 1e-5 * max(1.0, np.abs(expected).max())
+        tolerance = 1e-5 * np.abs(expected).max(initial=1.0)
         np.testing.assert_allclose(
             getattr(other, field), expected, rtol=1e-5, atol=tolerance, err_msg=field
         )
+
+
+def test_friction_is_that_of_geoms_and_of_contact_pairs():
+    robot = Robot("legs", LEGS.format(compiler="", inertial="", damping="0.7", **NAMED), 0.02)
+    model = edited_model(robot, some(robot))
+
+    np.testing.assert_allclose(model.geom_friction[:, 0], robot.model.geom_friction[:, 0] * 1.2)
+    np.testing.assert_allclose(model.pair_friction, [[0.72, 0.84, 0.01, 0.0001, 0.0001]])
 
 
 def test_a_robots_text_says_its_parameters(robot: Robot):

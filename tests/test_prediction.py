@@ -10,6 +10,7 @@ from selfmodel.behaviour import SIGNALS, Behaviour, Signal, collect
 from selfmodel.cli import resolve
 from selfmodel.comparator import Segments
 from selfmodel.driver import Driver
+from selfmodel.errors import InputError
 from selfmodel.estimate import IMU, JOINTS, STATE
 from selfmodel.faults import PAPER_KINDS
 from selfmodel.gap import draw_gap
@@ -167,6 +168,14 @@ def test_a_delay_is_the_same_in_a_run_a_prediction_and_a_physical_robot(
     assert furthest(predicted(slow, None), run, starts) < EXACT
     assert furthest(predicted(prompt, delay), run, starts) < EXACT
     assert furthest(predicted(prompt, None), run, starts) > 0.01
+
+
+def test_segments_that_do_not_say_what_is_still_on_its_way_are_refused(quadruped: Robot):
+    segments = cut(trial(quadruped), range(0, STEPS - HORIZON, 10), lead=1)
+    Simulator(late(quadruped, 1), 1).predict([INTACT], segments)
+
+    with pytest.raises(InputError, match="take effect 2 steps late, and segments have 1"):
+        Simulator(late(quadruped, 2), 1).predict([INTACT], segments)
 
 
 def test_without_the_base_a_segment_goes_on_where_the_one_before_it_ended(robot: Robot):

@@ -98,6 +98,28 @@ def test_a_foot_of_another_size_still_feels_all_of_its_skin(robot: Robot):
     np.testing.assert_allclose(skin(model), skin(robot.model))
 
 
+def test_a_foot_of_several_shapes_grows_as_one_and_so_does_what_feels_it():
+    robot = Robot(
+        "hopper",
+        """<mujoco><option timestep="0.005"/><worldbody><geom type="plane" size="0 0 1"/>
+        <body name="trunk" pos="0 0 0.5"><freejoint/><geom type="box" size="0.1 0.1 0.1"/>
+          <body name="leg"><joint name="hip" axis="0 1 0" range="-60 60"/>
+            <geom type="capsule" fromto="0 0 0 0 0 -0.3" size="0.02"/>
+            <geom type="sphere" pos="0 0 -0.3" size="0.03"/>
+            <site name="felt" pos="0 0 -0.3" size="0.04"/><site name="mark" size="0.01"/>
+          </body></body></worldbody>
+        <actuator><position name="hip" joint="hip" kp="50" ctrlrange="-1 1"/></actuator>
+        <sensor><touch name="touch" site="felt"/></sensor></mujoco>""",
+        0.02,
+    )
+    model = model_of(robot, dataclasses.replace(drawn(robot), foot_factor=1.4))
+
+    leg = model.geom_bodyid == model.body("leg").id
+    np.testing.assert_allclose(model.geom_size[leg, 0], [0.028, 0.042])
+    np.testing.assert_allclose(model.site("felt").size[0], 0.04 + 0.012)
+    np.testing.assert_allclose(model.site("mark").size[0], 0.01)
+
+
 def pushed(model: mujoco.MjModel, hinge: str, added: str, torque: float) -> float:
     """Where an added hinge comes to rest under a torque, rad; the base and the hinge are held."""
     data = mujoco.MjData(model)

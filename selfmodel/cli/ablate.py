@@ -79,11 +79,10 @@ def ablate(
     from selfmodel.settings import Settings  # noqa: PLC0415
     from selfmodel.tasks import ROBOTS  # noqa: PLC0415
 
-    names = lists.texts("--robots", robots, ROBOTS)
-    every_case = sorted({case for name in names for case in resolve.robot_entry(name).cases})
+    numbers = () if cases in ("all", "none") else lists.whole_numbers("--cases", cases, ())
     ablation = Ablation(
-        robots=names,
-        cases=[] if cases == "none" else lists.whole_numbers("--cases", cases, every_case),
+        robots=lists.texts("--robots", robots, ROBOTS),
+        cases=None if cases == "all" else numbers,
         damages=[damage.strip() for damage in damages.split(",") if damage.strip()],
         kinds=kinds,
         structure=structure,

@@ -87,6 +87,15 @@ KindNames = Annotated[
         f"{', '.join(kind.name for kind in ALL_KINDS)}, or package.module:object; or all.",
     ),
 ]
+NamedKinds = Annotated[
+    str,
+    typer.Option(
+        "--kinds",
+        metavar="package.module:object,...",
+        help="Kinds of your own that notation may name, beside all that come with selfmodel.",
+        show_default=False,
+    ),
+]
 DEFAULT_KINDS = ",".join(kind.name for kind in PAPER_KINDS)
 ControllerKind = Annotated[
     str,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from selfmodel.cli.options import Json, RobotOrModel, Threads
+from selfmodel.cli.options import Json, NamedKinds, RobotOrModel, Threads
 from selfmodel.errors import InputError, WorkError
 
 if TYPE_CHECKING:
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from selfmodel.cli.rendering.film import Film
+    from selfmodel.hypothesis import Hypothesis
     from selfmodel.logs import TrialLog
     from selfmodel.robot import Robot
 
@@ -55,6 +56,7 @@ def render(
             "`selfmodel diagnose --json` printed.",
         ),
     ] = None,
+    kinds: NamedKinds = "all",
     model: RobotOrModel = None,
     stick: Annotated[
         bool,
@@ -81,8 +83,10 @@ def render(
     # Whatever brings MuJoCo waits until it is known what draws.
     from selfmodel.cli import resolve  # noqa: PLC0415
     from selfmodel.cli.rendering.diagnosed import diagnosed  # noqa: PLC0415
+    from selfmodel.faults import known  # noqa: PLC0415
     from selfmodel.logs.errors import LogWriteError  # noqa: PLC0415
     from selfmodel.logs.files import replace  # noqa: PLC0415
+    from selfmodel.notation import parse  # noqa: PLC0415
 
     if diagnosis is not None:
         hypothesis = diagnosed(diagnosis)
@@ -91,7 +95,7 @@ def render(
     film, result = _filmed(
         log,
         robot,
-        hypothesis or "intact",
+        parse(hypothesis or "intact", robot.anatomy, known(resolve.kinds(kinds))),
         None if out.suffix.lower() in FILMS else pictures,
         resolve.threads(threads),
     )
@@ -149,18 +153,16 @@ def _choose_gl(out: Path, *, stick: bool) -> str | None:
 
 
 def _filmed(
-    log: "TrialLog", robot: "Robot", notation: str, pictures: int | None, threads: int
+    log: "TrialLog", robot: "Robot", assumed: "Hypothesis", pictures: int | None, threads: int
 ) -> "tuple[Film, dict[str, Any]]":
     """What is to be drawn, and what there is to say of it."""
     import numpy as np  # noqa: PLC0415  # with the other work
 
     from selfmodel.cli.rendering.film import evenly, film_of  # noqa: PLC0415
     from selfmodel.cli.rendering.video import RATE  # noqa: PLC0415
-    from selfmodel.notation import parse  # noqa: PLC0415
     from selfmodel.replay import replay  # noqa: PLC0415
     from selfmodel.simulator import Simulator  # noqa: PLC0415
 
-    assumed = parse(notation, robot.anatomy)
     logged = log.trial.behaviour
     found = replay(log.trial, assumed, Simulator(robot, threads))
     whole = np.arange(int(float(logged.time[-1]) * RATE) + 1) / RATE

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from selfmodel.cli.options import Json, RobotOrModel, Threads
+from selfmodel.cli.options import Json, NamedKinds, RobotOrModel, Threads
 
 if TYPE_CHECKING:
     from selfmodel.behaviour import Signal
@@ -39,6 +39,7 @@ def replay(
             metavar="NOTATION", help="What is taken to be wrong, such as break:front_left_knee."
         ),
     ] = "intact",
+    kinds: NamedKinds = "all",
     model: RobotOrModel = None,
     out: Annotated[
         Path | None,
@@ -54,6 +55,7 @@ def replay(
     from selfmodel.behaviour import SIGNALS  # noqa: PLC0415
     from selfmodel.cli import resolve  # noqa: PLC0415
     from selfmodel.cli.replay_figure import check_figure, draw  # noqa: PLC0415
+    from selfmodel.faults import known  # noqa: PLC0415
     from selfmodel.notation import parse  # noqa: PLC0415
     from selfmodel.replay import replay as simulate  # noqa: PLC0415
     from selfmodel.simulator import Simulator  # noqa: PLC0415
@@ -62,7 +64,7 @@ def replay(
         check_figure(out)
     (log,) = resolve.logs([file])
     robot = resolve.robot_of_logs([log], model)
-    assumed = parse(hypothesis, robot.anatomy)
+    assumed = parse(hypothesis, robot.anatomy, known(resolve.kinds(kinds)))
     logged = log.software.get("mujoco", "unknown")
     exact = logged == mujoco.__version__ and not log.imported
     tolerance = 0.0 if exact else TOLERANCE

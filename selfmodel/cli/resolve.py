@@ -173,6 +173,8 @@ def _kind(name: str) -> Kind:
     found = _plugged_in("kind", name, (*own, "all"))
     if not isinstance(found, Kind):
         raise InputError(f"{name!r} is no kind: expected a selfmodel.faults.Kind, got {found!r}")
+    if not found.hypothesised:
+        raise InputError(f"{name!r} is a kind that no diagnosis may propose: choose another")
     return found
 
 

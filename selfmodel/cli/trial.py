@@ -11,6 +11,7 @@ from selfmodel.cli.options import (
     GapLevel,
     Json,
     ModelSettings,
+    NamedKinds,
     Neurons,
     RobotName,
     Seed,
@@ -33,6 +34,7 @@ def trial(
         ),
     ],
     damage: Damage = None,
+    kinds: NamedKinds = "all",
     model_settings: ModelSettings = None,
     controller: Annotated[
         Path | None,
@@ -56,6 +58,7 @@ def trial(
     from selfmodel.cli import resolve  # noqa: PLC0415
     from selfmodel.cli.reality import draw_reality  # noqa: PLC0415
     from selfmodel.controller import draw_weights  # noqa: PLC0415
+    from selfmodel.faults import known  # noqa: PLC0415
     from selfmodel.logs import read_log  # noqa: PLC0415
     from selfmodel.logs.writer import write_trial  # noqa: PLC0415
     from selfmodel.notation import parse  # noqa: PLC0415
@@ -69,7 +72,9 @@ def trial(
         "cpg" if kind == "cpg" else "network",
     )
     check_log_name(out)
-    hidden = parse("intact" if damage is None else damage, made.anatomy)
+    hidden = parse(
+        "intact" if damage is None else damage, made.anatomy, known(resolve.kinds(kinds))
+    )
     reality = draw_reality(made, seed, gap, structure=structure)
     driver: Evolved
     if kind in resolve.DESIGNS:

@@ -70,6 +70,8 @@ class Kind:
             the genome's fourth value.
         special: Degrees at which a fault of this kind is one of another kind, without a degree, or
             None, which is nothing at all.
+        alone: The same where no other fault strikes the part: a sensor with a gain of 0 has failed,
+            unless it has a bias too.
         prefix: Letters in front of the degree's number in notation.
         unit: The unit of the degree.
         moves: Whether it changes how a robot moves under given commands; if not, it changes
@@ -99,10 +101,17 @@ class Kind:
         default=grid(0.0), compare=False, repr=False
     )
     special: Mapping[float, "Kind | None"] = field(default_factory=dict, compare=False, repr=False)
+    alone: Mapping[float, "Kind"] = field(default_factory=dict, compare=False, repr=False)
     prefix: str = field(default="", compare=False, repr=False)
     unit: str = field(default="", compare=False, repr=False)
     moves: bool = field(default=True, compare=False, repr=False)
     hypothesised: bool = field(default=True, compare=False, repr=False)
+
+    @property
+    def without_degree(self) -> "Kind":
+        """The kind that a fault of this kind is at one of its degrees, if any; else this one."""
+        others = (*self.special.values(), *self.alone.values())
+        return next((kind for kind in others if kind is not None), self)
 
     def candidates(self, anatomy: Anatomy) -> tuple["Fault", ...]:
         """Returns every fault that a genome or a local search proposes: each part, each level."""

@@ -10,8 +10,8 @@ if TYPE_CHECKING:
 
 
 def _strike(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
-    for motor in anatomy.joint(fault.part).motors:
-        embodiment.weaken_motor(anatomy.motors.index(motor), fault.degree)
+    motors = [anatomy.motors.index(motor) for motor in anatomy.joint(fault.part).motors]
+    embodiment.weaken_motors(motors, fault.degree)
 
 
 def _joints_with_motors(anatomy: Anatomy) -> tuple[str, ...]:

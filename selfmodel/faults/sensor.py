@@ -60,8 +60,9 @@ SENSOR_GAIN = Kind(
     moves=False,
     degrees=between(0.0, 2.0),
     levels=grid(0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.2, 1.4, 1.6, 1.8, 2.0),
-    # A gain of 0 is not a failed sensor: it may have a bias.
     special={1.0: None},
+    # With a bias, a gain of 0 is a reading that is stuck.
+    alone={0.0: FAILED_SENSOR},
     unit="times",
 )
 

@@ -1,4 +1,4 @@
-"""Wind: air that moves along forward, or across it."""
+"""Wind: the medium, air where the model has none, moves along forward, or across it."""
 
 from typing import TYPE_CHECKING
 
@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from selfmodel.embodiment import Embodiment
 
 AIR_DENSITY = 1.2
-"""Of air at 20 degrees Celsius, kg/m^3; a nominal robot walks in a vacuum."""
+"""Of air at 20 degrees Celsius, kg/m^3; a model that says no medium is in a vacuum."""
 
 AIR_VISCOSITY = 1.8e-5
 """Of the same air, Pa s."""
@@ -22,7 +22,8 @@ _LEVELS = grid(
 
 def _blow(embodiment: "Embodiment", axis: int, speed: float) -> None:
     option = embodiment.model.opt
-    option.density, option.viscosity = AIR_DENSITY, AIR_VISCOSITY
+    if option.density == option.viscosity == 0:  # what swims stays in its water
+        option.density, option.viscosity = AIR_DENSITY, AIR_VISCOSITY
     option.wind[axis] = speed
 
 

@@ -10,6 +10,7 @@ from selfmodel import __version__
 from selfmodel.atomic import put
 from selfmodel.cli import resolve
 from selfmodel.cli.ablation.plan import Ablation, Cell, model_digest
+from selfmodel.cli.keys import key_of
 from selfmodel.driver import Evolved
 from selfmodel.grid import GridBegins, Job, PartEnds, run_grid
 from selfmodel.hypothesis import INTACT
@@ -43,7 +44,7 @@ def fill(
     made_of = {name: settings[name] for name in settings if name not in OF_DIAGNOSIS}
     jobs = [
         Job(
-            key=f"{robot}-{number}",
+            key=f"{key_of(robot)}-{number}",
             parameters={
                 "robot": robot,
                 "model": model_digest(robot),
@@ -85,9 +86,9 @@ def evolve_gait(job: Job, _part: str, run: Path) -> Any:  # noqa: ANN401  # JSON
     robot = resolve.robot_entry(job.parameters["robot"]).robot()
     repair = Repair(Simulator(robot, threads=1), Settings(**job.parameters["settings"]))
     found = repair(INTACT, (), repair_stream(job.seed, 0), lambda _generation: None)
-    put(_path(run.parent, robot.name, job.seed), controller_bytes(found))
+    put(_path(run.parent, job.parameters["robot"], job.seed), controller_bytes(found))
     return {"evaluations": repair.evaluations}
 
 
 def _path(bank: Path, robot: str, number: int) -> Path:
-    return bank / f"{robot}-{number}.npz"
+    return bank / f"{key_of(robot)}-{number}.npz"

@@ -3,7 +3,6 @@
 import dataclasses
 import hashlib
 import itertools
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,8 +11,10 @@ from urllib.parse import quote
 
 from selfmodel import __version__
 from selfmodel.cli import resolve
+from selfmodel.cli.keys import check_keys, key_of
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.faults import PAPER_KINDS, Kind, known
+from selfmodel.gap import WIDEST
 from selfmodel.grid import Job, check_shared
 from selfmodel.notation import parse
 from selfmodel.settings import Settings
@@ -36,7 +37,7 @@ class Ablation:
 
     Attributes:
         robots: Names of robots.
-        cases: Numbers of failures of Table I.
+        cases: Numbers of failures of Table I; None for all that each robot can have.
         comparators: Names, or ``package.module:object``.
         gaps: Levels of the reality gap.
         seeds: A run for each.
@@ -50,7 +51,7 @@ class Ablation:
     """
 
     robots: Sequence[str]
-    cases: Sequence[int]
+    cases: Sequence[int] | None
     comparators: Sequence[str]
     gaps: Sequence[float]
     seeds: Sequence[int]
@@ -114,18 +115,28 @@ def check(ablation: Ablation) -> None:
     for name in ("robots", "comparators", "gaps", "seeds"):
         if not getattr(ablation, name):
             raise InputError(f"an ablation needs at least one of its {name}, got none")
-    if not (ablation.cases or ablation.damages):
+    if not (ablation.cases is None or ablation.cases or ablation.damages):
         raise InputError("an ablation needs at least one case or one damage, got neither")
     _check_names(ablation)
     for gap in ablation.gaps:
-        if not (math.isfinite(gap) and gap >= 0):
-            raise InputError(f"a gap is a number of at least 0, such as 0.05, got {gap}")
-    if ablation.next_trial != "bank" and ablation.settings.trials < 2:
+        if not 0 <= gap <= WIDEST:
+            raise InputError(f"a gap is a number from 0 to {WIDEST}, such as 0.05, got {gap}")
+    _check_trials(ablation)
+    check_shared(ablation.folder, _shared(ablation), "an ablation")
+
+
+def _check_trials(ablation: Ablation) -> None:
+    trials = ablation.settings.trials
+    if ablation.next_trial != "bank" and trials < 2:
         raise InputError(
             f"a trial is chosen by the first diagnosis: with --next-trial {ablation.next_trial} "
             f"there are at least 2 trials, got 1"
         )
-    check_shared(ablation.folder, _shared(ablation), "an ablation")
+    if ablation.next_trial == "bank" and trials > GAITS and 0 in ablation.gaps:
+        raise InputError(
+            f"without a gap, the same gait gives the same trial, and the bank has {GAITS}: give "
+            f"at most {GAITS} trials, got {trials}, or only gaps above 0"
+        )
 
 
 def cells(ablation: Ablation, only: tuple[int, int] = (1, 1)) -> list[Cell]:
@@ -155,7 +166,7 @@ def job(ablation: Ablation, cell: Cell, gaits: Sequence[str]) -> Job:
     """
     failure = f"case{cell.case:02d}" if cell.case is not None else quote(cell.truth, safe="=")
     return Job(
-        key=f"{cell.robot}-{failure}-gap{cell.gap!r}-seed{cell.seed:03d}",
+        key=f"{key_of(cell.robot)}-{failure}-gap{cell.gap!r}-seed{cell.seed:03d}",
         parameters={
             "robot": cell.robot,
             "model": model_digest(cell.robot),
@@ -185,10 +196,10 @@ def spec(of: Job) -> Spec:
 def _failures(ablation: Ablation, robot: str) -> list[tuple[int | None, str]]:
     entry = resolve.robot_entry(robot)
     anatomy = entry.robot().anatomy
-    cases: list[tuple[int | None, str]] = [(case, entry.cases[case]) for case in ablation.cases]
-    return cases + [
-        (None, str(parse(damage, anatomy, _named(ablation)))) for damage in ablation.damages
-    ]
+    numbers = entry.cases if ablation.cases is None else ablation.cases
+    cases: list[tuple[int | None, str]] = [(case, entry.cases[case]) for case in numbers]
+    damages = [str(parse(damage, anatomy, _named(ablation))) for damage in ablation.damages]
+    return cases + [(None, damage) for damage in dict.fromkeys(damages)]
 
 
 def _named(ablation: Ablation) -> tuple[Kind, ...]:
@@ -202,9 +213,10 @@ def model_digest(robot: str) -> str:
 
 
 def _check_names(ablation: Ablation) -> None:
+    check_keys(ablation.robots)
     for robot in ablation.robots:
         entry = resolve.robot_entry(robot)
-        for case in ablation.cases:
+        for case in ablation.cases or ():
             if case not in entry.cases:
                 raise unknown_name(f"case of {robot}", str(case), map(str, entry.cases))
         anatomy = entry.robot().anatomy

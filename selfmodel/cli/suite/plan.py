@@ -2,7 +2,6 @@
 
 import dataclasses
 import hashlib
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any
 
 from selfmodel import __version__
 from selfmodel.cli import resolve
+from selfmodel.cli.keys import check_keys, key_of
 from selfmodel.controller import Network
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.faults.neuron import SILENT_NEURON
@@ -60,14 +60,11 @@ def check(study: Study) -> None:
         InputError: Something is, and which.
     """
     resolve.comparator(study.comparator)
-    keys: dict[str, str] = {}
+    check_keys(study.bodies)
     for body in study.bodies:
         entry = resolve.robot_entry(body)
         resolve.design(study.controller, entry.robot())
         resolve.score(study.score, body, entry)
-        first = keys.setdefault(_key(body), body)
-        if first != body:
-            raise InputError(f"{first} and {body} would be called alike: rename one of the files")
     known = known_cases(study.bodies)
     for case in study.cases:
         if case not in known:
@@ -83,7 +80,7 @@ def gait_jobs(study: Study) -> list[Job]:
         del made_of[name]
     return [
         Job(
-            key=f"{_key(body)}-seed{seed:03d}",
+            key=f"{key_of(body)}-seed{seed:03d}",
             parameters={
                 **_body(body),
                 "settings": made_of,
@@ -117,7 +114,7 @@ def recovery_jobs(study: Study) -> list[Job]:
         entry = resolve.robot_entry(body)
         found += [
             Job(
-                key=f"{_key(body)}-case{case:02d}-seed{gait.seed:03d}",
+                key=f"{key_of(body)}-case{case:02d}-seed{gait.seed:03d}",
                 parameters={
                     **_body(body),
                     "case": case,
@@ -146,11 +143,6 @@ def _means_something(study: Study, entry: Entry, case: int) -> bool:
 def gait_path(folder: Path, key: str) -> Path:
     """Returns where the gait of that key is, in the folder of a study."""
     return folder / "gaits" / f"{key}.npz"
-
-
-def _key(body: str) -> str:
-    name = Path(body).stem if resolve.is_model(body) else body
-    return re.sub(r"[^\w.-]", "_", name, flags=re.ASCII).lstrip(".-") or "robot"
 
 
 def _body(body: str) -> dict[str, Any]:

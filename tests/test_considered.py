@@ -1,0 +1,64 @@
+"""Promises of what a diagnosis considers: what can strike the robot, under whatever name."""
+
+import dataclasses
+
+import pytest
+
+from selfmodel.comparators import SEGMENT_PREDICTION
+from selfmodel.considered import considered
+from selfmodel.diagnose import Diagnose
+from selfmodel.errors import InputError
+from selfmodel.explain import explain
+from selfmodel.faults import ALL_KINDS, KINDS, PAPER_KINDS
+from selfmodel.notation import parse
+from selfmodel.physical import SimulatedRobot
+from selfmodel.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.simulator import Simulator
+from selfmodel.trial import Plan
+from tests.conftest import random_controllers
+from tests.memory import MemoryJournal
+
+SMALL = dataclasses.replace(Settings().scaled(12), generations=2, steps=300)
+ANGLES = (KINDS["break"], KINDS["jam-angle"])
+
+BARE = """\
+<mujoco><option timestep="0.005"/><worldbody>
+  <geom type="plane" size="0 0 1"/>
+  <body name="trunk" pos="0 0 0.5"><freejoint/><geom type="box" size="0.1 0.1 0.1"/>
+    <body name="leg"><joint name="hip" axis="0 1 0" range="-60 60"/>
+      <geom type="capsule" fromto="0 0 0 0 0 -0.3" size="0.02"/></body></body>
+</worldbody>
+<actuator><position name="hip" joint="hip" kp="50" ctrlrange="-1 1"/></actuator></mujoco>
+"""
+"""A robot without a sensor."""
+
+
+def test_what_strikes_a_robot_stays_in_its_order_and_brings_its_other_names(robot: Robot):
+    assert considered(PAPER_KINDS, robot.anatomy) == PAPER_KINDS
+    assert considered(ALL_KINDS, robot.anatomy) == ALL_KINDS
+    assert considered(ANGLES, robot.anatomy) == (*ANGLES, KINDS["jam"])
+    gains = (KINDS["sensor-gain"], KINDS["motor"])
+    assert considered(gains, robot.anatomy) == (*gains, KINDS["sensor"])
+
+
+def test_a_kind_that_cannot_strike_a_robot_is_passed_over_and_alone_refused():
+    anatomy = Robot("bare", BARE, 0.02).anatomy
+
+    assert considered(PAPER_KINDS, anatomy) == (KINDS["break"], KINDS["jam"])
+    with pytest.raises(InputError, match="no part that sensor, sensor-gain can strike"):
+        considered((KINDS["sensor"], KINDS["sensor-gain"]), anatomy)
+
+
+def test_a_joint_that_turns_out_to_be_jammed_at_0_is_found_among_angles_trial_after_trial(
+    quadruped: Robot,
+):
+    hidden = parse("jam:front_left_shoulder", quadruped.anatomy)
+    journal, physical = MemoryJournal(quadruped), SimulatedRobot(quadruped, hidden)
+    trials = [
+        journal.record(physical, Plan(f"{number:02d}-after", "after", gait, SMALL.steps, 0))
+        for number, gait in enumerate(random_controllers(quadruped, 4)[1:])
+    ]
+    search = Diagnose(Simulator(quadruped, 1), SEGMENT_PREDICTION, SMALL, ANGLES)
+
+    assert explain(trials, search, 0, lambda _: None).best == hidden
