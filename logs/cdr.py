@@ -86,7 +86,8 @@ class Template:
             raise ValueError("the time stamps within a message differ")
         seconds = stamps[0].astype(np.int64)
         blocks = [_view(messages, offset, 8 * count, "<f8") for offset, count in self.blocks]
-        values = np.concatenate(blocks, axis=1).astype(np.float64, copy=False)
+        none: FloatArray = np.empty((len(messages), 0))  # for a robot that feels nothing
+        values = np.concatenate([none, *blocks], axis=1).astype(np.float64, copy=False)
         return seconds[:, 0] * _BILLION + seconds[:, 1], values
 
     def _fixed(self) -> NDArray[np.bool_]:

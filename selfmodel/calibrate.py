@@ -72,7 +72,8 @@ class Calibration:
         robot: The robot whose MJCF says the fitted parameters.
         parameters: The fitted parameters.
         deviations: The standard deviation of each factor's logarithm, ``(factors,)`` in the order
-            of ``Parameters.factors``: that of the prior where the trials show nothing.
+            of ``Parameters.factors``: that of the prior where the trials show nothing, less where
+            they show something.
         error_before: Root mean square error of the predictions with the nominal parameters, in
             units of ``SCALES``.
         error: The same with the fitted ones.
@@ -144,26 +145,16 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
         verbose=mujoco.minimize.Verbosity.SILENT,
     )
     found = from_factors(np.exp(fitted.ravel()), delay)
+    slopes = jacobian(fitted, zero)
+    count = len(slopes) - len(zero)  # of the errors: the rest is the prior, at its weight
+    spread = np.linalg.inv(slopes.T @ slopes) * count * SHARE**2
     return Calibration(
         robot=with_parameters(robot, found),
         parameters=found,
-        deviations=_deviations(jacobian(fitted, zero), residual(fitted)),
+        deviations=np.sqrt(np.diag(spread)),
         error_before=before,
         error=error(found),
     )
-
-
-def _deviations(slopes: FloatArray, residuals: FloatArray) -> FloatArray:
-    """The deviation of each logarithm, from the curvature of the fit and what errors remain.
-
-    Args:
-        slopes: Of the residuals, ``(residuals, factors)``; the prior's stand last.
-        residuals: Where the fit ended.
-    """
-    count = len(slopes) - slopes.shape[1]
-    errors = max(float(np.mean(residuals[:count] ** 2)), EXACT**2)
-    shown = slopes[:count].T @ slopes[:count] / (count * errors * SHARE**2)
-    return np.asarray(np.sqrt(np.diag(np.linalg.inv(shown + np.eye(len(shown)) / PRIOR**2))))
 
 
 def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> float:

@@ -11,9 +11,11 @@ from selfmodel.degrees import (
     with_fitted_degrees,
     with_mean_degrees,
 )
-from selfmodel.faults import FRICTION, KINDS, PAPER_KINDS, WORLD, Fault
-from selfmodel.hypothesis import Hypothesis
-from selfmodel.losses import Losses
+from selfmodel.faults import FRICTION, KINDS, PAPER_KINDS, WIND, WORLD, Fault
+from selfmodel.hypothesis import INTACT, Hypothesis
+from selfmodel.losses import Looks, Losses
+from selfmodel.notation import parse
+from selfmodel.refine import refined
 from tests.test_refine import ANATOMY, FAULTS, PIECES, find
 
 WEAK_MOTOR = KINDS["motor"]
@@ -166,3 +168,21 @@ def test_classes_of_what_reshapes_the_model_have_no_mean():
     flat = with_mean_degrees(rough, lambda asked: np.ones((len(asked), PIECES)), ANATOMY)
 
     assert flat == rough
+
+
+def test_a_mean_that_no_longer_needs_the_fault_leaves_the_best_degree_as_it_is():
+    """All winds but one predict as well as none, and not significantly worse than that one."""
+    rng = np.random.default_rng(0)
+    noise = rng.normal(size=PIECES)
+    noise -= noise.mean()
+
+    def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        rows = {"intact": np.full(PIECES, 1.0), "wind=8.0": np.linspace(0.85, 0.95, PIECES)}
+        return np.array([rows.get(str(one), 1.0 + noise) for one in hypotheses])
+
+    winds = coarse_candidates((WIND,), ANATOMY)
+    wind = parse("wind=8", ANATOMY)
+    mean = with_mean_degrees(wind, losses, ANATOMY)
+
+    assert mean not in (wind, INTACT)
+    assert refined([wind], winds, 1, Looks(losses, losses, None), ANATOMY) == wind

@@ -6,11 +6,15 @@ import numpy as np
 
 from selfmodel.behaviour import collect
 from selfmodel.hypothesis import INTACT
+from selfmodel.logs import read_log
+from selfmodel.logs.writer import write_trial
 from selfmodel.mjcf import MjcfSettings
 from selfmodel.oscillators import Oscillators
 from selfmodel.physical import SimulatedRobot
 from selfmodel.robot import Robot
+from selfmodel.settings import Settings
 from selfmodel.simulator import Simulator
+from selfmodel.trial import Plan
 from tests.mjcf.awkward import mjcf
 
 
@@ -24,3 +28,20 @@ def test_a_robot_without_any_sensor_moves_as_a_physical_and_as_a_simulated_one(t
     assert robot.anatomy.sensors == ()
     np.testing.assert_array_equal(simulated["joint_positions"][0], physical["joint_positions"])
     assert np.ptp(physical["joint_positions"]) > 0
+
+
+def test_a_trial_of_a_robot_without_any_sensor_is_logged_and_read(tmp_path: Path):
+    (tmp_path / "robot.xml").write_text(mjcf(), encoding="utf-8")
+    robot = Robot.from_mjcf(tmp_path / "robot.xml", MjcfSettings(touch=(), angle=()))
+    driver = Oscillators(robot.cpg, np.full(robot.cpg.weights, 0.5))
+    path = write_trial(
+        tmp_path / "trial.mcap",
+        robot,
+        Plan("trial", "single", driver, 20, 0),
+        SimulatedRobot(robot).run(driver, 20),
+        settings=Settings(),
+    )
+    read = read_log(path).trial.behaviour
+
+    assert read["sensors"].shape == (20, 0)
+    assert read["joint_positions"].shape == (20, robot.model.nu)
