@@ -78,7 +78,7 @@ def draw(path: Path, log: TrialLog, found: Replay, hypothesis: str) -> None:
 
 
 def _title(log: TrialLog, found: Replay) -> str:
-    name = f"{log.trial.robot}, trial {log.trial.plan.name}".replace("$", r"\$")
+    name = f"{log.trial.robot}, {log.trial.plan.name}".replace("$", r"\$")
     if found.first_divergence_step is None:
         return f"{name}: the same all the way"
     return f"{name}: they part at step {found.first_divergence_step}"
