@@ -8,7 +8,7 @@ from selfmodel.faults import Kind
 
 
 def considered(kinds: Sequence[Kind], anatomy: Anatomy) -> tuple[Kind, ...]:
-    """Returns those that can strike a robot, and what they are called without a degree.
+    """Returns those that can strike a robot, and what they are at some degree.
 
     Who considers joints jammed at an angle considers those jammed at 0, and who considers the
     gain of a sensor considers one of 0: these are kinds of their own.
@@ -18,9 +18,12 @@ def considered(kinds: Sequence[Kind], anatomy: Anatomy) -> tuple[Kind, ...]:
         anatomy: The robot's parts.
 
     Raises:
-        InputError: None of them can strike it.
+        InputError: None of them can strike it, or one is not for diagnoses.
     """
-    others = [kind.without_degree for kind in kinds]
+    hidden = [kind.name for kind in kinds if not kind.hypothesised]
+    if hidden:
+        raise InputError(f"no diagnosis may propose {', '.join(hidden)}: leave it out")
+    others = [other for kind in kinds for other in kind.others]
     able = tuple(kind for kind in dict.fromkeys((*kinds, *others)) if kind.candidates(anatomy))
     if not able:
         raise InputError(

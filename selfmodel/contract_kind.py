@@ -39,6 +39,12 @@ def check_kind(kind: Kind, robot: Robot) -> None:
         _check_words(fault, robot)
         if kind.absorbs(fault, fault, robot.anatomy):
             raise ValueError(f"{fault} absorbs itself, so it can never be said")
+    for other in kind.others:
+        if other.degrees is not None or (kind.hypothesised and not other.hypothesised):
+            raise ValueError(
+                f"{kind.name} is {other.name} at some degree, which must be a kind without degrees "
+                f"that a diagnosis may propose"
+            )
     _check_edits(kind, candidates, robot)
     _check_batch(kind, robot)
     if kind.feel is not None:

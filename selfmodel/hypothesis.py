@@ -51,10 +51,14 @@ def canonical(faults: Iterable[Fault], anatomy: Anatomy) -> Hypothesis:
     distinct: dict[tuple[Kind, str], Fault] = {}
     for fault in filter(None, (said.settled for said in faults)):
         distinct.setdefault((fault.kind, fault.part), fault)
-    struck = [fault.part for fault in distinct.values()]
-    for (kind, part), fault in list(distinct.items()):
-        if fault.degree in kind.alone and struck.count(part) == 1:
-            distinct[kind, part] = Fault(kind.alone[fault.degree], part)
+    for fault in list(distinct.values()):
+        simpler = fault.settled_alone
+        rest = [other for other in distinct.values() if other is not fault]
+        if simpler is not fault and not any(
+            simpler.kind.absorbs(simpler, other, anatomy) for other in rest
+        ):
+            del distinct[fault.kind, fault.part]
+            distinct[simpler.kind, simpler.part] = simpler
     kept = [
         fault
         for fault in distinct.values()

@@ -7,6 +7,7 @@ from functools import partial
 
 from selfmodel.calibrate import Calibration
 from selfmodel.comparator import Comparator
+from selfmodel.considered import considered
 from selfmodel.database import Journal
 from selfmodel.diagnose import Diagnose
 from selfmodel.diagnosis import Diagnosis
@@ -131,6 +132,7 @@ def recover(
         tried.append(believed)
         watch(journal.record(robot, plan))
 
+    considered(kinds, simulator.robot.anatomy)  # before any trial is spent
     if gait is None:
         gait = evolve_controller(INTACT)
     act(healthy, "before", INTACT, gait)

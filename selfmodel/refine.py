@@ -174,6 +174,7 @@ class _Search:
         simpler = [
             (*faults[:i], dataclasses.replace(fault, degree=special), *faults[i + 1 :])
             for i, fault in enumerate(faults)
+            if fault.degree not in fault.kind.alone
             for special in (*fault.kind.special, *fault.kind.alone)
         ]
         return self._distinct(hypothesis, [*fewer, *simpler])

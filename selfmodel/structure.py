@@ -134,13 +134,21 @@ def add_structure(spec: mujoco.MjSpec, structure: Structure) -> None:
         felt = {sensor.objname for sensor in spec.sensors if sensor.type == TOUCH}
         for site in body.sites:
             if site.name in felt:
-                site.size[0] += wider
+                site.size[: EXTENTS.get(site.type, 3)] += wider
     if structure.weak:
         motor = spec.actuator(structure.weak)
         motor.forcerange = np.array(motor.forcerange) * structure.saturation
 
 
 TOUCH = mujoco.mjtSensor.mjSENS_TOUCH
+
+EXTENTS = {
+    mujoco.mjtGeom.mjGEOM_SPHERE: 1,
+    mujoco.mjtGeom.mjGEOM_CAPSULE: 1,
+    mujoco.mjtGeom.mjGEOM_CYLINDER: 2,
+}
+"""The sizes of a site that are its own; a box and an ellipsoid have three. A capsule's ends are
+round, so it grows all around by its radius."""
 
 ROUND = (int(mujoco.mjtGeom.mjGEOM_SPHERE), int(mujoco.mjtGeom.mjGEOM_CAPSULE))
 """The shapes of geoms whose first size is a radius all around."""

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from selfmodel.cli.ablation import Ablation, ablate, collect
+from selfmodel.cli.ablation import Ablation, ablate, collect, write_results
 from selfmodel.cli.ablation.plan import cells, check
 from selfmodel.errors import InputError
 from selfmodel.robot import Robot
@@ -37,6 +37,13 @@ def test_all_cases_are_those_that_each_robot_can_have(tmp_path: Path):
     assert 0 < found["suite-walker-walk"] < 10
 
 
+def test_there_are_as_many_trials_without_a_gap_as_there_are_gaits(tmp_path: Path):
+    check(small(tmp_path, settings=Settings(trials=6)))
+    check(small(tmp_path, settings=Settings(trials=7), gaps=[0.05]))
+    with pytest.raises(InputError, match="at most 6 trials, got 7"):
+        check(small(tmp_path, settings=Settings(trials=7), gaps=[0.05, 0.0]))
+
+
 def test_a_robot_of_ones_own_is_ablated_by_the_name_of_its_file(
     quadruped: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
@@ -46,6 +53,9 @@ def test_a_robot_of_ones_own_is_ablated_by_the_name_of_its_file(
 
     assert ablate(ablation, workers=1, watch=lambda _event: None) == ()
     assert {row.robot for row in collect(ablation.folder)} == {"./mine.xml"}
+    assert {
+        path.name for path in write_results(ablation.folder).files if path.suffix == ".png"
+    } == {*("gap.png", "cases-mine-1.png", "cases-mine-2.png")}
     assert (ablation.folder / "runs" / "mine-case01-gap0.0-seed005").is_dir()
     with pytest.raises(InputError, match=r"mine.xml and ./mine.xml would be called alike"):
         check(small(tmp_path, robots=["mine.xml", "./mine.xml"]))

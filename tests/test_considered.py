@@ -1,21 +1,26 @@
 """Promises of what a diagnosis considers: what can strike the robot, under whatever name."""
 
 import dataclasses
+from pathlib import Path
 
 import pytest
 
+from selfmodel.anatomy import Anatomy
 from selfmodel.comparators import SEGMENT_PREDICTION
 from selfmodel.considered import considered
+from selfmodel.contract_kind import check_kind
 from selfmodel.diagnose import Diagnose
+from selfmodel.embodiment import Embodiment
 from selfmodel.errors import InputError
 from selfmodel.explain import explain
-from selfmodel.faults import ALL_KINDS, KINDS, PAPER_KINDS
+from selfmodel.faults import ALL_KINDS, KINDS, PAPER_KINDS, Fault, Kind, between, grid, known
 from selfmodel.notation import parse
 from selfmodel.physical import SimulatedRobot
 from selfmodel.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulator import Simulator
 from selfmodel.trial import Plan
+from tests.command import selfmodel
 from tests.conftest import random_controllers
 from tests.memory import MemoryJournal
 
@@ -48,6 +53,50 @@ def test_a_kind_that_cannot_strike_a_robot_is_passed_over_and_alone_refused():
     assert considered(PAPER_KINDS, anatomy) == (KINDS["break"], KINDS["jam"])
     with pytest.raises(InputError, match="no part that sensor, sensor-gain can strike"):
         considered((KINDS["sensor"], KINDS["sensor-gain"]), anatomy)
+
+
+def test_a_kind_that_no_diagnosis_may_propose_is_refused(robot: Robot):
+    with pytest.raises(InputError, match="no diagnosis may propose neuron: leave it out"):
+        considered((KINDS["break"], KINDS["neuron"]), robot.anatomy)
+
+
+def test_kinds_that_a_fault_is_of_at_some_degree_can_be_named(quadruped: Robot):
+    """What a diagnosis says is read back from its log."""
+    sticky = Kind(name="sticky", word="sticky", strike=strike)
+    stick = Kind(
+        name="stick",
+        word="stick",
+        strike=strike,
+        degrees=between(0, 2),
+        levels=grid(1.0, 2.0),
+        special={0.0: sticky, 0.5: None},
+    )
+
+    check_kind(stick, quadruped)
+    assert considered((stick,), quadruped.anatomy) == (stick, sticky)
+    assert str(parse("stick=0", quadruped.anatomy, known((stick,)))) == "sticky"
+    for wrong in (KINDS["neuron"], KINDS["slope"]):
+        with pytest.raises(ValueError, match=f"stick is {wrong.name} at some degree"):
+            check_kind(dataclasses.replace(stick, special={0.0: wrong}), quadruped)
+
+
+def strike(embodiment: Embodiment, _anatomy: Anatomy, fault: Fault) -> None:
+    """More friction in every joint."""
+    embodiment.model.dof_frictionloss[6:] += 0.1 + fault.degree
+
+
+def test_a_recovery_of_a_robot_with_nothing_to_strike_is_refused_before_any_trial(tmp_path: Path):
+    (tmp_path / "bare.xml").write_text(BARE, encoding="utf-8")
+    nothing = ("--set", "touch=[]", "--set", "angle=[]", "--controller", "cpg")
+    done = selfmodel(
+        *("recover", "bare.xml", "--damage", "break:hip", "--kinds", "sensor", *nothing),
+        *("--out", "run"),
+        cwd=tmp_path,
+    )
+
+    assert done.returncode == 2
+    assert "no part that sensor can strike" in done.stderr
+    assert list(tmp_path.rglob("*.mcap*")) == []
 
 
 def test_a_joint_that_turns_out_to_be_jammed_at_0_is_found_among_angles_trial_after_trial(

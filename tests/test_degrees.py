@@ -170,6 +170,19 @@ def test_classes_of_what_reshapes_the_model_have_no_mean():
     assert flat == rough
 
 
+def test_a_degree_that_is_not_needed_becomes_the_fault_without_one():
+    """A sensor with a gain that is next to none has failed, as far as anybody can tell."""
+    dead, faint = (parse(f"sensor:front_left_touch{of}", ANATOMY) for of in ("", "=gain0.1"))
+    gains = coarse_candidates((KINDS["sensor-gain"],), ANATOMY)
+    ripple = np.linspace(0.95, 1.05, PIECES)
+
+    def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        known = {dead: 0.1 * ripple, faint: 0.1 * ripple[::-1] - 0.0003}
+        return np.array([known.get(one, 1 + ripple) for one in hypotheses])
+
+    assert refined([faint], gains, 1, Looks(losses, losses, None), ANATOMY) == dead
+
+
 def test_a_mean_that_no_longer_needs_the_fault_leaves_the_best_degree_as_it_is():
     """All winds but one predict as well as none, and not significantly worse than that one."""
     rng = np.random.default_rng(0)

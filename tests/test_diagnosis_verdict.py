@@ -83,6 +83,44 @@ def test_a_fault_without_a_degree_is_explained_though_its_degree_is_considered(
     assert (found.verdict, found.rivals) == ("explained", ())
 
 
+class HardOfHearing:
+    """Takes a touch that is half felt for none, so that gains below a half are all the same."""
+
+    name = "hard of hearing"
+    request = staticmethod(SEGMENT_PREDICTION.request)
+
+    def losses(self, simulated: Behaviour, trial: Trial) -> np.ndarray:
+        """Those of short predictions, of what is felt."""
+        touch = [name.endswith("touch") for name in simulated.names.sensors]
+        readings = simulated["sensors"].copy()
+        readings[..., touch] = readings[..., touch] > 0.5
+        felt = Behaviour(
+            simulated.names, simulated.time, {**simulated.signals, "sensors": readings}
+        )
+        return SEGMENT_PREDICTION.losses(felt, trial)
+
+    def distances(self, simulated: Behaviour, trial: Trial) -> np.ndarray:
+        """Their means."""
+        return self.losses(simulated, trial).mean(axis=1)
+
+
+def test_faults_that_differ_by_a_degree_are_no_rivals(
+    quadruped: Robot, gait: Controller, before: list[Trial]
+):
+    truth = "sensor:front_left_touch"
+    trials = [trial(quadruped, truth, gait)]
+    found = diagnosed(
+        *(quadruped, trials, before),
+        comparator=HardOfHearing(),
+        kinds=(KINDS["sensor"], KINDS["sensor-gain"]),
+    )
+
+    assert str(found.best) == truth
+    assert any("=gain" in str(one.hypothesis) for one in found.ranked[1:3])
+    assert found.ranked[1].distance == found.ranked[0].distance
+    assert found.rivals == ()
+
+
 @pytest.mark.parametrize("case", [1, 2, 3, 6, 9])
 def test_a_failure_of_table_one_is_found_and_explained(
     quadruped: Robot, gait: Controller, before: list[Trial], case: int

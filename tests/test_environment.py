@@ -178,9 +178,11 @@ def test_what_swims_stays_in_its_water_when_that_moves(quadruped: Robot):
     swimmer = Robot(
         "swimmer", quadruped.mjcf.replace("<option ", '<option density="1000" ', 1), 0.01
     )
-    moved = built(swimmer, "wind=2").opt
+    syrup = Robot("syrup", quadruped.mjcf.replace("<option ", '<option viscosity="2" ', 1), 0.01)
 
+    moved, thick = (built(robot, "wind=2").opt for robot in (swimmer, syrup))
     assert (moved.density, moved.viscosity, moved.wind[0]) == (1000, 0, 2)
+    assert (thick.density, thick.viscosity, thick.wind[0]) == (0, 2, 2)
 
 
 @pytest.mark.parametrize(("word", "axis"), [("wind", 0), ("crosswind", 1)])

@@ -54,6 +54,7 @@ def test_canonical_form_is_a_fixed_point(name: str, data: st.DataObject):
         ("jam:front_left_knee=0.2+motor:front_left_knee=0.5", "jam:front_left_knee=0.2"),
         ("sensor:back_left_angle+sensor:back_left_angle=gain0.5", "sensor:back_left_angle"),
         ("sensor:back_left_angle=gain0", "sensor:back_left_angle"),
+        ("sensor:back_left_angle=gain0+sensor:back_left_angle", "sensor:back_left_angle"),
         (
             "sensor:back_left_angle=gain0+sensor:back_left_angle=bias0.3",
             "sensor:back_left_angle=bias0.3+sensor:back_left_angle=gain0.0",

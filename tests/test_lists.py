@@ -29,7 +29,11 @@ from selfmodel.errors import InputError
         ("--only", "0/2", "--only needs i/n"),
         ("--damages", "break:nose", "unknown part in the term 'break:nose'"),
         ("--damages", "brek:front_left_knee", "did you mean break?"),
-        ("--kinds", "selfmodel.faults.neuron:SILENT_NEURON", "no diagnosis may propose"),
+        (
+            "--kinds",
+            "selfmodel.faults.neuron:SILENT_NEURON",
+            "no diagnosis may propose neuron: leave it out",
+        ),
         ("--kinds", "break,frction", "unknown kind 'frction': did you mean friction?"),
         ("--cases", "none", "needs at least one case or one damage, got neither"),
     ],

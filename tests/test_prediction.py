@@ -174,8 +174,11 @@ def test_segments_that_do_not_say_what_is_still_on_its_way_are_refused(quadruped
     segments = cut(trial(quadruped), range(0, STEPS - HORIZON, 10), lead=1)
     Simulator(late(quadruped, 1), 1).predict([INTACT], segments)
 
-    with pytest.raises(InputError, match="take effect 2 steps late, and segments have 1"):
+    said = "take effect 2 steps late, and segments have 1"
+    with pytest.raises(InputError, match=said):
         Simulator(late(quadruped, 2), 1).predict([INTACT], segments)
+    with pytest.raises(InputError, match=said):
+        predict(quadruped, [quadruped.build(INTACT)], segments, threads=1, tally=Tally(), delay=2)
 
 
 def test_without_the_base_a_segment_goes_on_where_the_one_before_it_ended(robot: Robot):

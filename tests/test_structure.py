@@ -107,9 +107,11 @@ def test_a_foot_of_several_shapes_grows_as_one_and_so_does_what_feels_it():
             <geom type="capsule" fromto="0 0 0 0 0 -0.3" size="0.02"/>
             <geom type="sphere" pos="0 0 -0.3" size="0.03"/>
             <site name="felt" pos="0 0 -0.3" size="0.04"/><site name="mark" size="0.01"/>
+            <site name="boxed" type="box" pos="0 0 -0.15" size="0.04 0.05 0.2"/>
           </body></body></worldbody>
         <actuator><position name="hip" joint="hip" kp="50" ctrlrange="-1 1"/></actuator>
-        <sensor><touch name="touch" site="felt"/></sensor></mujoco>""",
+        <sensor><touch name="touch" site="felt"/><touch name="all" site="boxed"/></sensor>
+        </mujoco>""",
         0.02,
     )
     model = model_of(robot, dataclasses.replace(drawn(robot), foot_factor=1.4))
@@ -117,6 +119,7 @@ def test_a_foot_of_several_shapes_grows_as_one_and_so_does_what_feels_it():
     leg = model.geom_bodyid == model.body("leg").id
     np.testing.assert_allclose(model.geom_size[leg, 0], [0.028, 0.042])
     np.testing.assert_allclose(model.site("felt").size[0], 0.04 + 0.012)
+    np.testing.assert_allclose(model.site("boxed").size, [0.052, 0.062, 0.212])
     np.testing.assert_allclose(model.site("mark").size[0], 0.01)
 
 

@@ -142,7 +142,7 @@ def stage(name: str) -> Stage:
 
 
 def kinds(names: str) -> tuple[Kind, ...]:
-    """Returns the kinds of fault and of environment that a diagnosis is to consider.
+    """Returns the kinds of fault and of environment that are meant, for a diagnosis or in notation.
 
     Args:
         names: Those of kinds that come with selfmodel, or another's ``package.module:object``,
@@ -173,8 +173,6 @@ def _kind(name: str) -> Kind:
     found = _plugged_in("kind", name, (*own, "all"))
     if not isinstance(found, Kind):
         raise InputError(f"{name!r} is no kind: expected a selfmodel.faults.Kind, got {found!r}")
-    if not found.hypothesised:
-        raise InputError(f"{name!r} is a kind that no diagnosis may propose: choose another")
     return found
 
 

@@ -31,7 +31,8 @@ ALL_KINDS: tuple[Kind, ...] = tuple(kind for kind in KINDS.values() if kind.hypo
 
 def known(kinds: Iterable[Kind]) -> tuple[Kind, ...]:
     """Returns what notation may name where these are considered: they, and all that come here."""
-    return tuple(dict.fromkeys((*KINDS.values(), *kinds)))
+    named = [kind for one in kinds for kind in (one, *one.others)]
+    return tuple(dict.fromkeys((*KINDS.values(), *named)))
 
 
 __all__ = [

@@ -70,8 +70,9 @@ class Kind:
             the genome's fourth value.
         special: Degrees at which a fault of this kind is one of another kind, without a degree, or
             None, which is nothing at all.
-        alone: The same where no other fault strikes the part: a sensor with a gain of 0 has failed,
-            unless it has a bias too.
+        alone: Degrees at which a fault of this kind is one of another kind, without a degree, as
+            long as there is nothing else that such a one would absorb: a sensor with a gain of 0
+            has failed, unless it has a bias too.
         prefix: Letters in front of the degree's number in notation.
         unit: The unit of the degree.
         moves: Whether it changes how a robot moves under given commands; if not, it changes
@@ -108,10 +109,15 @@ class Kind:
     hypothesised: bool = field(default=True, compare=False, repr=False)
 
     @property
+    def others(self) -> tuple["Kind", ...]:
+        """The kinds that a fault of this kind is of at some degree."""
+        found = (*self.special.values(), *self.alone.values())
+        return tuple(dict.fromkeys(kind for kind in found if kind is not None))
+
+    @property
     def without_degree(self) -> "Kind":
         """The kind that a fault of this kind is at one of its degrees, if any; else this one."""
-        others = (*self.special.values(), *self.alone.values())
-        return next((kind for kind in others if kind is not None), self)
+        return self.others[0] if self.others else self
 
     def candidates(self, anatomy: Anatomy) -> tuple["Fault", ...]:
         """Returns every fault that a genome or a local search proposes: each part, each level."""
@@ -147,3 +153,9 @@ class Fault:
             return self
         kind = self.kind.special[self.degree]
         return None if kind is None else Fault(kind, self.part)
+
+    @property
+    def settled_alone(self) -> "Fault":
+        """The same in the fewest words where nothing else is wrong with the part."""
+        kind = self.kind.alone.get(self.degree)
+        return self if kind is None else Fault(kind, self.part)

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from selfmodel.cli.ablation.rows import Row
 from selfmodel.cli.ablation.scores import Score
+from selfmodel.cli.keys import key_of
 from selfmodel.intervals import Interval
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ def draw(rows: Sequence[Row], scores: Sequence[Score]) -> Iterator[tuple[str, by
         for trials in shown:
             same = [row for row in rows if (row.robot, row.trials) == (robot, trials)]
             if same:
-                yield f"cases-{robot}-{trials}.png", _png(_by_case(robot, trials, same))
+                yield f"cases-{key_of(robot)}-{trials}.png", _png(_by_case(robot, trials, same))
 
 
 def _first_and_last(trials: Sequence[int]) -> list[int]:

@@ -12,6 +12,7 @@ from urllib.parse import quote
 from selfmodel import __version__
 from selfmodel.cli import resolve
 from selfmodel.cli.keys import check_keys, key_of
+from selfmodel.considered import considered
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.faults import PAPER_KINDS, Kind, known
 from selfmodel.gap import WIDEST
@@ -220,9 +221,9 @@ def _check_names(ablation: Ablation) -> None:
             if case not in entry.cases:
                 raise unknown_name(f"case of {robot}", str(case), map(str, entry.cases))
         anatomy = entry.robot().anatomy
+        considered(resolve.kinds(ablation.kinds), anatomy)
         for damage in ablation.damages:
             parse(damage, anatomy, _named(ablation))
-    resolve.kinds(ablation.kinds)
     for comparator in ablation.comparators:
         resolve.comparator(comparator)
     if ablation.next_trial not in NEXT_TRIAL:
