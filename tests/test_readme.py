@@ -47,8 +47,15 @@ def test_every_command_is_run_here_or_by_ci(tmp_path: Path):
 @pytest.mark.parametrize("page", ["README.md", *(f"docs/{p.name}" for p in ROOT.glob("docs/*.md"))])
 def test_every_link_to_a_file_leads_somewhere(page: str):
     text = (ROOT / page).read_text(encoding="utf-8")
-    targets = re.findall(r"\]\((?!https?:)([^)#]+)", text)
+    targets = re.findall(r"\]\((?!https?:)([^)#]*)(?:#([^)]*))?\)", text)
+    files = [((ROOT / page).parent / target if target else ROOT / page) for target, _ in targets]
 
-    assert [
-        target for target in targets if not (ROOT / page).parent.joinpath(target).exists()
-    ] == []
+    assert [file for file in files if not file.exists()] == []
+    for file, (_, place) in zip(files, targets, strict=True):
+        assert not place or place in headings(file), f"{file.name} has no #{place}"
+
+
+def headings(page: Path) -> set[str]:
+    """What links to the headings of a page are called."""
+    found = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in found}
