@@ -35,7 +35,7 @@ from selfmodel.errors import InputError
             "no diagnosis may propose neuron: leave it out",
         ),
         ("--kinds", "break,frction", "unknown kind 'frction': did you mean friction?"),
-        ("--cases", "none", "needs at least one case or one damage, got neither"),
+        ("--cases", " none ", "needs at least one case or one damage, got neither"),
     ],
 )
 def test_a_bad_list_is_refused_in_a_sentence_before_anything_is_run(

@@ -79,6 +79,7 @@ def ablate(
     from selfmodel.settings import Settings  # noqa: PLC0415
     from selfmodel.tasks import ROBOTS  # noqa: PLC0415
 
+    cases = cases.strip()
     numbers = () if cases in ("all", "none") else lists.whole_numbers("--cases", cases, ())
     ablation = Ablation(
         robots=lists.texts("--robots", robots, ROBOTS),
