@@ -1,8 +1,8 @@
 """``make bench``: speed, memory and their growth, measured in one run and kept as JSON.
 
-Every figure is a median of at least five rounds, after one that warms up; those of the comparators,
-of which a round takes minutes, of three. Ratios compare things that took turns in one process, with
-the same model, threads, starts and motor targets.
+Every figure is a median of at least five rounds, after one that warms up, but for diagnoses: each
+comparator makes one of every failure, in turns, and their seconds are added up. Ratios compare
+things that took turns in one process, with the same model, threads, starts and motor targets.
 """
 
 import json

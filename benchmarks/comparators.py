@@ -5,7 +5,6 @@ Run by itself (``python -m benchmarks.comparators``) it prints what ``make bench
 
 import json
 import os
-from collections.abc import Callable
 from pathlib import Path
 from statistics import median
 from time import perf_counter
@@ -35,18 +34,18 @@ from selfmodel.trial import Plan, Stage, Trial
 if TYPE_CHECKING:
     from selfmodel.evolution import Generation
 
-ROUNDS = 3
-"""Rounds of every comparison, in which the comparators take turns; the medians are compared."""
+ROUNDS = 5
+"""Rounds in which arithmetic is compared with physics; the medians are kept."""
 
 SHARE = 0.25
 """The goal: the most that a comparator's arithmetic may take of the physics that it needs."""
 
 TIMES = 3.0
-"""The goal: the most that a diagnosis may take of one by forward displacement, once for every
+"""The goal: the most that diagnoses may take of those by forward displacement, once for every
 member where a comparator asks for an ensemble."""
 
-CASE = 7
-"""The failure that is diagnosed: a compound of two."""
+CASES = range(1, 10)
+"""The failures that are diagnosed. How much there is to refine depends on what has failed."""
 
 GAP = 0.05
 """The gap of the robot that fails: without one, a diagnosis has less to weigh."""
@@ -56,11 +55,11 @@ HEALTHY_TRIALS = 2
 
 
 class Known(NamedTuple):
-    """What is known of a robot that failed: its calibrated model, healthy trials, and one since."""
+    """What is known of a robot: its calibrated model, healthy trials, and one of each failure."""
 
     model: Robot
     intact: list[Trial]
-    trial: Trial
+    failed: dict[int, Trial]
 
 
 def measure(threads: int, settings: Settings) -> list[Facts]:
@@ -72,41 +71,46 @@ def measure(threads: int, settings: Settings) -> list[Facts]:
 
     Returns:
         A row a robot and comparator. ``arithmetic_over_physics``: seconds of its request and its
-        distances over those of the physics, for one generation's children. ``search_seconds``: a
-        diagnostic EA against one trial. ``diagnosis_seconds``: the same and what follows, where a
-        comparator that judges in pieces has its result refined by more hypotheses, and weighs them
-        against how well the healthy robot was predicted.
+        distances over those of the physics, for one generation's children. ``search_seconds``:
+        diagnostic EAs against one trial each, one for every failure. ``diagnosis_seconds``: the
+        same and what follows, where a comparator that judges in pieces has its result refined by
+        more hypotheses, and weighs them against how well the healthy robot was predicted.
+        ``of_single_diagnoses``: the ratio to forward displacement, failure by failure.
     """
     return [row for name in ROBOTS for row in _of_robot(name, threads, settings)]
 
 
 def _of_robot(name: str, threads: int, settings: Settings) -> list[Facts]:
     known = _known(name, threads, settings)
-    shares = _in_turns(lambda one: _share(known, one, threads, settings))
-    costs = _in_turns(lambda one: _diagnosis(known, one, threads, settings))
+    shares = {one.name: _share(known, one, threads, settings) for one in COMPARATORS.values()}
+    costs: dict[str, list[Facts]] = {one: [] for one in COMPARATORS}
+    for trial in known.failed.values():  # the comparators take turns
+        for one, comparator in COMPARATORS.items():
+            costs[one].append(_diagnosis(known, trial, comparator, threads, settings))
     usual = costs[FORWARD_DISPLACEMENT.name]
-    rows = []
-    for comparator in COMPARATORS.values():
-        request = comparator.request(known.trial)
-        members = request.members if isinstance(request, Ensemble) else 1
-        share, cost = shares[comparator.name], costs[comparator.name]
-        parts = share["arithmetic_seconds"] / share["physics_seconds"]
-        whole = cost["diagnosis_seconds"] / usual["diagnosis_seconds"]
-        rows.append(
-            {
-                "robot": name,
-                "comparator": comparator.name,
-                "members": members,
-                **share,
-                **cost,
-                "arithmetic_over_physics": parts,
-                "search_over_forward_displacement": cost["search_seconds"]
-                / usual["search_seconds"],
-                "diagnosis_over_forward_displacement": whole,
-                "within_goals": parts <= SHARE and whole <= TIMES * members,
-            }
-        )
-    return rows
+    return [
+        {"robot": name, "comparator": one} | _row(shares[one], costs[one], usual)
+        for one in COMPARATORS
+    ]
+
+
+def _row(share: Facts, costs: list[Facts], usual: list[Facts]) -> Facts:
+    parts = share["arithmetic_seconds"] / share["physics_seconds"]
+    total = {key: sum(cost[key] for cost in costs) for key in costs[0]}
+    whole = {key: total[key] / sum(cost[key] for cost in usual) for key in total}
+    return {
+        **share,
+        "diagnoses": len(costs),
+        **total,
+        "arithmetic_over_physics": parts,
+        "search_over_forward_displacement": whole["search_seconds"],
+        "diagnosis_over_forward_displacement": whole["diagnosis_seconds"],
+        "of_single_diagnoses": [
+            one["diagnosis_seconds"] / other["diagnosis_seconds"]
+            for one, other in zip(costs, usual, strict=True)
+        ],
+        "within_goals": parts <= SHARE and whole["diagnosis_seconds"] <= TIMES * share["members"],
+    }
 
 
 def _known(name: str, threads: int, settings: Settings) -> Known:
@@ -122,60 +126,54 @@ def _known(name: str, threads: int, settings: Settings) -> Known:
         return Trial(plan, name, behaviour, f"{plan.name}.mcap")
 
     intact = [trial("before", "intact", k, controller) for k, controller in enumerate(gaits)]
-    failed = trial("after", entry.cases[CASE], HEALTHY_TRIALS, gaits[0])
+    failed = {case: trial("after", entry.cases[case], HEALTHY_TRIALS, gaits[0]) for case in CASES}
     return Known(calibrate(robot, intact, threads).robot, intact, failed)
 
 
-def _in_turns(work: Callable[[Comparator], dict[str, float]]) -> dict[str, dict[str, float]]:
-    """The median of each number of each comparator, after a round of warm-up."""
-    rounds = [
-        {name: work(comparator) for name, comparator in COMPARATORS.items()}
-        for _ in range(ROUNDS + 1)
-    ][1:]
-    return {
-        name: {key: median(turn[name][key] for turn in rounds) for key in rounds[0][name]}
-        for name in COMPARATORS
-    }
-
-
-def _share(
-    known: Known, comparator: Comparator, threads: int, settings: Settings
-) -> dict[str, float]:
+def _share(known: Known, comparator: Comparator, threads: int, settings: Settings) -> Facts:
     """Seconds of a comparator's arithmetic, and of the physics, for one generation's children."""
+    rounds = [_share_once(known, comparator, threads, settings) for _ in range(ROUNDS + 1)][1:]
+    return {key: median(one[key] for one in rounds) for key in rounds[0]}
+
+
+def _share_once(known: Known, comparator: Comparator, threads: int, settings: Settings) -> Facts:
     children = settings.population - settings.survivors
     genomes = np.random.default_rng(0).random((children, VALUES * settings.genes))
     hypotheses = [decode(genome, known.model.anatomy, PAPER_KINDS) for genome in genomes]
     simulator = Simulator(known.model, threads)
+    trial = known.failed[CASES[0]]
     start = perf_counter()
-    request = comparator.request(known.trial)
+    request = comparator.request(trial)
     asked = perf_counter() - start
-    simulated = simulate(simulator, request, known.trial, hypotheses).behaviour
+    simulated = simulate(simulator, request, trial, hypotheses).behaviour
     start = perf_counter()
     if isinstance(comparator, Piecewise):
-        comparator.losses(simulated, known.trial)
+        comparator.losses(simulated, trial)
     else:
-        comparator.distances(simulated, known.trial)
+        comparator.distances(simulated, trial)
     return {
+        "members": request.members if isinstance(request, Ensemble) else 1,
         "arithmetic_seconds": asked + perf_counter() - start,
         "physics_seconds": simulator.tally.physics_seconds,
     }
 
 
 def _diagnosis(
-    known: Known, comparator: Comparator, threads: int, settings: Settings
-) -> dict[str, float]:
-    """Seconds of one diagnosis and of its search, and how many hypotheses they looked at."""
+    known: Known, trial: Trial, comparator: Comparator, threads: int, settings: Settings
+) -> Facts:
+    """Seconds of one diagnosis and of its search, and how much they looked at."""
     simulator = Simulator(known.model, threads)
     diagnose = Diagnose(simulator, comparator, settings, intact=known.intact)
     generations: list[Generation] = []
     start = perf_counter()
-    diagnose([known.trial], [], np.random.default_rng(0), generations.append)
+    diagnose([trial], [], np.random.default_rng(0), generations.append)
     return {
         "diagnosis_seconds": perf_counter() - start,
         "diagnosis_evaluations": diagnose.evaluations,
         "search_seconds": generations[-1].seconds,
         "search_evaluations": generations[-1].evaluations,
         "distinct_hypotheses": diagnose.distinct_hypotheses,
+        "control_steps": simulator.tally.steps,
     }
 
 
