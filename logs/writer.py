@@ -1,8 +1,8 @@
 """Writes a trial into its log while it runs, so that whatever happens, what happened is kept."""
 
 import itertools
-from collections.abc import Iterable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterable
+from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -10,7 +10,8 @@ from typing import Self
 from selfmodel.atomic import part_of
 from selfmodel.behaviour import Names, Sample
 from selfmodel.driver import Driver
-from selfmodel.errors import InputError, WorkError, in_words
+from selfmodel.ending import Ending
+from selfmodel.errors import InputError, in_words
 from selfmodel.logs.encoder import Encoder, empty_rows, parts_of
 from selfmodel.logs.errors import IncompleteError, salvage_it
 from selfmodel.logs.files import explained
@@ -71,25 +72,11 @@ def write_trial(
         gap=gap,
         imported=imported,
     )
-    with writer, _closing(samples):
+    # Whatever ends a trial, the robot is stopped.
+    with writer, Ending(getattr(samples, "close", lambda: None)):
         for sample in itertools.islice(samples, plan.steps):
             writer.add(sample)
     return path
-
-
-@contextmanager
-def _closing(samples: Iterable[Sample]) -> Iterator[None]:
-    """Closes samples, wherever this was interrupted; what interrupted it comes first."""
-    close = getattr(samples, "close", lambda: None)
-    try:
-        yield
-    except BaseException as reason:  # Ctrl-C too: whatever ends a trial, the robot is stopped
-        try:
-            close()
-        except (OSError, WorkError) as failure:
-            reason.add_note(in_words(failure))
-        raise
-    close()
 
 
 class TrialWriter:

@@ -12,6 +12,7 @@ import numpy as np
 from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.behaviour import SIGNALS, Names, Sample, Signal
 from selfmodel.driver import Driver, drive
+from selfmodel.ending import Ending
 from selfmodel.errors import InputError, TrialError
 from selfmodel.limits import Limit
 from selfmodel.playback import Playback
@@ -127,29 +128,17 @@ class EnvironmentRobot:
                 exceeded; the robot was stopped, or the error's note says that it was not.
             InputError: The observations are not of this robot.
         """
-        try:
+        with Ending(self._make_safe):  # after Ctrl-C and bugs too: no robot goes on by itself
             self._make_safe()
             yield from self._steps(controller, steps)
-        except GeneratorExit:
-            self._make_safe()
-            raise
-        except BaseException as reason:  # Ctrl-C and bugs too: no robot goes on by itself
-            try:
-                self._make_safe()
-            except TrialError as failure:
-                reason.add_note(str(failure))
-            raise
-        self._make_safe()
 
     def _make_safe(self) -> None:
         try:
             self._send_safe()
-        except KeyboardInterrupt as reason:
-            try:
-                self._send_safe()  # a second Ctrl-C must not keep the first one's from the robot
-            except TrialError as failure:
-                reason.add_note(str(failure))
-            raise
+        except KeyboardInterrupt:
+            # A second Ctrl-C must not keep the first one's from the robot.
+            with Ending(self._send_safe):
+                raise
 
     def _send_safe(self) -> None:
         try:

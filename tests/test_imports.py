@@ -59,6 +59,7 @@ LAYERS = (
         *(
             "atomic",
             "errors",
+            "ending",
             "arrays",
             "rotation",
             "differences",

@@ -40,17 +40,6 @@ STEPS = 31
 DAMAGE = "break:front_left_knee"
 
 
-def has_ffmpeg() -> bool:
-    try:
-        video.ffmpeg()
-    except WorkError:
-        return False
-    return True
-
-
-encodes = pytest.mark.skipif(not has_ffmpeg(), reason="no ffmpeg: pip install imageio-ffmpeg")
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory, quadruped: Robot) -> Path:
     """A folder with a short log of a damaged quadruped."""
@@ -299,7 +288,6 @@ def test_a_film_of_sticks_becomes_a_gif_of_all_its_frames(quadruped: Robot):
         assert (image.n_frames, image.size, image.info["loop"]) == (3, (960, 360), 0)
 
 
-@encodes
 def test_an_mp4_has_every_frame(quadruped: Robot, tmp_path: Path):
     frames = list(stick_frames(film(quadruped, "intact", frames=3)))
     path = tmp_path / "film.mp4"
