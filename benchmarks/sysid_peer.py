@@ -17,12 +17,13 @@ from absl import logging
 
 from selfmodel.arrays import FloatArray
 from selfmodel.behaviour import Signal
-from selfmodel.calibrate import BOUND, DELAYS, HORIZON, LEAD, SCALES, SEGMENTS
+from selfmodel.calibrate import BOUND, DELAYS, SCALES
 from selfmodel.differences import difference
 from selfmodel.estimate import STATE, estimated_states
 from selfmodel.parameters import Parameters, edited_model, factor_names, from_factors
 from selfmodel.places import places, writer
 from selfmodel.robot import Robot
+from selfmodel.stretches import HORIZON, LEAD, SEGMENTS
 from selfmodel.trial import Trial
 
 Theirs = Any

@@ -15,7 +15,7 @@ from selfmodel.comparators.arithmetic import command_errors, command_spans
 from selfmodel.comparators.trembling import trembling_loss
 from selfmodel.differences import difference
 from selfmodel.errors import InputError
-from selfmodel.estimate import IMU, JOINTS, STATE, estimated_states
+from selfmodel.estimate import ONBOARD, STATE, estimated_states
 from selfmodel.trial import Trial
 
 LEAD = 5
@@ -208,4 +208,4 @@ def _mean(values: FloatArray) -> FloatArray:
 
 
 SEGMENT_PREDICTION = SegmentPrediction("segment-prediction")
-SEGMENT_PREDICTION_ONBOARD = SegmentPrediction("segment-prediction-onboard", state=(*JOINTS, *IMU))
+SEGMENT_PREDICTION_ONBOARD = SegmentPrediction("segment-prediction-onboard", state=ONBOARD)

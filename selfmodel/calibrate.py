@@ -5,7 +5,7 @@ states (``mujoco.minimize``), with a prior that keeps what the trials do not sho
 delay, which is a whole number, is tried out.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco.minimize
@@ -13,16 +13,15 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.behaviour import Signal
-from selfmodel.comparator import Past, Segments
 from selfmodel.differences import difference
 from selfmodel.embodiment import embody
 from selfmodel.errors import InputError
-from selfmodel.estimate import STATE, estimated_states
 from selfmodel.events import Calibrated
 from selfmodel.hypothesis import INTACT
 from selfmodel.parameters import Parameters, edited_model, from_factors, nominal, with_parameters
 from selfmodel.prediction import predict
-from selfmodel.robot import Robot
+from selfmodel.robot import LONGEST_DELAY, Robot
+from selfmodel.stretches import Stretches, cut
 from selfmodel.tally import Tally
 from selfmodel.trial import Trial
 
@@ -41,11 +40,8 @@ STEP = 0.1
 """The finite difference of a logarithm. Contact makes a small one meaningless: a parameter moves
 when a foot comes down, and that shows as noise between near values."""
 
-DELAYS = range(6)
+DELAYS = range(LONGEST_DELAY + 1)
 """Control delays that are tried."""
-
-SEGMENTS, HORIZON, LEAD = 40, 10, max(DELAYS)
-"""Segments of a trial, their length, and the commands from before each that a delay may need."""
 
 SCALES: dict[Signal, float] = {
     "joint_positions": 0.03,
@@ -99,7 +95,8 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
 
     Args:
         robot: The robot as its model describes it.
-        trials: At least one, each with the whole state.
+        trials: At least one, each with the commands and the state; without the base's position
+            and linear velocity where these were not observed.
         threads: Threads for the physics.
 
     Raises:
@@ -107,7 +104,7 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
     """
     if not trials:
         raise InputError("expected at least one trial of the intact robot, got none")
-    data = [_stretches(trial) for trial in trials]
+    data = [cut(trial) for trial in trials]
     start = nominal(robot)
 
     def residuals(logarithms: FloatArray, delay: int) -> FloatArray:
@@ -162,7 +159,7 @@ def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> flo
 
     Args:
         robot: The self-model.
-        trials: At least one, each with the whole state.
+        trials: As for ``calibrate``.
         threads: Threads for the physics.
 
     Returns:
@@ -171,66 +168,12 @@ def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> flo
     Raises:
         InputError: A trial was not observed well enough.
     """
-    data = [_stretches(trial) for trial in trials]
+    data = [cut(trial) for trial in trials]
     return float(np.sqrt(np.mean(_errors(robot, [nominal(robot)], data, threads) ** 2)))
 
 
-@dataclass(frozen=True, eq=False)
-class _Stretches:
-    """A trial cut into segments, and what was observed in each, ``(segments, horizon, width)``."""
-
-    segments: Segments
-    observed: dict[Signal, FloatArray]
-
-
-def _stretches(trial: Trial) -> _Stretches:
-    behaviour = trial.behaviour
-    states, commands = estimated_states(behaviour), behaviour.steady_commands
-    last = behaviour.steps - 1 - HORIZON
-    evenly = np.unique(np.linspace(LEAD, max(last, LEAD), SEGMENTS).round().astype(int))
-    known = {signal: np.isfinite(states[signal]).all(axis=1) for signal in STATE}
-    known["commands"] = np.isfinite(commands).all(axis=1)
-
-    def usable(signals: Iterable[Signal]) -> list[int]:
-        """Where segments can begin in which these are known all along."""
-        whole = np.logical_and.reduce([known[signal] for signal in signals])
-        return [k for k in evenly.tolist() if k <= last and whole[k - LEAD : k + HORIZON + 1].all()]
-
-    starts = usable(known)
-    if not starts:
-        raise InputError(_useless(trial, [signal for signal in known if not usable([signal])]))
-    return _Stretches(
-        Segments(
-            states={signal: states[signal][starts] for signal in STATE},
-            commands=np.stack([commands[k - LEAD : k + HORIZON] for k in starts]),
-            lead=LEAD,
-            record=STATE,
-            past=Past(commands, np.array(starts)),
-        ),
-        {
-            signal: np.stack([states[signal][k + 1 : k + HORIZON + 1] for k in starts])
-            for signal in STATE
-        },
-    )
-
-
-def _useless(trial: Trial, lacking: Sequence[Signal]) -> str:
-    """The sentence for a trial in which no segment can begin."""
-    length = LEAD + HORIZON + 1
-    if trial.behaviour.steps < length:
-        has = f"the trial has {trial.behaviour.steps}"
-    elif lacking:
-        has = f"the log never has {', '.join(lacking)} for so long"
-    else:
-        has = "the log has no such stretch with all of them"
-    return (
-        f"{trial.path}: calibration needs stretches of {length} steps or more with the whole state "
-        f"({', '.join(STATE)}) and the commands, and {has}: leave this log out"
-    )
-
-
 def _errors(
-    robot: Robot, models: Sequence[Parameters], data: Sequence[_Stretches], threads: int
+    robot: Robot, models: Sequence[Parameters], data: Sequence[Stretches], threads: int
 ) -> FloatArray:
     """The errors of the predictions in units of ``SCALES``, ``(errors, models)``."""
     embodiments = [
@@ -247,9 +190,10 @@ def _errors(
             delay=models[0].delay,
         )
         for signal, scale in SCALES.items():
-            made = outcome.behaviour[signal][:, :, 1:]
-            error = difference(signal, made, stretches.observed[signal])
-            rows.append((error / scale).reshape(len(models), -1))
+            if signal in stretches.observed:
+                made = outcome.behaviour[signal][:, :, 1:]
+                error = difference(signal, made, stretches.observed[signal])
+                rows.append((error / scale).reshape(len(models), -1))
     return np.concatenate(rows, axis=1).T
 
 

@@ -14,7 +14,9 @@ from selfmodel.behaviour import Behaviour, Signal
 JOINTS: tuple[Signal, ...] = ("joint_positions", "joint_velocities")
 IMU: tuple[Signal, ...] = ("base_orientation", "base_angular_velocity")
 BASE: tuple[Signal, ...] = ("base_position", "base_linear_velocity")
-STATE: tuple[Signal, ...] = JOINTS + IMU + BASE
+ONBOARD: tuple[Signal, ...] = JOINTS + IMU
+"""The part of the state that a robot can tell by itself."""
+STATE: tuple[Signal, ...] = ONBOARD + BASE
 """The signals that make up the state."""
 
 MOSTLY, HALF = 0.6, 0.5

@@ -136,25 +136,60 @@ def without(found: Trial, **changes: np.ndarray) -> Trial:
     )
 
 
+def unseen(found: Trial) -> Trial:
+    """The trial as a robot knows it that nobody sees: without its base's place and velocity."""
+    unknown = np.full((found.behaviour.steps, 3), np.nan)
+    return without(found, base_position=unknown, base_linear_velocity=unknown)
+
+
+def test_a_robot_that_nobody_sees_is_calibrated_from_what_it_has_on_board():
+    real = with_parameters(QUADRUPED, TRUE)
+    seen = [trial(real, SimulatedRobot(real), 7)]
+    found = calibrate(QUADRUPED, [unseen(one) for one in trials(real)], threads=1)
+    off, true = np.log(found.parameters.factors), np.log(TRUE.factors)
+
+    assert found.parameters.delay == TRUE.delay
+    assert off @ true / (np.linalg.norm(off) * np.linalg.norm(true)) > 0.5
+    assert found.error < found.error_before
+    before, after = (prediction_error(r, seen, 1) for r in (QUADRUPED, found.robot))
+    assert after < 0.75 * before
+
+
+def test_an_exact_model_of_a_robot_that_nobody_sees_is_left_as_it_is(robot: Robot):
+    found = calibrate(robot, [unseen(one) for one in trials(robot, 1)], threads=1)
+
+    assert found.robot is robot
+    assert set(found.deviations) == {PRIOR}
+
+
+def test_trials_in_which_the_base_was_seen_and_others_are_fitted_to_together():
+    real = with_parameters(QUADRUPED, TRUE)
+    one, other = trials(real)
+    mixed = prediction_error(QUADRUPED, [one, unseen(other)], 1)
+    apart = [prediction_error(QUADRUPED, [each], 1) for each in (one, unseen(other))]
+
+    assert min(apart) < mixed < max(apart)
+
+
 def test_a_trial_that_lacks_part_of_the_state_is_refused_by_what_it_lacks():
     (whole,) = trials(QUADRUPED, 1)
     unknown = np.full((STEPS, 3), np.nan)
-    blind = without(whole, base_position=unknown, base_linear_velocity=unknown)
+    numb = without(unseen(whole), base_angular_velocity=unknown)
     expected = (
-        r"0\.mcap: calibration needs stretches of 16 steps or more .* and the log never has "
-        r"base_position, base_linear_velocity for so long: leave this log out"
+        r"0\.mcap: calibration needs stretches of 16 steps or more with joint_positions, .* and "
+        r"the commands, and the log never has base_angular_velocity for so long: leave this log out"
     )
     with pytest.raises(InputError, match=expected):
-        calibrate(QUADRUPED, [whole, blind], 1)
+        calibrate(QUADRUPED, [whole, numb], 1)
 
 
 def test_a_trial_with_no_stretch_of_all_of_it_is_refused():
     (whole,) = trials(QUADRUPED, 1)
-    early, late = (whole.behaviour[s].copy() for s in ("base_position", "joint_velocities"))
+    early, late = (whole.behaviour[s].copy() for s in ("base_orientation", "joint_velocities"))
     early[: STEPS // 2], late[STEPS // 2 - 1 :] = np.nan, np.nan
 
     with pytest.raises(InputError, match="has no such stretch with all of them"):
-        calibrate(QUADRUPED, [without(whole, base_position=early, joint_velocities=late)], 1)
+        calibrate(QUADRUPED, [without(whole, base_orientation=early, joint_velocities=late)], 1)
 
 
 def test_a_trial_that_is_too_short_is_refused():

@@ -52,12 +52,14 @@ def write(
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with logs: one across a gap, one after, one blind, one of another robot."""
+    """A folder with logs: across a gap, some unseen, one without velocities, of another robot."""
     made = tmp_path_factory.mktemp("calibrate")
     quadruped = ROBOTS["quadruped"].robot()
     write(made / "intact.mcap", quadruped, stage="before", level=0.1)
     write(made / "after.mcap", quadruped, stage="after", level=0.1)
-    write(made / "blind.mcap", quadruped, stage="before", lost=BASE)
+    write(made / "unseen.mcap", quadruped, stage="before", level=0.1, lost=BASE)
+    write(made / "unseen-after.mcap", quadruped, stage="after", level=0.1, lost=BASE)
+    write(made / "numb.mcap", quadruped, stage="before", lost=("joint_velocities",))
     write(made / "exact.mcap", quadruped)
     write(made / "other.mcap", ROBOTS["hexapod"].robot())
     (made / "taken.xml").write_text("mine", encoding="utf-8")
@@ -127,10 +129,10 @@ def test_a_table_says_each_factor_and_how_sure_it_is(folder: Path):
         (["intact.mcap", "--robot", "hexapod", "-o", "a.xml"], "hexapod is another robot"),
         (["none.mcap", "-o", "a.xml"], "none.mcap"),
         (
-            ["intact.mcap", "blind.mcap", "-o", "a.xml"],
-            "blind.mcap: calibration needs stretches of 16 steps or more with the whole state",
+            ["intact.mcap", "numb.mcap", "-o", "a.xml"],
+            "numb.mcap: calibration needs stretches of 16 steps or more with joint_positions, ",
         ),
-        (["blind.mcap", "-o", "a.xml"], "never has base_position, base_linear_velocity"),
+        (["numb.mcap", "-o", "a.xml"], "the log never has joint_velocities for so long"),
     ],
 )
 def test_what_cannot_be_used_is_said_in_one_sentence(
@@ -145,15 +147,29 @@ def test_what_cannot_be_used_is_said_in_one_sentence(
     assert (folder / "taken.xml").read_text(encoding="utf-8") == "mine"
 
 
+def test_a_robot_that_nobody_sees_is_calibrated_and_diagnosed(folder: Path):
+    fit = selfmodel("calibrate", "unseen.mcap", "-o", "unseen.xml", "--json", cwd=folder)
+    done = selfmodel(
+        *("diagnose", "unseen.mcap", "unseen-after.mcap", "--json"),
+        *("--comparator", "segment-prediction-onboard"),
+        cwd=folder,
+    )
+
+    assert [fit.returncode, done.returncode] == [0, 0], fit.stderr + done.stderr
+    found = json.loads(fit.stdout)
+    assert found["error"] < found["error_before"]
+    assert json.loads(done.stdout)["calibration"]["delay"] == found["delay"]
+
+
 def test_no_log_is_a_wrong_usage(folder: Path):
     assert selfmodel("calibrate", "-o", "a.xml", cwd=folder).returncode == 2
 
 
 def test_a_diagnosis_that_cannot_calibrate_says_how_to_do_without(folder: Path):
-    done = selfmodel("diagnose", "blind.mcap", "after.mcap", cwd=folder)
+    done = selfmodel("diagnose", "numb.mcap", "after.mcap", cwd=folder)
 
     assert done.returncode == 2
-    assert "blind.mcap: calibration needs" in done.stderr
+    assert "numb.mcap: calibration needs" in done.stderr
     assert "leave this log out, or give --no-calibrate" in done.stderr
 
 

@@ -103,7 +103,7 @@ LAYERS = (
         *("embodiment", "robot", "places", "noise", "senses", "batches", "tally", "prediction"),
         *("felt", "gap", "instruments", "start", "debris", "structure", "contract_kind"),
         *("simulator", "physical", "judge", "replay", "poses", "parameters", "disagreement"),
-        *("limits", "environment_robot", "score"),
+        *("limits", "environment_robot", "score", "stretches"),
     ),
     (
         *("database", "evidence", "screen", "refine", "degrees"),

@@ -11,7 +11,7 @@ from selfmodel.cli import resolve
 from selfmodel.comparator import Segments
 from selfmodel.driver import Driver
 from selfmodel.errors import InputError
-from selfmodel.estimate import IMU, JOINTS, STATE
+from selfmodel.estimate import ONBOARD, STATE
 from selfmodel.faults import PAPER_KINDS
 from selfmodel.gap import draw_gap
 from selfmodel.hypothesis import INTACT, Hypothesis, canonical
@@ -27,7 +27,6 @@ from selfmodel.tally import Tally
 from tests.conftest import exploding, random_motion
 
 HORIZON, STEPS = 12, 100
-ONBOARD = JOINTS + IMU
 RECORD: tuple[Signal, ...] = (*STATE, "sensors")
 EXACT = 1e-6
 

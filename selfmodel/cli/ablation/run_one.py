@@ -2,7 +2,7 @@
 
 import dataclasses
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from urllib.parse import quote
 
@@ -24,6 +24,7 @@ from selfmodel.events import Event
 from selfmodel.explain import explain
 from selfmodel.faults import known
 from selfmodel.notation import parse
+from selfmodel.robot import Robot
 from selfmodel.simulator import Simulator
 from selfmodel.trial import Trial
 
@@ -56,16 +57,22 @@ def run_one(spec: Spec, comparator: str, folder: Path, gaits: Path) -> list[Row]
     return _WAYS[spec.next_trial](setting)
 
 
-def _from_the_bank(setting: Setting) -> list[Row]:
-    """The trials are the same for every comparator, and so are their logs."""
-    intact = before_failure(setting)
-    trials = [
-        after_failure(setting, number, gait)
-        for number, gait in enumerate(setting.gaits[: setting.spec.settings.trials])
-    ]
-    simulator = Simulator(calibrated_robot(setting, intact), threads=1)
+def diagnosed(
+    setting: Setting, robot: Robot, intact: Sequence[Trial], trials: Sequence[Trial]
+) -> list[Row]:
+    """Returns a row for the diagnosis after the first trial, and one for that after the last.
+
+    Args:
+        setting: The run.
+        robot: The self-model, calibrated.
+        intact: Trials before the failure.
+        trials: Trials after it, at least one.
+
+    Raises:
+        InputError: The comparator cannot judge the trials.
+    """
     search = Diagnose(
-        simulator,
+        Simulator(robot, threads=1),
         setting.comparator,
         setting.spec.settings,
         resolve.kinds(setting.spec.kinds),
@@ -87,6 +94,16 @@ def _from_the_bank(setting: Setting) -> list[Row]:
 
     explain(trials, search, setting.spec.cell.seed, watch, after={1, len(trials)})
     return rows
+
+
+def _from_the_bank(setting: Setting) -> list[Row]:
+    """The trials are the same for every comparator, and so are their logs."""
+    intact = before_failure(setting)
+    trials = [
+        after_failure(setting, number, gait)
+        for number, gait in enumerate(setting.gaits[: setting.spec.settings.trials])
+    ]
+    return diagnosed(setting, calibrated_robot(setting, intact), intact, trials)
 
 
 def _in_a_recovery(setting: Setting) -> list[Row]:

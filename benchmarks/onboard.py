@@ -1,0 +1,115 @@
+"""Diagnoses of a robot whose base nobody ever saw, from the logs of an ablation.
+
+``python -m benchmarks.onboard FOLDER --out OUT`` takes the trials of the ablation in ``FOLDER``,
+forgets the base's position and linear velocity in all of them, those before the failure too,
+calibrates and diagnoses from what is left, and writes ``OUT/onboard.csv``. Called again it goes
+on where it was stopped. In an ablation itself every comparator has the same calibrated self-model,
+fitted to all that was logged of the healthy robot.
+"""
+
+import argparse
+import dataclasses
+from collections.abc import Iterable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from selfmodel.atomic import put
+from selfmodel.calibrate import calibrate
+from selfmodel.cli import resolve
+from selfmodel.cli.ablation.plan import spec
+from selfmodel.cli.ablation.rows import Row, as_csv, as_objects
+from selfmodel.cli.ablation.run_one import diagnosed
+from selfmodel.cli.ablation.trials import Setting
+from selfmodel.comparators import COMPARATORS
+from selfmodel.estimate import BASE
+from selfmodel.faults import known
+from selfmodel.grid import Finished, Job, finished, run_grid
+from selfmodel.intervals import proportion
+from selfmodel.logs.reader import read_log
+from selfmodel.notation import parse
+from selfmodel.trial import Trial
+
+COMPARATOR = "segment-prediction-onboard"
+
+
+def main() -> None:
+    """Diagnoses, prints a table and writes the rows."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path, help="of an ablation that has run")
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--robots", default="quadruped,hexapod")
+    parser.add_argument("--seeds", type=int, default=4, help="a run for each, from 0")
+    parser.add_argument("--workers", type=int, default=2)
+    options = parser.parse_args()
+    done = {part.key: part for part in finished(options.folder / "runs")}.values()
+    jobs = [
+        Job(run.key, run.parameters, run.seed, (COMPARATOR,))
+        for run in done
+        if run.seed < options.seeds and run.parameters["robot"] in options.robots.split(",")
+    ]
+    if not jobs:
+        raise SystemExit(f"{options.folder} has no such run of an ablation")
+    diagnose = partial(_diagnoses, options.folder / "runs")
+    run_grid(options.out / "runs", jobs, diagnose, workers=options.workers, watch=print)
+    rows = rows_of(finished(options.out / "runs"))
+    put(options.out / "onboard.csv", as_csv(rows).encode())
+    print(table(rows))
+
+
+def unseen(trial: Trial) -> Trial:
+    """Returns the trial as it would be known if nobody had seen where the base was."""
+    run = trial.behaviour
+    forgotten = {signal: np.full_like(run[signal], np.nan) for signal in BASE}
+    behaviour = dataclasses.replace(run, signals={**run.signals, **forgotten})
+    return dataclasses.replace(trial, behaviour=behaviour)
+
+
+def rows_of(parts: Iterable[Finished]) -> list[Row]:
+    """Returns the rows of what is done, robot by robot."""
+    rows = [Row(**row) for part in parts for row in part.result]
+    return sorted(rows, key=lambda row: (row.robot, row.gap, row.seed, row.truth, row.trials))
+
+
+def table(rows: Sequence[Row]) -> str:
+    """Returns how many of them are right, as Markdown."""
+    gaps = sorted({row.gap for row in rows})
+    lines = [
+        f"| robot | trials | {' | '.join(f'gap {gap:g}' for gap in gaps)} |",
+        f"|---|---|{'---|' * len(gaps)}",
+    ]
+    for robot, trials in sorted({(row.robot, row.trials) for row in rows}):
+        same = [row for row in rows if (row.robot, row.trials) == (robot, trials)]
+        shares = [_share([row.correct for row in same if row.gap == gap]) for gap in gaps]
+        lines.append(f"| {robot} | {trials} | {' | '.join(shares)} |")
+    return "\n".join(lines)
+
+
+def _share(right: Sequence[bool]) -> str:
+    interval = proportion(sum(right), len(right))
+    return f"{sum(right)} of {len(right)} ({interval.low:.0%} to {interval.high:.0%})"
+
+
+def _diagnoses(runs: Path, of: Job, comparator: str, _folder: Path) -> list[dict[str, Any]]:
+    said, folder = spec(of), runs / of.key
+    robot = resolve.robot_entry(said.cell.robot).robot()
+    setting = Setting(
+        spec=said,
+        comparator=COMPARATORS[comparator],
+        name=comparator,
+        robot=robot,
+        truth=parse(said.cell.truth, robot.anatomy, known(resolve.kinds(said.kinds))),
+        gaits=(),
+        folder=folder,
+    )
+    trials = [unseen(read_log(path).trial) for path in sorted((folder / "trials").glob("*.mcap"))]
+    intact = [trial for trial in trials if trial.plan.stage == "before"]
+    failed = [trial for trial in trials if trial.plan.stage == "after"]
+    fitted = calibrate(robot, intact, threads=1).robot
+    return as_objects(diagnosed(setting, fitted, intact, failed))
+
+
+if __name__ == "__main__":
+    main()
