@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.onboard import unseen
+from benchmarks.onboard import without_base
 from selfmodel.behaviour import collect
 from selfmodel.calibrate import calibrate, prediction_error
 from selfmodel.cli.ablation.bank import gait
@@ -52,7 +52,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--out", type=Path, default=RESULTS)
     options = parser.parse_args()
-    ways = {"selfmodel": _own, "selfmodel, base unseen": _unseen, **_peer()}
+    ways = {"selfmodel": _own, "selfmodel, without the base": _without_base, **_peer()}
     rows: list[Facts] = []
     for name in options.robots.split(","):
         robot = ROBOTS[name].robot()
@@ -70,8 +70,8 @@ def _own(robot: Robot, trials: Sequence[Trial]) -> tuple[Parameters, list[float]
     return found.parameters, found.deviations.tolist()
 
 
-def _unseen(robot: Robot, trials: Sequence[Trial]) -> tuple[Parameters, list[float]]:
-    return _own(robot, [unseen(trial) for trial in trials])
+def _without_base(robot: Robot, trials: Sequence[Trial]) -> tuple[Parameters, list[float]]:
+    return _own(robot, [without_base(trial) for trial in trials])
 
 
 Way = Callable[[Robot, Sequence[Trial]], tuple[Parameters, list[float]]]

@@ -26,7 +26,7 @@ from selfmodel.cli.ablation.trials import Setting
 from selfmodel.comparators import COMPARATORS
 from selfmodel.estimate import BASE
 from selfmodel.faults import known
-from selfmodel.grid import Finished, Job, finished, run_grid
+from selfmodel.grid import Finished, GridBegins, Job, PartEnds, finished, run_grid
 from selfmodel.intervals import proportion
 from selfmodel.logs.reader import read_log
 from selfmodel.notation import parse
@@ -48,18 +48,23 @@ def main() -> None:
     jobs = [
         Job(run.key, run.parameters, run.seed, (COMPARATOR,))
         for run in done
-        if run.seed < options.seeds and run.parameters["robot"] in options.robots.split(",")
+        if run.seed < options.seeds
+        and run.parameters["robot"] in options.robots.split(",")
+        and run.parameters["shared"]["next_trial"] == "bank"
     ]
     if not jobs:
-        raise SystemExit(f"{options.folder} has no such run of an ablation")
+        raise SystemExit(f"{options.folder} has no run of an ablation with these robots and seeds")
     diagnose = partial(_diagnoses, options.folder / "runs")
-    run_grid(options.out / "runs", jobs, diagnose, workers=options.workers, watch=print)
-    rows = rows_of(finished(options.out / "runs"))
+    failed = run_grid(options.out / "runs", jobs, diagnose, workers=options.workers, watch=_tell)
+    keys = {job.key for job in jobs}
+    rows = rows_of(part for part in finished(options.out / "runs") if part.key in keys)
     put(options.out / "onboard.csv", as_csv(rows).encode())
     print(table(rows))
+    if failed:
+        raise SystemExit("\n".join(f"{part.key} failed: {part.error}" for part in failed))
 
 
-def unseen(trial: Trial) -> Trial:
+def without_base(trial: Trial) -> Trial:
     """Returns the trial as it would be known if nobody had seen where the base was."""
     run = trial.behaviour
     forgotten = {signal: np.full_like(run[signal], np.nan) for signal in BASE}
@@ -87,6 +92,11 @@ def table(rows: Sequence[Row]) -> str:
     return "\n".join(lines)
 
 
+def _tell(event: GridBegins | PartEnds) -> None:
+    if isinstance(event, PartEnds):
+        print(f"{event.number} of {event.total}: {event.key}, {event.seconds:.0f} s", flush=True)
+
+
 def _share(right: Sequence[bool]) -> str:
     interval = proportion(sum(right), len(right))
     return f"{sum(right)} of {len(right)} ({interval.low:.0%} to {interval.high:.0%})"
@@ -104,7 +114,9 @@ def _diagnoses(runs: Path, of: Job, comparator: str, _folder: Path) -> list[dict
         gaits=(),
         folder=folder,
     )
-    trials = [unseen(read_log(path).trial) for path in sorted((folder / "trials").glob("*.mcap"))]
+    trials = [
+        without_base(read_log(path).trial) for path in sorted((folder / "trials").glob("*.mcap"))
+    ]
     intact = [trial for trial in trials if trial.plan.stage == "before"]
     failed = [trial for trial in trials if trial.plan.stage == "after"]
     fitted = calibrate(robot, intact, threads=1).robot

@@ -93,10 +93,14 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
     The result does not depend on the number of threads. A model that predicts the trials exactly
     is left as it is, to the bit.
 
+    Where the base's position or linear velocity was not observed, a trial is taken to begin in the
+    model's start pose, and the base is carried on from there; what was not observed on board, or
+    came late, leaves it a little off for the rest of the trial.
+
     Args:
         robot: The robot as its model describes it.
-        trials: At least one, each with the commands and the state; without the base's position
-            and linear velocity where these were not observed.
+        trials: At least one, each with the commands and the state; the base's position and linear
+            velocity may be missing.
         threads: Threads for the physics.
 
     Raises:
@@ -192,8 +196,10 @@ def _errors(
         for signal, scale in SCALES.items():
             if signal in stretches.observed:
                 made = outcome.behaviour[signal][:, :, 1:]
-                error = difference(signal, made, stretches.observed[signal])
-                rows.append((error / scale).reshape(len(models), -1))
+                observed = stretches.observed[signal]
+                error = difference(signal, made, observed) / scale
+                known = np.isfinite(observed).all(axis=-1)
+                rows.append(error[:, known].reshape(len(models), -1))
     return np.concatenate(rows, axis=1).T
 
 

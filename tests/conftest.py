@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+from dataclasses import replace
 from pathlib import Path
 
 # dm_control looks for a display as it is imported; nothing here is drawn.
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
+from selfmodel.behaviour import Signal
 from selfmodel.controller import Controller, draw_weights
 from selfmodel.hypothesis import Hypothesis
 from selfmodel.notation import parse
@@ -19,6 +21,7 @@ from selfmodel.oscillators import Oscillators
 from selfmodel.robot import Robot
 from selfmodel.simulator import Simulator
 from selfmodel.tasks import ROBOTS
+from selfmodel.trial import Trial
 from tests.command import SMALL, selfmodel
 
 settings.register_profile("unhurried", deadline=None)  # a busy machine is no bug
@@ -75,3 +78,12 @@ def exploding(simulator: Simulator, text: str) -> Hypothesis:
     built = simulator._embodiment(hypothesis)
     built.model.dof_damping[6:] = -1e3
     return hypothesis
+
+
+def lacking(trial: Trial, signals: tuple[Signal, ...], steps: slice = slice(None)) -> Trial:
+    """The trial with signals that were not observed at some steps."""
+    run = trial.behaviour
+    lost = {signal: run[signal].copy() for signal in signals}
+    for values in lost.values():
+        values[steps] = np.nan
+    return replace(trial, behaviour=replace(run, signals={**run.signals, **lost}))

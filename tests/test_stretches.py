@@ -6,33 +6,41 @@ import numpy as np
 import pytest
 
 from selfmodel.behaviour import Signal, collect
-from selfmodel.estimate import BASE, ONBOARD, STATE
+from selfmodel.errors import InputError
+from selfmodel.estimate import BASE, ONBOARD, STATE, estimated_states
+from selfmodel.gap import draw_gap
 from selfmodel.physical import SimulatedRobot
 from selfmodel.playback import played_back
 from selfmodel.stretches import HORIZON, LEAD, SEGMENTS, Stretches, cut
 from selfmodel.tasks import ROBOTS
 from selfmodel.trial import Plan, Trial
-from tests.conftest import random_motion
+from tests.conftest import lacking, random_motion
 
-STEPS = 203
+STEPS = 201
 QUADRUPED = ROBOTS["quadruped"].robot()
+GAP = draw_gap(QUADRUPED, 0.05, np.random.default_rng(0))
+
+
+def trial(physical: SimulatedRobot, steps: int = STEPS) -> Trial:
+    """A trial in which every joint moves."""
+    driver = played_back(QUADRUPED.anatomy.motors, random_motion(QUADRUPED, steps, 3))
+    behaviour = collect(QUADRUPED.anatomy.names, physical.run(driver, steps))
+    return Trial(Plan("made-up", "before", driver, steps, 0), QUADRUPED.name, behaviour, "a.mcap")
 
 
 @pytest.fixture(scope="module")
 def whole() -> Trial:
     """A trial without noise, all of it observed."""
-    driver = played_back(QUADRUPED.anatomy.motors, random_motion(QUADRUPED, STEPS, 3))
-    behaviour = collect(QUADRUPED.anatomy.names, SimulatedRobot(QUADRUPED).run(driver, STEPS))
-    return Trial(Plan("made-up", "before", driver, STEPS, 0), QUADRUPED.name, behaviour, "a.mcap")
+    return trial(SimulatedRobot(QUADRUPED))
 
 
-def lacking(trial: Trial, signals: tuple[Signal, ...], steps: slice = slice(None)) -> Trial:
-    """The trial with signals that were not observed at some steps."""
-    run = trial.behaviour
-    lost = {signal: run[signal].copy() for signal in signals}
-    for values in lost.values():
-        values[steps] = np.nan
-    return replace(trial, behaviour=replace(run, signals={**run.signals, **lost}))
+def lost_and_late(whole: Trial) -> Trial:
+    """One joint's velocity was not observed at steps 60 to 79, and step 150 came late."""
+    velocities = whole.behaviour["joint_velocities"].copy()
+    velocities[60:80, 0] = np.nan
+    signals = {**whole.behaviour.signals, "joint_velocities": velocities}
+    run = replace(whole.behaviour, signals=signals, late=np.arange(STEPS) == 150)
+    return replace(whole, behaviour=run)
 
 
 def starts(found: Stretches) -> np.ndarray:
@@ -76,19 +84,105 @@ def test_they_say_what_was_logged_and_commanded(whole: Trial, lost: tuple[Signal
 
 
 @pytest.mark.parametrize("lost", [(), BASE], ids=["seen", "unseen"])
-def test_none_touches_what_was_not_observed_or_came_late(whole: Trial, lost: tuple[Signal, ...]):
-    late = np.arange(STEPS) == 150
-    trial = lacking(lacking(whole, lost), ("joint_velocities",), slice(60, 80))
-    found = starts(cut(replace(trial, behaviour=replace(trial.behaviour, late=late))))
+def test_all_that_they_say_can_be_recorded_and_they_know_what_was_commanded_before(
+    whole: Trial, lost: tuple[Signal, ...]
+):
+    segments = cut(lacking(whole, lost)).segments
+
+    assert set(segments.record) == set(segments.states)
+    assert segments.lead == LEAD
+    assert segments.past is not None
+    np.testing.assert_array_equal(segments.past.commands, whole.behaviour["commands"])
+
+
+@pytest.mark.parametrize("lost", [(), BASE], ids=["seen", "unseen"])
+def test_their_state_is_the_estimated_one(lost: tuple[Signal, ...]):
+    run = lacking(trial(SimulatedRobot(QUADRUPED, gap=GAP)), lost)
+    found = cut(run)
+    estimated = estimated_states(run.behaviour, tuple(found.segments.states))
+
+    for signal, values in found.segments.states.items():
+        np.testing.assert_array_equal(values, estimated[signal][starts(found)])
+    assert np.any(
+        found.segments.states["joint_positions"] != run.behaviour["joint_positions"][starts(found)]
+    )
+
+
+def test_where_the_base_was_seen_they_touch_nothing_that_was_not_observed_or_came_late(
+    whole: Trial,
+):
+    found = starts(cut(lost_and_late(whole)))
 
     for first, last in ((60, 79), (149, 149)):
-        assert np.all((found + HORIZON < first) | (np.maximum(found - LEAD, 0) > last))
+        assert np.all((found + HORIZON < first) | (found - LEAD > last))
     assert found.min() < 40
     assert found.max() > 160
 
 
-def test_a_base_that_was_seen_for_a_while_is_used_then(whole: Trial):
+def test_where_it_was_not_they_are_judged_up_to_a_late_step_and_where_observed(whole: Trial):
+    found = cut(lost_and_late(lacking(whole, BASE)))
+    begins = starts(found)
+    rows = begins[:, np.newaxis] + np.arange(1, HORIZON + 1)
+    judged = np.isfinite(found.observed["joint_velocities"])
+    elsewhere = np.isfinite(found.observed["joint_positions"])
+
+    # What begins where the state is not known is left out; the command of step 149 stood longer.
+    assert begins.tolist() == [k for k in range(0, STEPS - HORIZON, HORIZON) if k not in (60, 70)]
+    late = (rows > 149) & (begins[:, np.newaxis] - LEAD <= 149)
+    np.testing.assert_array_equal(elsewhere, np.repeat(~late[..., np.newaxis], 8, axis=2))
+    missing = np.repeat(((rows >= 60) & (rows < 80))[..., np.newaxis], 8, axis=2)
+    missing[..., 1:] = False
+    np.testing.assert_array_equal(judged, elsewhere & ~missing)
+
+
+@pytest.mark.parametrize(("lost", "step"), [((), 1), (BASE, HORIZON)], ids=["seen", "unseen"])
+def test_none_is_predicted_under_commands_that_are_not_known(
+    whole: Trial, lost: tuple[Signal, ...], step: int
+):
+    found = starts(cut(lacking(lacking(whole, lost), ("commands",), slice(60, 62))))
+
+    assert np.all((found + HORIZON < 60) | (found - LEAD > 61))
+    assert len(found) > 0.8 * min(SEGMENTS, STEPS // step)
+
+
+def test_a_log_that_is_late_every_twentieth_step_serves(whole: Trial):
+    for phase in range(20):
+        late = np.arange(STEPS) % 20 == phase
+        late[0] = False
+        run = replace(lacking(whole, BASE).behaviour, late=late)
+        judged = cut(replace(whole, behaviour=run)).observed["joint_positions"]
+
+        assert np.isfinite(judged).sum() > STEPS
+
+
+def test_a_base_that_was_seen_for_a_while_is_looked_at_then(whole: Trial):
     found = cut(lacking(whole, BASE, slice(100, None)))
 
     assert set(found.observed) == set(STATE)
     assert starts(found).max() + HORIZON < 100
+
+
+def test_a_base_that_was_seen_for_a_moment_is_not_looked_at(whole: Trial):
+    found = cut(lacking(lacking(whole, BASE, slice(0, 100)), BASE, slice(130, None)))
+
+    assert set(found.observed) == set(ONBOARD)
+
+
+@pytest.mark.parametrize("steps", [16, 17, 40])
+def test_a_short_trial_has_each_stretch_once(steps: int):
+    whole = trial(SimulatedRobot(QUADRUPED), steps)
+
+    assert starts(cut(whole)).tolist() == list(range(LEAD, steps - HORIZON))
+    assert starts(cut(lacking(whole, BASE))).tolist() == list(range(0, steps - HORIZON, HORIZON))
+
+
+def test_a_trial_that_is_too_short_is_refused():
+    with pytest.raises(InputError, match=r"16 steps or more.* and the trial has 15: leave"):
+        cut(trial(SimulatedRobot(QUADRUPED), 15))
+
+
+def test_a_trial_of_nothing_but_late_steps_is_refused(whole: Trial):
+    run = replace(whole.behaviour, late=np.arange(STEPS) > 0)
+
+    with pytest.raises(InputError, match=r"none of them late, .* the log has no such stretch"):
+        cut(replace(whole, behaviour=run))
