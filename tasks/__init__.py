@@ -59,8 +59,9 @@ def load(
     Args:
         domain_name: A robot, such as ``"quadruped"``.
         task_name: A task of it, such as ``"walk"``.
-        task_kwargs: For the task: ``hypothesis``, what is wrong with the robot, in notation;
-            ``time_limit`` in seconds; ``random``, a seed or a numpy ``RandomState``.
+        task_kwargs: For the task: ``hypothesis``, what is wrong with the robot, in notation or as
+            a ``Hypothesis``, which may be of kinds of one's own; ``time_limit`` in seconds;
+            ``random``, a seed or a numpy ``RandomState``.
         environment_kwargs: For ``dm_control.rl.control.Environment``.
         visualize_reward: Has to be ``False``: these rewards are speeds, and have no colours.
 

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     import numpy as np
     from dm_control.rl import control
 
+    from selfmodel.hypothesis import Hypothesis
+
 CONTROL_TIMESTEP = 0.01
 """Seconds between two commands."""
 
@@ -40,7 +42,7 @@ def robot() -> Robot:
 
 @SUITE.add("walking")
 def walk(
-    hypothesis: str = "intact",
+    hypothesis: "str | Hypothesis" = "intact",
     time_limit: float = 10.0,
     random: "int | np.random.RandomState | None" = None,
     environment_kwargs: dict[str, Any] | None = None,

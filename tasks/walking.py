@@ -13,6 +13,7 @@ from dm_control.suite import base
 from selfmodel.arrays import FloatArray
 from selfmodel.behaviour import Signal
 from selfmodel.embodiment import Embodiment
+from selfmodel.hypothesis import Hypothesis
 from selfmodel.notation import parse
 from selfmodel.places import places, present
 from selfmodel.robot import Robot
@@ -21,7 +22,7 @@ from selfmodel.senses import Senses
 
 def environment(
     robot: Robot,
-    hypothesis: str,
+    hypothesis: str | Hypothesis,
     time_limit: float,
     random: int | np.random.RandomState | None,
     environment_kwargs: dict[str, Any] | None,
@@ -32,13 +33,15 @@ def environment(
 
     Args:
         robot: The robot with nothing wrong.
-        hypothesis: What is to be wrong, in notation; silent neurons are the controller's affair
-            and change nothing here.
+        hypothesis: What is to be wrong, or its notation, which can name what comes with selfmodel;
+            silent neurons are the controller's affair and change nothing here.
         time_limit: Length of an episode, s.
         random: For dm_control's tasks; walking starts from one place, so nothing depends on it.
         environment_kwargs: For ``control.Environment``.
     """
-    embodiment = robot.build(parse(hypothesis, robot.anatomy))
+    if isinstance(hypothesis, str):
+        hypothesis = parse(hypothesis, robot.anatomy)
+    embodiment = robot.build(hypothesis)
     return control.Environment(
         mujoco.Physics.from_model(core.MjModel(embodiment.model)),
         Walk(robot, embodiment, random),

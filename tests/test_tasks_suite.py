@@ -18,7 +18,12 @@ from dm_control.viewer import runtime
 from dm_env import specs
 
 from selfmodel import tasks
+from selfmodel.anatomy import Anatomy
+from selfmodel.embodiment import Embodiment
 from selfmodel.errors import InputError
+from selfmodel.faults import KINDS, Fault, Kind, between, grid
+from selfmodel.hypothesis import INTACT
+from selfmodel.notation import parse
 from selfmodel.tasks import ALL_TASKS, ROBOTS, SUITE, TASKS_BY_DOMAIN
 from tests.opengl import WORKS, draws
 
@@ -94,6 +99,24 @@ def test_every_time_step_is_finite_and_in_its_specs(domain: str, task: str, hypo
         assert abs(step.reward) < FASTEST
         assert step.discount == 1  # to walk has no end but time's
         assert np.abs(step.observation["sensors"]).max() < 2  # touch is 0 or 1, angles nearly
+
+
+def test_a_robot_may_have_a_fault_of_a_kind_of_ones_own():
+    def lighter(embodiment: Embodiment, _anatomy: Anatomy, fault: Fault) -> None:
+        embodiment.model.body_mass[1] *= fault.degree
+
+    kind = Kind(
+        name="lighter", word="lighter", strike=lighter, degrees=between(0.1, 0.9), levels=grid(0.5)
+    )
+    robot = ROBOTS["quadruped"].robot()
+    made = parse("lighter=0.5", robot.anatomy, (*KINDS.values(), kind))
+    whole, light = (
+        tasks.load("quadruped", "walk", {"hypothesis": one}).physics.model.body_mass
+        for one in (INTACT, made)
+    )
+
+    np.testing.assert_array_equal(whole, robot.model.body_mass)
+    assert light[1] == 0.5 * whole[1]
 
 
 @every_body
