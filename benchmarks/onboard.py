@@ -18,18 +18,13 @@ import numpy as np
 
 from selfmodel.atomic import put
 from selfmodel.calibrate import calibrate
-from selfmodel.cli import resolve
 from selfmodel.cli.ablation.plan import spec
 from selfmodel.cli.ablation.rows import Row, as_csv, as_objects
-from selfmodel.cli.ablation.run_one import diagnosed
-from selfmodel.cli.ablation.trials import Setting
-from selfmodel.comparators import COMPARATORS
+from selfmodel.cli.ablation.run_one import diagnosed, setting_of
 from selfmodel.estimate import BASE
-from selfmodel.faults import known
 from selfmodel.grid import Finished, GridBegins, Job, PartEnds, finished, run_grid
 from selfmodel.intervals import proportion
 from selfmodel.logs.reader import read_log
-from selfmodel.notation import parse
 from selfmodel.trial import Trial
 
 COMPARATOR = "segment-prediction-onboard"
@@ -41,7 +36,7 @@ def main() -> None:
     parser.add_argument("folder", type=Path, help="of an ablation that has run")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--robots", default="quadruped,hexapod")
-    parser.add_argument("--seeds", type=int, default=4, help="a run for each, from 0")
+    parser.add_argument("--seeds", type=int, default=4, help="the runs of the seeds below this")
     parser.add_argument("--workers", type=int, default=2)
     options = parser.parse_args()
     done = {part.key: part for part in finished(options.folder / "runs")}.values()
@@ -103,23 +98,14 @@ def _share(right: Sequence[bool]) -> str:
 
 
 def _diagnoses(runs: Path, of: Job, comparator: str, _folder: Path) -> list[dict[str, Any]]:
-    said, folder = spec(of), runs / of.key
-    robot = resolve.robot_entry(said.cell.robot).robot()
-    setting = Setting(
-        spec=said,
-        comparator=COMPARATORS[comparator],
-        name=comparator,
-        robot=robot,
-        truth=parse(said.cell.truth, robot.anatomy, known(resolve.kinds(said.kinds))),
-        gaits=(),
-        folder=folder,
-    )
+    folder = runs / of.key
+    setting = setting_of(spec(of), comparator, folder)
     trials = [
         without_base(read_log(path).trial) for path in sorted((folder / "trials").glob("*.mcap"))
     ]
     intact = [trial for trial in trials if trial.plan.stage == "before"]
     failed = [trial for trial in trials if trial.plan.stage == "after"]
-    fitted = calibrate(robot, intact, threads=1).robot
+    fitted = calibrate(setting.robot, intact, threads=1).robot
     return as_objects(diagnosed(setting, fitted, intact, failed))
 
 

@@ -93,14 +93,15 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
     The result does not depend on the number of threads. A model that predicts the trials exactly
     is left as it is, to the bit.
 
-    Where the base's position or linear velocity was not observed, a trial is taken to begin in the
-    model's start pose, and the base is carried on from there; what was not observed on board, or
-    came late, leaves it a little off for the rest of the trial.
+    A trial in which the base's position and linear velocity were hardly ever observed together is
+    taken to begin in the model's start pose, and the base is carried on from there. A step that
+    was late, a command that is not known, or a state that is not where a stretch begins (at every
+    tenth step) leaves it off for the rest of that trial.
 
     Args:
         robot: The robot as its model describes it.
         trials: At least one, each with the commands and the state; the base's position and linear
-            velocity may be missing.
+            velocity may be NaN.
         threads: Threads for the physics.
 
     Raises:
@@ -167,7 +168,8 @@ def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> flo
         threads: Threads for the physics.
 
     Returns:
-        The root mean square error over all segments, steps and columns, in units of ``SCALES``.
+        The root mean square error over all columns after all steps that are judged, in units of
+        ``SCALES``.
 
     Raises:
         InputError: A trial was not observed well enough.
@@ -196,10 +198,8 @@ def _errors(
         for signal, scale in SCALES.items():
             if signal in stretches.observed:
                 made = outcome.behaviour[signal][:, :, 1:]
-                observed = stretches.observed[signal]
-                error = difference(signal, made, observed) / scale
-                known = np.isfinite(observed).all(axis=-1)
-                rows.append(error[:, known].reshape(len(models), -1))
+                error = difference(signal, made, stretches.observed[signal]) / scale
+                rows.append(error[:, stretches.judged].reshape(len(models), -1))
     return np.concatenate(rows, axis=1).T
 
 

@@ -18,7 +18,7 @@ SEGMENTS, HORIZON, LEAD = 40, 10, LONGEST_DELAY
 it that a delay may need."""
 
 SEEN = 0.25
-"""Of how many of these the base must have been seen for it to be looked at."""
+"""In how many of those with all of the rest the base must have been seen to be looked at."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,33 +27,34 @@ class Stretches:
 
     Attributes:
         segments: Where they begin and what was commanded.
-        observed: What of the state was logged after each of their steps,
-            ``(segments, horizon, width)``; NaN where that cannot be judged.
+        observed: The state after each of their steps, as well as the log tells it,
+            ``(segments, horizon, width)``.
+        judged: Whether a prediction of it can be judged, ``(segments, horizon)``: it is known, and
+            so is what led there.
     """
 
     segments: Segments
     observed: Mapping[Signal, FloatArray]
+    judged: BoolArray
 
 
 def cut(trial: Trial) -> Stretches:
     """Returns stretches of a trial in which the state and the commands are known.
 
     They are spread over the trial, and all of each is known. Where the base's position and linear
-    velocity are known in less than a quarter of them, these are left out, and stretches follow each
-    other from the start of the trial, in the model's start pose, on: each goes on from where the
-    one before it left the base.
+    velocity are known in less than a quarter of those in which all the rest is, these are left out,
+    and stretches follow each other from the start of the trial, in the model's start pose, on: each
+    goes on from where the one before it left the base.
 
     Raises:
-        InputError: There is nothing to judge without them either.
+        InputError: There is too little to judge without them either.
     """
     if trial.behaviour.steps <= LEAD + HORIZON:
         raise _useless(trial, f"the trial has {trial.behaviour.steps}")
     found = _spread(trial.behaviour) or _chained(trial.behaviour)
     if found is None:
-        signals = {signal: trial.behaviour[signal] for signal in (*ONBOARD, "commands")}
-        never = [signal for signal, values in signals.items() if not _rows_known(values).any()]
-        has = f"the log never has {', '.join(never)}" if never else "the log has no such stretch"
-        raise _useless(trial, has)
+        never = _never_known(trial.behaviour)
+        raise _useless(trial, f"the log never has {never}" if never else "the log has none of use")
     return found
 
 
@@ -62,38 +63,36 @@ def _spread(behaviour: Behaviour) -> Stretches | None:
     last = behaviour.steps - 1 - HORIZON
     begins = np.unique(np.linspace(LEAD, last, SEGMENTS).round().astype(np.intp))
     states = estimated_states(behaviour, STATE)
-    whole = _rows_known(np.hstack([*states.values(), behaviour.steady_commands]))
-    starts = begins[_all_known(whole, begins)]
-    if len(starts) < SEEN * len(begins):
+    on_board = _known({signal: states[signal] for signal in ONBOARD}) & _steady(behaviour)
+    whole = _all_known(on_board & _known(states), begins)
+    if not whole.any() or whole.sum() < SEEN * _all_known(on_board, begins).sum():
         return None
-    rows = starts[:, np.newaxis] + np.arange(1, HORIZON + 1)
-    observed = {signal: values[rows] for signal, values in states.items()}
-    return Stretches(_segments(behaviour, states, starts), observed)
+    return _stretches(behaviour, states, begins[whole])
 
 
 def _chained(behaviour: Behaviour) -> Stretches | None:
-    """Stretches of what is on board, one after another; None where nothing can be judged.
+    """Stretches of what is on board, one after another; None where too little can be judged.
 
-    One that can be simulated is kept for the sake of those after it. It is judged up to its first
-    step that was late, at those steps that were observed.
+    What can be simulated is, for the sake of what goes on from it: all that begins in a known state
+    under known commands. It is judged until a command stands for other than a time step, if none
+    did just before, and where it was observed.
     """
     begins = np.arange(0, behaviour.steps - HORIZON, HORIZON)
     states = estimated_states(behaviour, ONBOARD)
-    beginning = _rows_known(np.hstack(list(states.values())))[begins]
-    commanded = _all_known(_rows_known(behaviour["commands"]), begins)
-    starts = begins[beginning & commanded]
-    steady = _rows_known(behaviour.steady_commands)
-    before = np.maximum(starts[:, np.newaxis] + np.arange(-LEAD, HORIZON), 0)
-    so_far = np.logical_and.accumulate(steady[before], axis=1)[:, LEAD:, np.newaxis]
-    rows = starts[:, np.newaxis] + np.arange(1, HORIZON + 1)
-    observed = {signal: np.where(so_far, values[rows], np.nan) for signal, values in states.items()}
-    if not any(np.isfinite(values).any() for values in observed.values()):
-        return None
-    return Stretches(_segments(behaviour, states, starts), observed)
+    commanded = np.asarray(np.isfinite(behaviour["commands"]).all(axis=1))
+    starts = begins[_known(states)[begins] & _all_known(commanded, begins)]
+    found = _stretches(behaviour, states, starts)
+    return found if found.judged.sum() >= HORIZON else None
 
 
-def _rows_known(values: FloatArray) -> BoolArray:
-    return np.asarray(np.isfinite(values).all(axis=1))
+def _known(signals: Mapping[Signal, FloatArray]) -> BoolArray:
+    """At which steps all of them are known, ``(steps,)``."""
+    return np.asarray(np.isfinite(np.hstack(list(signals.values()))).all(axis=1))
+
+
+def _steady(behaviour: Behaviour) -> BoolArray:
+    """Whether each command is known to have stood for a control time step, ``(steps,)``."""
+    return np.asarray(np.isfinite(behaviour.steady_commands).all(axis=1))
 
 
 def _all_known(known: BoolArray, begins: IndexArray) -> BoolArray:
@@ -101,18 +100,38 @@ def _all_known(known: BoolArray, begins: IndexArray) -> BoolArray:
     return np.array([known[max(k - LEAD, 0) : k + HORIZON + 1].all() for k in begins.tolist()])
 
 
-def _segments(
+def _stretches(
     behaviour: Behaviour, states: Mapping[Signal, FloatArray], starts: IndexArray
-) -> Segments:
+) -> Stretches:
     commands = behaviour["commands"]
     padded = np.concatenate([np.zeros((LEAD, commands.shape[1])), commands])
-    return Segments(
-        states={signal: values[starts] for signal, values in states.items()},
-        commands=padded[starts[:, np.newaxis] + np.arange(LEAD + HORIZON)],
-        lead=LEAD,
-        record=tuple(states),
-        past=Past(commands, starts),
+    before = starts[:, np.newaxis] + np.arange(-LEAD, HORIZON)
+    after = starts[:, np.newaxis] + np.arange(1, HORIZON + 1)
+    steady = np.logical_and.accumulate(_steady(behaviour)[np.maximum(before, 0)], axis=1)
+    return Stretches(
+        Segments(
+            states={signal: values[starts] for signal, values in states.items()},
+            commands=padded[before + LEAD],
+            lead=LEAD,
+            record=tuple(states),
+            past=Past(commands, starts),
+        ),
+        observed={signal: values[after] for signal, values in states.items()},
+        judged=steady[:, LEAD:] & _known(states)[after],
     )
+
+
+def _never_known(behaviour: Behaviour) -> str:
+    """What of that which is needed was never observed, by its columns where only some were not."""
+    found = []
+    signals: tuple[Signal, ...] = (*ONBOARD, "commands")
+    for signal in signals:
+        names = np.array(behaviour.names.columns(signal))
+        lacking = ~np.isfinite(behaviour[signal]).any(axis=0)
+        if lacking.any():
+            some = "" if lacking.all() else f" of {', '.join(names[lacking])}"
+            found.append(signal + some)
+    return ", ".join(found)
 
 
 def _useless(trial: Trial, has: str) -> InputError:

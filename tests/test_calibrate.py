@@ -153,10 +153,12 @@ def test_an_exact_model_of_a_robot_that_nobody_sees_is_left_as_it_is(robot: Robo
 def test_trials_in_which_the_base_was_seen_and_others_are_fitted_to_together():
     real = with_parameters(QUADRUPED, TRUE)
     one, other = trials(real)
-    mixed = prediction_error(QUADRUPED, [one, lacking(other, BASE)], 1)
+    found = calibrate(QUADRUPED, [one, lacking(other, BASE)], threads=1)
     apart = [prediction_error(QUADRUPED, [each], 1) for each in (one, lacking(other, BASE))]
 
-    assert min(apart) < mixed < max(apart)
+    assert min(apart) < found.error_before < max(apart)
+    assert found.error < found.error_before
+    assert found.parameters.delay == TRUE.delay
 
 
 def test_a_trial_that_lacks_part_of_the_state_is_refused_by_what_it_lacks():
@@ -175,7 +177,7 @@ def test_a_trial_with_no_stretch_of_all_of_it_is_refused():
     early = lacking(whole, ("base_orientation",), slice(STEPS // 2))
     never_both = lacking(early, ("joint_velocities",), slice(STEPS // 2 - 1, None))
 
-    with pytest.raises(InputError, match="the log has no such stretch: leave"):
+    with pytest.raises(InputError, match="the log has none of use: leave"):
         calibrate(QUADRUPED, [never_both], 1)
 
 
@@ -192,7 +194,7 @@ def test_moments_that_were_not_observed_are_passed_over(lost: Signal):
     assert prediction_error(QUADRUPED, [lacking(whole, (lost,), slice(100, 200))], 1) < 1e-4
 
 
-def test_moments_within_a_stretch_that_were_not_observed_lead_no_unseen_robot_astray():
+def test_moments_that_were_not_observed_lead_no_unseen_robot_astray_if_no_stretch_begins_there():
     (whole,) = trials(QUADRUPED, 1)
     blinks = lacking(lacking(whole, BASE), ("joint_velocities",), slice(102, 108))
 

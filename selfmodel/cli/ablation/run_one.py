@@ -20,6 +20,7 @@ from selfmodel.cli.ablation.trials import (
 from selfmodel.cli.experiment import Experiment, run
 from selfmodel.diagnose import Diagnose
 from selfmodel.diagnosis import Diagnosis
+from selfmodel.driver import Evolved
 from selfmodel.events import Event
 from selfmodel.explain import explain
 from selfmodel.faults import known
@@ -42,19 +43,34 @@ def run_one(spec: Spec, comparator: str, folder: Path, gaits: Path) -> list[Row]
         InputError: The comparator cannot judge the trials.
         WorkError: A trial could not be run or read.
     """
+    bank_gaits = (
+        bank.gait(gaits, spec.cell.robot, number) for number in spec.cell.gaits(spec.settings)
+    )
+    setting = setting_of(spec, comparator, folder, tuple(bank_gaits))
+    return _WAYS[spec.next_trial](setting)
+
+
+def setting_of(
+    spec: Spec, comparator: str, folder: Path, gaits: tuple[Evolved, ...] = ()
+) -> Setting:
+    """Returns the objects that a run's specification stands for.
+
+    Args:
+        spec: What to run.
+        comparator: A name, or ``package.module:object``.
+        folder: Where the run is kept.
+        gaits: Its gaits, where trials are still to be run.
+    """
     robot = resolve.robot_entry(spec.cell.robot).robot()
-    setting = Setting(
+    return Setting(
         spec=spec,
         comparator=resolve.comparator(comparator),
         name=comparator,
         robot=robot,
         truth=parse(spec.cell.truth, robot.anatomy, known(resolve.kinds(spec.kinds))),
-        gaits=tuple(
-            bank.gait(gaits, spec.cell.robot, number) for number in spec.cell.gaits(spec.settings)
-        ),
+        gaits=gaits,
         folder=folder,
     )
-    return _WAYS[spec.next_trial](setting)
 
 
 def diagnosed(
