@@ -5,17 +5,20 @@ states (``mujoco.minimize``), with a prior that keeps what the trials do not sho
 delay, which is a whole number, is tried out.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 
 import mujoco.minimize
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.behaviour import Signal
+from selfmodel.behaviour import Behaviour, Signal
+from selfmodel.comparator import Segments
 from selfmodel.differences import difference
 from selfmodel.embodiment import embody
 from selfmodel.errors import InputError
+from selfmodel.estimate import BASE
 from selfmodel.events import Calibrated
 from selfmodel.hypothesis import INTACT
 from selfmodel.parameters import Parameters, edited_model, from_factors, nominal, with_parameters
@@ -111,43 +114,30 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
         raise InputError("expected at least one trial of the intact robot, got none")
     data = [cut(trial) for trial in trials]
     start = nominal(robot)
-
-    def residuals(logarithms: FloatArray, delay: int) -> FloatArray:
-        """From ``(factors, m)`` to ``(residuals, m)``, the prior's among them."""
-        models = [from_factors(np.exp(row), delay) for row in logarithms.T]
-        errors = _errors(robot, models, data, threads)
-        weight = np.sqrt(len(errors)) * SHARE / PRIOR
-        return np.concatenate([_damped(errors), weight * logarithms])
-
-    def error(parameters: Parameters) -> float:
-        return float(np.sqrt(np.mean(_errors(robot, [parameters], data, threads) ** 2)))
-
-    before = error(start)
+    before = _error(robot, start, data, threads)
     deviations = np.full(len(start.factors), PRIOR)
     if before < EXACT:
         return Calibration(robot, start, deviations, before, before)
     zero = np.zeros((len(start.factors), 1))
-    delay = min(DELAYS, key=lambda steps: float(np.sum(residuals(zero, steps) ** 2)))
 
-    def residual(x: FloatArray) -> FloatArray:
-        return residuals(np.reshape(x, (len(zero), -1)), delay)
+    def residuals_at(delay: int, of: Sequence[Stretches]) -> Residual:
+        return partial(_residuals, robot, of, delay, threads)
 
-    def jacobian(x: FloatArray, _residual: FloatArray) -> FloatArray:
-        steps = STEP * np.eye(len(zero))
-        ahead, behind = residual(x + steps), residual(x - steps)
-        return np.asarray((ahead - behind) / (2 * STEP))
-
+    delay = min(DELAYS, key=lambda steps: float(np.sum(residuals_at(steps, data)(zero) ** 2)))
+    residual = residuals_at(delay, data)
     fitted, _ = mujoco.minimize.least_squares(
         zero,
         residual,
         bounds=[np.full_like(zero, -BOUND), np.full_like(zero, BOUND)],
-        jacobian=jacobian,
+        jacobian=lambda x, _residual: _slopes(residual, x),
         max_iter=ITERATIONS,
         xtol=1e-3,
         verbose=mujoco.minimize.Verbosity.SILENT,
     )
     found = from_factors(np.exp(fitted.ravel()), delay)
-    slopes = jacobian(fitted, zero)
+    # What a factor does to the whole of a long simulation is mostly chaos, and tells nothing of it.
+    short = [_placed(robot, found, stretches, threads) for stretches in data]
+    slopes = _slopes(residuals_at(delay, short), fitted)
     count = len(slopes) - len(zero)  # of the errors: the rest is the prior, at its weight
     spread = np.linalg.inv(slopes.T @ slopes) * count * SHARE**2
     return Calibration(
@@ -155,7 +145,7 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
         parameters=found,
         deviations=np.sqrt(np.diag(spread)),
         error_before=before,
-        error=error(found),
+        error=_error(robot, found, data, threads),
     )
 
 
@@ -174,33 +164,72 @@ def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> flo
     Raises:
         InputError: A trial was not observed well enough.
     """
-    data = [cut(trial) for trial in trials]
-    return float(np.sqrt(np.mean(_errors(robot, [nominal(robot)], data, threads) ** 2)))
+    return _error(robot, nominal(robot), [cut(trial) for trial in trials], threads)
+
+
+Residual = Callable[[FloatArray], FloatArray]
+"""From logarithms of factors, ``(factors, m)``, to residuals, ``(residuals, m)``."""
+
+
+def _slopes(residual: Residual, x: FloatArray) -> FloatArray:
+    """The derivative of the residuals, ``(residuals, factors)``."""
+    steps = STEP * np.eye(len(x))
+    ahead, behind = residual(x + steps), residual(x - steps)
+    return np.asarray((ahead - behind) / (2 * STEP))
+
+
+def _residuals(
+    robot: Robot, data: Sequence[Stretches], delay: int, threads: int, logarithms: FloatArray
+) -> FloatArray:
+    """See ``Residual``; the prior's are among them."""
+    logarithms = np.reshape(logarithms, (len(logarithms), -1))
+    models = [from_factors(np.exp(row), delay) for row in logarithms.T]
+    errors = _errors(robot, models, data, threads)
+    weight = np.sqrt(len(errors)) * SHARE / PRIOR
+    return np.concatenate([_damped(errors), weight * logarithms])
+
+
+def _error(robot: Robot, parameters: Parameters, data: Sequence[Stretches], threads: int) -> float:
+    return float(np.sqrt(np.mean(_errors(robot, [parameters], data, threads) ** 2)))
+
+
+def _placed(robot: Robot, found: Parameters, stretches: Stretches, threads: int) -> Stretches:
+    """The same, each beginning by itself: with the base where a model has it by then."""
+    segments = stretches.segments
+    if "base_position" in segments.states:
+        return stretches
+    carried_on = replace(segments, record=BASE)
+    made = _predicted(robot, [found], carried_on, threads)
+    states = {**segments.states, **{signal: made[signal][0, :, 0] for signal in BASE}}
+    return replace(stretches, segments=replace(segments, states=states))
 
 
 def _errors(
     robot: Robot, models: Sequence[Parameters], data: Sequence[Stretches], threads: int
 ) -> FloatArray:
     """The errors of the predictions in units of ``SCALES``, ``(errors, models)``."""
+    rows = []
+    for stretches in data:
+        made = _predicted(robot, models, stretches.segments, threads)
+        for signal, scale in SCALES.items():
+            if signal in stretches.observed:
+                predicted, observed = made[signal][:, :, 1:], stretches.observed[signal]
+                error = difference(signal, predicted, observed) / scale
+                rows.append(error[:, stretches.judged].reshape(len(models), -1))
+    return np.concatenate(rows, axis=1).T
+
+
+def _predicted(
+    robot: Robot, models: Sequence[Parameters], segments: Segments, threads: int
+) -> Behaviour:
+    """What models that have one delay predict, ``(models, segments, horizon + 1, width)``."""
     embodiments = [
         embody(edited_model(robot, parameters), robot.anatomy, INTACT) for parameters in models
     ]
-    rows = []
-    for stretches in data:
-        outcome = predict(
-            robot,
-            embodiments,
-            stretches.segments,
-            threads=threads,
-            tally=Tally(),
-            delay=models[0].delay,
-        )
-        for signal, scale in SCALES.items():
-            if signal in stretches.observed:
-                made = outcome.behaviour[signal][:, :, 1:]
-                error = difference(signal, made, stretches.observed[signal]) / scale
-                rows.append(error[:, stretches.judged].reshape(len(models), -1))
-    return np.concatenate(rows, axis=1).T
+    delay = models[0].delay
+    return predict(
+        robot, embodiments, segments, threads=threads, tally=Tally(), delay=delay
+    ).behaviour
 
 
 def _damped(errors: FloatArray) -> FloatArray:

@@ -141,6 +141,9 @@ def test_a_robot_that_nobody_sees_is_calibrated_from_what_it_has_on_board():
     assert found.error < found.error_before
     before, after = (prediction_error(r, seen, 1) for r in (QUADRUPED, found.robot))
     assert after < 0.75 * before
+    # It knows no more of the factors than one that is seen.
+    assert np.median(found.deviations / fitted().deviations) > 0.7
+    assert (found.deviations < PRIOR).all()
 
 
 def test_an_exact_model_of_a_robot_that_nobody_sees_is_left_as_it_is(robot: Robot):
