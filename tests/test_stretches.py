@@ -192,8 +192,8 @@ def test_a_trial_of_nothing_but_late_steps_is_refused(whole: Trial):
 
 
 def test_a_trial_of_which_too_little_can_be_judged_is_refused(whole: Trial):
-    """All of it is seen at some time, and never more than at one step together."""
-    blinking = lacking(whole, (*BASE, "base_orientation"), slice(1, None))
+    """All of it is seen at some time, and together after five steps only."""
+    blinking = lacking(whole, (*BASE, "base_orientation"), slice(6, None))
 
     with pytest.raises(InputError, match=r"the log has none of use: leave"):
         cut(blinking)
