@@ -2,28 +2,28 @@
 
 ``python -m benchmarks.onboard FOLDER --out OUT`` takes the trials of the ablation in ``FOLDER``,
 forgets the base's position and linear velocity in all of them, those before the failure too,
-calibrates and diagnoses from what is left, and writes ``OUT/onboard.csv``. Called again it goes
-on where it was stopped. In an ablation itself every comparator has the same calibrated self-model,
-fitted to all that was logged of the healthy robot.
+calibrates and diagnoses from what is left, and writes ``OUT/results.csv`` and the rest of what an
+ablation has. Called again it goes on where it was stopped. In an ablation itself every comparator
+has the same calibrated self-model, fitted to all that was logged of the healthy robot.
 """
 
 import argparse
 import dataclasses
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from selfmodel.atomic import put
 from selfmodel.calibrate import calibrate
 from selfmodel.cli.ablation.plan import spec
-from selfmodel.cli.ablation.rows import Row, as_csv, as_objects
+from selfmodel.cli.ablation.results import write_results
+from selfmodel.cli.ablation.rows import as_objects
 from selfmodel.cli.ablation.run_one import diagnosed, setting_of
+from selfmodel.cli.ablation.scores import Score
 from selfmodel.estimate import BASE
-from selfmodel.grid import Finished, GridBegins, Job, PartEnds, finished, run_grid
-from selfmodel.intervals import proportion
+from selfmodel.grid import GridBegins, Job, PartEnds, finished, run_grid
 from selfmodel.logs.reader import read_log
 from selfmodel.trial import Trial
 
@@ -51,10 +51,7 @@ def main() -> None:
         raise SystemExit(f"{options.folder} has no run of an ablation with these robots and seeds")
     diagnose = partial(_diagnoses, options.folder / "runs")
     failed = run_grid(options.out / "runs", jobs, diagnose, workers=options.workers, watch=_tell)
-    keys = {job.key for job in jobs}
-    rows = rows_of(part for part in finished(options.out / "runs") if part.key in keys)
-    put(options.out / "onboard.csv", as_csv(rows).encode())
-    print(table(rows))
+    print(table(write_results(options.out).scores))
     if failed:
         raise SystemExit("\n".join(f"{part.key} failed: {part.error}" for part in failed))
 
@@ -67,34 +64,28 @@ def without_base(trial: Trial) -> Trial:
     return dataclasses.replace(trial, behaviour=behaviour)
 
 
-def rows_of(parts: Iterable[Finished]) -> list[Row]:
-    """Returns the rows of what is done, robot by robot."""
-    rows = [Row(**row) for part in parts for row in part.result]
-    return sorted(rows, key=lambda row: (row.robot, row.gap, row.seed, row.truth, row.trials))
-
-
-def table(rows: Sequence[Row]) -> str:
-    """Returns how many of them are right, as Markdown."""
-    gaps = sorted({row.gap for row in rows})
+def table(scores: Sequence[Score]) -> str:
+    """Returns how many diagnoses are right, as Markdown."""
+    gaps = sorted({score.gap for score in scores})
     lines = [
         f"| robot | trials | {' | '.join(f'gap {gap:g}' for gap in gaps)} |",
         f"|---|---|{'---|' * len(gaps)}",
     ]
-    for robot, trials in sorted({(row.robot, row.trials) for row in rows}):
-        same = [row for row in rows if (row.robot, row.trials) == (robot, trials)]
-        shares = [_share([row.correct for row in same if row.gap == gap]) for gap in gaps]
-        lines.append(f"| {robot} | {trials} | {' | '.join(shares)} |")
+    for robot, trials in sorted({(score.robot, score.trials) for score in scores}):
+        shares = {
+            score.gap: f"{score.right} of {score.runs} "
+            f"({score.correct.low:.0%} to {score.correct.high:.0%})"
+            for score in scores
+            if (score.robot, score.trials) == (robot, trials)
+        }
+        cells = [shares.get(gap, "-") for gap in gaps]
+        lines.append(f"| {robot} | {trials} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
 
 def _tell(event: GridBegins | PartEnds) -> None:
     if isinstance(event, PartEnds):
         print(f"{event.number} of {event.total}: {event.key}, {event.seconds:.0f} s", flush=True)
-
-
-def _share(right: Sequence[bool]) -> str:
-    interval = proportion(sum(right), len(right))
-    return f"{sum(right)} of {len(right)} ({interval.low:.0%} to {interval.high:.0%})"
 
 
 def _diagnoses(runs: Path, of: Job, comparator: str, _folder: Path) -> list[dict[str, Any]]:

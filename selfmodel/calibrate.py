@@ -136,8 +136,7 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
     )
     found = from_factors(np.exp(fitted.ravel()), delay)
     # What a factor does to the whole of a long simulation is mostly chaos, and tells nothing of it.
-    short = [_placed(robot, found, stretches, threads) for stretches in data]
-    slopes = _slopes(residuals_at(delay, short), fitted)
+    slopes = _slopes(residuals_at(delay, _placed(robot, found, data, threads)), fitted)
     count = len(slopes) - len(zero)  # of the errors: the rest is the prior, at its weight
     spread = np.linalg.inv(slopes.T @ slopes) * count * SHARE**2
     return Calibration(
@@ -193,43 +192,53 @@ def _error(robot: Robot, parameters: Parameters, data: Sequence[Stretches], thre
     return float(np.sqrt(np.mean(_errors(robot, [parameters], data, threads) ** 2)))
 
 
-def _placed(robot: Robot, found: Parameters, stretches: Stretches, threads: int) -> Stretches:
-    """The same, each beginning by itself: with the base where a model has it by then."""
-    segments = stretches.segments
-    if "base_position" in segments.states:
-        return stretches
-    carried_on = replace(segments, record=BASE)
-    made = _predicted(robot, [found], carried_on, threads)
-    states = {**segments.states, **{signal: made[signal][0, :, 0] for signal in BASE}}
-    return replace(stretches, segments=replace(segments, states=states))
+def _placed(
+    robot: Robot, found: Parameters, data: Sequence[Stretches], threads: int
+) -> list[Stretches]:
+    """The same stretches, each beginning by itself: with the base where a model has it by then."""
+    predicted = _predictor(robot, [found], threads)
+
+    def placed(stretches: Stretches) -> Stretches:
+        segments = stretches.segments
+        if "base_position" in segments.states:
+            return stretches
+        made = predicted(replace(segments, record=BASE))
+        states = {**segments.states, **{signal: made[signal][0, :, 0] for signal in BASE}}
+        return replace(stretches, segments=replace(segments, states=states))
+
+    return [placed(stretches) for stretches in data]
 
 
 def _errors(
     robot: Robot, models: Sequence[Parameters], data: Sequence[Stretches], threads: int
 ) -> FloatArray:
     """The errors of the predictions in units of ``SCALES``, ``(errors, models)``."""
+    predicted = _predictor(robot, models, threads)
     rows = []
     for stretches in data:
-        made = _predicted(robot, models, stretches.segments, threads)
+        made = predicted(stretches.segments)
         for signal, scale in SCALES.items():
             if signal in stretches.observed:
-                predicted, observed = made[signal][:, :, 1:], stretches.observed[signal]
-                error = difference(signal, predicted, observed) / scale
+                observed = stretches.observed[signal]
+                error = difference(signal, made[signal][:, :, 1:], observed) / scale
                 rows.append(error[:, stretches.judged].reshape(len(models), -1))
     return np.concatenate(rows, axis=1).T
 
 
-def _predicted(
-    robot: Robot, models: Sequence[Parameters], segments: Segments, threads: int
-) -> Behaviour:
-    """What models that have one delay predict, ``(models, segments, horizon + 1, width)``."""
+def _predictor(
+    robot: Robot, models: Sequence[Parameters], threads: int
+) -> Callable[[Segments], Behaviour]:
+    """Predicts with models that have one delay: ``(models, segments, horizon + 1, width)``."""
+    delay = models[0].delay
     embodiments = [
         embody(edited_model(robot, parameters), robot.anatomy, INTACT) for parameters in models
     ]
-    delay = models[0].delay
-    return predict(
-        robot, embodiments, segments, threads=threads, tally=Tally(), delay=delay
-    ).behaviour
+
+    def predicted(segments: Segments) -> Behaviour:
+        outcome = predict(robot, embodiments, segments, threads=threads, tally=Tally(), delay=delay)
+        return outcome.behaviour
+
+    return predicted
 
 
 def _damped(errors: FloatArray) -> FloatArray:

@@ -131,14 +131,14 @@ def test_where_it_was_not_they_are_judged_up_to_a_late_step_and_where_observed(w
     np.testing.assert_array_equal(found.judged, ~late & ~missing)
 
 
-@pytest.mark.parametrize(("lost", "step"), [((), 1), (BASE, HORIZON)], ids=["seen", "unseen"])
+@pytest.mark.parametrize(("lost", "fewest"), [((), 33), (BASE, 17)], ids=["seen", "unseen"])
 def test_none_is_predicted_under_commands_that_are_not_known(
-    whole: Trial, lost: tuple[Signal, ...], step: int
+    whole: Trial, lost: tuple[Signal, ...], fewest: int
 ):
     found = starts(cut(lacking(lacking(whole, lost), ("commands",), slice(60, 62))))
 
     assert np.all((found + HORIZON < 60) | (found - LEAD > 61))
-    assert len(found) > 0.8 * min(SEGMENTS, STEPS // step)
+    assert len(found) >= fewest
 
 
 def test_a_log_that_is_late_every_twentieth_step_serves():
