@@ -5,6 +5,7 @@
 """
 
 import csv
+import math
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -90,7 +91,7 @@ def _within(said: float, true: float) -> bool:
 
 _NEAR: Mapping[str, Callable[[float, float], bool]] = {
     "friction": lambda said, true: abs(said / true - 1) <= 0.15,
-    "slope": lambda said, true: abs(degrees(said - true)) <= 1.5,
+    "slope": lambda said, true: abs(math.degrees(said - true)) <= 1.5,
     "wind": lambda said, true: abs(said / true - 1) <= 0.2,
     "crosswind": lambda said, true: abs(said / true - 1) <= 0.2,
     "roughness": lambda said, true: _class(said) == _class(true),
