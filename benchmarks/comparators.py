@@ -15,7 +15,7 @@ import numpy as np
 from benchmarks.results import Facts
 from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT
 from selfmodel.controllers.driver import Evolved
-from selfmodel.diagnosis.comparator import Comparator, Piecewise
+from selfmodel.diagnosis.comparator import Comparator, PiecewiseTrial
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.evidence import simulate
 from selfmodel.diagnosis.genome import VALUES, decode
@@ -140,7 +140,7 @@ def _known(name: str, threads: int, settings: Settings) -> Known:
 def _share(known: Known, comparator: Comparator, threads: int, settings: Settings) -> Facts:
     """Seconds of a comparator's arithmetic, and of the physics, for one generation's children."""
     rounds = [_share_once(known, comparator, threads, settings) for _ in range(ROUNDS + 1)][1:]
-    request = comparator.request(known.failed[CASES[0]])
+    request = comparator.prepare(known.failed[CASES[0]]).request
     members = request.members if isinstance(request, Ensemble) else 1
     return {"members": members} | {key: median(one[key] for one in rounds) for key in rounds[0]}
 
@@ -152,14 +152,14 @@ def _share_once(known: Known, comparator: Comparator, threads: int, settings: Se
     simulator = Simulator(known.model, threads)
     trial = known.failed[CASES[0]]
     start = perf_counter()
-    request = comparator.request(trial)
+    prepared = comparator.prepare(trial)
     asked = perf_counter() - start
-    simulated = simulate(simulator, request, trial, hypotheses).behaviour
+    simulated = simulate(simulator, prepared.request, trial, hypotheses).behaviour
     start = perf_counter()
-    if isinstance(comparator, Piecewise):
-        comparator.losses(simulated, trial)
+    if isinstance(prepared, PiecewiseTrial):
+        prepared.losses(simulated)
     else:
-        comparator.distances(simulated, trial)
+        prepared.distances(simulated)
     return {
         "arithmetic_seconds": asked + perf_counter() - start,
         "physics_seconds": simulator.stats.physics_seconds,

@@ -27,7 +27,7 @@ def diagnose(
     files: LogFiles,
     *,
     robot: RobotOrModel = None,
-    comparator: ComparatorName = DEFAULT,
+    comparator: ComparatorName = DEFAULT.name,
     kinds: KindNames = DEFAULT_KINDS,
     calibrate: Calibrated = True,
     seed: Annotated[

@@ -35,7 +35,7 @@ def recover(
     ] = None,
     damage: Damage = None,
     model_settings: ModelSettings = None,
-    comparator: ComparatorName = DEFAULT,
+    comparator: ComparatorName = DEFAULT.name,
     calibrate: Calibrated = True,
     gap: GapLevel = 0.0,
     structure: Structural = False,

@@ -13,7 +13,7 @@ from selfmodel.comparators import COMPARATORS
 from selfmodel.controllers.driver import Design, Driver, Evolved
 from selfmodel.controllers.network import Controller, Network
 from selfmodel.controllers.playback import Playback
-from selfmodel.diagnosis.comparator import Comparator
+from selfmodel.diagnosis.comparator import Comparator, as_comparator
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.kind import FaultKind
@@ -112,13 +112,7 @@ def comparator(name: str) -> Comparator:
     """
     if name in COMPARATORS:
         return COMPARATORS[name]
-    found = _plugged_in("comparator", name, COMPARATORS)
-    if isinstance(found, type) or not isinstance(found, Comparator):
-        raise InputError(
-            f"{name!r} is no comparator: expected an object, not a class, with the members of "
-            f"selfmodel.diagnosis.comparator.Comparator, got {found!r}"
-        )
-    return found
+    return as_comparator(_plugged_in("comparator", name, COMPARATORS), name)
 
 
 def next_trial(name: str) -> str:

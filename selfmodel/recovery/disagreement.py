@@ -4,9 +4,8 @@ That a test is chosen for what it tells hypotheses apart is from Bongard, Zykov 
 *Resilient machines through continuous self-modeling* (Science 2006).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import combinations
-from types import MappingProxyType
 
 import numpy as np
 
@@ -18,28 +17,16 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.simulation.cache import Cache
 from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import Behaviour, Signal
+from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.rotation import directions
 from selfmodel.trials.signal_difference import difference
+from selfmodel.trials.signal_scales import DISAGREEMENT_SCALES
 
 EARLY = 100
 """Control steps that disagreement is read off. By then contact has made two predictions differ
 whatever they assume: closed loop, where two hypotheses differed 2.4 times as much as self-models
 that differ by 3 % in the first quarter of a second, it was 1.7 times after three quarters, and no
 more came."""
-
-SCALES: Mapping[Signal, float] = MappingProxyType(
-    {
-        "sensors": 1.0,
-        "joint_positions": 0.3,
-        "base_position": 0.1,
-        "base_orientation": 0.3,
-        "base_linear_velocity": 0.3,
-        "base_angular_velocity": 1.0,
-    }
-)
-"""By how much two predictions must differ to be told apart at a glance, in each signal's unit; what
-differs by more counts no more, so that one wild prediction does not decide."""
 
 LOWEST = 0.5
 """A base below this part of its standing height has fallen; one that begins on the ground, as a
@@ -115,7 +102,7 @@ class Disagreement:
     def _predicted(self, drivers: Sequence[Driver], steps: int) -> SimulationResult:
         """Each driver under each hypothesis, ``(drivers, hypotheses, steps, width)``."""
         runs = [(hypothesis, one) for one in drivers for hypothesis in self._hypotheses]
-        outcome = self._simulator.run(runs, steps, (*SCALES, "commands"))
+        outcome = self._simulator.run(runs, steps, (*DISAGREEMENT_SCALES, "commands"))
         return outcome.grouped(len(drivers), len(self._hypotheses))
 
     def _first_falls(self, simulated: SimulationResult) -> IndexArray:
@@ -133,7 +120,8 @@ def disagreements(behaviour: Behaviour) -> FloatArray:
     between their predictions.
 
     Args:
-        behaviour: The signals of ``SCALES``, ``(controllers, hypotheses, steps, width)`` each.
+        behaviour: The signals of ``DISAGREEMENT_SCALES``, each
+            ``(controllers, hypotheses, steps, width)``.
 
     Returns:
         ``(controllers,)``; 0 for a single hypothesis, NaN where a simulation diverged.
@@ -141,12 +129,12 @@ def disagreements(behaviour: Behaviour) -> FloatArray:
     controllers, hypotheses = behaviour["sensors"].shape[:2]
     pairs = list(combinations(range(hypotheses), 2))
     total = np.zeros(controllers)
-    for name, scale in SCALES.items():
+    for name, scale in DISAGREEMENT_SCALES.items():
         values = behaviour[name][:, :, :EARLY]
         for one, other in pairs:
             apart = difference(name, values[:, one], values[:, other])
             total += np.minimum(np.abs(apart) / scale, 1).mean(axis=(1, 2))
-    return total / max(len(pairs), 1) / len(SCALES)
+    return total / max(len(pairs), 1) / len(DISAGREEMENT_SCALES)
 
 
 def first_falls(behaviour: Behaviour, normals: FloatArray, standing_height: float) -> IndexArray:

@@ -3,6 +3,7 @@
 import mujoco
 
 from selfmodel.controllers.network import HIDDEN_NEURONS
+from selfmodel.robot.control_delay import MAX_CONTROL_DELAY
 
 NEURONS = "selfmodel_hidden_neurons"
 """The custom numeric of an MJCF that says how many; without it, they are the paper's."""
@@ -28,10 +29,6 @@ def hidden_neurons(model: mujoco.MjModel) -> int:
 
 CONTROL_DELAY = "selfmodel_control_delay"
 """The custom numeric of an MJCF that says how many control steps a command takes to its effect."""
-
-
-MAX_CONTROL_DELAY = 5
-"""Control steps that it may say: as many as segments have commands from before their start."""
 
 
 def control_delay(model: mujoco.MjModel) -> int:

@@ -17,7 +17,6 @@ from selfmodel.faults.notation import parse
 from selfmodel.recovery.disagreement import (
     EARLY,
     LOWEST,
-    SCALES,
     Disagreement,
     disagreements,
     first_falls,
@@ -26,6 +25,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.trials.behaviour import Behaviour, Names, Signal
+from selfmodel.trials.signal_scales import DISAGREEMENT_SCALES
 from tests.conftest import random_controllers
 
 NAMES = Names(sensors=("touch",), motors=("motor",), hinges=("hinge",))
@@ -213,7 +213,10 @@ def test_disagreement_is_a_part_of_one_and_knows_no_order_of_the_hypotheses(
 ):
     rng = np.random.default_rng(seed)
     shape = (2, hypotheses, 7)
-    signals = {signal: size * rng.normal(size=(*shape, NAMES.width(signal))) for signal in SCALES}
+    signals = {
+        signal: size * rng.normal(size=(*shape, NAMES.width(signal)))
+        for signal in DISAGREEMENT_SCALES
+    }
     turned = Rotation.from_rotvec(size * rng.normal(size=(np.prod(shape), 3)))
     signals["base_orientation"] = turned.as_quat(scalar_first=True).reshape(*shape, 4)
     order = rng.permutation(hypotheses)
