@@ -77,7 +77,7 @@ class Evolution:
         return self._asked
 
     def tell(self, fitness: FloatArray) -> None:
-        """Takes the fitness of the genomes last asked for, ``(n,)``, and generates the next genomes.
+        """Takes the fitness of the genomes last asked for, ``(n,)``, and generates children.
 
         Raises:
             ValueError: ``fitness`` has another shape, or a NaN.

@@ -22,13 +22,13 @@ STATE: tuple[Signal, ...] = ONBOARD + BASE
 
 NOISE_SHARE, NOISE_SHARE_PER_COLUMN = 0.6, 0.5
 """Smallest shares of successive residuals of opposite sign that count as noise: in the mean over
-the columns, and in each column. For pure noise the share is two thirds; without noise it is below one
-half, except for joints that oscillate at every step."""
+the columns, and in each column. For pure noise the share is two thirds; without noise it is below
+one half, except for joints that oscillate at every step."""
 
 MAX_UNEXPLAINED_SHARE = 0.5
 """Largest share of the residuals left after regression on the velocity changes at which the
-residuals count as dynamics, not noise. Noise in 370 trials with a gap left 0.98; an oscillating cheetah left
-less than 0.001."""
+residuals count as dynamics, not noise. Noise in 370 trials with a gap left 0.98; an oscillating
+cheetah left less than 0.001."""
 
 _SMOOTHED: tuple[tuple[Signal, Signal, int, float], ...] = (
     ("joint_positions", "joint_velocities", 3, 1e-3),
