@@ -4,7 +4,7 @@
 (``benchmarks/same_bits_plan.py``) with the selfmodel that PYTHON imports, and writes one JSON file:
 every number of every ``--json`` output as a hexadecimal float, and digests of every log and file
 that a command wrote. ``python -m benchmarks.same_bits compare OLD NEW`` prints a line a command and
-exits with 1 if a result differs. Times, versions and paths of this machine are left out. Keys that
+exits with 1 if a result differs. Times, versions and sentences are left out. Keys that
 only NEW has are no difference. selfmodel itself is never imported here: only its command line, its
 JSON and its logs are used, which stay the same while modules move.
 
@@ -40,8 +40,8 @@ print(selfmodel.__file__, file=sys.stderr)
 print(json.dumps({"mujoco": mujoco.__version__, "numpy": numpy.__version__,
                   "machine": platform.machine()}))
 """
-LEFT_OUT = ("seconds", "mujoco")
-"""Keys of JSON output that are times or versions."""
+LEFT_OUT = ("seconds", "mujoco", "test")
+"""Keys of JSON that are times, versions or sentences."""
 
 TABLE_ONE_KEYS = (
     *("robot", "case", "truth", "comparator", "gap", "seed", "diagnosis", "correct"),
@@ -59,6 +59,9 @@ def main() -> None:
     recording.add_argument("--tree", type=Path, help="working tree to import selfmodel from")
     recording.add_argument("-o", "--out", type=Path, required=True)
     recording.add_argument("--jobs", type=int, default=1, help="scenarios that run at once")
+    recording.add_argument(
+        "--resume", action="store_true", help="keep what FILE.json has of the same version"
+    )
     recording.set_defaults(run=record)
     comparing = commands.add_parser("compare", help="compare two records; exits with 1 or 0")
     comparing.add_argument("old", type=Path, help="a record, or docs/results.jsonl")
@@ -75,8 +78,7 @@ def main() -> None:
 
 
 def record(options: argparse.Namespace) -> None:
-    """Runs the chosen scenarios and writes one JSON file, one command a line."""
-    chosen = tuple(s for s in scenarios() if _is_chosen(s.name, options.only or PARTS[:-1]))
+    """Runs the chosen scenarios; after each, the file has one line for each command so far."""
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
     environment |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
     if options.tree is not None:
@@ -88,13 +90,17 @@ def record(options: argparse.Namespace) -> None:
         machine = subprocess.run(
             ask, cwd=folder, env=environment, check=True, stdout=subprocess.PIPE, text=True
         )
-    items: Items = {MADE_WITH: json.loads(machine.stdout)}
+    items: Items = _read(options.out) if options.resume else {}
+    items[MADE_WITH] = json.loads(machine.stdout)
+    done = {name.partition(":")[0] for name in items}
+    only = options.only or PARTS[:-1]
+    chosen = [s for s in scenarios() if _is_chosen(s.name, only) and s.name not in done]
     with ThreadPoolExecutor(options.jobs) as pool:
         for found in pool.map(partial(_run, python, environment), chosen):
             print(*found, sep="\n", flush=True)
             items |= found
-    lines = (f"{json.dumps(name)}: {json.dumps(item)}" for name, item in items.items())
-    options.out.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
+            lines = (f"{json.dumps(name)}: {json.dumps(item)}" for name, item in items.items())
+            options.out.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
 
 
 def compare(options: argparse.Namespace) -> None:
