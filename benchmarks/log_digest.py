@@ -31,9 +31,9 @@ def log_digests(path: Path) -> dict[str, str]:
         path: A trial log.
 
     Returns:
-        By topic the digest of all decoded messages with their log times; by attachment the digest
-        of its bytes, or of its arrays if it is an ``.npz``; by metadata record the digest of its
-        fields, without those that are digests of whole files.
+        By topic, the digest of all decoded messages with their log times; ``attachments``, the
+        digest of the names, and of the bytes or the arrays of an ``.npz``; ``metadata``, the digest
+        of the records' fields, without those that are digests of whole files.
     """
     hashes: dict[str, hashlib._Hash] = {}
     store = get_typestore(Stores.EMPTY)
@@ -52,14 +52,16 @@ def log_digests(path: Path) -> dict[str, str]:
             for part in _flat(content):
                 hashes[channel.topic].update(part)
         found |= {topic: _short(digest) for topic, digest in sorted(hashes.items())}
-        for attachment in reader.iter_attachments():
-            found[attachment.name] = _attachment(attachment.name, attachment.data)
+        attached = {a.name: _attachment(a.name, a.data) for a in reader.iter_attachments()}
+        found["attachments"] = bytes_digest(repr(sorted(attached.items())).encode())
+        records: dict[str, str] = {}
         for record in reader.iter_metadata():
             if record.name in RECORDS:
                 fields = sorted(
                     item for item in record.metadata.items() if not item[0].endswith("sha256")
                 )
-                found[record.name] = bytes_digest(repr(fields).encode())
+                records[record.name] = bytes_digest(repr(fields).encode())
+        found["metadata"] = bytes_digest(repr(sorted(records.items())).encode())
     return found
 
 

@@ -45,9 +45,12 @@ LEFT_OUT = ("seconds", "mujoco", "test")
 
 TABLE_ONE_KEYS = (
     *("robot", "case", "truth", "comparator", "gap", "seed", "diagnosis", "correct"),
-    *("displacement", "recovery", "physical_trials", "evaluations"),
+    *("displacement", "recovery", "physical_trials"),
 )
 """Keys of a recovery in ``docs/results.jsonl``."""
+
+SEARCHED = ("diagnostic", "distinct_hypotheses")
+"""Keys of its ``evaluations``; the others do not count the gait, which ``table_one`` shares."""
 
 
 def main() -> None:
@@ -90,7 +93,7 @@ def record(options: argparse.Namespace) -> None:
         machine = subprocess.run(
             ask, cwd=folder, env=environment, check=True, stdout=subprocess.PIPE, text=True
         )
-    items: Items = _read(options.out) if options.resume else {}
+    items = _read(options.out) if options.resume and options.out.exists() else {}
     items[MADE_WITH] = json.loads(machine.stdout)
     done = {name.partition(":")[0] for name in items}
     only = options.only or PARTS[:-1]
@@ -99,8 +102,7 @@ def record(options: argparse.Namespace) -> None:
         for found in pool.map(partial(_run, python, environment), chosen):
             print(*found, sep="\n", flush=True)
             items |= found
-            lines = (f"{json.dumps(name)}: {json.dumps(item)}" for name, item in items.items())
-            options.out.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
+            _write(options.out, items)
 
 
 def compare(options: argparse.Namespace) -> None:
@@ -114,8 +116,8 @@ def compare(options: argparse.Namespace) -> None:
         if name not in old or name not in new:
             where = f"only in {options.new if name in new else options.old}"
         else:
-            expected = _table_one_row(new[name]) if options.old.suffix == ".jsonl" else new[name]
-            where = next(_differences(old[name], expected), "")
+            result = _row(new[name]["json"]) if options.old.suffix == ".jsonl" else new[name]
+            where = next(_differences(old[name], result), "")
         different += bool(where)
         print(f"{name}: {f'different: {where}' if where else 'same'}")
     print(f"{len(names) - different} of {len(names)} the same to the last bit")
@@ -164,11 +166,13 @@ def _digests(path: Path) -> Any:  # noqa: ANN401 - JSON
 
 
 def _exact(value: Any) -> Any:  # noqa: ANN401 - JSON
-    """Returns JSON with floats in hexadecimal, and without times and versions."""
+    """Returns JSON with floats in hexadecimal, and lists of floats as digests, less LEFT_OUT."""
     if isinstance(value, dict):
         return {key: _exact(item) for key, item in value.items() if key not in LEFT_OUT}
     if isinstance(value, list):
-        return [_exact(item) for item in value]
+        items = [_exact(item) for item in value]
+        numbers = bool(value) and all(isinstance(item, float) for item in value)
+        return bytes_digest(json.dumps(items).encode()) if numbers else items
     return value.hex() if isinstance(value, float) else value
 
 
@@ -194,16 +198,21 @@ def _read(path: Path) -> Items:
         return found
     rows = [row for row in map(json.loads, text.splitlines()) if "case" in row]
     return {
-        f"{table_one_name(row['robot'], row['case'], row['seed'])}:recover": {
-            "json": _exact({key: row[key] for key in TABLE_ONE_KEYS})
-        }
+        f"{table_one_name(row['robot'], row['case'], row['seed'])}:recover": _row(_exact(row))
         for row in rows
     }
 
 
-def _table_one_row(item: Any) -> Any:  # noqa: ANN401 - JSON
-    """Returns the part of a recorded recovery that ``docs/results.jsonl`` has, too."""
-    return {"json": {key: item["json"].get(key) for key in TABLE_ONE_KEYS}}
+def _write(path: Path, items: Items) -> None:
+    """Writes one line for each command."""
+    lines = (json.dumps({k: v}, separators=(",", ":"))[1:-1] for k, v in items.items())
+    path.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
+
+
+def _row(found: dict[str, Any]) -> dict[str, Any]:
+    """Returns the part of a recovery that a row of ``docs/results.jsonl`` has, too."""
+    searched = {key: found["evaluations"][key] for key in SEARCHED}
+    return {**{key: found[key] for key in TABLE_ONE_KEYS}, "evaluations": searched}
 
 
 if __name__ == "__main__":

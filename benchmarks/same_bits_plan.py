@@ -85,10 +85,10 @@ def _gait(robot: str, number: int) -> tuple[str, str]:
 def _trials() -> Iterator[Scenario]:
     for robot in ROBOTS:
         for case, damage in enumerate(damages(robot), 1):
-            options = ("--damage", damage, "--seed", str(case), *_gait(robot, case))
+            which = ("--damage", damage, "--seed", str(case), *_gait(robot, case))
             name = f"trials/{robot}-case{case:02d}"
-            yield Scenario(name, {"trial": _trial(robot, "trial.mcap", *options)})
-        others = {
+            yield Scenario(name, {"trial": _trial(robot, "trial.mcap", *which)})
+        others: dict[str, tuple[str, ...]] = {
             "network": (),
             "cpg": ("--controller", "cpg"),
             "neurons": ("--neurons", "5"),
@@ -114,17 +114,18 @@ def _diagnoses() -> Iterator[Scenario]:
         yield Scenario(
             f"diagnoses/{robot}",
             {
-                **_before_and_after_commands(before, after),
+                "before": before,
+                "after": after,
                 "default": full,
                 "uncalibrated": (*full, "--no-calibrate"),
                 "without-healthy": ("diagnose", "after.mcap", *COMMON),
             },
         )
-        with_gap = [(*command, "--gap", "0.05") for command in (before, after)]
         yield Scenario(
             f"diagnoses/{robot}-gap",
             {
-                **_before_and_after_commands(*with_gap),
+                "before": (*before, "--gap", "0.05"),
+                "after": (*after, "--gap", "0.05"),
                 "calibrate": ("calibrate", "before.mcap", "--out", "model.xml", *COMMON),
                 "default": full,
             },
@@ -148,12 +149,6 @@ def _before_and_after(robot: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
         _trial(robot, "before.mcap", "--stage", "before", *gait),
         _trial(robot, "after.mcap", "--damage", damages(robot)[6], *gait),
     )
-
-
-def _before_and_after_commands(
-    before: tuple[str, ...], after: tuple[str, ...]
-) -> dict[str, tuple[str, ...]]:
-    return {"before": before, "after": after}
 
 
 def _recover(robot: str, *options: str) -> dict[str, tuple[str, ...]]:
