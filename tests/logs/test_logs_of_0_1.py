@@ -1,7 +1,7 @@
-"""Promises that what version 0.1 wrote is read for good: logs, controllers, models and diagnoses.
+"""Promises that logs, controllers, models and diagnoses written by version 0.1 stay readable.
 
-`tests/data/logs-0.1/README.md` describes the files. `expected.json` has what version 0.1 printed
-about them, a command a line.
+`tests/data/logs-0.1/README.md` describes the files; `expected.json` beside it has the commands and
+the output of version 0.1.
 """
 
 import json
@@ -25,7 +25,7 @@ LEFT_OUT = {"seconds", "running", "test", "driver", "notes"}
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A copy of the files, and a folder for what commands write."""
+    """A copy of the files, and a folder for the output of commands."""
     copy = tmp_path_factory.mktemp("logs") / "data"
     shutil.copytree(DATA, copy)
     (copy / "out").mkdir()
@@ -70,7 +70,7 @@ def messages(log: str) -> list[tuple[str, int, bytes]]:
 
 
 @pytest.mark.parametrize("entry", EXPECTED, ids=lambda entry: " ".join(entry["command"])[:60])
-def test_a_command_prints_what_version_0_1_printed(
+def test_a_command_prints_the_same_as_version_0_1(
     entry: dict, folder: Path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.chdir(folder)
