@@ -62,8 +62,10 @@ def recover(
     # Whatever brings MuJoCo waits until the command runs.
     from selfmodel.cli.output.display import display  # noqa: PLC0415
     from selfmodel.cli.output.report import as_object, print_report  # noqa: PLC0415
+    from selfmodel.controllers.controller import check_silent_neurons  # noqa: PLC0415
     from selfmodel.experiments import plugins as resolve  # noqa: PLC0415
     from selfmodel.experiments.experiment import Experiment, run  # noqa: PLC0415
+    from selfmodel.faults.neuron import silent_neurons  # noqa: PLC0415
     from selfmodel.faults.notation import parse  # noqa: PLC0415
     from selfmodel.faults.registry import known  # noqa: PLC0415
     from selfmodel.logs.files import replace  # noqa: PLC0415
@@ -72,10 +74,10 @@ def recover(
     entry = resolve.robot_entry(robot, model_settings or ())
     considered = resolve.kinds(kinds)
     damaged = resolve.case_notation(entry, case, damage)
-    made = resolve.with_neurons(entry.robot(), neurons, controller)
-    design = resolve.design(controller, made)
+    made = entry.robot()
+    design = resolve.design(controller, made, neurons)
     truth = parse(damaged, made.anatomy, known(considered))
-    resolve.check_neurons(truth, design)
+    check_silent_neurons(design, silent_neurons(truth))
     experiment = Experiment(
         robot=made,
         case=case,

@@ -4,20 +4,16 @@ import hashlib
 import importlib
 import os
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from operator import attrgetter
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 
 from selfmodel.comparators import COMPARATORS
-from selfmodel.controllers.driver import Design, Driver, Evolved
-from selfmodel.controllers.network import Controller, Network
+from selfmodel.controllers.controller import Controller, Design
 from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.kind import FaultKind
-from selfmodel.faults.neuron import SILENT_NEURON
 from selfmodel.faults.registry import ALL_KINDS, KINDS
 from selfmodel.faults.table_one import cases_of
 from selfmodel.logs import LogError, TrialLog, load_controller, read_log
@@ -25,19 +21,13 @@ from selfmodel.logs.files import read_bounded
 from selfmodel.logs.robots import described_difference, the_robot_of
 from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.next_trial import NextTrial, by_disagreement, by_repair
+from selfmodel.robot.designs import DESIGNS
 from selfmodel.robot.mjcf.adaptation import adapt
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings, parse_setting, read_settings
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.robot import with_neurons as neurons_in
 from selfmodel.tasks import Entry, entry
-from selfmodel.trials.behaviour import Names
 from selfmodel.trials.trial import STAGES, Stage, stage_of
-
-DESIGNS: Mapping[str, Callable[[Robot], Design]] = MappingProxyType(
-    {"network": attrgetter("network"), "cpg": attrgetter("cpg")}
-)
-"""The kinds of controller that a repair EA can evolve."""
 
 NEXT_TRIAL: Mapping[str, NextTrial] = MappingProxyType(
     {"repair": by_repair, "disagreement": by_disagreement}
@@ -202,15 +192,21 @@ def _plugged_in(what: str, name: str, known: Iterable[str]) -> object:
         ) from error
 
 
-def design(name: str, robot: Robot) -> Design:
-    """Returns the kind of controller of that name, for a robot.
+def design(name: str, robot: Robot, neurons: int | None = None) -> Design:
+    """Returns the controller design of that name for a robot.
+
+    Args:
+        name: One of ``DESIGNS``.
+        robot: The robot that the design is for.
+        neurons: Number of hidden neurons; the design's default if not given.
 
     Raises:
-        InputError: There is no such kind, or a motor does not say what it may be commanded.
+        InputError: There is no such design, it cannot have that many hidden neurons, or a motor
+            has no command range.
     """
     if name not in DESIGNS:
         raise unknown_name("kind of controller", name, DESIGNS)
-    return DESIGNS[name](robot)
+    return DESIGNS[name](robot, neurons)
 
 
 def score(name: str, robot: str, entry: Entry) -> Score:
@@ -231,40 +227,16 @@ def score(name: str, robot: str, entry: Entry) -> Score:
     return entry.episode_return
 
 
-def with_neurons(robot: Robot, neurons: int | None, design: str) -> Robot:
-    """Returns the robot with that many hidden neurons, or as it is where none are asked for.
-
-    Raises:
-        InputError: They are too many or none, or its controller is to be of a kind without them.
-    """
-    if neurons is None:
-        return robot
-    if design != "network":
-        raise InputError(f"--neurons {neurons} is of a network: leave it out with {design!r}")
-    return neurons_in(robot, neurons)
-
-
-def check_neurons(truth: Hypothesis, driver: Design | Driver) -> None:
-    """Checks that what drives a robot has neurons where one of them is to be silent.
-
-    Raises:
-        InputError: It has none.
-    """
-    if isinstance(driver, Network | Controller):
-        return
-    for fault in truth.faults:
-        if fault.kind is SILENT_NEURON:
-            raise InputError(
-                f"{fault} means nothing to a robot that oscillators drive, which have no hidden "
-                f"neurons: leave it out, or drive the robot with a network"
-            )
-
-
-def controller(path: Path, robot: Robot) -> Evolved:
+def controller(path: Path, robot: Robot, neurons: int | None = None) -> Controller:
     """Returns the controller in a ``.npz`` file or in a trial's log.
 
+    Args:
+        path: The file.
+        robot: The robot that the controller must fit.
+        neurons: Number of hidden neurons that the controller must have; any if not given.
+
     Raises:
-        InputError: The file cannot be read as either, or its controller fits another robot.
+        InputError: The file contains no controller, or one that does not fit.
     """
     try:
         loaded = (
@@ -279,28 +251,21 @@ def controller(path: Path, robot: Robot) -> Evolved:
             f"{path} has no controller, only the commands that were recorded: give the log of a "
             f"robot that selfmodel drove, or a .npz"
         )
-    needed = _described(
-        robot.anatomy.names,
-        f"with {robot.anatomy.neurons} hidden neurons"
-        if isinstance(loaded, Controller)
-        else f"every {robot.control_timestep:g} s",
-    )
-    found = _described(
-        loaded.design,
-        f"with {loaded.network.hidden} hidden neurons"
-        if isinstance(loaded, Controller)
-        else f"every {loaded.cpg.timestep:g} s",
-    )
-    if found != needed:
+    found = loaded.design
+    needed = DESIGNS[found.name](robot, found.hidden or None if neurons is None else neurons)
+    if _connections(found) != _connections(needed):
         raise InputError(
-            f"{path} has a controller for {found}; this robot needs one for {needed}: give one "
-            f"that was made for it"
+            f"{path} has a controller for {_connections(found)}; this robot needs one for "
+            f"{_connections(needed)}: give one that was made for it"
         )
     return loaded
 
 
-def _described(ends: Design | Names, more: str) -> str:
-    return f"the sensors {', '.join(ends.sensors)}, the motors {', '.join(ends.motors)}, {more}"
+def _connections(design: Design) -> str:
+    return (
+        f"the sensors {', '.join(design.sensors)} and the motors {', '.join(design.motors)}, "
+        f"{design.description}"
+    )
 
 
 def logs(paths: Sequence[Path]) -> list[TrialLog]:
