@@ -170,9 +170,7 @@ def test_they_share_no_batch_with_networks_or_with_others_that_are_connected_oth
     with pytest.raises(ValueError, match=r"got 1 x a network of .*; 1 x a CPG of .*; 0 play"):
         make_batch([network, one], [frozenset()] * 2, sensors=8)
     other = Controller(CPG, genomes(1)[0])
-    with pytest.raises(
-        ValueError, match=r"got 1 x a CPG of 8 .*; 1 x a CPG of 2 sensors"
-    ):
+    with pytest.raises(ValueError, match=r"got 1 x a CPG of 8 .*; 1 x a CPG of 2 sensors"):
         make_batch([one, other], [frozenset()] * 2, sensors=8)
 
 
