@@ -64,6 +64,7 @@ def trial(
     from selfmodel.faults.registry import known  # noqa: PLC0415
     from selfmodel.logs import read_log  # noqa: PLC0415
     from selfmodel.logs.writer import write_trial  # noqa: PLC0415
+    from selfmodel.robot.designs import DESIGNS  # noqa: PLC0415
     from selfmodel.settings import Settings  # noqa: PLC0415
     from selfmodel.trials.trial import TrialPlan  # noqa: PLC0415
 
@@ -74,7 +75,7 @@ def trial(
         "intact" if damage is None else damage, made.anatomy, known(resolve.kinds(kinds))
     )
     reality = draw_reality(made, seed, gap, structure=structure)
-    if kind in resolve.DESIGNS:
+    if kind in DESIGNS:
         design = resolve.design(kind, made, neurons)
         driver = Controller(design, draw_genomes(np.random.default_rng(seed), (design.weights,)))
     else:

@@ -252,7 +252,8 @@ def controller(path: Path, robot: Robot, neurons: int | None = None) -> Controll
             f"robot that selfmodel drove, or a .npz"
         )
     found = loaded.design
-    needed = DESIGNS[found.name](robot, found.hidden or None if neurons is None else neurons)
+    hidden = (found.hidden or None) if neurons is None else neurons
+    needed = DESIGNS[found.name](robot, hidden)
     if _connections(found) != _connections(needed):
         raise InputError(
             f"{path} has a controller for {_connections(found)}; this robot needs one for "
