@@ -1,4 +1,5 @@
-"""Limit of the control delay, readable without MuJoCo."""
+"""Limit of the control delay, in a file that needs no MuJoCo."""
 
 MAX_CONTROL_DELAY = 5
-"""Control steps from a command to its effect, at most."""
+"""Largest control delay, in control steps: segments contain that many commands before their
+start."""
