@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
-from selfmodel.comparators.arithmetic import command_errors, command_spans
+from selfmodel.comparators.command_errors import command_errors, command_spans
 from selfmodel.comparators.sensor_noise_level import noise_level_loss
 from selfmodel.errors import InputError
 from selfmodel.simulation.requests import Segments, command_steps, cut_segments

@@ -1,11 +1,11 @@
-"""Promises of the check of a controller's arithmetic: exact, silent where nothing is known."""
+"""Promises of the command errors: exact, and silent where the controller is unknown."""
 
 import dataclasses
 
 import numpy as np
 import pytest
 
-from selfmodel.comparators.arithmetic import command_errors, command_spans
+from selfmodel.comparators.command_errors import command_errors, command_spans
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
 from selfmodel.faults.notation import parse
