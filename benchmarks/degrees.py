@@ -1,6 +1,7 @@
 """How well degrees of faults and environments are found, from the rows of an ablation.
 
-``python -m benchmarks.degrees FOLDER`` prints the tables that ``docs/comparators.md`` has;
+``python -m benchmarks.degrees FOLDER`` prints the tables of
+``docs/results/faults-and-environments.md``;
 ``selfmodel ablate --damages ... --out FOLDER`` makes the rows.
 """
 

@@ -1,7 +1,7 @@
 """Every single fault, recorded as a robot's driver would, imported and diagnosed again.
 
 Run with ``python -m benchmarks.round_trip``; it takes five minutes on two cores, and prints the
-table that ``docs/real-robots.md`` has.
+table that ``docs/results/import.md`` has.
 """
 
 import os

@@ -41,7 +41,7 @@ TOLD_APART_BY_WAY = (1, 2, 3, 5, 6, 9)
 
 
 def main() -> None:
-    """Runs what has not been run yet, and writes docs/results.md."""
+    """Runs what has not been run yet, and writes docs/results/table-one.md."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("runs/table_one"))
     parser.add_argument("--workers", type=int, default=os.cpu_count())
