@@ -16,7 +16,7 @@ mpl.use("Agg")  # a figure in a file needs no display
 
 from matplotlib import pyplot as plt
 
-from selfmodel.cli.suite.rows import SINGLE, Row, Summary, summarise
+from selfmodel.experiments.suite.rows import SINGLE, Row, Summary, summarise
 
 FIGURE = Path("docs/figures/bodies.png")
 

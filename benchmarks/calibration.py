@@ -18,21 +18,21 @@ from typing import Any
 import numpy as np
 
 from benchmarks.onboard import without_base
-from selfmodel.behaviour import collect
-from selfmodel.calibrate import calibrate, prediction_error
-from selfmodel.cli.ablation.bank import gait
-from selfmodel.driver import Evolved
-from selfmodel.gap import Gap, draw_gap, perturbed
-from selfmodel.hypothesis import INTACT
-from selfmodel.parameters import Parameters, with_model, with_parameters
-from selfmodel.physical import SimulatedRobot
-from selfmodel.repair import Repair
-from selfmodel.robot import Robot
+from selfmodel.controllers.driver import Evolved
+from selfmodel.experiments.ablation.bank import gait
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.physical.reality_gap import Gap, draw_gap, perturbed
+from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.recovery.random_streams import gap_stream, repair_stream
+from selfmodel.recovery.repair import Repair
+from selfmodel.robot.parameters import Parameters, with_model, with_parameters
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulator import Simulator
-from selfmodel.streams import gap_stream, repair_stream
+from selfmodel.simulation.calibrate import calibrate, prediction_error
+from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
-from selfmodel.trial import Plan, Trial
+from selfmodel.trials.behaviour import collect
+from selfmodel.trials.trial import Plan, Trial
 
 RESULTS = Path(__file__).with_suffix(".json")
 NO_NOISE = 1e-12

@@ -13,23 +13,24 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from benchmarks.results import Facts
-from selfmodel.behaviour import collect
-from selfmodel.calibrate import calibrate
-from selfmodel.cli.ablation.bank import gait
-from selfmodel.cli.reality import draw_reality
-from selfmodel.comparator import Comparator, Ensemble, Piecewise
 from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT
-from selfmodel.diagnose import Diagnose
-from selfmodel.driver import Evolved
-from selfmodel.evidence import simulate
-from selfmodel.faults import PAPER_KINDS
-from selfmodel.genome import VALUES, decode
-from selfmodel.notation import parse
-from selfmodel.robot import Robot
+from selfmodel.controllers.driver import Evolved
+from selfmodel.diagnosis.comparator import Comparator, Piecewise
+from selfmodel.diagnosis.diagnose import Diagnose
+from selfmodel.diagnosis.evidence import simulate
+from selfmodel.diagnosis.genome import VALUES, decode
+from selfmodel.experiments.ablation.bank import gait
+from selfmodel.experiments.reality import draw_reality
+from selfmodel.faults.notation import parse
+from selfmodel.faults.registry import PAPER_KINDS
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulator import Simulator
+from selfmodel.simulation.calibrate import calibrate
+from selfmodel.simulation.requests import Ensemble
+from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
-from selfmodel.trial import Plan, Stage, Trial
+from selfmodel.trials.behaviour import collect
+from selfmodel.trials.trial import Plan, Stage, Trial
 
 if TYPE_CHECKING:
     from selfmodel.evolution import Generation

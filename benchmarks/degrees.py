@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from math import degrees
 from pathlib import Path
 
-from selfmodel.faults import WORLD, Fault
-from selfmodel.hypothesis import Hypothesis
-from selfmodel.intervals import proportion
-from selfmodel.notation import parse
+from selfmodel.experiments.confidence_intervals import proportion
+from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.faults.kind import WORLD, Fault
+from selfmodel.faults.notation import parse
 from selfmodel.tasks import ROBOTS
 
 ROUGHNESSES = (0.0, 0.02, 0.04)

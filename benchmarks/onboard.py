@@ -16,16 +16,16 @@ from typing import Any
 
 import numpy as np
 
-from selfmodel.calibrate import calibrate
-from selfmodel.cli.ablation.plan import spec
-from selfmodel.cli.ablation.results import write_results
-from selfmodel.cli.ablation.rows import as_objects
-from selfmodel.cli.ablation.run_one import diagnosed, setting_of
-from selfmodel.cli.ablation.scores import Score
-from selfmodel.estimate import BASE
-from selfmodel.grid import GridBegins, Job, PartEnds, finished, run_grid
+from selfmodel.experiments.ablation.plan import spec
+from selfmodel.experiments.ablation.results import write_results
+from selfmodel.experiments.ablation.rows import as_objects
+from selfmodel.experiments.ablation.run_one import diagnosed, setting_of
+from selfmodel.experiments.ablation.scores import Score
+from selfmodel.experiments.grid import GridBegins, Job, PartEnds, finished, run_grid
 from selfmodel.logs.reader import read_log
-from selfmodel.trial import Trial
+from selfmodel.simulation.calibrate import calibrate
+from selfmodel.trials.state_estimation import BASE
+from selfmodel.trials.trial import Trial
 
 COMPARATOR = "segment-prediction-onboard"
 

@@ -15,19 +15,20 @@ from pathlib import Path
 from statistics import median
 from time import perf_counter
 
-from selfmodel.behaviour import Sample
 from selfmodel.comparators import FORWARD_DISPLACEMENT
-from selfmodel.database import Database, Journal
-from selfmodel.diagnosis import Diagnosis
-from selfmodel.driver import Driver
+from selfmodel.controllers.driver import Driver
+from selfmodel.diagnosis.diagnosis import Diagnosis
+from selfmodel.faults.notation import parse
 from selfmodel.logs.journal import open_journal
-from selfmodel.notation import parse
-from selfmodel.physical import PhysicalRobot, SimulatedRobot
-from selfmodel.recover import recover
+from selfmodel.physical.interface import PhysicalRobot
+from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.recovery.database import Database, Journal
+from selfmodel.recovery.recover import recover
 from selfmodel.settings import Settings
-from selfmodel.simulator import Simulator
+from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
-from selfmodel.trial import Plan, Trial
+from selfmodel.trials.behaviour import Sample
+from selfmodel.trials.trial import Plan, Trial
 
 ROUNDS = 5
 

@@ -9,24 +9,24 @@ import tempfile
 from pathlib import Path
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT
-from selfmodel.diagnose import Diagnose
-from selfmodel.driver import Evolved
-from selfmodel.explain import explain
-from selfmodel.faults import PAPER_KINDS
-from selfmodel.hypothesis import INTACT, Hypothesis, canonical
+from selfmodel.controllers.driver import Evolved
+from selfmodel.diagnosis.diagnose import Diagnose
+from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
+from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.logs import TrialLog, read_log
 from selfmodel.logs.robots import robot_of
 from selfmodel.logs.rosbag.importer import import_bag, write_recording
 from selfmodel.logs.rosbag.mapping_file import parse_mapping
 from selfmodel.logs.writer import write_trial
-from selfmodel.physical import SimulatedRobot
-from selfmodel.repair import Repair
-from selfmodel.robot import Robot
+from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.recovery.explain import explain
+from selfmodel.recovery.random_streams import repair_stream
+from selfmodel.recovery.repair import Repair
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulator import Simulator
-from selfmodel.streams import repair_stream
+from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
-from selfmodel.trial import Plan
+from selfmodel.trials.trial import Plan
 from tests.logs.rosbag import driver
 
 SETTINGS = Settings()

@@ -10,11 +10,11 @@ from mujoco import rollout
 
 from benchmarks.results import Facts
 from selfmodel import tasks
-from selfmodel.controller import Controller, draw_weights
-from selfmodel.driver import drive
-from selfmodel.hypothesis import INTACT
-from selfmodel.robot import Robot
-from selfmodel.simulator import Run, Simulator
+from selfmodel.controllers.driver import drive
+from selfmodel.controllers.network import Controller, draw_weights
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.robot.robot import Robot
+from selfmodel.simulation.simulator import Run, Simulator
 
 ROUNDS = 7
 """Rounds of every comparison; its parts take turns, and the medians are compared."""

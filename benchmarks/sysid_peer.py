@@ -16,15 +16,15 @@ import numpy as np
 from absl import logging
 
 from selfmodel.arrays import FloatArray
-from selfmodel.behaviour import Signal
-from selfmodel.calibrate import BOUND, DELAYS, SCALES
-from selfmodel.differences import difference
-from selfmodel.estimate import STATE, estimated_states
-from selfmodel.parameters import Parameters, edited_model, factor_names, from_factors
-from selfmodel.places import places, writer
-from selfmodel.robot import Robot
-from selfmodel.stretches import HORIZON, LEAD, SEGMENTS
-from selfmodel.trial import Trial
+from selfmodel.robot.parameters import Parameters, edited_model, factor_names, from_factors
+from selfmodel.robot.robot import Robot
+from selfmodel.robot.state_access import places, writer
+from selfmodel.simulation.calibrate import BOUND, DELAYS, SCALES
+from selfmodel.simulation.calibration_segments import HORIZON, LEAD, SEGMENTS
+from selfmodel.trials.behaviour import Signal
+from selfmodel.trials.signal_difference import difference
+from selfmodel.trials.state_estimation import STATE, estimated_states
+from selfmodel.trials.trial import Trial
 
 Theirs = Any
 """What mujoco.sysid makes or asks for."""

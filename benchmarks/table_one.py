@@ -23,16 +23,16 @@ import numpy as np
 from benchmarks.results import Facts, write_results
 from benchmarks.walking import walk
 from selfmodel import __version__
-from selfmodel.cli.experiment import Experiment, run
-from selfmodel.cli.report import facts
+from selfmodel.cli.output.report import facts
 from selfmodel.comparators import FORWARD_DISPLACEMENT
-from selfmodel.hypothesis import INTACT
+from selfmodel.experiments.experiment import Experiment, run
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.faults.notation import parse
 from selfmodel.logs import load_controller, save_controller
-from selfmodel.notation import parse
-from selfmodel.repair import Repair
-from selfmodel.robot import Robot
+from selfmodel.recovery.repair import Repair
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulator import Simulator
+from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 
 SEEDS = range(10)

@@ -10,15 +10,15 @@ import numpy as np
 from mcap.reader import make_reader
 from mcap.writer import Writer
 
-from selfmodel.behaviour import Sample
-from selfmodel.controller import Controller, draw_weights
+from selfmodel.controllers.network import Controller, draw_weights
 from selfmodel.logs import read_log
 from selfmodel.logs.contents import read_contents
 from selfmodel.logs.writer import TrialWriter
-from selfmodel.physical import SimulatedRobot
-from selfmodel.robot import Robot
+from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trial import Plan
+from selfmodel.trials.behaviour import Sample
+from selfmodel.trials.trial import Plan
 
 ROUNDS = 7
 

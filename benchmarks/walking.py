@@ -5,10 +5,11 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from selfmodel.driver import Evolved, drive
-from selfmodel.hypothesis import INTACT
-from selfmodel.robot import Robot
-from selfmodel.senses import Senses
+from selfmodel.controllers.driver import Evolved, drive
+from selfmodel.faults.build import build
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.robot.robot import Robot
+from selfmodel.robot.sensing import Senses
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class Walk:
 
 def walk(robot: Robot, controller: Evolved, steps: int) -> Walk:
     """Returns how a controller makes an intact robot walk."""
-    embodiment = robot.build(INTACT)
+    embodiment = build(robot, INTACT)
     model, data = embodiment.model, mujoco.MjData(embodiment.model)
     mujoco.mj_forward(model, data)
     senses = Senses(model, robot.anatomy, [embodiment])

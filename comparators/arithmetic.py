@@ -6,10 +6,10 @@ No physics is needed to judge it, so a difference means something is wrong with 
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.controller import TARGET_RANGE
-from selfmodel.driver import drive
-from selfmodel.playback import Playback
-from selfmodel.trial import Trial
+from selfmodel.controllers.command_range import TARGET_RANGE
+from selfmodel.controllers.driver import drive
+from selfmodel.controllers.playback import Playback
+from selfmodel.trials.trial import Trial
 
 
 def command_errors(trial: Trial) -> FloatArray:

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.behaviour import Behaviour, forward_displacement
-from selfmodel.comparator import ClosedLoop
 from selfmodel.errors import InputError
-from selfmodel.trial import Trial
+from selfmodel.simulation.requests import ClosedLoop
+from selfmodel.trials.behaviour import Behaviour, forward_displacement
+from selfmodel.trials.trial import Trial
 
 
 @dataclass(frozen=True)

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
-from selfmodel.behaviour import Behaviour, Signal
-from selfmodel.comparator import ClosedLoop
 from selfmodel.comparators.bounded import bounded
 from selfmodel.comparators.gait_features import GROUPS, Gait, differences, observed
 from selfmodel.comparators.observed import observed_signals
-from selfmodel.trial import Trial
+from selfmodel.simulation.requests import ClosedLoop
+from selfmodel.trials.behaviour import Behaviour, Signal
+from selfmodel.trials.trial import Trial
 
 SIGNALS: tuple[Signal, ...] = ("sensors", "joint_positions")
 

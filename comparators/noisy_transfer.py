@@ -7,11 +7,11 @@ from types import MappingProxyType
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
-from selfmodel.behaviour import Behaviour, Signal
-from selfmodel.comparator import Ensemble
 from selfmodel.comparators.observed import observed_signals
-from selfmodel.differences import comparable
-from selfmodel.trial import Trial
+from selfmodel.simulation.requests import Ensemble
+from selfmodel.trials.behaviour import Behaviour, Signal
+from selfmodel.trials.signal_difference import comparable
+from selfmodel.trials.trial import Trial
 
 WINDOW = 25
 """Control steps of a window; a window is a piece of the trial."""

@@ -4,9 +4,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from selfmodel.behaviour import Signal
 from selfmodel.errors import InputError
-from selfmodel.trial import Trial
+from selfmodel.trials.behaviour import Signal
+from selfmodel.trials.trial import Trial
 
 
 def observed_signals(

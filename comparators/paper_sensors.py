@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.behaviour import Behaviour, forward_displacement
-from selfmodel.comparator import ClosedLoop
 from selfmodel.comparators.bounded import bounded
 from selfmodel.comparators.sensor_series import SensorSeries
-from selfmodel.trial import Trial
+from selfmodel.simulation.requests import ClosedLoop
+from selfmodel.trials.behaviour import Behaviour, forward_displacement
+from selfmodel.trials.trial import Trial
 
 SHARE = 0.2
 """How much of the distance the displacement makes up."""

@@ -9,14 +9,14 @@ from types import MappingProxyType
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
-from selfmodel.behaviour import Behaviour, Signal
-from selfmodel.comparator import Past, Segments
 from selfmodel.comparators.arithmetic import command_errors, command_spans
 from selfmodel.comparators.trembling import trembling_loss
-from selfmodel.differences import difference
 from selfmodel.errors import InputError
-from selfmodel.estimate import ONBOARD, STATE, estimated_states
-from selfmodel.trial import Trial
+from selfmodel.simulation.requests import Past, Segments
+from selfmodel.trials.behaviour import Behaviour, Signal
+from selfmodel.trials.signal_difference import difference
+from selfmodel.trials.state_estimation import ONBOARD, STATE, estimated_states
+from selfmodel.trials.trial import Trial
 
 LEAD = 5
 """Commands from before a segment that a model with a control delay may need."""

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
-from selfmodel.behaviour import Behaviour, Signal
-from selfmodel.comparator import ClosedLoop
 from selfmodel.comparators.bounded import bounded
 from selfmodel.comparators.observed import observed_signals
-from selfmodel.differences import comparable
-from selfmodel.trial import Trial
+from selfmodel.simulation.requests import ClosedLoop
+from selfmodel.trials.behaviour import Behaviour, Signal
+from selfmodel.trials.signal_difference import comparable
+from selfmodel.trials.trial import Trial
 
 BLOCK = 5
 """Control steps that are averaged before anything is compared: noise and jitter shrink."""

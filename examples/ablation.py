@@ -6,7 +6,7 @@ Usage: python examples/ablation.py FOLDER
 import sys
 from pathlib import Path
 
-from selfmodel.cli.ablation import Ablation, ablate, write_results
+from selfmodel.experiments.ablation import Ablation, ablate, write_results
 from selfmodel.settings import Settings
 
 

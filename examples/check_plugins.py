@@ -10,14 +10,14 @@ import sys
 from heading_comparator import HEADING
 from payload import PAYLOAD
 
-from selfmodel.contract import check_comparator, shown
-from selfmodel.contract_kind import check_kind
-from selfmodel.evidence import simulate
-from selfmodel.hypothesis import INTACT
+from selfmodel.diagnosis.comparator_contract import check_comparator, shown
+from selfmodel.diagnosis.evidence import simulate
+from selfmodel.diagnosis.kind_contract import check_kind
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log
 from selfmodel.logs.robots import the_robot_of
-from selfmodel.notation import parse
-from selfmodel.simulator import Simulator
+from selfmodel.simulation.simulator import Simulator
 
 log = read_log(sys.argv[1])
 robot, trial = the_robot_of([log]), log.trial

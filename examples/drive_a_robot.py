@@ -13,16 +13,16 @@ from pathlib import Path
 import dm_env
 import numpy as np
 
-from selfmodel.behaviour import Signal
-from selfmodel.controller import Controller, draw_weights
-from selfmodel.environment_robot import EnvironmentRobot
+from selfmodel.controllers.network import Controller, draw_weights
 from selfmodel.errors import InputError, TrialError, in_words
-from selfmodel.limits import joint_limits, tilt_limit
 from selfmodel.logs.writer import write_trial
-from selfmodel.robot import Robot
+from selfmodel.physical.environment_robot import EnvironmentRobot
+from selfmodel.physical.safety_limits import joint_limits, tilt_limit
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.tasks import ROBOTS
-from selfmodel.trial import Plan
+from selfmodel.trials.behaviour import Signal
+from selfmodel.trials.trial import Plan
 
 OBSERVED: tuple[Signal, ...] = (
     *("sensors", "joint_positions", "joint_velocities", "base_position", "base_orientation"),

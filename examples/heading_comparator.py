@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
-from selfmodel.behaviour import Behaviour
-from selfmodel.comparator import ClosedLoop
 from selfmodel.errors import InputError
-from selfmodel.trial import Trial
+from selfmodel.simulation.requests import ClosedLoop
+from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.trial import Trial
 
 
 @dataclass(frozen=True)

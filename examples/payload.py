@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import mujoco
 
-from selfmodel.anatomy import Anatomy
-from selfmodel.faults import Fault, Kind, between, grid
+from selfmodel.faults.kind import Fault, Kind, between, grid
+from selfmodel.robot.anatomy import Anatomy
 
 if TYPE_CHECKING:
-    from selfmodel.embodiment import Embodiment
+    from selfmodel.robot.embodiment import Embodiment
 
 
 def load(embodiment: "Embodiment", _anatomy: Anatomy, fault: Fault) -> None:

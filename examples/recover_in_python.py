@@ -7,12 +7,12 @@ import sys
 from pathlib import Path
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT
+from selfmodel.faults.notation import parse
 from selfmodel.logs.journal import open_journal
-from selfmodel.notation import parse
-from selfmodel.physical import SimulatedRobot
-from selfmodel.recover import recover
+from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.recovery.recover import recover
 from selfmodel.settings import Settings
-from selfmodel.simulator import Simulator
+from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 
 

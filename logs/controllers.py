@@ -19,12 +19,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from selfmodel.controller import Network, checked_ranges
-from selfmodel.driver import Design, Evolved
+from selfmodel.controllers.command_range import checked_ranges
+from selfmodel.controllers.cpg import Cpg
+from selfmodel.controllers.driver import Design, Evolved
+from selfmodel.controllers.network import Network
 from selfmodel.errors import InputError
 from selfmodel.logs.errors import LogWriteError
 from selfmodel.logs.files import read_bounded
-from selfmodel.oscillators import Cpg
 
 LARGEST = 2**20
 """Bytes that a controller may have: the paper's have under 3,000."""

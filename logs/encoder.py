@@ -8,7 +8,6 @@ from operator import itemgetter
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.behaviour import SIGNALS, Names, Sample
 from selfmodel.logs.frames import (
     Kinematics,
     body_names,
@@ -17,7 +16,8 @@ from selfmodel.logs.frames import (
     to_micrometres,
 )
 from selfmodel.logs.topics import TIMING, Part, frames_stride, topics, transforms
-from selfmodel.robot import Robot
+from selfmodel.robot.robot import Robot
+from selfmodel.trials.behaviour import SIGNALS, Names, Sample
 
 
 def empty_rows(names: Names, steps: int, *, timed: bool) -> dict[Part, FloatArray]:

@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
-from selfmodel.atomic import part_of, put, sync, sync_folder
 from selfmodel.errors import InputError
+from selfmodel.logs.atomic import part_of, put, sync, sync_folder
 from selfmodel.logs.errors import LogWriteError
 
 

@@ -5,9 +5,9 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.logs.topics import WORLD
-from selfmodel.places import fields_of, writer
-from selfmodel.robot import Robot
-from selfmodel.rotation import product
+from selfmodel.robot.robot import Robot
+from selfmodel.robot.state_access import fields_of, writer
+from selfmodel.trials.rotation import product
 
 _POSITION_XYZW = [0, 1, 2, 4, 5, 6, 3]
 

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from selfmodel.behaviour import SIGNALS, Signal
-from selfmodel.controller import Controller
-from selfmodel.driver import Driver
+from selfmodel.controllers.cpg import Oscillators
+from selfmodel.controllers.driver import Driver
+from selfmodel.controllers.network import Controller
 from selfmodel.logs.contents import Contents, read_contents
 from selfmodel.logs.reader import TrialLog, interpret
 from selfmodel.logs.records import HIDDEN, IMPORT, SALVAGE
-from selfmodel.oscillators import Oscillators
+from selfmodel.trials.behaviour import SIGNALS, Signal
 
 
 @dataclass(frozen=True)

@@ -7,21 +7,22 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, get_args
 
-from selfmodel.anatomy import Anatomy
-from selfmodel.database import Database
-from selfmodel.diagnosis import Candidate, Diagnosis, Outside, Verdict
+from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, Outside, Verdict
 from selfmodel.errors import InputError
-from selfmodel.faults import KINDS, Kind
+from selfmodel.faults.kind import Kind
+from selfmodel.faults.notation import parse
+from selfmodel.faults.registry import KINDS
 from selfmodel.logs.errors import CorruptError, SchemaMismatchError
 from selfmodel.logs.files import replace
 from selfmodel.logs.reader import read_log
 from selfmodel.logs.records import checked_name
 from selfmodel.logs.writer import write_trial
-from selfmodel.notation import parse
-from selfmodel.physical import PhysicalRobot, Timed
-from selfmodel.robot import Robot
+from selfmodel.physical.interface import PhysicalRobot, Timed
+from selfmodel.recovery.database import Database
+from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trial import Plan, Stage, Trial
+from selfmodel.trials.trial import Plan, Stage, Trial
 
 TRIALS = "trials"
 DIAGNOSES = "diagnoses.json"
@@ -32,7 +33,9 @@ EVERY_KIND = tuple(KINDS.values())
 
 @dataclass(frozen=True, eq=False)
 class FolderJournal:
-    """Keeps a recovery in a folder; see ``selfmodel.database.Journal``. ``open_journal`` makes it.
+    """Keeps a recovery in a folder; ``open_journal`` makes it.
+
+    See ``selfmodel.recovery.database.Journal``.
 
     Attributes:
         folder: ``trials/NAME.mcap`` for each trial, and ``diagnoses.json``.

@@ -7,7 +7,7 @@ from pathlib import Path
 from mcap.writer import CompressionType, Writer
 
 import selfmodel
-from selfmodel.atomic import part_of, sync
+from selfmodel.logs.atomic import part_of, sync
 from selfmodel.logs.files import create_part, explained, publish
 from selfmodel.logs.records import MEDIA_TYPES, with_digest
 from selfmodel.logs.schemas import schema_text

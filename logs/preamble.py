@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 
 import selfmodel
+from selfmodel.controllers.playback import Playback
 from selfmodel.logs.controllers import controller_bytes
 from selfmodel.logs.logfile import LogFile
 from selfmodel.logs.records import (
@@ -29,10 +30,9 @@ from selfmodel.logs.records import (
 )
 from selfmodel.logs.topics import DESCRIPTION, DESCRIPTION_TYPE, description
 from selfmodel.logs.urdf import urdf
-from selfmodel.playback import Playback
-from selfmodel.robot import Robot
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trial import Plan
+from selfmodel.trials.trial import Plan
 
 
 def write_preamble(

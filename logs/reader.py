@@ -7,8 +7,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from selfmodel.behaviour import Behaviour
-from selfmodel.driver import Driver, Evolved
+from selfmodel.controllers.driver import Driver, Evolved
+from selfmodel.controllers.playback import played_back
 from selfmodel.errors import InputError
 from selfmodel.logs.contents import Contents, read_contents
 from selfmodel.logs.controllers import parse_controller
@@ -47,9 +47,9 @@ from selfmodel.logs.records import (
 )
 from selfmodel.logs.signals import read_behaviour
 from selfmodel.logs.timing import Timing, read_timing
-from selfmodel.playback import played_back
 from selfmodel.settings import Settings
-from selfmodel.trial import Plan, Trial
+from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.trial import Plan, Trial
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,8 +171,8 @@ def read_gap(path: str | Path) -> dict[str, Any] | None:
     This is for scoring. Nothing that diagnoses may call it.
 
     Returns:
-        The numbers of a ``selfmodel.gap.Gap``, and under ``structure`` those of a
-        ``selfmodel.structure.Structure`` or None; None where no gap is told.
+        The numbers of a ``selfmodel.physical.reality_gap.Gap``, and under ``structure`` those of a
+        ``selfmodel.physical.structural_mismatch.Structure`` or None; None where no gap is told.
 
     Raises:
         LogError: The file is damaged, or what it says is no gap.

@@ -11,7 +11,7 @@ from typing import Any
 
 from selfmodel.errors import InputError
 from selfmodel.settings import Settings
-from selfmodel.trial import STAGES, Stage, stage_of
+from selfmodel.trials.trial import STAGES, Stage, stage_of
 
 FORMAT = "1"
 """The version of the log's format; a reader refuses others."""

@@ -9,13 +9,7 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Metadata, Schema
 
 from selfmodel.logs.budget import Budget, ExcessError
-from selfmodel.logs.contents import (
-    FILE_LIMIT,
-    Contents,
-    Messages,
-    messages_of,
-    read_bytes,
-)
+from selfmodel.logs.contents import FILE_LIMIT, Contents, Messages, messages_of, read_bytes
 from selfmodel.logs.errors import ANOTHER, CorruptError, NotMcapError, UnsupportedError
 from selfmodel.logs.framing import (
     FAILURES,

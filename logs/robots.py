@@ -5,13 +5,13 @@ from contextlib import contextmanager
 
 import mujoco
 
-from selfmodel.behaviour import Names
 from selfmodel.errors import InputError
 from selfmodel.logs.errors import SchemaMismatchError
 from selfmodel.logs.reader import TrialLog
-from selfmodel.mjcf import MOST_SUBSTEPS
-from selfmodel.robot import Robot
-from selfmodel.untrusted import checked_model
+from selfmodel.robot.mjcf.adaptation import MOST_SUBSTEPS
+from selfmodel.robot.mjcf.untrusted import checked_model
+from selfmodel.robot.robot import Robot
+from selfmodel.trials.behaviour import Names
 
 GOOD = "what was observed reads well"
 

@@ -7,9 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from selfmodel.atomic import part_of
-from selfmodel.behaviour import forward_displacement
 from selfmodel.errors import InputError
+from selfmodel.logs.atomic import part_of
 from selfmodel.logs.budget import RECORD_LIMIT, UNPACKED_LIMIT
 from selfmodel.logs.contents import Contents, Messages
 from selfmodel.logs.errors import CorruptError, LogError, SchemaMismatchError
@@ -33,6 +32,7 @@ from selfmodel.logs.rescue import rescue
 from selfmodel.logs.signals import read_behaviour, read_names
 from selfmodel.logs.topics import DESCRIPTION, TIMING, TRANSFORMS, Topic, frames_stride, topics
 from selfmodel.settings import Settings
+from selfmodel.trials.behaviour import forward_displacement
 
 
 @dataclass(frozen=True)

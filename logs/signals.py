@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 
 from selfmodel.arrays import FloatArray, frozen
-from selfmodel.behaviour import SIGNALS, Behaviour, Names, Signal
-from selfmodel.driver import Evolved
+from selfmodel.controllers.driver import Evolved
 from selfmodel.logs.cdr import names_of
 from selfmodel.logs.contents import Contents, Messages
 from selfmodel.logs.errors import CorruptError, SchemaMismatchError
 from selfmodel.logs.records import TrialRecord
 from selfmodel.logs.topics import Part, Topic, topics
+from selfmodel.trials.behaviour import SIGNALS, Behaviour, Names, Signal
 
 
 def read_behaviour(

@@ -7,8 +7,8 @@ from typing import Literal
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.behaviour import Names, Signal
 from selfmodel.logs.cdr import Layout, Template
+from selfmodel.trials.behaviour import Names, Signal
 
 WORLD = "world"
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.logs.frames import body_names
-from selfmodel.robot import Robot
+from selfmodel.robot.robot import Robot
 
 _JOINTS = {
     int(mujoco.mjtJoint.mjJNT_HINGE): "revolute",

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from selfmodel.logs.errors import SchemaMismatchError
 from selfmodel.logs.reader import TrialLog, read_log
-from selfmodel.untrusted import checked_model
+from selfmodel.robot.mjcf.untrusted import checked_model
 
 
 def verify(path: Path) -> tuple[TrialLog, bool]:

@@ -7,21 +7,21 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from selfmodel.atomic import part_of
-from selfmodel.behaviour import Names, Sample
-from selfmodel.driver import Driver
-from selfmodel.ending import Ending
+from selfmodel.controllers.driver import Driver
+from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError, in_words
+from selfmodel.logs.atomic import part_of
 from selfmodel.logs.encoder import Encoder, empty_rows, parts_of
 from selfmodel.logs.errors import IncompleteError, salvage_it
 from selfmodel.logs.files import explained
 from selfmodel.logs.logfile import LogFile
 from selfmodel.logs.preamble import write_preamble
 from selfmodel.logs.records import FINISHED, RESULT, STOPPED, Imported, Result, checked_name
-from selfmodel.playback import Playback
-from selfmodel.robot import Robot
+from selfmodel.physical.cleanup import Ending
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trial import Plan
+from selfmodel.trials.behaviour import Names, Sample
+from selfmodel.trials.trial import Plan
 
 FLUSH_STEPS = 50
 """How many steps a kill can cost at most. It makes the file 1 % larger than never flushing."""
@@ -48,7 +48,7 @@ def write_trial(
         samples: What happens, as it happens; not more than the plan's steps are asked for, and what
             has ``close``, as a generator has, is closed before the log is, which stops the robot.
             To look at them on their way, use ``TrialWriter``: a ``map`` over a generator has none.
-        timed: Whether the robot is ``selfmodel.physical.Timed``: its samples have moments.
+        timed: Whether the robot is ``physical.interface.Timed``: its samples have moments.
         settings: The paper's numbers, for the record.
         hidden: What is wrong with a simulated robot, in notation; for ``read_truth`` only.
         gap: How else it differs from its model, as JSON; for ``read_gap`` only.

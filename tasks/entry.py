@@ -4,10 +4,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from selfmodel.hypothesis import Hypothesis
-from selfmodel.physical import PhysicalRobot
-from selfmodel.robot import Robot
-from selfmodel.score import Score
+from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.physical.interface import PhysicalRobot
+from selfmodel.recovery.fitness import Score
+from selfmodel.robot.robot import Robot
 
 if TYPE_CHECKING:
     from dm_control.rl import control

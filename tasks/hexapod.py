@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 from dm_control.utils import containers
 
-from selfmodel.robot import Robot
+from selfmodel.robot.robot import Robot
 
 if TYPE_CHECKING:
     import numpy as np
     from dm_control.rl import control
 
-    from selfmodel.hypothesis import Hypothesis
+    from selfmodel.faults.hypothesis import Hypothesis
 
 CONTROL_TIMESTEP = 0.01
 """Seconds between two commands."""

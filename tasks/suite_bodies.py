@@ -6,10 +6,12 @@ from collections.abc import Mapping
 from functools import lru_cache, partial
 from typing import Any
 
-from selfmodel.cases import cases_of
 from selfmodel.errors import unknown_name
-from selfmodel.mjcf import MjcfSettings, adapt_text
-from selfmodel.robot import Robot
+from selfmodel.faults.table_one import cases_of
+from selfmodel.robot.mjcf.adaptation import adapt_text
+from selfmodel.robot.mjcf.load import robot_from
+from selfmodel.robot.mjcf.settings import MjcfSettings
+from selfmodel.robot.robot import Robot
 from selfmodel.tasks.entry import Entry
 from selfmodel.tasks.suite_environment import SuiteRobot, episode_return
 
@@ -84,7 +86,7 @@ def robot(domain: str, task: str) -> Robot:
         keyframe, text = _FORWARD, text.replace("</mujoco>", _swimmers_start(_links(task)))
     settings = MjcfSettings(keyframe=keyframe, control_timestep=control_timestep(domain))
     named = name(domain, task)
-    return Robot.from_adapted(adapt_text(named, text, assets, settings), named)
+    return robot_from(adapt_text(named, text, assets, settings), named)
 
 
 def control_timestep(domain: str) -> float | None:

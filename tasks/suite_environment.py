@@ -9,19 +9,20 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from selfmodel.activations import activations_of
 from selfmodel.arrays import FloatArray
-from selfmodel.behaviour import SIGNALS, Behaviour, Sample, Signal
-from selfmodel.driver import Driver
-from selfmodel.embodiment import Embodiment
-from selfmodel.environment_robot import EnvironmentRobot
-from selfmodel.hypothesis import Hypothesis
-from selfmodel.mjcf.mujoco_errors import told_by_mujoco
-from selfmodel.physical import OWN_SEED
-from selfmodel.places import places, present, writer
-from selfmodel.robot import Robot
-from selfmodel.score import Score
-from selfmodel.senses import Senses
+from selfmodel.controllers.driver import Driver
+from selfmodel.faults.build import build
+from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.physical.environment_robot import EnvironmentRobot
+from selfmodel.physical.simulated_robot import OWN_SEED
+from selfmodel.recovery.fitness import Score
+from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.mjcf.mujoco_errors import told_by_mujoco
+from selfmodel.robot.robot import Robot
+from selfmodel.robot.sensing import Senses
+from selfmodel.robot.state_access import places, present, writer
+from selfmodel.simulation.activations import activations_of
+from selfmodel.trials.behaviour import SIGNALS, Behaviour, Sample, Signal
 
 STATE: tuple[Signal, ...] = (
     "joint_positions",
@@ -47,7 +48,7 @@ class SuiteRobot:
     """
 
     def __init__(self, domain: str, task: str, robot: Robot, hidden: Hypothesis) -> None:
-        embodiment = robot.build(hidden, OWN_SEED)
+        embodiment = build(robot, hidden, OWN_SEED)
         physics, rewarding = episode_parts(domain, task)
         stepped = _Stepped(rewarding, robot, embodiment)
         control = importlib.import_module("dm_control.rl.control")
@@ -132,7 +133,7 @@ def episode_return(domain: str, task: str) -> Score:
 
     def of(robot: Robot, hypothesis: Hypothesis, behaviour: Behaviour) -> FloatArray:
         make, rewarding = episode_parts(domain, task)
-        physics = make(robot.build(hypothesis).model)
+        physics = make(build(robot, hypothesis).model)
         runs = range(len(behaviour["commands"]))
         return np.array([_sum(robot, physics, rewarding, behaviour, run) for run in runs])
 

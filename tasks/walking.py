@@ -11,13 +11,14 @@ from dm_control.rl import control
 from dm_control.suite import base
 
 from selfmodel.arrays import FloatArray
-from selfmodel.behaviour import Signal
-from selfmodel.embodiment import Embodiment
-from selfmodel.hypothesis import Hypothesis
-from selfmodel.notation import parse
-from selfmodel.places import places, present
-from selfmodel.robot import Robot
-from selfmodel.senses import Senses
+from selfmodel.faults.build import build
+from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.faults.notation import parse
+from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.robot import Robot
+from selfmodel.robot.sensing import Senses
+from selfmodel.robot.state_access import places, present
+from selfmodel.trials.behaviour import Signal
 
 
 def environment(
@@ -41,7 +42,7 @@ def environment(
     """
     if isinstance(hypothesis, str):
         hypothesis = parse(hypothesis, robot.anatomy)
-    embodiment = robot.build(hypothesis)
+    embodiment = build(robot, hypothesis)
     return control.Environment(
         mujoco.Physics.from_model(core.MjModel(embodiment.model)),
         Walk(robot, embodiment, random),

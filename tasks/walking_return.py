@@ -1,10 +1,10 @@
 """The return of our own walking task."""
 
 from selfmodel.arrays import FloatArray
-from selfmodel.behaviour import Behaviour, forward_displacement
-from selfmodel.hypothesis import Hypothesis
-from selfmodel.robot import Robot
-from selfmodel.score import Score
+from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.recovery.fitness import Score
+from selfmodel.robot.robot import Robot
+from selfmodel.trials.behaviour import Behaviour, forward_displacement
 
 
 def _speeds(robot: Robot, _hypothesis: Hypothesis, behaviour: Behaviour) -> FloatArray:

@@ -13,16 +13,16 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-from selfmodel.behaviour import Signal
-from selfmodel.controller import Controller, draw_weights
-from selfmodel.hypothesis import Hypothesis
-from selfmodel.notation import parse
-from selfmodel.oscillators import Oscillators
-from selfmodel.robot import Robot
-from selfmodel.simulator import Simulator
+from selfmodel.controllers.cpg import Oscillators
+from selfmodel.controllers.network import Controller, draw_weights
+from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.faults.notation import parse
+from selfmodel.robot.robot import Robot
+from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
-from selfmodel.trial import Trial
-from tests.command import SMALL, selfmodel
+from selfmodel.trials.behaviour import Signal
+from selfmodel.trials.trial import Trial
+from tests.helpers.command import SMALL, selfmodel
 
 settings.register_profile("unhurried", deadline=None)  # a busy machine is no bug
 settings.load_profile("unhurried")

@@ -7,8 +7,8 @@ import pytest
 
 from selfmodel.errors import InputError
 from selfmodel.evolution import Evolution, Generation, evolve
-from selfmodel.memo import Memo
 from selfmodel.settings import Settings
+from selfmodel.simulation.cache import Memo
 
 LENGTH = 12
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from selfmodel.arrays import FloatArray, frozen
-from selfmodel.behaviour import SIGNALS, Behaviour, Sample, Signal
-from selfmodel.driver import Evolved
+from selfmodel.controllers.driver import Evolved
+from selfmodel.controllers.playback import Playback
 from selfmodel.logs.records import Imported
 from selfmodel.logs.rosbag.bag import Source, open_bag
 from selfmodel.logs.rosbag.checks import check_columns, check_names, check_topics
@@ -27,10 +27,10 @@ from selfmodel.logs.rosbag.signals import (
 )
 from selfmodel.logs.rosbag.tracks import Tracks, read_tracks, required
 from selfmodel.logs.writer import write_trial
-from selfmodel.playback import Playback
-from selfmodel.robot import Robot
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trial import Plan
+from selfmodel.trials.behaviour import SIGNALS, Behaviour, Sample, Signal
+from selfmodel.trials.trial import Plan
 
 LONGEST = 1_000_000
 """Control steps that an import may have: one wrong stamp must not fill the memory."""

@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import Literal
 
 from selfmodel.logs.rosbag.tables import Document
-from selfmodel.trial import Stage
+from selfmodel.trials.trial import Stage
 
 ANGLES: Mapping[str, float] = MappingProxyType({"rad": 1.0, "deg": math.pi / 180})
 LENGTHS: Mapping[str, float] = MappingProxyType({"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0})

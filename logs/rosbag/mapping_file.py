@@ -19,7 +19,7 @@ from selfmodel.logs.rosbag.mapping import (
     Touch,
 )
 from selfmodel.logs.rosbag.tables import Table, parse_document
-from selfmodel.trial import STAGES
+from selfmodel.trials.trial import STAGES
 
 LARGEST = 2**20
 """Bytes that a mapping may have."""

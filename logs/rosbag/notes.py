@@ -4,10 +4,10 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from selfmodel.behaviour import Behaviour
 from selfmodel.logs.rosbag.mapping import BagMapping
 from selfmodel.logs.rosbag.quality import Quality
-from selfmodel.robot import Robot
+from selfmodel.robot.robot import Robot
+from selfmodel.trials.behaviour import Behaviour
 
 APART = 0.1
 """A joint that starts further than this from the model's start pose is told of, rad."""

@@ -10,12 +10,7 @@ from numpy.typing import NDArray
 from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.logs.errors import CorruptError, UnsupportedError
 from selfmodel.logs.rosbag.bag import Bag, Topic
-from selfmodel.logs.rosbag.messages import (
-    RefusedError,
-    Rows,
-    UndecodableError,
-    read_message,
-)
+from selfmodel.logs.rosbag.messages import RefusedError, Rows, UndecodableError, read_message
 
 IntArray = NDArray[np.int64]
 

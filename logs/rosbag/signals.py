@@ -5,15 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from selfmodel.anatomy import Anatomy
 from selfmodel.arrays import FloatArray
-from selfmodel.behaviour import Signal
 from selfmodel.logs.rosbag.clock import Track
 from selfmodel.logs.rosbag.resample import angles, hold, linear, reach, slerp
 from selfmodel.logs.rosbag.series import IntArray
 from selfmodel.logs.rosbag.tracks import Tracks
 from selfmodel.logs.rosbag.turning import rotated, turned, unyaw
-from selfmodel.robot import Robot
+from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.robot import Robot
+from selfmodel.trials.behaviour import Signal
 
 Interpolation = Callable[[FloatArray, FloatArray, FloatArray, float], FloatArray]
 

@@ -11,7 +11,7 @@ from selfmodel.logs.rosbag.likeness import Guess, matched
 from selfmodel.logs.rosbag.mapping import UNKNOWN, RoleKind
 from selfmodel.logs.rosbag.messages import ARRAY, JOINT_STATE, NUMBERS, ODOMETRY, WRENCH
 from selfmodel.logs.rosbag.series import Series, read_series
-from selfmodel.robot import Robot
+from selfmodel.robot.robot import Robot
 
 _COMMANDED = ("command", "cmd", "target", "desired", "setpoint", "goal", "reference")
 

@@ -8,7 +8,7 @@ from selfmodel.cli import logs, suite
 from selfmodel.cli.ablate import ablate
 from selfmodel.cli.calibrate import calibrate
 from selfmodel.cli.diagnose import diagnose
-from selfmodel.cli.plain import plain
+from selfmodel.cli.output.plain import plain
 from selfmodel.cli.recover import recover
 from selfmodel.cli.render import render
 from selfmodel.cli.replay import replay

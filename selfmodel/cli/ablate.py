@@ -16,9 +16,9 @@ from selfmodel.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from selfmodel.cli.ablation import Results
-    from selfmodel.cli.ablation.scores import Score
-    from selfmodel.intervals import Interval
+    from selfmodel.experiments.ablation import Results
+    from selfmodel.experiments.ablation.scores import Score
+    from selfmodel.experiments.confidence_intervals import Interval
 
 
 def ablate(
@@ -71,11 +71,13 @@ def ablate(
 ) -> None:
     """Compare comparators on the same trials: robots x cases x gaps x seeds, with intervals."""
     # Whatever brings MuJoCo waits until the command runs.
-    from selfmodel.cli import grid_command, lists, resolve  # noqa: PLC0415
-    from selfmodel.cli.ablation import Ablation, write_results  # noqa: PLC0415
-    from selfmodel.cli.ablation import ablate as run  # noqa: PLC0415
-    from selfmodel.cli.ablation.results import as_object  # noqa: PLC0415
+    from selfmodel.cli import lists  # noqa: PLC0415
+    from selfmodel.cli.output import grid_command  # noqa: PLC0415
     from selfmodel.comparators import COMPARATORS  # noqa: PLC0415
+    from selfmodel.experiments import plugins as resolve  # noqa: PLC0415
+    from selfmodel.experiments.ablation import Ablation, write_results  # noqa: PLC0415
+    from selfmodel.experiments.ablation import ablate as run  # noqa: PLC0415
+    from selfmodel.experiments.ablation.results import as_object  # noqa: PLC0415
     from selfmodel.settings import Settings  # noqa: PLC0415
     from selfmodel.tasks import ROBOTS  # noqa: PLC0415
 
@@ -112,7 +114,7 @@ def ablate(
 
 
 def _print(results: "Results") -> None:
-    from selfmodel.cli.tables import show  # noqa: PLC0415  # only where a table is drawn
+    from selfmodel.cli.output.tables import show  # noqa: PLC0415  # only where a table is drawn
 
     ends = {score.trials for score in results.scores}
     rows = [_texts(score) for score in results.scores if score.trials in (min(ends), max(ends))]

@@ -11,7 +11,7 @@ from selfmodel.cli.options import Json, LogFiles, RobotOrModel, Threads
 from selfmodel.errors import InputError
 
 if TYPE_CHECKING:
-    from selfmodel.robot import Robot
+    from selfmodel.robot.robot import Robot
 
 
 def calibrate(
@@ -33,10 +33,10 @@ def calibrate(
     model. What is written is a model for --robot of diagnose and replay.
     """
     # Whatever brings MuJoCo waits until the command runs.
-    from selfmodel.calibrate import calibrate as fit_to  # noqa: PLC0415
-    from selfmodel.cli import resolve  # noqa: PLC0415
+    from selfmodel.experiments import plugins as resolve  # noqa: PLC0415
     from selfmodel.logs.files import create_part, explained, publish, refuse_existing  # noqa: PLC0415
-    from selfmodel.parameters import factor_names  # noqa: PLC0415
+    from selfmodel.robot.parameters import factor_names  # noqa: PLC0415
+    from selfmodel.simulation.calibrate import calibrate as fit_to  # noqa: PLC0415
 
     start = perf_counter()
     if out.suffix.lower() != ".xml":
@@ -82,8 +82,8 @@ def _refuse_assets(robot: "Robot", where: str) -> None:
 
 
 def _print(result: dict[str, Any]) -> None:
-    from selfmodel.cli.plain import plain  # noqa: PLC0415  # only where it is printed
-    from selfmodel.cli.tables import show  # noqa: PLC0415  # the same
+    from selfmodel.cli.output.plain import plain  # noqa: PLC0415  # only where it is printed
+    from selfmodel.cli.output.tables import show  # noqa: PLC0415  # the same
 
     rows = [
         (plain(one["name"]), "1", f"{one['factor']:.3f}", f"± {100 * one['deviation']:.1f} %")

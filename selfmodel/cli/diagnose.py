@@ -45,13 +45,13 @@ def diagnose(
     how the robot moves with nothing wrong: the self-model is fitted to them.
     """
     # Whatever brings MuJoCo waits until the command runs.
-    from selfmodel.cli import resolve  # noqa: PLC0415
-    from selfmodel.cli.display import display  # noqa: PLC0415
-    from selfmodel.cli.fitting import calibration_values, fitted  # noqa: PLC0415
-    from selfmodel.cli.ranking import as_values, sureness  # noqa: PLC0415
-    from selfmodel.diagnose import Diagnose  # noqa: PLC0415
-    from selfmodel.explain import explain  # noqa: PLC0415
-    from selfmodel.simulator import Simulator  # noqa: PLC0415
+    from selfmodel.cli.output.display import display  # noqa: PLC0415
+    from selfmodel.cli.output.ranking import as_values, sureness  # noqa: PLC0415
+    from selfmodel.diagnosis.diagnose import Diagnose  # noqa: PLC0415
+    from selfmodel.experiments import plugins as resolve  # noqa: PLC0415
+    from selfmodel.experiments.fitting import calibration_values, fitted  # noqa: PLC0415
+    from selfmodel.recovery.explain import explain  # noqa: PLC0415
+    from selfmodel.simulation.simulator import Simulator  # noqa: PLC0415
 
     start = perf_counter()
     judge = resolve.comparator(comparator)
@@ -69,7 +69,7 @@ def diagnose(
         typer.echo(f"note: {note}", err=True)
     with display() as watch:
         if fit:
-            watch(fit.summary)
+            watch(fit)
         diagnosis = explain([log.trial for log in used], search, chosen, watch)
     result = {
         "robot": model.name,
@@ -94,7 +94,7 @@ def diagnose(
 
 
 def _is_played_back(log: "TrialLog") -> bool:
-    from selfmodel.playback import Playback  # noqa: PLC0415  # with the other work
+    from selfmodel.controllers.playback import Playback  # noqa: PLC0415  # with the other work
 
     return isinstance(log.trial.plan.controller, Playback)
 
@@ -128,8 +128,8 @@ def _since_the_failure(logs: "list[TrialLog]") -> "list[TrialLog]":
 def _print(result: dict[str, Any]) -> None:
     from rich.console import Console  # noqa: PLC0415  # only where a table is drawn
 
-    from selfmodel.cli.plain import plain  # noqa: PLC0415  # the same
-    from selfmodel.cli.ranking import in_words, ranking_table  # noqa: PLC0415  # the same
+    from selfmodel.cli.output.plain import plain  # noqa: PLC0415  # the same
+    from selfmodel.cli.output.ranking import in_words, ranking_table  # noqa: PLC0415  # the same
 
     Console(markup=False).print(ranking_table(result["diagnosis"]))
     count = len(result["logs"])

@@ -6,8 +6,8 @@ from typing import Annotated
 import typer
 
 from selfmodel.errors import InputError
-from selfmodel.faults import ALL_KINDS, PAPER_KINDS
-from selfmodel.trial import STAGES
+from selfmodel.faults.registry import ALL_KINDS, PAPER_KINDS
+from selfmodel.trials.trial import STAGES
 
 RobotName = Annotated[
     str,

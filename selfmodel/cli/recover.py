@@ -60,13 +60,13 @@ def recover(
 ) -> None:
     """Recover a robot from a failure: diagnose it from logged trials, evolve a controller."""
     # Whatever brings MuJoCo waits until the command runs.
-    from selfmodel.cli import resolve  # noqa: PLC0415
-    from selfmodel.cli.display import display  # noqa: PLC0415
-    from selfmodel.cli.experiment import Experiment, run  # noqa: PLC0415
-    from selfmodel.cli.report import as_object, print_report  # noqa: PLC0415
-    from selfmodel.faults import known  # noqa: PLC0415
+    from selfmodel.cli.output.display import display  # noqa: PLC0415
+    from selfmodel.cli.output.report import as_object, print_report  # noqa: PLC0415
+    from selfmodel.experiments import plugins as resolve  # noqa: PLC0415
+    from selfmodel.experiments.experiment import Experiment, run  # noqa: PLC0415
+    from selfmodel.faults.notation import parse  # noqa: PLC0415
+    from selfmodel.faults.registry import known  # noqa: PLC0415
     from selfmodel.logs.files import replace  # noqa: PLC0415
-    from selfmodel.notation import parse  # noqa: PLC0415
     from selfmodel.settings import Settings  # noqa: PLC0415
 
     entry = resolve.robot_entry(robot, model_settings or ())

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from selfmodel.cli.rendering.film import Film
-    from selfmodel.hypothesis import Hypothesis
+    from selfmodel.faults.hypothesis import Hypothesis
     from selfmodel.logs import TrialLog
-    from selfmodel.robot import Robot
+    from selfmodel.robot.robot import Robot
 
 STRIPS = (".png", ".svg", ".pdf")
 """Endings of a strip of pictures."""
@@ -81,12 +81,12 @@ def render(
         raise InputError("expected --hypothesis or --diagnosis, got both: leave one out")
     gl = _choose_gl(out, stick=stick)
     # Whatever brings MuJoCo waits until it is known what draws.
-    from selfmodel.cli import resolve  # noqa: PLC0415
     from selfmodel.cli.rendering.diagnosed import diagnosed  # noqa: PLC0415
-    from selfmodel.faults import known  # noqa: PLC0415
+    from selfmodel.experiments import plugins as resolve  # noqa: PLC0415
+    from selfmodel.faults.notation import parse  # noqa: PLC0415
+    from selfmodel.faults.registry import known  # noqa: PLC0415
     from selfmodel.logs.errors import LogWriteError  # noqa: PLC0415
     from selfmodel.logs.files import replace  # noqa: PLC0415
-    from selfmodel.notation import parse  # noqa: PLC0415
 
     if diagnosis is not None:
         hypothesis = diagnosed(diagnosis)
@@ -160,8 +160,8 @@ def _filmed(
 
     from selfmodel.cli.rendering.film import evenly, film_of  # noqa: PLC0415
     from selfmodel.cli.rendering.video import RATE  # noqa: PLC0415
-    from selfmodel.replay import replay  # noqa: PLC0415
-    from selfmodel.simulator import Simulator  # noqa: PLC0415
+    from selfmodel.simulation.replay import replay  # noqa: PLC0415
+    from selfmodel.simulation.simulator import Simulator  # noqa: PLC0415
 
     logged = log.trial.behaviour
     found = replay(log.trial, assumed, Simulator(robot, threads))
@@ -223,7 +223,7 @@ def _watched(frames: "Iterable[NDArray[np.uint8]]", total: int) -> "Iterator[NDA
 
 
 def _print(result: dict[str, Any]) -> None:
-    from selfmodel.cli.plain import plain  # noqa: PLC0415  # only where it is printed
+    from selfmodel.cli.output.plain import plain  # noqa: PLC0415  # only where it is printed
 
     typer.echo(
         plain(

@@ -10,9 +10,9 @@ import typer
 from selfmodel.cli.options import Json, NamedKinds, RobotOrModel, Threads
 
 if TYPE_CHECKING:
-    from selfmodel.behaviour import Signal
     from selfmodel.logs import TrialLog
-    from selfmodel.replay import Replay
+    from selfmodel.simulation.replay import Replay
+    from selfmodel.trials.behaviour import Signal
 
 TOLERANCE = 1e-6
 """By how much numbers may differ and count as the same between versions of MuJoCo, or after
@@ -52,13 +52,13 @@ def replay(
     # Whatever brings MuJoCo waits until the command runs.
     import mujoco  # noqa: PLC0415
 
-    from selfmodel.behaviour import SIGNALS  # noqa: PLC0415
-    from selfmodel.cli import resolve  # noqa: PLC0415
     from selfmodel.cli.replay_figure import check_figure, draw  # noqa: PLC0415
-    from selfmodel.faults import known  # noqa: PLC0415
-    from selfmodel.notation import parse  # noqa: PLC0415
-    from selfmodel.replay import replay as simulate  # noqa: PLC0415
-    from selfmodel.simulator import Simulator  # noqa: PLC0415
+    from selfmodel.experiments import plugins as resolve  # noqa: PLC0415
+    from selfmodel.faults.notation import parse  # noqa: PLC0415
+    from selfmodel.faults.registry import known  # noqa: PLC0415
+    from selfmodel.simulation.replay import replay as simulate  # noqa: PLC0415
+    from selfmodel.simulation.simulator import Simulator  # noqa: PLC0415
+    from selfmodel.trials.behaviour import SIGNALS  # noqa: PLC0415
 
     if out is not None:
         check_figure(out)
@@ -97,8 +97,8 @@ def _finite(value: float) -> float | None:
 
 
 def _print(result: dict[str, Any], log: "TrialLog", found: "Replay") -> None:
-    from selfmodel.cli.plain import plain  # noqa: PLC0415  # only where it is printed
-    from selfmodel.cli.tables import show  # noqa: PLC0415  # the same
+    from selfmodel.cli.output.plain import plain  # noqa: PLC0415  # only where it is printed
+    from selfmodel.cli.output.tables import show  # noqa: PLC0415  # the same
 
     typer.echo(
         plain(f"{result['log']}: {result['steps']} steps of {result['robot']}, replayed as ")

@@ -11,10 +11,10 @@ from selfmodel.errors import InputError, WorkError
 from selfmodel.logs.errors import LogWriteError
 from selfmodel.logs.files import refuse_existing, replace
 from selfmodel.logs.reader import TrialLog
-from selfmodel.replay import Replay
+from selfmodel.simulation.replay import Replay
 
 if TYPE_CHECKING:
-    from selfmodel.behaviour import Signal
+    from selfmodel.trials.behaviour import Signal
 
 FORMATS = ("png", "svg", "pdf")
 

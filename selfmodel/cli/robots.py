@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from selfmodel.cli.options import Json, ModelSettings
-from selfmodel.cli.plain import plain
+from selfmodel.cli.output.plain import plain
 
 if TYPE_CHECKING:
     from selfmodel.tasks import Entry
@@ -25,8 +25,8 @@ def robots(
 ) -> None:
     """List the robots, or the parts and failure cases of one."""
     # The robots bring MuJoCo, which takes longer to import than the help takes to print.
-    from selfmodel.cli.resolve import is_model, notes_on, robot_entry  # noqa: PLC0415
-    from selfmodel.cli.robot_parts import parts, print_parts  # noqa: PLC0415
+    from selfmodel.cli.output.robot_parts import parts, print_parts  # noqa: PLC0415
+    from selfmodel.experiments.plugins import is_model, notes_on, robot_entry  # noqa: PLC0415
     from selfmodel.tasks import ROBOTS  # noqa: PLC0415
 
     if robot is None:

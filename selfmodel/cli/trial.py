@@ -21,7 +21,7 @@ from selfmodel.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from selfmodel.driver import Evolved
+    from selfmodel.controllers.driver import Evolved
 
 
 def trial(
@@ -55,15 +55,15 @@ def trial(
     # Whatever brings MuJoCo waits until the command runs.
     import numpy as np  # noqa: PLC0415
 
-    from selfmodel.cli import resolve  # noqa: PLC0415
-    from selfmodel.cli.reality import draw_reality  # noqa: PLC0415
-    from selfmodel.controller import draw_weights  # noqa: PLC0415
-    from selfmodel.faults import known  # noqa: PLC0415
+    from selfmodel.controllers.network import draw_weights  # noqa: PLC0415
+    from selfmodel.experiments import plugins as resolve  # noqa: PLC0415
+    from selfmodel.experiments.reality import draw_reality  # noqa: PLC0415
+    from selfmodel.faults.notation import parse  # noqa: PLC0415
+    from selfmodel.faults.registry import known  # noqa: PLC0415
     from selfmodel.logs import read_log  # noqa: PLC0415
     from selfmodel.logs.writer import write_trial  # noqa: PLC0415
-    from selfmodel.notation import parse  # noqa: PLC0415
     from selfmodel.settings import Settings  # noqa: PLC0415
-    from selfmodel.trial import Plan  # noqa: PLC0415
+    from selfmodel.trials.trial import Plan  # noqa: PLC0415
 
     kind = "network" if controller is None else str(controller)
     made = resolve.with_neurons(

@@ -2,11 +2,11 @@
 
 from typing import TYPE_CHECKING
 
-from selfmodel.anatomy import Anatomy
 from selfmodel.faults.kind import Fault, Kind, between, grid
+from selfmodel.robot.anatomy import Anatomy
 
 if TYPE_CHECKING:
-    from selfmodel.embodiment import Embodiment
+    from selfmodel.robot.embodiment import Embodiment
 
 
 def _grip(embodiment: "Embodiment", _anatomy: Anatomy, fault: Fault) -> None:

@@ -6,14 +6,13 @@ A hinge that cannot be at 0 is held at the end of its range that is nearest.
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from selfmodel.anatomy import Anatomy, Joint
-from selfmodel.faults.joints import joints
-from selfmodel.faults.kind import Fault, Kind
+from selfmodel.faults.kind import Fault, Kind, joints
 from selfmodel.faults.motor import WEAK_MOTOR
 from selfmodel.faults.sensor import FAILED_SENSOR, SENSOR_GAIN
+from selfmodel.robot.anatomy import Anatomy, Joint
 
 if TYPE_CHECKING:
-    from selfmodel.embodiment import Embodiment
+    from selfmodel.robot.embodiment import Embodiment
 
 LEVELS = 12
 """Angles that a genome proposes, evenly inside the joint's range: 0.09 rad apart for 60 degrees."""

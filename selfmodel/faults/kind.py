@@ -5,18 +5,23 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
-from selfmodel.anatomy import Anatomy
 from selfmodel.arrays import FloatArray
+from selfmodel.robot.anatomy import Anatomy
 
 if TYPE_CHECKING:
     from mujoco import MjSpec
 
-    from selfmodel.embodiment import Embodiment
+    from selfmodel.robot.embodiment import Embodiment
 
 Values = TypeVar("Values")
 
 WORLD = ""
 """The part that an environment strikes: the world, which notation does not name."""
+
+
+def joints(anatomy: Anatomy) -> tuple[str, ...]:
+    """Returns the names of the joints that can fail."""
+    return tuple(joint.name for joint in anatomy.joints)
 
 
 def in_the_world(_anatomy: Anatomy) -> tuple[str, ...]:

@@ -6,11 +6,11 @@ readings, in which touch is 0 or 1 and an angle is 1 at the end of its joint's r
 
 from typing import TYPE_CHECKING
 
-from selfmodel.anatomy import Anatomy
 from selfmodel.faults.kind import Fault, Kind, between, grid
+from selfmodel.robot.anatomy import Anatomy
 
 if TYPE_CHECKING:
-    from selfmodel.embodiment import Embodiment
+    from selfmodel.robot.embodiment import Embodiment
 
 
 def _sensors(anatomy: Anatomy) -> tuple[str, ...]:

@@ -5,16 +5,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from selfmodel.anatomy import Anatomy
 from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
 from selfmodel.faults.kind import Fault, Kind, between, grid
-from selfmodel.rotation import rotated
+from selfmodel.robot.anatomy import Anatomy
+from selfmodel.trials.rotation import rotated
 
 if TYPE_CHECKING:
     from mujoco import MjSpec
 
-    from selfmodel.embodiment import Embodiment
+    from selfmodel.robot.embodiment import Embodiment
 
 HALF_EXTENT = (15.0, 8.0)
 """How far the field reaches from the start along x and y, m; beyond it there is nothing."""

@@ -2,11 +2,11 @@
 
 from typing import TYPE_CHECKING
 
-from selfmodel.anatomy import Anatomy
 from selfmodel.faults.kind import Fault, Kind, between, grid
+from selfmodel.robot.anatomy import Anatomy
 
 if TYPE_CHECKING:
-    from selfmodel.embodiment import Embodiment
+    from selfmodel.robot.embodiment import Embodiment
 
 AIR_DENSITY = 1.2
 """Of air at 20 degrees Celsius, kg/m^3; a model that says no medium is in a vacuum."""

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from selfmodel.behaviour import SIGNALS, Moment, Sample
-from selfmodel.controller import Controller, draw_weights
+from selfmodel.controllers.network import Controller, draw_weights
 from selfmodel.logs.writer import write_trial
-from selfmodel.robot import Robot
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trial import Plan
+from selfmodel.trials.behaviour import SIGNALS, Moment, Sample
+from selfmodel.trials.trial import Plan
 
 MJCF = """
 <mujoco model="biped">

@@ -22,7 +22,6 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, Message, Metadata, Schema
 from mcap.writer import CompressionType, Writer
 
-from selfmodel.behaviour import SIGNALS, Sample
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError, TrialLog, read_log
 from selfmodel.logs.budget import Budget
@@ -30,8 +29,9 @@ from selfmodel.logs.framing import Frame, frames, parse, unpack
 from selfmodel.logs.salvage import salvage
 from selfmodel.logs.scan import scan
 from selfmodel.logs.writer import write_trial
-from selfmodel.robot import Robot
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
+from selfmodel.trials.behaviour import SIGNALS, Sample
 from tests.logs.conftest import MJCF, made_up, plan_of, timed
 
 STEPS = 120

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from selfmodel.controller import Controller, Network, draw_weights
-from selfmodel.driver import Design
+from selfmodel.controllers.cpg import Cpg
+from selfmodel.controllers.driver import Design
+from selfmodel.controllers.network import Controller, Network, draw_weights
 from selfmodel.errors import InputError
 from selfmodel.logs import load_controller, save_controller
 from selfmodel.logs.controllers import LARGEST, controller_bytes, parse_controller
-from selfmodel.oscillators import Cpg
 
 PARTS = st.lists(st.text("abc_é", min_size=1, max_size=5), max_size=5).map(tuple)
 

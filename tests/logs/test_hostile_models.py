@@ -11,7 +11,7 @@ import pytest
 from selfmodel.logs import LogError, read_log
 from selfmodel.logs.reader import TrialLog
 from selfmodel.logs.robots import robot_of
-from selfmodel.untrusted import LARGEST_FILES, checked_model
+from selfmodel.robot.mjcf.untrusted import LARGEST_FILES, checked_model
 from tests.logs.conftest import MJCF
 from tests.logs.hostile import outcome
 

@@ -10,14 +10,14 @@ from pathlib import Path
 
 import pytest
 
-from selfmodel.behaviour import Sample
 from selfmodel.errors import InputError
 from selfmodel.logs import IncompleteError, LogWriteError, TruncatedError, files, logfile, read_log
 from selfmodel.logs.rescue import rescue
 from selfmodel.logs.signals import topics
 from selfmodel.logs.writer import FLUSH_STEPS, write_trial
-from selfmodel.robot import Robot
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
+from selfmodel.trials.behaviour import Sample
 from tests.logs.conftest import STEPS, made_up, plan_of
 
 SCRIPT = """

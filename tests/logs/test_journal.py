@@ -6,18 +6,19 @@ from pathlib import Path
 
 import pytest
 
-from selfmodel.behaviour import Sample
-from selfmodel.controller import Controller
-from selfmodel.diagnosis import Candidate, Diagnosis, Outside
+from selfmodel.controllers.network import Controller
+from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, Outside
 from selfmodel.errors import InputError
-from selfmodel.faults import WORLD, Fault, Kind, known
-from selfmodel.hypothesis import INTACT, canonical
+from selfmodel.faults.hypothesis import INTACT, canonical
+from selfmodel.faults.kind import WORLD, Fault, Kind
+from selfmodel.faults.notation import parse
+from selfmodel.faults.registry import known
 from selfmodel.logs import CorruptError, LogError, SchemaMismatchError, read_truth
 from selfmodel.logs.journal import FolderJournal, open_journal, read_database
-from selfmodel.notation import parse
-from selfmodel.robot import Robot
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trial import Plan
+from selfmodel.trials.behaviour import Sample
+from selfmodel.trials.trial import Plan
 from tests.logs.conftest import made_up, plan_of
 
 HEAD = '[{"trials": 1, "ranked": [{"hypothesis": "intact", "distance": 1}], "intact_distance": 1, '

@@ -11,7 +11,6 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from selfmodel.arrays import FloatArray
-from selfmodel.behaviour import Names
 from selfmodel.logs import read_log
 from selfmodel.logs.cdr import names_of
 from selfmodel.logs.contents import read_contents
@@ -19,9 +18,10 @@ from selfmodel.logs.frames import body_names
 from selfmodel.logs.schemas import schema_text
 from selfmodel.logs.topics import Topic, description, topics, transforms
 from selfmodel.logs.writer import write_trial
-from selfmodel.physical import SimulatedRobot
-from selfmodel.robot import Robot
+from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
+from selfmodel.trials.behaviour import Names
 from tests.logs.conftest import plan_of
 
 OURS = "selfmodel_msgs/msg/SensorReadings"

@@ -8,14 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from selfmodel.behaviour import SIGNALS, Behaviour, Sample, collect
 from selfmodel.errors import InputError
 from selfmodel.logs import read_log, read_truth
 from selfmodel.logs.writer import TrialWriter, write_trial
-from selfmodel.physical import SimulatedRobot
-from selfmodel.robot import Robot
+from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trial import Plan
+from selfmodel.trials.behaviour import SIGNALS, Behaviour, Sample, collect
+from selfmodel.trials.trial import Plan
 from tests.logs.conftest import STEPS, made_up, plan_of
 
 ANYTHING = st.floats(allow_nan=True, allow_infinity=True, width=64)

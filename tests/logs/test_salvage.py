@@ -10,8 +10,8 @@ import pytest
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 
-from selfmodel.behaviour import SIGNALS
-from selfmodel.controller import Controller
+from selfmodel.controllers.network import Controller
+from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError
 from selfmodel.logs import CorruptError, LogError, LogWriteError, read_log, read_truth
 from selfmodel.logs.contents import read_contents
@@ -20,9 +20,9 @@ from selfmodel.logs.logfile import LogFile
 from selfmodel.logs.records import HIDDEN, SALVAGE
 from selfmodel.logs.salvage import salvage, salvageable_steps
 from selfmodel.logs.writer import write_trial
-from selfmodel.playback import Playback
-from selfmodel.robot import Robot
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
+from selfmodel.trials.behaviour import SIGNALS
 from tests.logs.conftest import STEPS, made_up, plan_of
 
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from mcap.opcode import Opcode
 
-from selfmodel.behaviour import SIGNALS, Sample, collect
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError, SchemaMismatchError, UnsupportedError, logfile, read_log
 from selfmodel.logs.contents import read_contents
@@ -17,8 +16,9 @@ from selfmodel.logs.records import LONGEST_TEXT, RESULT, TRIAL
 from selfmodel.logs.salvage import salvage
 from selfmodel.logs.topics import TIMING
 from selfmodel.logs.writer import write_trial
-from selfmodel.robot import Robot
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
+from selfmodel.trials.behaviour import SIGNALS, Sample, collect
 from tests.logs.conftest import STEPS, made_up, plan_of, timed
 from tests.logs.test_damage import metadata, rewritten
 from tests.logs.test_salvage import spoiled

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from selfmodel.cli.options import Json, check_log_name
-from selfmodel.cli.plain import plain
+from selfmodel.cli.output.plain import plain
 from selfmodel.errors import InputError
 
 if TYPE_CHECKING:
-    from selfmodel.driver import Evolved
+    from selfmodel.controllers.driver import Evolved
     from selfmodel.logs.rosbag.importer import Recording
     from selfmodel.logs.rosbag.mapping import BagMapping
-    from selfmodel.robot import Robot
+    from selfmodel.robot.robot import Robot
 
 TIMESTEP = 0.01
 """Seconds between two commands that ``--suggest`` assumes of an MJCF file, or nearly so."""
@@ -65,7 +65,7 @@ def import_(
 
 def _suggestion(bag: Path, name: str) -> str:
     # Whatever brings MuJoCo or ROS's messages waits until the command runs.
-    from selfmodel.cli import resolve  # noqa: PLC0415
+    from selfmodel.experiments import plugins as resolve  # noqa: PLC0415
     from selfmodel.logs.rosbag.bag import open_bag  # noqa: PLC0415
     from selfmodel.logs.rosbag.suggest import suggest  # noqa: PLC0415
 
@@ -111,7 +111,7 @@ def _import(bag: Path, out: Path, path: Path, *, as_json: bool) -> None:
 
 def _mapped_robot(mapping: "BagMapping", folder: Path) -> "Robot":
     """The robot that a mapping names: one that comes with selfmodel, or a file beside it."""
-    from selfmodel.cli import resolve  # noqa: PLC0415
+    from selfmodel.experiments import plugins as resolve  # noqa: PLC0415
 
     name, timestep = mapping.robot, mapping.control_timestep
     own = not _is_model(name)
@@ -130,7 +130,7 @@ def _mapped_robot(mapping: "BagMapping", folder: Path) -> "Robot":
 
 
 def _controller(mapping: "BagMapping", folder: Path, robot: "Robot") -> "Evolved | None":
-    from selfmodel.cli import resolve  # noqa: PLC0415
+    from selfmodel.experiments import plugins as resolve  # noqa: PLC0415
 
     if mapping.controller is None:
         return None
@@ -153,7 +153,7 @@ def _facts(out: Path, mapping: "BagMapping", recording: "Recording") -> dict[str
 
 
 def _print(out: Path, recording: "Recording") -> None:
-    from selfmodel.cli.tables import show  # noqa: PLC0415  # only where a table is drawn
+    from selfmodel.cli.output.tables import show  # noqa: PLC0415  # only where a table is drawn
 
     rows = [
         (

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from selfmodel.cli.options import Json, LogFiles
-from selfmodel.cli.plain import plain
+from selfmodel.cli.output.plain import plain
 from selfmodel.errors import InputError
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ def _clock(log: "TrialLog") -> dict[str, int] | None:
 
 
 def _print(one: dict[str, Any]) -> None:
-    from selfmodel.cli.tables import show  # noqa: PLC0415  # only where a table is drawn
+    from selfmodel.cli.output.tables import show  # noqa: PLC0415  # only where a table is drawn
 
     if "error" in one:
         typer.echo(plain(f"error: {one['error']}"))

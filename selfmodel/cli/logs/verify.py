@@ -7,7 +7,7 @@ from typing import Any
 import typer
 
 from selfmodel.cli.options import Json, LogFiles
-from selfmodel.cli.plain import plain
+from selfmodel.cli.output.plain import plain
 from selfmodel.errors import InputError
 
 

@@ -7,12 +7,13 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
-from selfmodel.behaviour import Behaviour
+from selfmodel.cli.rendering.poses import poses_of
 from selfmodel.faults.broken import BROKEN
+from selfmodel.faults.build import build
+from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.jammed import JAMMED, JAMMED_AT_ANGLE
-from selfmodel.hypothesis import Hypothesis
-from selfmodel.poses import poses_of
-from selfmodel.robot import Robot
+from selfmodel.robot.robot import Robot
+from selfmodel.trials.behaviour import Behaviour
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +72,7 @@ def film_of(
         motions: A title and the motion under it, all with the same times.
         moments: ``(frames,)`` seconds: of each, the last step that was not later is drawn.
     """
-    embodiment = robot.build(hypothesis)
+    embodiment = build(robot, hypothesis)
     model = embodiment.model
     time = motions[0][1].time
     # A moment that is a step but for rounding is that step.

@@ -11,8 +11,8 @@ from selfmodel.cli.options import Json
 def list_bodies(*, as_json: Json = False) -> None:
     """List the domains: their tasks, joints, sensors, motors, time steps and failures."""
     # Whatever brings MuJoCo waits until the command runs.
-    from selfmodel.cli.suite.bodies import DOMAINS  # noqa: PLC0415
-    from selfmodel.cli.tables import show  # noqa: PLC0415
+    from selfmodel.cli.output.tables import show  # noqa: PLC0415
+    from selfmodel.experiments.suite.bodies import DOMAINS  # noqa: PLC0415
 
     found = [_facts(domain) for domain in DOMAINS]
     if as_json:
@@ -34,8 +34,8 @@ def list_bodies(*, as_json: Json = False) -> None:
 
 
 def _facts(domain: str) -> dict[str, Any]:
-    from selfmodel.cli.resolve import robot_entry  # noqa: PLC0415
-    from selfmodel.cli.suite.bodies import DOMAINS, bodies  # noqa: PLC0415
+    from selfmodel.experiments.plugins import robot_entry  # noqa: PLC0415
+    from selfmodel.experiments.suite.bodies import DOMAINS, bodies  # noqa: PLC0415
 
     entry = robot_entry(bodies([domain], None)[0])
     robot = entry.robot()

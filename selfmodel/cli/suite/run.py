@@ -10,7 +10,7 @@ from selfmodel.cli.options import ComparatorName, ControllerKind, Generations, J
 from selfmodel.comparators import DEFAULT
 
 if TYPE_CHECKING:
-    from selfmodel.cli.suite.rows import Summary
+    from selfmodel.experiments.suite.rows import Summary
 
 COLUMNS = (
     *("robot", "case", "truth", "right", "before", "after", "recovered", "recovered ÷ before"),
@@ -68,11 +68,13 @@ def run(
 ) -> None:
     """Let bodies of the suite, ours and your own fail and recover: bodies x cases x seeds."""
     # Whatever brings MuJoCo waits until the command runs.
-    from selfmodel.cli import grid_command, lists, resolve  # noqa: PLC0415
-    from selfmodel.cli.suite.bodies import DOMAINS, bodies, tasks_of  # noqa: PLC0415
-    from selfmodel.cli.suite.plan import Study, known_cases  # noqa: PLC0415
-    from selfmodel.cli.suite.results import write_results  # noqa: PLC0415
-    from selfmodel.cli.suite.work import run_study  # noqa: PLC0415
+    from selfmodel.cli import lists  # noqa: PLC0415
+    from selfmodel.cli.output import grid_command  # noqa: PLC0415
+    from selfmodel.experiments import plugins as resolve  # noqa: PLC0415
+    from selfmodel.experiments.suite.bodies import DOMAINS, bodies, tasks_of  # noqa: PLC0415
+    from selfmodel.experiments.suite.plan import Study, known_cases  # noqa: PLC0415
+    from selfmodel.experiments.suite.results import write_results  # noqa: PLC0415
+    from selfmodel.experiments.suite.work import run_study  # noqa: PLC0415
     from selfmodel.settings import Settings  # noqa: PLC0415
 
     asked = lists.texts("--domains", domains, DOMAINS)
@@ -105,7 +107,7 @@ def run(
 
 
 def _print(summaries: "tuple[Summary, ...]") -> None:
-    from selfmodel.cli.tables import show  # noqa: PLC0415  # only where a table is drawn
+    from selfmodel.cli.output.tables import show  # noqa: PLC0415  # only where a table is drawn
 
     if summaries:
         show(COLUMNS, [_texts(summary) for summary in summaries], texts=3)

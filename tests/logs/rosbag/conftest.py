@@ -7,7 +7,7 @@ import pytest
 
 from selfmodel.logs.rosbag.importer import Recording, import_bag
 from selfmodel.logs.rosbag.mapping_file import parse_mapping
-from selfmodel.robot import Robot
+from selfmodel.robot.robot import Robot
 from tests.logs.conftest import biped  # noqa: F401 - a fixture
 from tests.logs.rosbag.bags import T0, Item, array, imu, joint_state, odometry, wrench, write_bag
 

@@ -12,11 +12,12 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.driver import Evolved, drive
-from selfmodel.hypothesis import Hypothesis
-from selfmodel.places import places
-from selfmodel.robot import Robot
-from selfmodel.senses import Senses
+from selfmodel.controllers.driver import Evolved, drive
+from selfmodel.faults.build import build
+from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.robot.robot import Robot
+from selfmodel.robot.sensing import Senses
+from selfmodel.robot.state_access import places
 from tests.logs.rosbag.bags import T0, Item, joint_state, odometry, wrench, write_bag
 
 JOINT_PERIOD, JITTER, JOINT_LATENCY = 0.005, 0.0004, 0.002
@@ -64,7 +65,7 @@ def mapping(robot: Robot, steps: int, controller: str | None) -> str:
 
 
 def _driven(robot: Robot, hidden: Hypothesis, controller: Evolved, steps: int) -> Iterator[Item]:
-    embodiment = robot.build(hidden)
+    embodiment = build(robot, hidden)
     model, data = embodiment.model, mujoco.MjData(embodiment.model)
     mujoco.mj_forward(model, data)
     senses = Senses(model, robot.anatomy, [embodiment])

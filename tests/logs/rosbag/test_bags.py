@@ -28,7 +28,7 @@ from selfmodel.logs.rosbag.checks import TYPES
 from selfmodel.logs.rosbag.messages import KINDS
 from selfmodel.logs.rosbag.series import read_series
 from selfmodel.logs.rosbag.suggest import suggest
-from selfmodel.robot import Robot
+from selfmodel.robot.robot import Robot
 from tests.logs.rosbag.bags import FORMS, ROS, T0, array, storage, write_bag
 from tests.logs.rosbag.conftest import imported, recorded
 

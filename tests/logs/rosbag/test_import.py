@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
+from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError
 from selfmodel.logs import read_log
 from selfmodel.logs.rosbag.importer import import_bag, write_recording
 from selfmodel.logs.rosbag.mapping_file import parse_mapping
-from selfmodel.playback import Playback
-from selfmodel.robot import Robot
+from selfmodel.robot.robot import Robot
 from tests.logs.conftest import MJCF
 from tests.logs.rosbag.bags import (
     ROS,

@@ -9,7 +9,7 @@ import pytest
 from selfmodel.errors import InputError
 from selfmodel.logs.rosbag.mapping import Link
 from selfmodel.logs.rosbag.mapping_file import parse_mapping, read_mapping
-from selfmodel.robot import Robot
+from selfmodel.robot.robot import Robot
 from tests.logs.rosbag.bags import T0, joint_state, write_bag
 from tests.logs.rosbag.conftest import JOINTS, MAPPING, imported, recorded
 

@@ -8,21 +8,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from selfmodel.behaviour import Behaviour, collect
 from selfmodel.comparators import COMPARATORS, DEFAULT
-from selfmodel.controller import Controller
-from selfmodel.diagnose import Diagnose
-from selfmodel.hypothesis import Hypothesis
+from selfmodel.controllers.network import Controller
+from selfmodel.diagnosis.diagnose import Diagnose
+from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log, save_controller
 from selfmodel.logs.rosbag.bag import open_bag
 from selfmodel.logs.rosbag.importer import import_bag
 from selfmodel.logs.rosbag.mapping_file import parse_mapping
 from selfmodel.logs.rosbag.suggest import suggest
-from selfmodel.notation import parse
-from selfmodel.physical import SimulatedRobot
-from selfmodel.robot import Robot
+from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulator import Simulator
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.behaviour import Behaviour, collect
 from tests.conftest import random_controllers
 from tests.logs.rosbag.driver import mapping, record
 

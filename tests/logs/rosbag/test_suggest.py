@@ -8,7 +8,7 @@ from selfmodel.logs.rosbag.bag import open_bag
 from selfmodel.logs.rosbag.likeness import likeness, matched
 from selfmodel.logs.rosbag.mapping_file import parse_mapping
 from selfmodel.logs.rosbag.suggest import suggest
-from selfmodel.robot import Robot
+from selfmodel.robot.robot import Robot
 from tests.logs.rosbag.bags import T0, array, joint_state, write_bag
 from tests.logs.rosbag.conftest import imported, recorded
 

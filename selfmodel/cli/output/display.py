@@ -1,0 +1,107 @@
+"""What ``selfmodel recover`` shows while it works: a line for all that is done, a bar for the rest.
+
+The bar is for terminals; its hypothesis stands in the line that follows, so that no terminal is too
+narrow for the numbers.
+"""
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn
+
+from selfmodel.diagnosis.diagnosis import Diagnosis
+from selfmodel.evolution import Generation
+from selfmodel.recovery.events import Event, Question, SearchBegins
+from selfmodel.simulation.calibrate import Calibration
+from selfmodel.trials.trial import Trial
+
+
+@contextmanager
+def display() -> Iterator[Callable[[Event], None]]:
+    """Gives a function that shows the events it is told of, on standard error."""
+    console = Console(stderr=True, highlight=False, markup=False, emoji=False)
+    if not sys.stderr.isatty():
+        yield _Lines(console)
+        return
+    progress = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(bar_width=None),
+        MofNCompleteColumn(),
+        TextColumn("best {task.fields[best]}"),
+        TextColumn("{task.fields[rate]}/s"),
+        console=console,
+        expand=True,
+    )
+    with progress:
+        yield _Bar(progress)
+
+
+class _Lines:
+    """A line for the end of each search, for every trial and every diagnosis."""
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._search = ""
+
+    def __call__(self, event: Event) -> None:
+        match event:
+            case SearchBegins(kind, hypothesis):
+                self._search = f"{kind} EA" if hypothesis is None else f"{kind} EA for {hypothesis}"
+            case Generation() if event.number == event.total:
+                self._say(
+                    f"{self._search}: {event.number} generations, {event.evaluations} "
+                    f"evaluations, {_rate(event)}/s, best {event.best:.4f}"
+                )
+            case Calibration():
+                self._say(
+                    f"calibration: error {event.error_before:.3f} before, {event.error:.3f} after; "
+                    f"delay {event.parameters.delay} "
+                    f"{'step' if event.parameters.delay == 1 else 'steps'}"
+                )
+            case Question():
+                apart = ", ".join(map(str, event.hypotheses))
+                self._say(f"the next trial is to tell apart: {apart}")
+            case Trial():
+                self._say(f"trial {event.plan.name}: {event.displacement:.3f} m forward")
+            case Diagnosis():
+                best, trials = event.ranked[0], event.trials
+                self._say(
+                    f"diagnosis from {trials} {'trial' if trials == 1 else 'trials'}: "
+                    f"{best.hypothesis} (distance {best.distance:.4f}), {event.verdict}"
+                )
+
+    def _say(self, line: str) -> None:
+        self._console.print(line, soft_wrap=True)
+
+
+class _Bar:
+    """The same lines, above a bar for the search that is going on."""
+
+    def __init__(self, progress: Progress) -> None:
+        self._progress = progress
+        self._lines = _Lines(progress.console)
+        self._task: TaskID | None = None
+
+    def __call__(self, event: Event) -> None:
+        match event:
+            case SearchBegins():
+                self._task = self._progress.add_task(
+                    f"{event.kind} EA", total=None, best="-", rate="-"
+                )
+            case Generation() if self._task is not None:
+                self._progress.update(
+                    self._task,
+                    total=event.total,
+                    completed=event.number,
+                    best=f"{event.best:.3f}",
+                    rate=_rate(event),
+                )
+                if event.number == event.total:
+                    self._progress.remove_task(self._task)
+        self._lines(event)
+
+
+def _rate(generation: Generation) -> str:
+    return f"{generation.evaluations / generation.seconds:.0f}" if generation.seconds else "-"

@@ -1,0 +1,96 @@
+"""What ``selfmodel recover`` says at the end, for people and for programs."""
+
+import json
+from typing import Any
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from selfmodel.cli.output.ranking import as_values, in_words, ranking_table, sureness
+from selfmodel.controllers.cpg import Cpg
+from selfmodel.experiments.experiment import Experiment, Outcome
+from selfmodel.experiments.fitting import calibration_values
+
+
+def as_object(experiment: Experiment, outcome: Outcome) -> str:
+    """Returns the outcome as one JSON object."""
+    return json.dumps(facts(experiment, outcome), indent=2, allow_nan=False)
+
+
+def print_report(experiment: Experiment, outcome: Outcome) -> None:
+    """Prints the trials, and the diagnosis beside the truth."""
+    found = facts(experiment, outcome)
+    console = Console()
+    trials = Table("trial", "what was then believed", "forward, m", title="physical trials")
+    trials.columns[1].overflow = "fold"
+    trials.columns[2].justify = "right"
+    for trial in found["trials"]:
+        trials.add_row(trial["stage"], trial["hypothesis"], f"{trial['displacement']:.3f}")
+    console.print(trials, ranking_table(found["diagnosis"], found["truth"]))
+    evaluations, trials_since = found["evaluations"], found["physical_trials"]
+    verdict = "right" if found["correct"] else "wrong"
+    # Not through rich: a folder's name may look like markup, and must not be folded.
+    typer.echo(
+        f"truth: {found['truth']}{_reality(found)}; the diagnosis is {verdict}.\n"
+        f"{in_words(found)}\n"
+        f"The robot went {found['displacement']['before']:.2f} m before, "
+        f"{found['displacement']['after']:.2f} m after the failure, and "
+        f"{found['displacement']['recovered']:.2f} m at best in "
+        f"{'1 trial' if trials_since == 1 else f'{trials_since} trials'} since.\n"
+        f"{evaluations['repair']} controllers and {evaluations['distinct_hypotheses']} distinct "
+        f"hypotheses in {found['seconds']:.0f} s; diverged: {evaluations['diverged']}.\n"
+        f"Logs: {experiment.folder}"
+    )
+
+
+def _reality(found: dict[str, Any]) -> str:
+    """How the physical robot differed from its model beside the truth, in words."""
+    gap = f", at a reality gap of {found['gap']:g}" if found["gap"] else ""
+    return gap + (", built differently" if found["structure"] else "")
+
+
+def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
+    """Returns the outcome as plain values, as ``recover --json`` prints it."""
+    recovery, tally = outcome.recovery, outcome.tally
+    return {
+        "robot": experiment.robot.name,
+        "case": experiment.case,
+        "truth": str(experiment.truth),
+        "comparator": experiment.comparator.name,
+        "kinds": [kind.name for kind in experiment.kinds],
+        "gap": experiment.gap,
+        "structure": experiment.structure,
+        "next_trial": experiment.next_trial,
+        "controller": "cpg" if isinstance(experiment.design, Cpg) else "network",
+        "neurons": 0 if isinstance(experiment.design, Cpg) else experiment.robot.anatomy.neurons,
+        "seed": experiment.seed,
+        "trials": [
+            {
+                "log": trial.path,
+                "stage": trial.plan.stage,
+                "displacement": trial.displacement,
+                "hypothesis": str(tried),
+            }
+            for trial, tried in zip(recovery.trials, recovery.tried, strict=True)
+        ],
+        "diagnosis": as_values(recovery.diagnosis.ranked),
+        **sureness(recovery.diagnosis),
+        "calibration": calibration_values(recovery.calibration),
+        "correct": outcome.correct,
+        "displacement": {
+            "before": recovery.before,
+            "after": recovery.after,
+            "recovered": recovery.recovered,
+        },
+        "recovery": recovery.recovered / recovery.before if recovery.before > 0 else None,
+        "physical_trials": len(recovery.trials) - 2,
+        "evaluations": {
+            "repair": recovery.repair_evaluations,
+            "diagnostic": recovery.diagnostic_evaluations,
+            "distinct_hypotheses": recovery.distinct_hypotheses,
+            "simulated_steps": tally.steps,
+            "diverged": tally.diverged,
+        },
+        "seconds": outcome.seconds,
+    }

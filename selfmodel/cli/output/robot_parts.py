@@ -1,0 +1,130 @@
+"""The parts of one robot, and what can go wrong with each, for people and for programs."""
+
+from typing import Any
+
+import mujoco
+from rich.console import Console
+from rich.table import Table
+
+from selfmodel.cli.output.plain import plain
+from selfmodel.faults.registry import ALL_KINDS
+from selfmodel.robot.actuator_ranges import command_ranges
+from selfmodel.robot.robot import Robot
+from selfmodel.robot.transmission import motor_joints
+
+
+def parts(robot: Robot) -> dict[str, Any]:
+    """Returns a robot's root, joints, sensors, motors and possible faults as plain values."""
+    anatomy, model = robot.anatomy, robot.model
+    floats = model.jnt_type[model.body(robot.root).jntadr[0]] == mujoco.mjtJoint.mjJNT_FREE
+    ranges = command_ranges(model)
+    return {
+        "root": {"body": robot.root, "floats": bool(floats)},
+        "physics_timestep": float(model.opt.timestep),
+        "joint_details": [
+            {
+                "name": joint.name,
+                "hinges": list(joint.hinges),
+                "limits": [list(ends) for ends in joint.limits],
+                "limited": [bool(model.joint(hinge).limited[0]) for hinge in joint.hinges],
+                "motors": list(joint.motors),
+                "limb": sorted(joint.bodies, key=lambda name: int(model.body(name).id)),
+            }
+            for joint in anatomy.joints
+        ],
+        "sensor_details": [
+            {"name": s.name, "kind": s.kind, "of": s.hinge or s.body} for s in anatomy.sensors
+        ],
+        "motor_details": [
+            {
+                "name": name,
+                "drives": [model.joint(j).name for j in sorted(motor_joints(model, number))],
+                "commands": [centre - half, centre + half],
+                "force": _force(model, number),
+            }
+            for number, (name, (centre, half)) in enumerate(
+                zip(anatomy.motors, ranges, strict=True)
+            )
+        ],
+        "faults": [
+            {
+                "kind": kind.name,
+                "parts": len(found),
+                "example": str(found[-1]),
+            }
+            for kind in ALL_KINDS
+            if (found := kind.candidates(anatomy))
+        ],
+    }
+
+
+def print_parts(facts: dict[str, Any]) -> None:
+    """Prints what ``parts`` found, with the names of the robot above it."""
+    root = "moves freely" if facts["root"]["floats"] else "slides, and turns about one axis"
+    tables = [
+        _table(
+            "part",
+            "what was found",
+            title=facts["robot"],
+            rows=[
+                ("root", f"{facts['root']['body']}, {root}"),
+                ("commands", f"every {facts['control_timestep']:g} s"),
+                ("physics", f"every {facts['physics_timestep']:g} s"),
+                ("controller", f"{facts['hidden_neurons']} neurons, {facts['weights']} weights"),
+            ],
+        ),
+        _table(
+            *("joint", "hinges, rad", "motors", "limb beyond it"),
+            title="joints, which can break or jam",
+            rows=[
+                (one["name"], _limits(one), ", ".join(one["motors"]), ", ".join(one["limb"]))
+                for one in facts["joint_details"]
+            ],
+        ),
+        _table(
+            *("sensor", "kind", "of"),
+            title="sensors, which can fail",
+            rows=[(one["name"], one["kind"], one["of"]) for one in facts["sensor_details"]],
+        ),
+        _table(
+            *("motor", "drives", "commands", "force"),
+            title="motors",
+            rows=[
+                (one["name"], ", ".join(one["drives"]), _span(one["commands"]), _span(one["force"]))
+                for one in facts["motor_details"]
+            ],
+        ),
+        _table(
+            *("kind", "faults", "such as"),
+            title="faults that can be hypothesised",
+            rows=[(one["kind"], str(one["parts"]), one["example"]) for one in facts["faults"]],
+        ),
+    ]
+    Console(markup=False).print(*tables)
+
+
+def _table(*columns: str, title: str, rows: list[tuple[str, ...]]) -> Table:
+    table = Table(*columns, title=plain(title))
+    for column in table.columns:
+        column.overflow = "fold"
+    for row in rows:
+        table.add_row(*map(plain, row))
+    return table
+
+
+def _limits(joint: dict[str, Any]) -> str:
+    told = zip(joint["hinges"], joint["limits"], joint["limited"], strict=True)
+    return ", ".join(
+        f"{hinge} {_span(ends)}" if limited else f"{hinge}, no limits"
+        for hinge, ends, limited in told
+    )
+
+
+def _span(ends: list[float] | None) -> str:
+    return f"{ends[0]:.3g} to {ends[1]:.3g}" if ends else "no limits"
+
+
+def _force(model: mujoco.MjModel, motor: int) -> list[float] | None:
+    if not model.actuator_forcelimited[motor]:
+        return None
+    return [float(end) for end in model.actuator_forcerange[motor]]

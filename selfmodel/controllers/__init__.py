@@ -1,0 +1,1 @@
+"""Command sources of a robot: network, central pattern generator, playback."""

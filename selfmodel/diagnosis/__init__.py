@@ -1,0 +1,1 @@
+"""The diagnostic EA: which hypothesis explains the logged trials."""

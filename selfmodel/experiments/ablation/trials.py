@@ -1,0 +1,89 @@
+"""The physical trials of a run: made once, and known from their logs."""
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from selfmodel.controllers.driver import Evolved
+from selfmodel.diagnosis.comparator import Comparator
+from selfmodel.experiments.ablation.plan import HEALTHY_TRIALS, Spec
+from selfmodel.experiments.reality import draw_reality
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.logs.atomic import part_of, put
+from selfmodel.logs.reader import read_log
+from selfmodel.logs.writer import write_trial
+from selfmodel.robot.robot import Robot
+from selfmodel.simulation.calibrate import calibrate
+from selfmodel.trials.trial import Plan, Stage, Trial
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """The objects that a run's specification stands for.
+
+    Attributes:
+        spec: The specification.
+        comparator: Judges hypotheses.
+        name: What it was asked for by.
+        robot: The robot as its model describes it.
+        truth: What goes wrong with it.
+        gaits: Its gaits for this run, in the order of the trials.
+        folder: Where the run is kept.
+    """
+
+    spec: Spec
+    comparator: Comparator
+    name: str
+    robot: Robot
+    truth: Hypothesis
+    gaits: tuple[Evolved, ...]
+    folder: Path
+
+
+def before_failure(setting: Setting) -> list[Trial]:
+    """Returns the trials of the healthy robot, as their logs say; runs those missing."""
+    return [
+        _trial(setting, number, "before", gait)
+        for number, gait in enumerate(setting.gaits[:HEALTHY_TRIALS])
+    ]
+
+
+def after_failure(setting: Setting, number: int, controller: Evolved) -> Trial:
+    """Returns the trial of that number, from 0, of the damaged robot; see ``before_failure``."""
+    return _trial(setting, HEALTHY_TRIALS + number, "after", controller)
+
+
+def calibrated_robot(setting: Setting, intact: Sequence[Trial]) -> Robot:
+    """Returns the self-model fitted to the trials before the failure, the same for all comparators.
+
+    It is kept beside the trials.
+    """
+    path, robot = setting.folder / "calibrated.xml", setting.robot
+    if not path.exists():
+        put(path, calibrate(robot, intact, threads=1).robot.mjcf.encode())
+    return dataclasses.replace(robot, mjcf=path.read_text(encoding="utf-8"))
+
+
+def _trial(setting: Setting, number: int, stage: Stage, gait: Evolved) -> Trial:
+    """The trial as its log says it; run if there is no log yet."""
+    steps, seed = setting.spec.settings.steps, setting.spec.cell.seed
+    plan = Plan(f"{number:02d}-{stage}", stage, gait, steps, seed)
+    path = setting.folder / "trials" / f"{plan.name}.mcap"
+    if not path.exists():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part_of(path).unlink(missing_ok=True)  # of a run that was killed
+        hidden = INTACT if stage == "before" else setting.truth
+        cell, robot = setting.spec.cell, setting.robot
+        reality = draw_reality(robot, cell.seed, cell.gap, structure=setting.spec.structure)
+        write_trial(
+            path,
+            robot,
+            plan,
+            # Each trial has noise of its own, the same for every comparator.
+            reality.robot(robot, hidden, stream=number).run(plan.controller, plan.steps),
+            settings=setting.spec.settings,
+            hidden=str(hidden),
+            gap=reality.text,
+        )
+    return read_log(path).trial

@@ -1,0 +1,54 @@
+"""What a simulated physical robot is like beside its fault, drawn from the command's seed."""
+
+import json
+from dataclasses import dataclass
+
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.physical.reality_gap import Gap, draw_gap
+from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.structural_mismatch import Structure, draw_structure
+from selfmodel.recovery.random_streams import gap_stream, structure_stream
+from selfmodel.robot.robot import Robot
+
+
+@dataclass(frozen=True)
+class Reality:
+    """How a physical robot differs from its model, whatever fails.
+
+    Attributes:
+        gap: What is drawn at a level; at level 0, nothing differs.
+        structure: Mismatches of structure, if there are any.
+    """
+
+    gap: Gap
+    structure: Structure | None
+
+    @property
+    def text(self) -> str | None:
+        """What a log hides of it, as JSON; None where the robot is as its model."""
+        if self.gap.level == 0 and self.structure is None:
+            return None
+        structure = None if self.structure is None else self.structure.as_values()
+        return json.dumps({**self.gap.as_values(), "structure": structure}, allow_nan=False)
+
+    def robot(self, robot: Robot, hidden: Hypothesis = INTACT, stream: int = 0) -> SimulatedRobot:
+        """Returns the physical robot; see ``SimulatedRobot``."""
+        return SimulatedRobot(robot, hidden, self.gap, self.structure, stream)
+
+
+def draw_reality(robot: Robot, seed: int, level: float, *, structure: bool) -> Reality:
+    """Returns what a physical robot is like.
+
+    Args:
+        robot: The robot as its model describes it.
+        seed: The command's; a search of the same seed draws nothing of this.
+        level: The gap's.
+        structure: Whether there are mismatches of structure.
+
+    Raises:
+        InputError: The level is out of range.
+    """
+    return Reality(
+        gap=draw_gap(robot, level, gap_stream(seed)),
+        structure=draw_structure(robot, structure_stream(seed)) if structure else None,
+    )

@@ -1,0 +1,172 @@
+"""What a study of many bodies consists of, as the runs of a grid."""
+
+import dataclasses
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from selfmodel import __version__
+from selfmodel.controllers.network import Network
+from selfmodel.errors import InputError, unknown_name
+from selfmodel.experiments import plugins as resolve
+from selfmodel.experiments.grid import Job, check_shared, finished
+from selfmodel.experiments.keys import check_keys, key_of
+from selfmodel.faults.neuron import SILENT_NEURON
+from selfmodel.faults.notation import parse
+from selfmodel.settings import Settings
+from selfmodel.tasks import Entry
+
+OF_DIAGNOSIS = ("trials", "genes", "kept")
+"""Settings that no gait depends on."""
+
+
+@dataclass(frozen=True)
+class Study:
+    """Which bodies fail in which ways, and how they are brought back.
+
+    Attributes:
+        bodies: Names of robots, and paths of MJCF files.
+        cases: Numbers of failures like those of Table I; a body that cannot have one is left out of
+            it, and so are silent neurons where there are none.
+        seeds: A run for each.
+        folder: Where all of it is kept.
+        settings: The paper's numbers.
+        score: What controllers are evolved for, and what is told of the trials.
+        controller: The kind of controller.
+        comparator: Its name, or ``package.module:object``.
+    """
+
+    bodies: Sequence[str]
+    cases: Sequence[int]
+    seeds: Sequence[int]
+    folder: Path
+    settings: Settings
+    score: str
+    controller: str
+    comparator: str
+
+
+def known_cases(bodies: Sequence[str]) -> tuple[int, ...]:
+    """Returns the numbers of the cases that at least one of some bodies has."""
+    return tuple(sorted({case for body in bodies for case in resolve.robot_entry(body).cases}))
+
+
+def check(study: Study) -> None:
+    """Checks all that can be wrong with a study, before anything is run.
+
+    Raises:
+        InputError: Something is, and which.
+    """
+    resolve.comparator(study.comparator)
+    check_keys(study.bodies)
+    for body in study.bodies:
+        entry = resolve.robot_entry(body)
+        resolve.design(study.controller, entry.robot())
+        resolve.score(study.score, body, entry)
+    known = known_cases(study.bodies)
+    for case in study.cases:
+        if case not in known:
+            raise unknown_name("case of these bodies", str(case), map(str, known))
+    check_shared(study.folder, _shared(study), "a study")
+
+
+def gait_jobs(study: Study) -> list[Job]:
+    """Returns the evolution of each body's gait before it fails, one a seed."""
+    shared = _shared(study)
+    made_of = {name: shared["settings"][name] for name in shared["settings"]}
+    for name in OF_DIAGNOSIS:
+        del made_of[name]
+    return [
+        Job(
+            key=f"{key_of(body)}-seed{seed:03d}",
+            parameters={
+                **_body(body),
+                "settings": made_of,
+                **{name: shared[name] for name in ("selfmodel", "score", "controller")},
+            },
+            seed=seed,
+            parts=("gait",),
+        )
+        for seed in study.seeds
+        for body in study.bodies
+    ]
+
+
+def recovery_jobs(study: Study) -> list[Job]:
+    """Returns the recoveries whose gait has been evolved, one seed after another.
+
+    Raises:
+        InputError: A gait that was evolved is not there any more.
+    """
+    found = []
+    for gait in gait_jobs(study):
+        path = gait_path(study.folder, gait.key)
+        if not path.exists():
+            if any(part.key == gait.key for part in finished(study.folder / "gaits")):
+                raise InputError(
+                    f"{path} is missing, the gait that recoveries begin with: put it back, or "
+                    f"delete {study.folder / 'gaits' / gait.key} to evolve it again"
+                )
+            continue
+        body = gait.parameters["body"]
+        entry = resolve.robot_entry(body)
+        found += [
+            Job(
+                key=f"{key_of(body)}-case{case:02d}-seed{gait.seed:03d}",
+                parameters={
+                    **_body(body),
+                    "case": case,
+                    "truth": entry.cases[case],
+                    "gait": gait.key,
+                    "gait_sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
+                    "shared": _shared(study),
+                },
+                seed=gait.seed,
+                parts=("recovery",),
+            )
+            for case in study.cases
+            if case in entry.cases and _means_something(study, entry, case)
+        ]
+    return found
+
+
+def _means_something(study: Study, entry: Entry, case: int) -> bool:
+    """Whether a failure is one as the study drives the robot: oscillators have no neurons."""
+    robot = entry.robot()
+    faults = parse(entry.cases[case], robot.anatomy).faults
+    drives = resolve.design(study.controller, robot)
+    return isinstance(drives, Network) or all(fault.kind is not SILENT_NEURON for fault in faults)
+
+
+def gait_path(folder: Path, key: str) -> Path:
+    """Returns where the gait of that key is, in the folder of a study."""
+    return folder / "gaits" / f"{key}.npz"
+
+
+def _body(body: str) -> dict[str, Any]:
+    robot = resolve.robot_entry(body).robot()
+    assets = hashlib.sha256()
+    for name, content in sorted(robot.assets.items()):
+        # Of one length each: what ends where is told apart.
+        for part in (name.encode(), content):
+            assets.update(hashlib.sha256(part).digest())
+    return {
+        "body": body,
+        "robot": robot.name,
+        "control_timestep": robot.control_timestep,
+        "model": hashlib.sha256(robot.mjcf.encode()).hexdigest(),
+        "assets": assets.hexdigest(),
+    }
+
+
+def _shared(study: Study) -> dict[str, Any]:
+    """What is the same for all runs, and must be for their rows to stand in one table."""
+    return {
+        "selfmodel": __version__,
+        "settings": dataclasses.asdict(study.settings),
+        "score": study.score,
+        "controller": study.controller,
+        "comparator": study.comparator,
+    }

@@ -1,0 +1,123 @@
+"""Runs a study: first the gaits before the failure, then the recoveries that begin with them."""
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from selfmodel.experiments import plugins as resolve
+from selfmodel.experiments.experiment import Experiment
+from selfmodel.experiments.experiment import run as run_experiment
+from selfmodel.experiments.grid import GridBegins, Job, PartEnds, run_grid
+from selfmodel.experiments.suite.plan import Study, check, gait_jobs, gait_path, recovery_jobs
+from selfmodel.experiments.suite.rows import Row, as_objects
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.notation import parse
+from selfmodel.logs.atomic import put
+from selfmodel.logs.controllers import controller_bytes
+from selfmodel.recovery.events import Event
+from selfmodel.recovery.fitness import Score
+from selfmodel.recovery.random_streams import repair_stream
+from selfmodel.recovery.repair import Repair
+from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.trial import Trial
+
+
+def run_study(
+    study: Study, *, workers: int, watch: Callable[[GridBegins | PartEnds], None]
+) -> tuple[PartEnds, ...]:
+    """Runs what has not been run yet, and returns what failed.
+
+    Args:
+        study: What to run.
+        workers: Processes at a time, each with one thread of physics.
+        watch: Is told what happens, of the gaits' grid and then of the recoveries'.
+
+    Raises:
+        InputError: Something about it is wrong, or its folder holds another.
+    """
+    check(study)
+    no_gait = run_grid(
+        study.folder / "gaits", gait_jobs(study), _evolve, workers=workers, watch=watch
+    )
+    jobs = recovery_jobs(study)
+    failed = run_grid(study.folder / "runs", jobs, _recover, workers=workers, watch=watch)
+    return no_gait + failed
+
+
+def _evolve(job: Job, _part: str, run: Path) -> Any:  # noqa: ANN401  # JSON
+    """Evolves a gait as a recovery with that seed begins, and keeps it."""
+    said = job.parameters
+    entry = resolve.robot_entry(said["body"])
+    robot = entry.robot()
+    repair = Repair(
+        Simulator(robot, threads=1),
+        Settings(**said["settings"]),
+        resolve.design(said["controller"], robot),
+        score=resolve.score(said["score"], said["body"], entry),
+    )
+    found = repair(INTACT, (), repair_stream(job.seed, 0), _ignore)
+    put(run.parent / f"{job.key}.npz", controller_bytes(found))
+    return {"evaluations": repair.evaluations}
+
+
+def _recover(job: Job, _part: str, run: Path) -> Any:  # noqa: ANN401  # JSON
+    """Lets a body fail and recover, and returns its row."""
+    said, shared = job.parameters, job.parameters["shared"]
+    entry = resolve.robot_entry(said["body"])
+    robot = entry.robot()
+    truth = parse(said["truth"], robot.anatomy)
+    design = resolve.design(shared["controller"], robot)
+    resolve.check_neurons(truth, design)
+    folder = run / "recovery"
+    shutil.rmtree(folder, ignore_errors=True)  # what is left of a run that was killed
+    experiment = Experiment(
+        robot=robot,
+        case=said["case"],
+        truth=truth,
+        comparator=resolve.comparator(shared["comparator"]),
+        settings=Settings(**shared["settings"]),
+        seed=job.seed,
+        threads=1,
+        folder=folder,
+        gait=resolve.controller(gait_path(run.parents[1], said["gait"]), robot),
+        design=design,
+        score=resolve.score(shared["score"], said["body"], entry),
+        physical=entry.physical,
+    )
+    outcome = run_experiment(experiment, _ignore)
+    before, *since = outcome.recovery.trials
+    after, *recoveries = (_worth(experiment.score, robot, truth, trial) for trial in since)
+    diagnosis = outcome.recovery.diagnosis
+    row = Row(
+        robot=robot.name,
+        case=said["case"],
+        truth=str(truth),
+        seed=job.seed,
+        best=str(diagnosis.best),
+        correct=outcome.correct,
+        verdict=diagnosis.verdict,
+        trials=len(since),
+        before=_worth(experiment.score, robot, INTACT, before),
+        after=after,
+        recovered=max(recoveries),
+        diverged=outcome.tally.diverged,
+        seconds=outcome.seconds,
+    )
+    return as_objects([row])
+
+
+def _worth(score: Score, robot: Robot, hidden: Hypothesis, trial: Trial) -> float:
+    """The score of a physical trial."""
+    shown = trial.behaviour
+    signals = {signal: shown[signal][np.newaxis] for signal in score.record}
+    return float(score.of(robot, hidden, Behaviour(shown.names, shown.time, signals))[0])
+
+
+def _ignore(_event: Event) -> None:
+    """Nobody looks on."""

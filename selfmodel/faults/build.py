@@ -1,0 +1,102 @@
+"""Builds the model of a robot under a hypothesis."""
+
+from collections.abc import Callable, Sequence
+
+import mujoco
+from mujoco import MjModel, MjSpec
+
+from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.robot import Robot
+
+SpecEdit = Callable[[MjSpec], None]
+"""Edits a specification before it is compiled."""
+
+
+def build(
+    robot: Robot,
+    hypothesis: Hypothesis,
+    seed: int = 0,
+    *,
+    edits: Sequence[SpecEdit] = (),
+    perturb: Callable[[MjModel], MjModel] | None = None,
+) -> Embodiment:
+    """Returns the embodiment of a robot under a hypothesis.
+
+    Args:
+        robot: The nominal robot.
+        hypothesis: In canonical form.
+        seed: Seed of the random parts of the faults, such as the shape of rough terrain. The
+            self-model's seed is 0; a physical robot has another seed, unknown to the self-model.
+        edits: Further edits of the specification, after those of the hypothesis.
+        perturb: Maps the compiled model to the model that the faults are applied to; identity by
+            default.
+
+    Raises:
+        InputError: The model has no place for a fault of the hypothesis.
+    """
+    model = compile_model(robot, hypothesis, seed, edits)
+    if perturb is not None:
+        model = perturb(model)
+    return apply_faults(model, robot.anatomy, hypothesis, seed)
+
+
+def compile_model(
+    robot: Robot, hypothesis: Hypothesis, seed: int = 0, edits: Sequence[SpecEdit] = ()
+) -> MjModel:
+    """Returns the compiled model with the faults that edit the specification.
+
+    The result is the robot's own model, not a copy, where nothing edits the specification.
+
+    Args:
+        robot: The nominal robot.
+        hypothesis: In canonical form.
+        seed: As for ``build``.
+        edits: As for ``build``.
+    """
+    faults = hypothesis.shape.faults
+    if not faults and not edits:
+        return robot.model
+    spec = robot.specification()
+    for fault in faults:
+        if fault.kind.reshape:
+            fault.kind.reshape(spec, fault, seed)
+    for edit in edits:
+        edit(spec)
+    return spec.compile()
+
+
+def apply_faults(
+    model: MjModel, anatomy: Anatomy, hypothesis: Hypothesis, seed: int = 0
+) -> Embodiment:
+    """Returns the embodiment of a compiled model with the faults of a hypothesis applied.
+
+    Args:
+        model: The model as ``compile_model`` returns it; it is not changed.
+        anatomy: The robot's parts.
+        hypothesis: In canonical form.
+        seed: As for ``build``.
+    """
+    embodiment = Embodiment.of(model, anatomy, seed)
+    if not hypothesis.faults:
+        return embodiment
+    for fault in hypothesis.faults:
+        fault.kind.strike(embodiment, anatomy, fault)
+    # One MjData for both models, whose layouts are the same: its allocation costs the most here.
+    data = mujoco.MjData(model)
+    nominal = _mean_inertia(model, data)
+    mujoco.mj_setConst(embodiment.model, data)
+    # Tendons keep their length, although a welded joint's angle has become its reference.
+    embodiment.model.tendon_length0[:] = model.tendon_length0
+    # The solver's tolerance is relative to the mean inertia, and a welded hinge's armature would
+    # make any solution converged. The absolute tolerance is kept.
+    embodiment.model.opt.tolerance *= nominal / _mean_inertia(embodiment.model, data)
+    return embodiment
+
+
+def _mean_inertia(model: MjModel, data: mujoco.MjData) -> float:
+    """Mean of the diagonal of the mass matrix in the reference configuration."""
+    mujoco.mj_resetData(model, data)
+    mujoco.mj_fwdPosition(model, data)
+    return float(data.M[model.M_rowadr + model.M_rownnz - 1].mean())

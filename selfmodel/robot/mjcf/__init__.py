@@ -1,0 +1,1 @@
+"""Any MJCF file, made into a robot."""

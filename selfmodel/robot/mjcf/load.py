@@ -1,0 +1,39 @@
+"""Loads a robot from an MJCF file."""
+
+from pathlib import Path
+
+from selfmodel.errors import InputError
+from selfmodel.robot.mjcf.adaptation import Adapted, adapt
+from selfmodel.robot.mjcf.settings import MjcfSettings, read_settings
+from selfmodel.robot.robot import Robot
+
+
+def load_mjcf(path: Path | str, settings: MjcfSettings | None = None) -> Robot:
+    """Returns the robot that an MJCF file describes; see docs/robots.md.
+
+    Args:
+        path: The file, which is not changed. It may name others in its folder and below.
+        settings: What the file itself does not contain; None for those of the TOML beside it.
+
+    Raises:
+        InputError: No robot can be made of the file; the message gives the reason and the remedy.
+    """
+    file = Path(path)
+    adapted = adapt(file, read_settings(file) if settings is None else settings)
+    return robot_from(adapted, str(file))
+
+
+def robot_from(adapted: Adapted, source: str) -> Robot:
+    """Returns the robot of an adapted MJCF.
+
+    Args:
+        adapted: As ``adapt`` or ``adapt_text`` returns it.
+        source: The name of the MJCF in an error message.
+
+    Raises:
+        InputError: The adapted model is no valid robot.
+    """
+    try:
+        return Robot(adapted.name, adapted.mjcf, adapted.control_timestep, adapted.assets)
+    except ValueError as error:
+        raise InputError(f"{source}: {' '.join(str(error).split())}") from error

@@ -1,0 +1,128 @@
+"""The continuous parameters of a self-model, and the robot that has others."""
+
+import copy
+import dataclasses
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from selfmodel.arrays import FloatArray
+from selfmodel.robot.custom_numerics import CONTROL_DELAY
+from selfmodel.robot.robot import Robot
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """By what factors a robot differs from its nominal model.
+
+    Attributes:
+        root_mass: Of the root body's mass and inertia.
+        limb_mass: Of the mass and inertia of all other bodies.
+        friction: Of the sliding friction of everything.
+        damping: Of the damping of every joint.
+        motor_gains: Of each motor's torque, in the model's order.
+        delay: Control steps from a command to its effect.
+    """
+
+    root_mass: float
+    limb_mass: float
+    friction: float
+    damping: float
+    motor_gains: tuple[float, ...]
+    delay: int = 0
+
+    @property
+    def factors(self) -> FloatArray:
+        """The factors in one row: root, limbs, friction, damping, motors."""
+        shared = (self.root_mass, self.limb_mass, self.friction, self.damping)
+        return np.array([*shared, *self.motor_gains])
+
+
+def factor_names(robot: Robot) -> tuple[str, ...]:
+    """Returns what each factor is of, in the order of ``Parameters.factors``."""
+    shared = ("mass of the root", "mass of the limbs", "friction", "damping")
+    return (*shared, *(f"motor {motor}" for motor in robot.anatomy.motors))
+
+
+def nominal(robot: Robot) -> Parameters:
+    """Returns the parameters of a robot as its model describes it."""
+    return Parameters(1.0, 1.0, 1.0, 1.0, (1.0,) * robot.model.nu, robot.control_delay)
+
+
+def from_factors(factors: FloatArray, delay: int) -> Parameters:
+    """Returns parameters from a row of factors; see ``Parameters.factors``."""
+    root, limbs, friction, damping, *motors = (float(factor) for factor in factors)
+    return Parameters(root, limbs, friction, damping, tuple(motors), delay)
+
+
+def edited_model(robot: Robot, parameters: Parameters) -> mujoco.MjModel:
+    """Returns a copy of a robot's model that has these parameters, but for the delay."""
+    model = copy.copy(robot.model)
+    masses = _mass_factors(robot, parameters)
+    model.body_mass *= masses
+    model.body_inertia *= masses[:, np.newaxis]
+    model.geom_friction[:, 0] *= parameters.friction
+    model.pair_friction[:, :2] *= parameters.friction
+    model.dof_damping *= parameters.damping
+    model.dof_dampingpoly *= parameters.damping
+    motors = np.array(parameters.motor_gains)[:, np.newaxis]
+    model.actuator_gainprm *= motors
+    model.actuator_biasprm *= motors
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    return model
+
+
+def with_parameters(robot: Robot, parameters: Parameters) -> Robot:
+    """Returns a robot whose MJCF says these parameters, the delay included.
+
+    Numbers in an MJCF have six digits, so its model is that of ``edited_model`` to one part in a
+    million.
+    """
+    return with_model(robot, edited_model(robot, parameters), parameters.delay)
+
+
+def with_model(robot: Robot, model: mujoco.MjModel, delay: int) -> Robot:
+    """Returns a robot whose MJCF says what an edited copy of its compiled model does.
+
+    Args:
+        robot: The robot that the copy is of.
+        model: The copy, with other masses, friction, damping or motor gains.
+        delay: Control steps from a command to its effect.
+    """
+    spec = robot.specification()
+    spec.compile()  # until then its parts have no numbers
+    compiler = spec.compiler
+    # What would change the masses again as the text is compiled.
+    compiler.settotalmass, compiler.inertiafromgeom = -1.0, _SAID_OR_FROM_GEOMS
+    compiler.boundmass = compiler.boundinertia = 0.0
+    for body in spec.bodies[1:]:
+        body.explicitinertial = True
+        body.fullinertia = np.full(6, np.nan)
+        body.mass, body.inertia = model.body_mass[body.id], model.body_inertia[body.id]
+        body.ipos, body.iquat = model.body_ipos[body.id], model.body_iquat[body.id]
+    for geom in spec.geoms:
+        geom.friction = model.geom_friction[geom.id]
+    for pair in spec.pairs:
+        pair.friction = model.pair_friction[pair.id]
+    for joint in spec.joints:
+        dof = model.jnt_dofadr[joint.id]
+        joint.damping = [model.dof_damping[dof], *model.dof_dampingpoly[dof]]
+    for motor in spec.actuators:
+        motor.gainprm = model.actuator_gainprm[motor.id]
+        motor.biasprm = model.actuator_biasprm[motor.id]
+    for numeric in spec.numerics:
+        if numeric.name == CONTROL_DELAY:
+            spec.delete(numeric)
+    spec.add_numeric(name=CONTROL_DELAY, data=[float(delay)])
+    return dataclasses.replace(robot, mjcf=spec.to_xml())
+
+
+_SAID_OR_FROM_GEOMS = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
+
+
+def _mass_factors(robot: Robot, parameters: Parameters) -> FloatArray:
+    factors = np.full(robot.model.nbody, parameters.limb_mass)
+    factors[0] = 1.0
+    factors[robot.model.body(robot.root).id] = parameters.root_mass
+    return factors

@@ -1,0 +1,132 @@
+"""A robot: an MJCF model, its parts by name, and its rhythm."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from xml.etree import ElementTree as ET
+
+import mujoco
+import numpy as np
+
+from selfmodel.controllers.cpg import Cpg
+from selfmodel.controllers.network import Network
+from selfmodel.errors import InputError
+from selfmodel.robot.actuator_ranges import command_ranges
+from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.anatomy_reader import driven_joints, read_anatomy
+from selfmodel.robot.custom_numerics import (
+    CONTROL_DELAY,
+    MAX_HIDDEN_NEURONS,
+    NEURONS,
+    control_delay,
+    hidden_neurons,
+)
+from selfmodel.robot.floating_base import find_root
+from selfmodel.robot.model_checks import check_carried
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A body plan with nothing wrong, and how often it is controlled.
+
+    Everything but the control time step is read from the MJCF, so a log that carries both carries
+    the robot. Forward is the world's x axis at the start.
+
+    Attributes:
+        name: What it is called.
+        mjcf: The model, as one XML text that needs no files but the assets.
+        control_timestep: Seconds between two commands.
+        assets: The files that the model names, such as meshes.
+        model: The compiled model.
+        anatomy: Its joints, sensors and motors.
+        root: Its root body, whose travel counts.
+    """
+
+    name: str
+    mjcf: str
+    control_timestep: float
+    assets: Mapping[str, bytes] = field(default_factory=dict, repr=False)
+    model: mujoco.MjModel = field(init=False, repr=False)
+    anatomy: Anatomy = field(init=False, repr=False)
+    root: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        model = mujoco.MjModel.from_xml_string(self.mjcf, dict(self.assets))
+        if not model.opt.timestep > 0:
+            raise ValueError(f"the physics time step must be above 0 s, got {model.opt.timestep}")
+        root = find_root(model, driven_joints(model))
+        check_carried(model, root)
+        object.__setattr__(self, "model", model)
+        object.__setattr__(self, "anatomy", read_anatomy(model, root, hidden_neurons(model)))
+        object.__setattr__(self, "root", str(model.body(root).name))
+        control_delay(model)  # raises ValueError
+        if not np.isclose(self.substeps * model.opt.timestep, self.control_timestep, rtol=1e-9):
+            raise ValueError(
+                f"the control time step {self.control_timestep} s must be a multiple of the "
+                f"physics time step {model.opt.timestep} s"
+            )
+
+    @property
+    def substeps(self) -> int:
+        """Physics steps in a control step."""
+        return max(1, round(self.control_timestep / float(self.model.opt.timestep)))
+
+    @property
+    def control_delay(self) -> int:
+        """Control steps from a command to its effect, as the model's ``CONTROL_DELAY`` says."""
+        return control_delay(self.model)
+
+    @property
+    def is_calibrated(self) -> bool:
+        """Whether a calibration wrote the model, and with it a ``CONTROL_DELAY``."""
+        found: int = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_NUMERIC, CONTROL_DELAY)
+        return found >= 0
+
+    @property
+    def network(self) -> Network:
+        """The network that controls it.
+
+        Raises:
+            InputError: A motor does not say what it may be commanded.
+        """
+        names, ranges = self.anatomy.names, command_ranges(self.model)
+        return Network(names.sensors, names.motors, self.anatomy.neurons, ranges)
+
+    @property
+    def cpg(self) -> Cpg:
+        """The oscillators that can control it in the network's place.
+
+        Raises:
+            InputError: A motor does not say what it may be commanded.
+        """
+        names, ranges = self.anatomy.names, command_ranges(self.model)
+        return Cpg(names.sensors, names.motors, self.control_timestep, ranges)
+
+    @property
+    def standing_height(self) -> float:
+        """Height of the root body above the ground at the start, m."""
+        return float(self.model.body(self.root).pos[2])
+
+    def specification(self) -> mujoco.MjSpec:
+        """Returns the MJCF as a specification that can be edited before it is compiled."""
+        return mujoco.MjSpec.from_string(self.mjcf, assets=dict(self.assets))
+
+
+def with_neurons(robot: Robot, neurons: int) -> Robot:
+    """Returns the robot with that many hidden neurons in its network.
+
+    Its MJCF says so, and is otherwise the same to the digit, so that it moves the same to the bit.
+
+    Raises:
+        InputError: They are too many, or none.
+    """
+    if not 1 <= neurons <= MAX_HIDDEN_NEURONS:
+        raise InputError(f"a network has 1 to {MAX_HIDDEN_NEURONS} hidden neurons, got {neurons}")
+    if neurons == robot.anatomy.neurons:
+        return robot
+    root = ET.fromstring(robot.mjcf)  # noqa: S314  # a robot's own, which MuJoCo has read
+    for custom in root.findall("custom"):
+        for numeric in custom.findall("numeric"):
+            if numeric.get("name") == NEURONS:
+                custom.remove(numeric)
+    ET.SubElement(ET.SubElement(root, "custom"), "numeric", name=NEURONS, data=str(neurons))
+    return replace(robot, mjcf=ET.tostring(root, encoding="unicode"))

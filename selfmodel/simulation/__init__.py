@@ -1,0 +1,1 @@
+"""The self-model in motion: rollouts, short predictions, calibration, replay."""

@@ -1,0 +1,191 @@
+"""Promises of `selfmodel calibrate`: a model that other commands take, or a sentence that helps."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from selfmodel.controllers.playback import played_back
+from selfmodel.logs.writer import write_trial
+from selfmodel.physical.reality_gap import draw_gap
+from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.robot.parameters import nominal, with_parameters
+from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.tasks import ROBOTS
+from selfmodel.trials.behaviour import Sample, Signal
+from selfmodel.trials.trial import Plan, Stage
+from tests.conftest import random_motion
+from tests.helpers.command import selfmodel
+
+STEPS = 150
+SETTINGS = Settings(generations=2).scaled(8)
+BASE: tuple[Signal, ...] = ("base_position", "base_linear_velocity")
+
+
+def write(
+    path: Path,
+    robot: Robot,
+    *,
+    stage: Stage = "single",
+    level: float = 0.0,
+    lost: tuple[Signal, ...] = (),
+) -> Path:
+    """Logs a trial in which every joint moves."""
+    driver = played_back(robot.anatomy.motors, random_motion(robot, STEPS))
+    gap = draw_gap(robot, level, np.random.default_rng(2))
+    samples = (
+        Sample(
+            sample.time,
+            {
+                signal: np.full_like(row, np.nan) if signal in lost else row
+                for signal, row in sample.values.items()
+            },
+        )
+        for sample in SimulatedRobot(robot, gap=gap).run(driver, STEPS)
+    )
+    return write_trial(
+        path, robot, Plan(path.stem, stage, driver, STEPS, 0), samples, settings=SETTINGS
+    )
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with logs: across a gap, some unseen, one without velocities, of another robot."""
+    made = tmp_path_factory.mktemp("calibrate")
+    quadruped = ROBOTS["quadruped"].robot()
+    write(made / "intact.mcap", quadruped, stage="before", level=0.1)
+    write(made / "after.mcap", quadruped, stage="after", level=0.1)
+    write(made / "unseen.mcap", quadruped, stage="before", level=0.1, lost=BASE)
+    write(made / "unseen-after.mcap", quadruped, stage="after", level=0.1, lost=BASE)
+    write(made / "numb.mcap", quadruped, stage="before", lost=("joint_velocities",))
+    write(made / "exact.mcap", quadruped)
+    write(made / "other.mcap", ROBOTS["hexapod"].robot())
+    (made / "taken.xml").write_text("mine", encoding="utf-8")
+    return made
+
+
+def test_a_calibrated_model_is_one_for_replay_and_diagnose(folder: Path):
+    done = selfmodel("calibrate", "intact.mcap", "-o", "fit.xml", "--json", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+
+    assert found["error"] < found["error_before"]
+    assert not found["as_it_was"]
+    assert len(found["parameters"]) == 4 + 8
+    assert all(0 < one["deviation"] <= 0.15 for one in found["parameters"])
+    assert not (folder / "fit.xml.part").exists()
+    replayed = selfmodel("replay", "intact.mcap", "--robot", "fit.xml", "--json", cwd=folder)
+    assert replayed.returncode == 0, replayed.stderr
+    plain = selfmodel("replay", "intact.mcap", "--json", cwd=folder)
+    errors = [json.loads(run.stdout)["rms"]["joint_positions"] for run in (replayed, plain)]
+    assert json.loads(replayed.stdout)["model"] == "fit.xml"
+    assert errors[0] != errors[1]
+    diagnosed = selfmodel("diagnose", "after.mcap", "--robot", "fit.xml", "--json", cwd=folder)
+    assert diagnosed.returncode == 0, diagnosed.stderr
+    again = selfmodel("calibrate", "intact.mcap", "--robot", "fit.xml", "-o", "2.xml", cwd=folder)
+    assert again.returncode == 0, again.stderr
+
+
+def test_a_trial_from_before_the_failure_is_fitted_to_and_not_explained(tmp_path: Path):
+    healthy = selfmodel(
+        *("trial", "quadruped", "--stage", "before", "--out", "healthy.mcap"), cwd=tmp_path
+    )
+    failed = selfmodel(
+        *("trial", "quadruped", "--controller", "healthy.mcap", "--out", "failed.mcap"),
+        *("--damage", "break:front_left_knee"),
+        cwd=tmp_path,
+    )
+    done = selfmodel(
+        *("diagnose", "healthy.mcap", "failed.mcap", "--json"),
+        *("--comparator", "forward-displacement"),
+        cwd=tmp_path,
+    )
+
+    assert [healthy.returncode, failed.returncode, done.returncode] == [0, 0, 0], done.stderr
+    found = json.loads(done.stdout)
+    assert (found["intact"], found["logs"]) == (["healthy.mcap"], ["failed.mcap"])
+    assert found["calibration"] is not None
+
+
+def test_a_table_says_each_factor_and_how_sure_it_is(folder: Path):
+    done = selfmodel("calibrate", "exact.mcap", "-o", "same.xml", cwd=folder)
+
+    assert done.returncode == 0, done.stderr
+    assert "motor front_left_shoulder" in done.stdout
+    assert "± 15.0 %" in done.stdout
+    assert "delay, control steps: 0 (0 before)" in done.stdout
+    assert "it is left as it was" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["intact.mcap", "-o", "fit.txt"], "--out needs a name that ends in .xml"),
+        (["intact.mcap", "-o", "taken.xml"], "taken.xml exists, and is not overwritten"),
+        (["intact.mcap", "-o", "no/fit.xml"], "there is no folder no"),
+        (["intact.mcap", "other.mcap", "-o", "a.xml"], "the logs are of different robots"),
+        (["intact.mcap", "--robot", "hexapod", "-o", "a.xml"], "hexapod is another robot"),
+        (["none.mcap", "-o", "a.xml"], "none.mcap"),
+        (
+            ["intact.mcap", "numb.mcap", "-o", "a.xml"],
+            "numb.mcap: calibration needs stretches of 16 steps or more, none of them late, with ",
+        ),
+        (["numb.mcap", "-o", "a.xml"], "the log never has joint_velocities: leave"),
+    ],
+)
+def test_what_cannot_be_used_is_said_in_one_sentence(
+    folder: Path, arguments: list[str], sentence: str
+):
+    done = selfmodel("calibrate", *arguments, cwd=folder)
+
+    assert done.returncode == 2
+    assert sentence in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not (folder / "a.xml").exists()
+    assert (folder / "taken.xml").read_text(encoding="utf-8") == "mine"
+
+
+def test_a_robot_that_nobody_sees_is_calibrated_and_diagnosed(folder: Path):
+    fit = selfmodel("calibrate", "unseen.mcap", "-o", "unseen.xml", "--json", cwd=folder)
+    done = selfmodel(
+        *("diagnose", "unseen.mcap", "unseen-after.mcap", "--json"),
+        *("--comparator", "segment-prediction-onboard"),
+        cwd=folder,
+    )
+
+    assert [fit.returncode, done.returncode] == [0, 0], fit.stderr + done.stderr
+    found = json.loads(fit.stdout)
+    assert found["error"] < found["error_before"]
+    assert json.loads(done.stdout)["calibration"]["delay"] == found["delay"]
+
+
+def test_no_log_is_a_wrong_usage(folder: Path):
+    assert selfmodel("calibrate", "-o", "a.xml", cwd=folder).returncode == 2
+
+
+def test_a_diagnosis_that_cannot_calibrate_says_how_to_do_without(folder: Path):
+    done = selfmodel("diagnose", "numb.mcap", "after.mcap", cwd=folder)
+
+    assert done.returncode == 2
+    assert "numb.mcap: calibration needs" in done.stderr
+    assert "leave this log out, or give --no-calibrate" in done.stderr
+
+
+def test_a_model_that_names_files_is_refused(tmp_path: Path):
+    quadruped = ROBOTS["quadruped"].robot()
+    text = with_parameters(quadruped, nominal(quadruped)).mjcf
+    points = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    asset = '<mesh name="shell" file="shell.obj"/>'
+    text = text.replace("<worldbody>", f"<asset>{asset}</asset><worldbody>", 1)
+    text = text.replace(
+        "</worldbody>", '<geom type="mesh" mesh="shell" pos="50 0 0"/></worldbody>', 1
+    )
+    robot = Robot("quadruped", text, 0.01, {"shell.obj": points.encode()})
+    write(tmp_path / "a.mcap", robot)
+    done = selfmodel("calibrate", "a.mcap", "-o", "fit.xml", cwd=tmp_path)
+
+    assert done.returncode == 2
+    assert "its model names other files (shell.obj)" in done.stderr
+    assert not (tmp_path / "fit.xml").exists()

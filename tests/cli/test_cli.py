@@ -1,0 +1,300 @@
+"""Promises of the command line, kept by running it as its users do."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from selfmodel import cli
+from selfmodel.errors import TrialError
+from selfmodel.logs import read_log, save_controller
+from selfmodel.logs.journal import read_database
+from selfmodel.robot.robot import Robot
+from tests.conftest import random_controllers
+from tests.helpers.command import DIAGNOSIS, SMALL, selfmodel
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_recover_prints_one_json_object_with_everything_promised(recovered: tuple[Path, dict]):
+    _, told = recovered
+
+    assert set(told) == {
+        *("robot", "case", "truth", "comparator", "kinds", "gap", "structure", "seed", "trials"),
+        *DIAGNOSIS,
+        *("displacement", "recovery", "physical_trials", "evaluations", "seconds", "next_trial"),
+        *("controller", "neurons", "correct"),
+    }
+    assert (told["robot"], told["case"], told["seed"], told["gap"]) == ("quadruped", 4, 0, 0)
+    assert told["truth"] == "break:front_left_shoulder+sensor:front_right_touch"
+    assert told["comparator"] == "segment-prediction"
+    assert (told["controller"], told["neurons"]) == ("network", 3)
+    assert told["verdict"] in {"explained", "ambiguous", "unexplained"}
+    assert told["outside"] is None, "without a gap, a fault that is considered explains all"
+    assert set(told["calibration"]) >= {"deviations", "error_before", "error"}
+    assert told["intact_distance"] >= told["diagnosis"][0]["distance"] >= 0
+    stages = [trial["stage"] for trial in told["trials"]]
+    assert stages == ["before", "after", "recovery", "recovery", "recovery"]
+    assert told["physical_trials"] == 3
+    assert told["evaluations"]["repair"] == told["evaluations"]["diagnostic"] == 4 * (8 + 4)
+    assert set(told["evaluations"]) == {
+        *("repair", "diagnostic", "distinct_hypotheses", "simulated_steps", "diverged"),
+    }
+    assert 1 <= len(told["diagnosis"]) <= 10
+    ways = [trial["displacement"] for trial in told["trials"]]
+    assert told["displacement"] == {
+        "before": ways[0],
+        "after": ways[1],
+        "recovered": max(ways[2:]),
+    }
+    assert told["recovery"] == max(ways[2:]) / ways[0]
+    assert isinstance(told["correct"], bool)
+
+
+def test_every_trial_of_a_recovery_is_a_log_that_says_the_same(recovered: tuple[Path, dict]):
+    folder, told = recovered
+    for trial in told["trials"]:
+        log = read_log(folder / trial["log"])
+
+        assert log.trial.displacement == trial["displacement"]
+        assert log.trial.plan.stage == trial["stage"]
+        assert log.trial.behaviour.steps == 1000
+    assert not list(folder.rglob("*.part"))
+
+
+def test_the_database_is_read_back_from_the_folder(recovered: tuple[Path, dict], quadruped: Robot):
+    folder, told = recovered
+    database = read_database(folder / "run", quadruped.anatomy)
+
+    assert [t.displacement for t in database.trials] == [t["displacement"] for t in told["trials"]]
+    assert [t.plan.stage for t in database.evidence] == ["after", *["recovery"] * 3]
+    assert [str(h) for h in database.hypotheses] == [d["hypothesis"] for d in told["diagnosis"]]
+    assert json.loads((folder / "run" / "result.json").read_text(encoding="utf-8")) == told
+
+
+def test_the_same_seed_tells_the_same(recovered: tuple[Path, dict]):
+    folder, told = recovered
+    again = selfmodel(
+        *("recover", "quadruped", "--case", "4", *SMALL, "--out", "again", "--json"),
+        *("--threads", "1"),
+        cwd=folder,
+    )
+
+    def timeless(one: dict) -> dict:
+        return {**one, "seconds": 0, "trials": [{**trial, "log": ""} for trial in one["trials"]]}
+
+    assert timeless(json.loads(again.stdout)) == timeless(told)
+
+
+def test_a_folder_that_holds_another_run_is_refused_and_left_alone(recovered: tuple[Path, dict]):
+    folder, _ = recovered
+    before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
+    refused = selfmodel("recover", "hexapod", "--case", "1", "--out", "run", cwd=folder)
+
+    assert refused.returncode == 2
+    assert "run holds another run or other files" in refused.stderr
+    assert {path: path.stat().st_mtime_ns for path in folder.rglob("*")} == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (
+            ["recover", "quadrupd", "--case", "1"],
+            "unknown robot 'quadrupd': did you mean quadruped?",
+        ),
+        (["recover", "quadruped", "--case", "11"], "unknown case of Table I '11'"),
+        (["recover", "quadruped"], "expected either --case N or --damage NOTATION, got neither"),
+        (["recover", "quadruped", "--case", "1", "--damage", "intact"], "got both"),
+        (["recover", "hexapod", "--damage", "break:front_left_hp"], "did you mean front_left_hip"),
+        (["recover", "hexapod", "--damage", "break"], "cannot read the term 'break'"),
+        (
+            ["recover", "hexapod", "--case", "1", "--comparator", "forward-displacment"],
+            "did you mean forward-displacement?",
+        ),
+        (["recover", "hexapod", "--case", "1", "--comparator", "no.such:thing"], "cannot find"),
+        (["recover", "hexapod", "--case", "1", "--comparator", "math:pi"], "is no comparator"),
+        (["recover", "hexapod", "--case", "1", "--population", "1"], "population"),
+        (["recover", "hexapod", "--case", "x"], "case"),
+        (["trial", "quadruped", "--out", "no/such/folder/a.mcap"], "there is no folder"),
+        (["trial", "quadruped", "--out", "a.bag"], "ends in .mcap"),
+        (["trial", "quadruped", "--out", "a.mcap", "--controller", "no.npz"], "no.npz"),
+        (["trial", "quadruped", "--out", "a.mcap", "--controller", "bad.mcap"], "bad.mcap"),
+        (["trial", "quadruped", "--out", "a.mcap", "--stage", "befor"], "did you mean before"),
+        (["robots", "octopod"], "unknown robot 'octopod'"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_status_2(tmp_path: Path, arguments: list[str], said: str):
+    (tmp_path / "bad.mcap").write_bytes(b"not a log")
+    done = selfmodel(*arguments, cwd=tmp_path, COLUMNS="200")
+
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+    assert [path.name for path in tmp_path.iterdir()] == ["bad.mcap"]
+
+
+def test_progress_goes_to_standard_error_in_plain_lines_when_piped(tmp_path: Path):
+    done = selfmodel("recover", "quadruped", "--case", "9", *SMALL, "--trials", "1", cwd=tmp_path)
+
+    assert done.returncode == 0
+    assert "\x1b" not in done.stderr + done.stdout
+    lines = done.stderr.splitlines()
+    begins = [
+        *("repair EA for intact:", "trial 00-before:", "calibration: error ", "trial 01-after:"),
+        "diagnostic EA:",
+        *("diagnosis from 1 trial:", "repair EA for ", "trial 02-recovery:", "diagnostic EA:"),
+        "diagnosis from 2 trials:",
+    ]
+    assert len(lines) == len(begins)
+    assert all(line.startswith(begin) for line, begin in zip(lines, begins, strict=True))
+    assert "truth: intact; the diagnosis is" in done.stdout
+    assert any(
+        line.startswith(("Explained: ", "Ambiguous: ", "Unexplained: "))
+        for line in done.stdout.splitlines()
+    )
+    assert len(list((tmp_path / "runs").iterdir())) == 1
+
+
+def test_a_narrow_terminal_loses_no_name(tmp_path: Path):
+    done = selfmodel("robots", "quadruped", cwd=tmp_path, COLUMNS="40")
+    text = "".join(
+        character for character in done.stdout if character.isalnum() or character in "_:+"
+    )
+
+    assert max(map(len, done.stdout.splitlines())) <= 40
+    assert "break:front_left_shoulder+jam:back_left_shoulder+sensor:back_right_angle" in text
+
+
+def test_a_trial_takes_a_controller_from_a_file_or_from_a_log(tmp_path: Path, quadruped: Robot):
+    (controller,) = random_controllers(quadruped, 1, seed=9)
+    save_controller(tmp_path / "gait.npz", controller)
+    first = selfmodel(
+        *("trial", "quadruped", "--controller", "gait.npz", "--out", "a.mcap", "--json"),
+        cwd=tmp_path,
+    )
+    second = selfmodel(
+        *("trial", "quadruped", "--controller", "a.mcap", "--out", "b.mcap", "--json"), cwd=tmp_path
+    )
+    damage = ("--damage", "break:front_left_knee")
+    third = selfmodel(
+        *("trial", "quadruped", "--controller", "a.mcap", *damage, "--out", "c.mcap", "--json"),
+        cwd=tmp_path,
+    )
+    a, b, c = (json.loads(done.stdout) for done in (first, second, third))
+
+    assert read_log(tmp_path / "b.mcap").trial.plan.controller == controller
+    assert a["displacement"] == b["displacement"] != c["displacement"]
+    assert (a["truth"], c["truth"]) == ("intact", "break:front_left_knee")
+    refused = selfmodel(
+        *("trial", "hexapod", "--controller", "a.mcap", "--out", "d.mcap"), cwd=tmp_path
+    )
+    assert refused.returncode == 2
+    assert "give one that was made for it" in refused.stderr
+
+
+def test_a_trial_without_a_controller_draws_one_from_its_seed(tmp_path: Path):
+    told = [
+        json.loads(
+            selfmodel(
+                *("trial", "hexapod", "--seed", seed, "--out", f"{name}.mcap", "--json"),
+                cwd=tmp_path,
+            ).stdout
+        )["displacement"]
+        for name, seed in (("a", "1"), ("b", "1"), ("c", "2"))
+    ]
+
+    assert told[0] == told[1] != told[2]
+
+
+def test_an_interrupted_recovery_keeps_its_finished_trials(tmp_path: Path):
+    running = subprocess.Popen(
+        [
+            *(sys.executable, "-m", "selfmodel", "recover", "quadruped", "--case", "1"),
+            *(*SMALL, "--trials", "90", "--out", "run"),
+        ],
+        cwd=tmp_path,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    trials = tmp_path / "run" / "trials"
+    deadline = time.monotonic() + 120
+    while not (trials / "01-after.mcap").exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    running.send_signal(signal.SIGINT)
+    _, told = running.communicate(timeout=60)
+
+    assert running.returncode == 130
+    assert "interrupted: the finished trials are in run" in told
+    assert "Traceback" not in told
+    for name in ("00-before", "01-after"):
+        assert read_log(trials / f"{name}.mcap").trial.behaviour.steps == 1000
+
+
+def test_a_comparator_from_elsewhere_plugs_in(tmp_path: Path):
+    (tmp_path / "mine.py").write_text(
+        "from selfmodel.trials.behaviour import forward_displacement\n"
+        "from selfmodel.simulation.requests import ClosedLoop\n"
+        "class Squared:\n"
+        "    name = 'squared'\n"
+        "    def request(self, trial):\n"
+        "        return ClosedLoop(record=('base_position',))\n"
+        "    def distances(self, simulated, trial):\n"
+        "        return (forward_displacement(simulated) - trial.displacement) ** 2\n"
+        "squared = Squared()\n",
+        encoding="utf-8",
+    )
+    done = selfmodel(
+        *("recover", "quadruped", "--case", "2", *SMALL, "--trials", "1", "--json"),
+        *("--comparator", "mine:squared", "--out", "run"),
+        cwd=tmp_path,
+        PYTHONPATH=".",
+    )
+
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert told["comparator"] == "squared"
+    assert all(np.isfinite(candidate["distance"]) for candidate in told["diagnosis"])
+
+
+def test_robots_are_listed_with_their_parts_and_cases(tmp_path: Path):
+    told = json.loads(selfmodel("robots", "--json", cwd=tmp_path).stdout)["robots"]
+
+    assert [one["robot"] for one in told] == ["quadruped", "hexapod"]
+    assert [one["weights"] for one in told] == [68, 120]
+    assert [len(one["cases"]) for one in told] == [10, 10]
+
+
+def test_help_names_every_command(tmp_path: Path):
+    done = selfmodel("--help", cwd=tmp_path)
+
+    assert done.returncode == 0
+    assert all(command in done.stdout for command in ("robots", "recover", "trial"))
+
+
+def test_the_installed_command_is_the_same_as_the_module():
+    command = Path(sys.executable).with_name("selfmodel")
+    done = subprocess.run([command, "robots"], capture_output=True, text=True, check=True, cwd=ROOT)
+
+    assert "quadruped" in done.stdout
+
+
+def test_what_an_error_s_notes_say_is_told_too(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    def fail() -> None:
+        error = TrialError("the environment failed")
+        error.add_note("the safe command could not be sent")
+        raise error
+
+    monkeypatch.setattr(cli, "app", fail)
+    with pytest.raises(SystemExit, match="1"):
+        cli.main()
+    told = capsys.readouterr().err
+    assert told == "error: the environment failed; the safe command could not be sent\n"

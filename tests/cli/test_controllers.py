@@ -1,0 +1,108 @@
+"""Promises of ``--controller`` and ``--neurons``: what is evolved, and what the logs say of it."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from selfmodel.controllers.cpg import Oscillators
+from selfmodel.logs import read_log
+from tests.helpers.command import SMALL, selfmodel
+
+FEW = (*SMALL, "--trials", "1", "--out", "run", "--json")
+
+
+@pytest.fixture(scope="module")
+def rhythmic(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
+    """A folder in which a robot was recovered with oscillators, and what it said."""
+    folder = tmp_path_factory.mktemp("rhythmic")
+    done = selfmodel("recover", "quadruped", "--case", "3", "--controller", "cpg", *FEW, cwd=folder)
+    assert done.returncode == 0, done.stderr
+    return folder, json.loads(done.stdout)
+
+
+def test_a_recovery_evolves_oscillators_where_they_are_asked_for(rhythmic: tuple[Path, dict]):
+    folder, told = rhythmic
+    drivers = [read_log(folder / one["log"]).trial.plan.controller for one in told["trials"]]
+
+    assert told["controller"] == "cpg"
+    assert len(drivers) == 3
+    assert all(isinstance(driver, Oscillators) for driver in drivers)
+    assert drivers[0] == drivers[1] != drivers[2]
+
+
+def test_the_logs_of_oscillators_give_the_ranking_of_their_run(rhythmic: tuple[Path, dict]):
+    folder, told = rhythmic
+    logs = [one["log"] for one in told["trials"]]
+    done = selfmodel("diagnose", *logs, "--json", cwd=folder)
+
+    assert json.loads(done.stdout)["diagnosis"] == told["diagnosis"]
+
+
+def test_oscillators_of_a_log_drive_another_trial_which_replays(rhythmic: tuple[Path, dict]):
+    folder, told = rhythmic
+    given = ("--controller", told["trials"][0]["log"], "--damage", "break:back_left_knee")
+    done = selfmodel("trial", "quadruped", *given, "--out", "broken.mcap", "--json", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    again = selfmodel(
+        *("replay", "broken.mcap", "--hypothesis", "break:back_left_knee", "--json"), cwd=folder
+    )
+    info = selfmodel("logs", "info", "broken.mcap", cwd=folder)
+
+    assert json.loads(again.stdout)["identical"] is True
+    assert "oscillators of" in info.stdout
+
+
+def test_a_trial_takes_random_oscillators_or_a_random_network_of_any_size(tmp_path: Path):
+    for number, asked in enumerate((["--controller", "cpg"], ["--neurons", "6"])):
+        out = f"{number}.mcap"
+        done = selfmodel("trial", "quadruped", *asked, "--out", out, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+    rhythmic, large = (read_log(tmp_path / f"{k}.mcap").trial.plan.controller for k in (0, 1))
+
+    assert isinstance(rhythmic, Oscillators)
+    assert large.network.hidden == 6
+
+
+def test_a_recovery_s_network_has_as_many_neurons_as_are_asked_for(tmp_path: Path):
+    asked = ("--neurons", "5", "--damage", "neuron:4", "--no-calibrate")
+    done = selfmodel("recover", "quadruped", *asked, *FEW, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    log = read_log(tmp_path / told["trials"][-1]["log"])
+
+    assert told["neurons"] == 5
+    assert told["controller"] == "network"
+    assert log.trial.plan.controller.network.hidden == 5
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        (("--controller", "cpq"), "unknown kind of controller 'cpq': did you mean cpg?"),
+        (("--controller", "cpg", "--neurons", "4"), "--neurons 4 is of a network: leave it out"),
+        (("--controller", "cpg", "--case", "10"), "neuron:0 means nothing to a robot that osc"),
+        (("--neurons", "101"), "less than or equal to 100"),
+    ],
+)
+def test_what_cannot_be_evolved_is_said_before_anything_runs(
+    asked: tuple[str, ...], said: str, tmp_path: Path
+):
+    case = () if "--case" in asked else ("--case", "1")
+    done = selfmodel("recover", "quadruped", *asked, *case, "--out", "run", cwd=tmp_path)
+
+    assert done.returncode == 2
+    assert said in " ".join(done.stderr.split())
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_controller_of_another_size_is_refused_by_what_differs(tmp_path: Path):
+    first = selfmodel("trial", "quadruped", "--neurons", "6", "--out", "6.mcap", cwd=tmp_path)
+    done = selfmodel(
+        *("trial", "quadruped", "--controller", "6.mcap", "--out", "3.mcap"), cwd=tmp_path
+    )
+
+    assert first.returncode == 0
+    assert done.returncode == 2
+    assert "6 hidden neurons; this robot needs one for" in done.stderr
+    assert "3 hidden neurons" in done.stderr

@@ -1,0 +1,111 @@
+"""Promises of ``--kinds``: a diagnosis proposes what is considered, and nothing else."""
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from tests.helpers.command import SMALL, selfmodel
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+PATH = os.pathsep.join(filter(None, (str(EXAMPLES), os.environ.get("PYTHONPATH"))))
+"""Where the examples can be imported from."""
+
+
+@pytest.fixture(scope="module")
+def heavy(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
+    """A folder in which a robot under a load on slippery ground was recovered, and what it said."""
+    folder = tmp_path_factory.mktemp("heavy")
+    arguments = ("--damage", "payload=2+friction=0.4", "--kinds", "payload:PAYLOAD,friction,jam")
+    done = selfmodel(
+        *("recover", "quadruped", *arguments, *SMALL, "--trials", "1", "--out", "run", "--json"),
+        cwd=folder,
+        PYTHONPATH=PATH,
+    )
+    assert done.returncode == 0, done.stderr
+    return folder, json.loads(done.stdout)
+
+
+def words(diagnosis: list[dict]) -> set[str]:
+    """The words of all terms of a ranking."""
+    terms = "+".join(one["hypothesis"] for one in diagnosis).split("+")
+    return {term.partition("=")[0].partition(":")[0] for term in terms}
+
+
+def test_a_recovery_considers_the_kinds_that_are_chosen(heavy: tuple[Path, dict]):
+    _, told = heavy
+
+    assert told["truth"] == "friction=0.4+payload=2.0"
+    assert told["kinds"] == ["payload", "friction", "jam"]
+    assert {"payload", "friction"} & words(told["diagnosis"])
+    assert words(told["diagnosis"]) <= {*told["kinds"], "intact"}
+
+
+def test_the_logs_and_the_kinds_of_a_run_give_its_ranking(heavy: tuple[Path, dict]):
+    run, told = heavy
+    logs = [trial["log"] for trial in told["trials"]]
+    done = selfmodel(
+        *("diagnose", *logs, "--kinds", "payload:PAYLOAD,friction,jam", "--json"),
+        cwd=run,
+        PYTHONPATH=PATH,
+    )
+    found = json.loads(done.stdout)
+
+    assert found["diagnosis"] == told["diagnosis"]
+    assert found["kinds"] == told["kinds"]
+
+
+def test_a_trial_and_its_replay_name_a_kind_of_ones_own(tmp_path: Path):
+    own = ("--kinds", "payload:PAYLOAD")
+    logged = selfmodel(
+        *("trial", "quadruped", "--damage", "payload=2", *own, "--out", "a.mcap"),
+        cwd=tmp_path,
+        PYTHONPATH=PATH,
+    )
+    again = selfmodel(
+        *("replay", "a.mcap", "--hypothesis", "payload=2", *own, "--json"),
+        cwd=tmp_path,
+        PYTHONPATH=PATH,
+    )
+    drawn = selfmodel(
+        *("render", "a.mcap", "--hypothesis", "payload=2", *own, "--out", "a.png"),
+        cwd=tmp_path,
+        PYTHONPATH=PATH,
+    )
+
+    assert logged.returncode == drawn.returncode == 0, logged.stderr + drawn.stderr
+    assert json.loads(again.stdout)["identical"]
+    unknown = selfmodel("replay", "a.mcap", "--hypothesis", "payload=2", cwd=tmp_path)
+    assert unknown.returncode == 2
+    assert "payload" in unknown.stderr
+
+
+def test_the_paper_s_kinds_are_the_default(recovered: tuple[Path, dict]):
+    _, told = recovered
+
+    assert told["kinds"] == ["break", "jam", "sensor"]
+    assert words(told["diagnosis"]) <= {"break", "jam", "sensor", "intact"}
+    assert not any("=" in one["hypothesis"] for one in told["diagnosis"])
+
+
+@pytest.mark.parametrize("command", [["recover", "quadruped", "--case", "1"], ["diagnose", "a"]])
+def test_an_unknown_kind_is_one_sentence_and_status_2(command: list[str], tmp_path: Path):
+    done = selfmodel(*command, "--kinds", "break,frction", cwd=tmp_path)
+
+    assert done.returncode == 2
+    assert "unknown kind 'frction': did you mean friction?" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_trial_takes_an_environment_beside_a_fault_and_replays(tmp_path: Path):
+    damage = "break:front_left_knee+slope=0.1+friction=0.4"
+    done = selfmodel(
+        *("trial", "quadruped", "--damage", damage, "--out", "a.mcap", "--json"), cwd=tmp_path
+    )
+    truth = json.loads(done.stdout)["truth"]
+    again = selfmodel("replay", "a.mcap", "--hypothesis", truth, "--json", cwd=tmp_path)
+
+    assert truth == "break:front_left_knee+friction=0.4+slope=0.1"
+    assert json.loads(again.stdout)["identical"]

@@ -1,0 +1,322 @@
+"""Promises of the commands that work on logs: logs, replay, diagnose."""
+
+import json
+import os
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import mujoco
+import pytest
+
+from selfmodel.logs import read_log
+from tests.helpers.command import DIAGNOSIS, SMALL, selfmodel
+
+PAPERS = ("--comparator", "forward-displacement", "--no-calibrate")
+
+BLOCKED = """
+import sys
+
+class Blocker:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in ("mujoco", "dm_control"):
+            raise ImportError(f"{name} is blocked")
+
+sys.meta_path.insert(0, Blocker())
+from selfmodel.cli import main
+main()
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a log of a damaged quadruped, a cut one, a spoiled one, and a hexapod's."""
+    folder = tmp_path_factory.mktemp("logs")
+    damage = ("--damage", "break:front_left_knee", "--seed", "3")
+    for robot, name, extra in (("quadruped", "a", damage), ("hexapod", "b", ())):
+        done = selfmodel("trial", robot, *extra, "--out", f"{name}.mcap", cwd=folder)
+        assert done.returncode == 0, done.stderr
+    data = (folder / "a.mcap").read_bytes()
+    (folder / "cut.mcap.part").write_bytes(data[: len(data) // 2])
+    (folder / "copy.mcap").write_bytes(data)
+    os.mkfifo(folder / "pipe")
+    (folder / "flipped.mcap").write_bytes(data[:200_000] + b"\x00" + data[200_001:])
+    return folder
+
+
+def test_info_tells_what_is_in_a_log_but_not_what_is_hidden(folder: Path):
+    done = selfmodel("logs", "info", "a.mcap", cwd=folder)
+    told = json.loads(selfmodel("logs", "info", "a.mcap", "--json", cwd=folder).stdout)
+
+    assert done.returncode == 0
+    for word in ("quadruped", "finished", "/joint_states", "Foxglove", "rerun", "observed"):
+        assert word in done.stdout
+    assert "front_left_knee" not in done.stdout
+    (one,) = told["files"]
+    log = read_log(folder / "a.mcap")
+    assert one["displacement"] == log.trial.displacement
+    assert (one["steps"], one["planned_steps"], one["status"]) == (1000, 1000, "finished")
+    assert one["topics"]["/odom"] == {
+        "type": "nav_msgs/msg/Odometry",
+        "messages": 1000,
+        "rate": 100,
+    }
+    assert one["truth"] == "hidden"
+    assert set(one["observed"].values()) == {1}
+    assert "front_left_knee" not in json.dumps({**one, "topics": {}})
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "steps"),
+    [("cut.mcap.part", "TruncatedError", 501), ("flipped.mcap", "CorruptError", 950)],
+)
+def test_damage_is_told_with_what_can_be_saved_and_how(
+    folder: Path, tmp_path: Path, name: str, kind: str, steps: int
+):
+    info = selfmodel("logs", "info", name, "--json", cwd=folder)
+    verify = selfmodel("logs", "verify", name, "a.mcap", "--json", cwd=folder)
+    (damaged,) = json.loads(info.stdout)["files"]
+    checked = json.loads(verify.stdout)
+
+    assert (info.returncode, verify.returncode) == (1, 1)
+    assert (damaged["kind"], damaged["salvageable_steps"]) == (kind, steps)
+    assert checked["ok"] is False
+    assert [one["ok"] for one in checked["files"]] == [False, True]
+    command = f"selfmodel logs salvage {name} -o NEW.mcap"
+    assert f"`{command}`" in damaged["error"]
+    out = tmp_path / "new.mcap"
+    arguments = command.replace("NEW.mcap", str(out)).split()[1:]
+    salvaged = selfmodel(*arguments, "--json", cwd=folder)
+    assert json.loads(salvaged.stdout)["steps"] == steps
+    assert selfmodel("logs", "verify", str(out), cwd=folder).returncode == 0
+    told = json.loads(
+        selfmodel(
+            *("replay", str(out), "--hypothesis", "break:front_left_knee", "--json"), cwd=folder
+        ).stdout
+    )
+    assert (told["identical"], told["steps"]) == (True, 1000 if "flipped" in name else steps)
+
+
+def test_a_file_that_is_not_there_hides_nothing_of_the_others(folder: Path):
+    done = selfmodel("logs", "info", "a.mcap", "no.mcap", "pipe", "--json", cwd=folder)
+    there, missing, pipe = json.loads(done.stdout)["files"]
+
+    assert done.returncode == 1
+    assert there["steps"] == 1000
+    assert missing["kind"] == pipe["kind"] == "InputError"
+
+
+def test_the_command_that_helps_can_be_pasted_whatever_the_file_is_called(
+    folder: Path, tmp_path: Path
+):
+    name = tmp_path / "cut half é.mcap"
+    name.write_bytes((folder / "cut.mcap.part").read_bytes())
+    (told,) = json.loads(selfmodel("logs", "info", str(name), "--json", cwd=folder).stdout)["files"]
+    command = told["error"].partition("`")[2].partition("`")[0]
+    arguments = shlex.split(command.replace("NEW.mcap", str(tmp_path / "new.mcap")))[1:]
+
+    assert selfmodel(*arguments, cwd=folder).returncode == 0
+
+
+@pytest.mark.parametrize(
+    "arguments", [("replay", "a.mcap"), ("logs", "info", "a.mcap")], ids=["replay", "info"]
+)
+def test_a_narrow_terminal_loses_no_number(folder: Path, arguments: tuple[str, ...]):
+    narrow = selfmodel(*arguments, cwd=folder, COLUMNS="40").stdout
+    wide = selfmodel(*arguments, cwd=folder, COLUMNS="120").stdout
+    cells = [cell.strip() for line in wide.splitlines() for cell in line.split("│")[1:-1]]
+
+    assert len(cells) > 20
+    assert "…" not in narrow
+    assert all(cell in narrow for cell in cells)
+
+
+def test_verify_loads_the_model_too(folder: Path):
+    done = selfmodel("logs", "verify", "a.mcap", "--json", cwd=folder)
+
+    assert json.loads(done.stdout)["files"][0]["model_loaded"] is True
+
+
+def test_verify_says_ok_or_what_is_wrong_a_line_a_file(folder: Path):
+    good = selfmodel("logs", "verify", "a.mcap", "b.mcap", cwd=folder)
+    bad = selfmodel("logs", "verify", "cut.mcap.part", "a.mcap", "no.mcap", cwd=folder)
+
+    assert (good.returncode, bad.returncode) == (0, 1)
+    assert good.stdout.splitlines() == [f"ok: {n}.mcap: 1000 steps, finished" for n in "ab"]
+    lines = bad.stdout.splitlines()
+    assert [line.partition(":")[0] for line in lines] == ["error", "ok", "error"]
+    assert "ends too early" in lines[0]
+    assert "no.mcap: expected a log file that can be read" in lines[2]
+
+
+def test_logs_are_looked_into_where_there_is_no_simulator(folder: Path, tmp_path: Path):
+    for arguments in (
+        ("logs", "info", "a.mcap"),
+        ("logs", "verify", "a.mcap"),
+        ("logs", "salvage", "cut.mcap.part", "-o", str(tmp_path / "new.mcap")),
+    ):
+        command = [sys.executable, "-c", BLOCKED, *arguments]
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        assert ("its model was not loaded" in done.stdout) == (arguments[1] == "verify")
+
+
+def test_replay_of_the_truth_is_identical_and_says_so(folder: Path):
+    arguments = ("replay", "a.mcap", "--hypothesis", "break:front_left_knee")
+    told = json.loads(selfmodel(*arguments, "--json", cwd=folder).stdout)
+    said = selfmodel(*arguments, cwd=folder).stdout
+
+    version = mujoco.__version__
+    assert told["identical"] is True
+    assert told["first_divergence_step"] is None
+    assert set(told["rms"].values()) == {0}
+    assert told["mujoco"] == {"logged": version, "running": version}
+    assert "identical: every number" in said
+
+
+def test_replay_of_another_hypothesis_shows_where_they_part(folder: Path, tmp_path: Path):
+    figure = tmp_path / "parting.png"
+    arguments = ("replay", "a.mcap", "--hypothesis", "break:front_left_shoulder")
+    told = json.loads(selfmodel(*arguments, "--json", cwd=folder).stdout)
+    drawn = selfmodel(*arguments, "--out", str(figure), cwd=folder, COLUMNS="80")
+
+    assert told["identical"] is False
+    assert 0 <= told["first_divergence_step"] < 100
+    assert all(error > 0 for error in told["rms"].values())
+    assert f"They part at step {told['first_divergence_step']}" in drawn.stdout
+    assert max(map(len, drawn.stdout.splitlines())) <= 80
+    assert figure.read_bytes().startswith(b"\x89PNG")
+
+
+def test_replay_with_another_mujoco_compares_with_a_tolerance_and_says_so(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    from selfmodel.cli.replay import TOLERANCE, replay  # noqa: PLC0415  # what is tested
+
+    monkeypatch.setattr(mujoco, "__version__", "3.99.0")
+    replay(folder / "a.mcap", hypothesis="break:front_left_knee", as_json=True)
+    told = json.loads(capsys.readouterr().out)
+    replay(folder / "a.mcap", hypothesis="intact")
+    said = capsys.readouterr().out
+
+    assert told["mujoco"]["running"] == "3.99.0"
+    assert told["tolerance"] == TOLERANCE
+    assert "made with MuJoCo 3" in said
+    assert "this is 3.99.0" in said
+
+
+@pytest.fixture(scope="module")
+def recovered_as_the_paper_did(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
+    """A folder in which a small recovery by displacement alone ran, and what it printed."""
+    folder = tmp_path_factory.mktemp("paper")
+    done = selfmodel(
+        *("recover", "quadruped", "--case", "1", *SMALL, "--out", "run", "--json", *PAPERS),
+        cwd=folder,
+    )
+    assert done.returncode == 0, done.stderr
+    return folder, json.loads(done.stdout)
+
+
+@pytest.mark.parametrize(
+    ("run", "options"),
+    [("recovered", ()), ("recovered_as_the_paper_did", PAPERS)],
+    ids=["default", "forward-displacement"],
+)
+def test_diagnosis_from_logs_alone_says_what_the_run_said_that_wrote_them(
+    run: str, options: tuple[str, ...], request: pytest.FixtureRequest
+):
+    folder, told = request.getfixturevalue(run)
+    logs = [trial["log"] for trial in told["trials"]]
+    done = selfmodel("diagnose", *logs, *options, "--json", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+
+    for said in DIAGNOSIS:
+        assert found[said] == told[said], said
+    assert found["logs"] == logs[1:]
+    assert found["intact"] == logs[:1]
+    assert found["evaluations"] == told["evaluations"]["diagnostic"]
+    assert found["distinct_hypotheses"] == told["evaluations"]["distinct_hypotheses"]
+    assert found["seconds"] > 0
+
+
+def test_the_papers_way_is_the_ea_alone_ranked_by_distance_from_a_model_as_it_is(
+    recovered_as_the_paper_did: tuple[Path, dict],
+):
+    _, told = recovered_as_the_paper_did
+    ranked = [one["distance"] for one in told["diagnosis"]]
+
+    assert told["calibration"] is None
+    assert told["test"] == "equal distances"
+    assert told["evaluations"]["diagnostic"] == 4 * (8 + 4)
+    assert told["evaluations"]["distinct_hypotheses"] <= 4 * (8 + 4) + 1
+    assert ranked == sorted(ranked)
+
+
+def test_diagnosis_shows_its_ranking_and_takes_another_self_model(
+    recovered: tuple[Path, dict], tmp_path: Path
+):
+    run, told = recovered
+    log = run / told["trials"][1]["log"]
+    model = tmp_path / "mine.xml"
+    model.write_text(read_log(log).mjcf, encoding="utf-8")
+    named = selfmodel("diagnose", str(log), "--robot", "quadruped", cwd=tmp_path)
+    own = selfmodel("diagnose", str(log), "--robot", "mine.xml", "--json", cwd=tmp_path)
+
+    assert named.returncode == 0, named.stderr
+    best = json.loads(own.stdout)["diagnosis"][0]["hypothesis"]
+    assert best in named.stdout
+    assert "1 log, segment-prediction" in named.stdout
+    assert "diagnosis from 1 trial" in named.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["diagnose", "a.mcap", "b.mcap"], "a.mcap is of 'quadruped', b.mcap of 'hexapod'"),
+        (["diagnose", "a.mcap", "a.mcap"], "a.mcap and a.mcap are the same log"),
+        (["diagnose", "a.mcap", "copy.mcap"], "a.mcap and copy.mcap are the same log"),
+        (
+            ["diagnose", "a.mcap", "--robot", "hexapod"],
+            "hexapod is another robot than that of a.mcap: it has 12 sensors, the log 8",
+        ),
+        (["diagnose", "pipe"], "pipe: expected a log file, got a pipe or a device"),
+        (["replay", "pipe"], "pipe: expected a log file, got a pipe or a device"),
+        (["logs", "salvage", "pipe", "-o", "n.mcap"], "expected a log file, got a pipe"),
+        (["logs", "import", "pipe", "--suggest", "--robot", "quadruped"], "a bag, got a pipe"),
+        (
+            ["logs", "import", "a.mcap", "--mapping", "/dev/zero", "-o", "n.mcap"],
+            "/dev/zero: expected a mapping, got a pipe or a device",
+        ),
+        (["diagnose", "a.mcap", "--robot", "no.xml"], "no.xml: expected an MJCF file"),
+        (["diagnose", "a.mcap", "--robot", "octopod"], "unknown robot 'octopod'"),
+        (["diagnose", "cut.mcap.part"], "selfmodel logs salvage cut.mcap.part"),
+        (["diagnose", "no.mcap"], "no.mcap: expected a log file that can be read"),
+        (["diagnose"], "FILE..."),
+        (["replay", "flipped.mcap"], "selfmodel logs salvage flipped.mcap"),
+        (["replay", "a.mcap", "--hypothesis", "break:front_left_kne"], "did you mean"),
+        (["replay", "a.mcap", "--out", "f.gif"], "ends in .png, .svg or .pdf"),
+        (["replay", "a.mcap", "--out", "no/f.png"], "there is no folder no"),
+        (["logs", "salvage", "cut.mcap.part", "-o", "a.mcap"], "a.mcap exists"),
+        (["logs", "salvage", "cut.mcap.part", "-o", "new.bag"], "ends in .mcap"),
+        (["logs", "salvage", "a.mcap", "-o", "new.mcap"], "there is nothing to salvage"),
+    ],
+)
+def test_bad_input_to_a_command_on_logs_is_one_sentence_and_status_2(
+    folder: Path, arguments: list[str], said: str
+):
+    before = sorted(path.name for path in folder.iterdir())
+    done = selfmodel(*arguments, cwd=folder, COLUMNS="200")
+
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+    assert sorted(path.name for path in folder.iterdir()) == before
+
+
+def test_help_names_every_command_on_logs():
+    told = selfmodel("logs", "--help", cwd=Path.cwd()).stdout
+
+    assert all(command in told for command in ("info", "verify", "salvage", "import"))

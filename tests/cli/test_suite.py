@@ -1,0 +1,297 @@
+"""Promises of ``selfmodel suite``: what it lists, and runs that go on where they were stopped."""
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from selfmodel.cli import app
+from selfmodel.comparators import DEFAULT
+from selfmodel.errors import InputError
+from selfmodel.experiments.grid import Job, run_grid
+from selfmodel.experiments.suite import work
+from selfmodel.experiments.suite.bodies import DOMAINS, bodies
+from selfmodel.experiments.suite.plan import (
+    Study,
+    check,
+    gait_jobs,
+    gait_path,
+    known_cases,
+    recovery_jobs,
+)
+from selfmodel.experiments.suite.rows import Row, summarise
+from selfmodel.experiments.suite.work import run_study
+from selfmodel.settings import Settings
+from tests.helpers.command import SMALL, selfmodel
+from tests.robot.mjcf.awkward import CUBE
+
+ROOT = Path(__file__).parents[2]
+
+TINY = (*SMALL, "--steps", "60", "--trials", "1", "--workers", "1")
+
+STUDY = Study(
+    bodies=[],
+    cases=[],
+    seeds=range(1),
+    folder=Path(),
+    settings=Settings(),
+    score="displacement",
+    controller="network",
+    comparator=DEFAULT,
+)
+
+BIPED = """
+<mujoco>
+  <worldbody>
+    <body name="trunk" pos="0 0 0.5">
+      <freejoint/>
+      <geom size="0.1" mass="2"/>
+      <body name="left" pos="0 0.1 0">
+        <joint name="left_hip" axis="0 1 0" range="-40 40" damping="0.1"/>
+        <geom type="capsule" fromto="0 0 0 0 0 -0.4" size="0.03" mass="0.5"/>
+      </body>
+      <body name="right" pos="0 -0.1 0">
+        <joint name="right_hip" axis="0 1 0" range="-40 40" damping="0.1"/>
+        <geom type="capsule" fromto="0 0 0 0 0 -0.4" size="0.03" mass="0.5"/>
+      </body>
+    </body>
+  </worldbody>
+  <actuator>
+    <motor joint="left_hip" ctrlrange="-1 1"/>
+    <motor joint="right_hip" ctrlrange="-1 1"/>
+  </actuator>
+</mujoco>
+"""
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict, list[str]]:
+    """A folder with a study of three bodies, what it printed, and the arguments."""
+    folder = tmp_path_factory.mktemp("study")
+    (folder / "biped.xml").write_text(BIPED)
+    arguments = ["suite", "run", "--domains", "walker,quadruped,biped.xml", "--cases", "1,5"]
+    arguments += [*TINY, "--out", "out"]
+    done = selfmodel(*arguments, "--json", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    return folder, json.loads(done.stdout), arguments
+
+
+def test_every_domain_is_listed_with_its_parts_and_cases(tmp_path: Path):
+    done = selfmodel("suite", "list", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    told = {one["domain"]: one for one in json.loads(done.stdout)["domains"]}
+
+    assert list(told)[:3] == ["quadruped", "hexapod", "suite-quadruped"]
+    walker = told["suite-walker"]
+    assert (walker["joints"], walker["motors"], walker["sensors"]) == (6, 6, 8)
+    assert walker["robots"] == [f"suite-walker-{task}" for task in ("walk", "run", "stand")]
+    assert walker["control_timestep"] == 0.025
+    assert walker["cases"]["2"] == "break:right_hip"
+    assert "8" not in walker["cases"]
+
+
+def test_ours_and_the_suites_and_ones_own_fail_and_recover_side_by_side(
+    study: tuple[Path, dict, list[str]],
+):
+    folder, told, _ = study
+    rows = told["rows"]
+
+    # A limb of one joint has no part that could be lost alone: the biped has no case 1.
+    assert [(row["robot"], row["case"]) for row in rows] == [
+        *(("biped", 5), ("quadruped", 1), ("quadruped", 5)),
+        *(("suite-walker-walk", 1), ("suite-walker-walk", 5)),
+    ]
+    for row in rows:
+        assert row["trials"] == 2
+        assert row["seconds"] > 0
+    walker = [row for row in rows if row["robot"] == "suite-walker-walk"]
+    assert walker[0]["before"] == walker[1]["before"], "one gait for all cases of a body and seed"
+    kept = json.loads((folder / "out" / "results.json").read_text())
+    assert kept == {key: told[key] for key in ("rows", "summaries")}
+    with (folder / "out" / "results.csv").open() as file:
+        assert [row["truth"] for row in csv.DictReader(file)] == [row["truth"] for row in rows]
+
+
+def test_the_same_command_again_does_nothing_and_says_the_same(
+    study: tuple[Path, dict, list[str]],
+):
+    folder, told, arguments = study
+    logs = {path: path.stat().st_mtime_ns for path in folder.rglob("*.mcap")}
+    again = selfmodel(*arguments, "--json", cwd=folder)
+
+    assert again.returncode == 0, again.stderr
+    assert json.loads(again.stdout) == told
+    assert {path: path.stat().st_mtime_ns for path in folder.rglob("*.mcap")} == logs
+
+
+def test_one_more_seed_is_added_to_what_is_there(study: tuple[Path, dict, list[str]]):
+    folder, told, arguments = study
+    more = [*arguments, "--seeds", "2"]
+    more[more.index("--domains") + 1] = "biped.xml"
+    more[more.index("--cases") + 1] = "5"
+    done = selfmodel(*more, "--json", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    rows = json.loads(done.stdout)["rows"]
+
+    assert len(rows) == len(told["rows"]) + 1
+    assert [row for row in rows if row["seed"] == 0] == told["rows"]
+
+
+def test_a_study_that_was_made_otherwise_is_not_mixed_with_another(
+    study: tuple[Path, dict, list[str]],
+):
+    folder, _, arguments = study
+    done = selfmodel(*arguments, "--controller", "cpg", cwd=folder)
+
+    assert done.returncode == 2
+    assert "holds a study that was made otherwise" in done.stderr
+
+
+@pytest.mark.parametrize("changed", ["biped.toml", "foot.obj"])
+def test_a_body_that_is_another_by_now_is_not_run_into_its_study(
+    changed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(tmp_path)
+    meshed = '<mujoco><asset><mesh name="foot" file="foot.obj"/></asset>'
+    shown = '<freejoint/><geom type="mesh" mesh="foot" contype="0" conaffinity="0" mass="0"/>'
+    mine = BIPED.replace("<mujoco>", meshed).replace("<freejoint/>", shown)
+    (tmp_path / "biped.xml").write_text(mine)
+    (tmp_path / "foot.obj").write_text(CUBE)
+    study = replace(STUDY, bodies=["biped.xml"], cases=[5], folder=tmp_path)
+    (before,) = gait_jobs(study)
+    assert gait_jobs(study) == [before]
+
+    others = {"biped.toml": "control_timestep = 0.02", "foot.obj": CUBE.replace(".1", ".2")}
+    (tmp_path / changed).write_text(others[changed])
+    (after,) = gait_jobs(study)
+
+    assert after.parameters != before.parameters
+
+
+def test_the_score_may_be_the_tasks_own_rewards(tmp_path: Path):
+    arguments = ["suite", "run", "--domains", "suite-walker", "--tasks", "stand", "--cases", "3"]
+    done = selfmodel(*arguments, *TINY, "--score", "return", "--out", "out", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    (row,) = json.loads(done.stdout)["rows"]
+
+    assert row["robot"] == "suite-walker-stand"
+    assert 0 < row["before"] < 60  # of 59 rewards none is above 1
+    assert (
+        "recovered"
+        in selfmodel(*arguments, *TINY, *("--score", "return", "--out", "out"), cwd=tmp_path).stdout
+    )
+
+
+REFUSED = [
+    ({"bodies": ["suite-walker-walk"], "cases": [8]}, "unknown case of these bodies '8'"),
+    ({"score": "return"}, "no rewards"),
+    ({"score": "beauty"}, "unknown score 'beauty'"),
+    ({"comparator": "no-such"}, "unknown comparator"),
+    ({"controller": "brain"}, "unknown kind of controller"),
+    ({"bodies": ["biped.xml", "other/biped.xml"]}, "would be called alike"),
+]
+
+
+@pytest.mark.parametrize(("changed", "reason"), REFUSED)
+def test_what_cannot_be_run_is_refused_before_anything_is(
+    changed: dict, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "other").mkdir()
+    for name in ("biped.xml", "other/biped.xml"):
+        (tmp_path / name).write_text(BIPED)
+    study = replace(STUDY, bodies=["biped.xml"], cases=[2], folder=tmp_path / "out")
+    check(study)
+
+    with pytest.raises(InputError, match=reason):
+        run_study(replace(study, **changed), workers=1, watch=lambda _: None)
+    assert not (tmp_path / "out").exists()
+
+
+def test_all_cases_are_those_that_the_bodies_have(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    asked: list[Study] = []
+    monkeypatch.setattr(work, "run_study", lambda study, **_: asked.append(study) or ())
+    arguments = ["suite", "run", "--domains", "hopper,swimmer", "--out", str(tmp_path)]
+    told = CliRunner().invoke(app, arguments)
+
+    assert told.exit_code == 0, told.output
+    check(asked[0])
+    assert asked[0].cases == known_cases(("suite-hopper-hop", "suite-swimmer-swimmer6"))
+    assert asked[0].cases
+    assert 8 not in asked[0].cases
+
+
+def test_oscillators_have_no_neurons_that_could_be_silent(tmp_path: Path):
+    study = replace(STUDY, bodies=["quadruped"], cases=[9, 10], folder=tmp_path)
+    put_gaits(study)
+    oscillating = replace(study, controller="cpg")
+
+    assert [job.parameters["case"] for job in recovery_jobs(study)] == [9, 10]
+    assert [job.parameters["case"] for job in recovery_jobs(oscillating)] == [9]
+
+
+def put_gaits(study: Study) -> None:
+    """Something in the place of each gait."""
+    for job in gait_jobs(study):
+        path = gait_path(study.folder, job.key)
+        path.parent.mkdir(parents=True)
+        path.write_bytes(b"a gait")
+
+
+def test_a_gait_that_was_lost_is_told_of_and_not_passed_over(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.syspath_prepend(str(ROOT))  # the grid's processes find the function there
+    study = replace(STUDY, bodies=["quadruped"], cases=[2], folder=tmp_path)
+    assert recovery_jobs(study) == []
+    run_grid(tmp_path / "gaits", gait_jobs(study), evolve_nothing, workers=1, watch=lambda _: None)
+
+    with pytest.raises(InputError, match=r"quadruped-seed000\.npz is missing"):
+        run_study(study, workers=1, watch=lambda _: None)
+
+
+def evolve_nothing(_job: Job, _part: str, _run: Path) -> None:
+    """Says that it is done, and keeps no gait."""
+
+
+def test_a_domain_that_nobody_has_is_told_from_the_nearest(tmp_path: Path):
+    done = selfmodel("suite", "run", "--domains", "walkr", "--out", "out", cwd=tmp_path)
+
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: unknown domain 'walkr': did you mean suite-walker")
+
+
+def test_domains_of_the_suite_need_no_prefix_where_we_have_no_robot_of_that_name():
+    assert bodies(["quadruped"], None) == ("quadruped",)
+    assert bodies(["suite-quadruped", "walker"], None) == (
+        "suite-quadruped-walk",
+        "suite-walker-walk",
+    )
+    assert bodies(["walker", "hopper"], ["stand"]) == ("suite-walker-stand", "suite-hopper-stand")
+    assert bodies(["walker"], DOMAINS["suite-walker"])[1:] == (
+        "suite-walker-run",
+        "suite-walker-stand",
+    )
+    with pytest.raises(InputError, match="has none of the tasks run: it has walk"):
+        bodies(["hexapod"], ["run"])
+    with pytest.raises(InputError, match="unknown task of these domains 'rnu': did you mean run"):
+        bodies(["walker", "biped.xml"], ["walk", "rnu"])
+
+
+def test_summaries_are_medians_and_leave_out_ratios_that_mean_nothing():
+    def row(seed: int, before: float, recovered: float, *, correct: bool) -> Row:
+        return Row(
+            "a", 1, "break:x", seed, "x", correct, "explained", 2, before, 0.0, recovered, 0, 3.0
+        )
+
+    rows = [row(0, 2.0, 1.0, correct=True), row(1, -1.0, 3.0, correct=False)]
+    case, single = summarise([*rows, row(2, 4.0, 4.0, correct=True)])
+
+    assert (case.case, single.case) == (1, None)
+    assert (case.right, case.runs) == (2, 3)
+    assert case.before == 2.0
+    assert case.recovery == 0.75  # of 0.5 and 1
+    assert case.correct.low < 2 / 3 < case.correct.high

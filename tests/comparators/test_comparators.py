@@ -1,0 +1,287 @@
+"""The contract of every registered comparator: add one, and it is tested."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from selfmodel.arrays import FloatArray
+from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT
+from selfmodel.diagnosis.comparator import Comparator
+from selfmodel.diagnosis.comparator_contract import check_comparator, shown
+from selfmodel.diagnosis.evidence import Evidence, simulate
+from selfmodel.diagnosis.significance import NEGLIGIBLE
+from selfmodel.errors import InputError
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.faults.notation import parse
+from selfmodel.robot.robot import Robot
+from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.behaviour import SIGNALS, Behaviour
+from selfmodel.trials.trial import Plan, Trial
+from tests.conftest import random_controllers
+
+Both = tuple[Trial, Behaviour]
+
+
+def hypotheses_about(robot: Robot) -> list[str]:
+    """The damage of the trial, and others."""
+    joints = [joint.name for joint in robot.anatomy.joints]
+    return [f"break:{joints[0]}", "intact", f"jam:{joints[1]}", f"break:{joints[2]}"]
+
+
+@pytest.fixture(scope="module")
+def logged_and_simulated(robot: Robot) -> Both:
+    """A trial of a damaged robot, and runs of its controller: with the same damage, and others."""
+    # One that does not tremble: trembling joints are taken for noisy ones, and averaged.
+    controller = random_controllers(robot, 5)[4]
+    runs = [(parse(text, robot.anatomy), controller) for text in hypotheses_about(robot)]
+    simulated = Simulator(robot, 2).run(runs, 300, SIGNALS).behaviour
+    observed = Behaviour(
+        simulated.names, simulated.time, {signal: simulated[signal][0] for signal in SIGNALS}
+    )
+    plan = Plan("00-after", "after", controller, 300, 0)
+    return Trial(plan, robot.name, observed, "nowhere.mcap"), simulated
+
+
+def with_the_perfect_one(outcome: Behaviour, perfect: Behaviour) -> Behaviour:
+    """The simulations with another one before them."""
+    signals = {
+        signal: np.concatenate([perfect[signal], values])
+        for signal, values in outcome.signals.items()
+    }
+    return Behaviour(outcome.names, outcome.time, signals)
+
+
+@pytest.mark.parametrize("name", COMPARATORS)
+def test_a_comparator_keeps_its_contract(name: str, robot: Robot, logged_and_simulated: Both):
+    trial, _ = logged_and_simulated
+    comparator = COMPARATORS[name]
+    request = comparator.request(trial)
+    hypotheses = [parse(text, robot.anatomy) for text in hypotheses_about(robot)]
+    outcome = simulate(Simulator(robot, 2), request, trial, hypotheses).behaviour
+
+    check_comparator(comparator, trial, with_the_perfect_one(outcome, shown(request, trial)))
+    distances = comparator.distances(outcome, trial)
+    assert np.all(distances[1:] > distances[0]), "it does not tell the truth from other damage"
+    if isinstance(request, ClosedLoop):
+        assert distances[0] == 0
+    # No member of an ensemble is the robot, and a base that is carried on drifts.
+    elif isinstance(request, Segments) and "base_position" in request.states:
+        assert distances[0] < NEGLIGIBLE
+    assert comparator.name == name
+    assert isinstance(comparator, Comparator)
+
+
+def test_forward_displacement_is_the_difference_of_the_ways(logged_and_simulated: Both):
+    trial, simulated = logged_and_simulated
+    x = simulated["base_position"][:, :, 0]
+    ways = x[:, -1] - x[:, 0]
+
+    np.testing.assert_array_equal(
+        FORWARD_DISPLACEMENT.distances(simulated, trial), np.abs(ways - ways[0])
+    )
+
+
+class Broken:
+    """A comparator that can break its contract in one way."""
+
+    name = "broken"
+
+    def __init__(self, way: str) -> None:
+        self.way = way
+        self.calls = 0
+
+    def request(self, _trial: Trial) -> ClosedLoop:
+        """Asks for nothing in one way, for what it needs in all others."""
+        return ClosedLoop(record=() if self.way == "request" else ("base_position",))
+
+    def distances(self, simulated: Behaviour, trial: Trial) -> FloatArray:
+        """Is forward displacement, spoilt."""
+        self.calls += 1
+        right = FORWARD_DISPLACEMENT.distances(simulated, trial)
+        return {
+            "shape": right[:, np.newaxis],
+            "sign": -right,
+            "nan": np.where(right > 0, np.nan, right),
+            "offset": right + 1,
+            "impure": right * self.calls,
+            "crowd": right * len(right),
+        }[self.way]
+
+
+@pytest.mark.parametrize(
+    ("way", "said"),
+    [
+        ("request", "a request of ClosedLoop must record some of"),
+        ("shape", "expected a distance for each of 4 runs"),
+        ("sign", "must be finite and at least 0"),
+        ("nan", "must be finite and at least 0"),
+        ("offset", "must be at 0, got 1"),
+        ("impure", "the same arguments must give the same distances"),
+        ("crowd", "must not depend on the other runs"),
+    ],
+)
+def test_the_contract_kit_sees_each_way_to_break_it(
+    way: str, said: str, logged_and_simulated: Both
+):
+    with pytest.raises(ValueError, match=said):
+        check_comparator(Broken(way), *logged_and_simulated)
+
+
+class Pieces:
+    """A comparator in pieces, of any request, that can break its contract in one way."""
+
+    name = "pieces"
+
+    def __init__(self, asks: Request, way: str = "") -> None:
+        self.asks = asks
+        self.way = way
+        self.calls = 0
+
+    def request(self, _trial: Trial) -> Request:
+        """Asks for what it was made with."""
+        return self.asks
+
+    def distances(self, simulated: Behaviour, _trial: Trial) -> FloatArray:
+        """Is the mean of the sound losses."""
+        return self._sound(simulated).mean(axis=1)
+
+    def losses(self, simulated: Behaviour, _trial: Trial) -> FloatArray:
+        """Is how far each joint is from the first run's, spoilt."""
+        self.calls += 1
+        right = self._sound(simulated)
+        return {
+            "": right,
+            "shape": right[:, 0],
+            "none": right[:, :0],
+            "sign": right - right.max(),
+            "mean": right * 2,
+            "impure": right * (1 + 1e-15 * self.calls),
+            "crowd": right * (1 + 1e-15 * len(right)),
+        }[self.way]
+
+    def _sound(self, simulated: Behaviour) -> FloatArray:
+        values = simulated["joint_positions"]
+        return np.abs(values - TRUTH).reshape(len(values), -1, values.shape[-1]).mean(axis=1)
+
+
+TRUTH = 0.25
+"""Where all joints stand in the runs that the pieces of these tests are about."""
+
+
+def runs_of_shape(trial: Trial, *lengths: int) -> Behaviour:
+    """Two runs of joints that stand still, the first where the trial has them."""
+    names = trial.behaviour.names
+    values = np.full((2, *lengths, len(names.hinges)), TRUTH)
+    values[1] += 0.5
+    return Behaviour(names, np.arange(lengths[-1]) * 0.01, {"joint_positions": values})
+
+
+def segments(trial: Trial, *, lead: int = 2, rows: int = 27) -> Segments:
+    """Three segments of a trial."""
+    names = trial.behaviour.names
+    return Segments(
+        states={"joint_positions": np.zeros((3, len(names.hinges)))},
+        commands=np.zeros((3, rows, len(names.motors))),
+        lead=lead,
+        record=("joint_positions",),
+    )
+
+
+ENSEMBLE = Ensemble(("joint_positions",), members=4, level=0.05)
+
+
+def test_the_contract_kit_judges_requests_of_every_kind(logged_and_simulated: Both):
+    trial, _ = logged_and_simulated
+    steps = trial.behaviour.steps
+
+    check_comparator(Pieces(ClosedLoop(("joint_positions",))), trial, runs_of_shape(trial, steps))
+    check_comparator(Pieces(segments(trial)), trial, runs_of_shape(trial, 3, 26))
+    check_comparator(Pieces(ENSEMBLE), trial, runs_of_shape(trial, 4, steps))
+
+
+def test_the_contract_kit_wants_what_was_requested(logged_and_simulated: Both):
+    trial, _ = logged_and_simulated
+
+    with pytest.raises(ValueError, match=r"its request is a Segments: .* \(n, 3, 26, width\)"):
+        check_comparator(Pieces(segments(trial)), trial, runs_of_shape(trial, 300))
+    with pytest.raises(ValueError, match=r"is a Ensemble: .* \(n, 4, 300, width\)"):
+        check_comparator(Pieces(ENSEMBLE), trial, runs_of_shape(trial, 300))
+
+
+def test_the_contract_kit_sees_a_request_that_cannot_be_met(logged_and_simulated: Both):
+    trial, simulated = logged_and_simulated
+    unknown = segments(trial)
+    unknown.commands[0] = np.nan
+    narrow = replace(segments(trial), commands=np.zeros((3, 27, 1)))
+    fewer = replace(segments(trial), states={"joint_positions": np.zeros((2, 1))})
+    broken: list[tuple[object, str]] = [
+        ("joint_positions", "must be a ClosedLoop, Segments or an Ensemble"),
+        (replace(ENSEMBLE, members=0), "at least one member"),
+        (segments(trial, lead=27), "a horizon of at least 1 step"),
+        (unknown, "must all be known"),
+        (narrow, "the commands of segments must have shape"),
+        (fewer, "the states of joint_positions must have shape"),
+        (replace(segments(trial), record=("commands",)), "Segments must record some of"),
+    ]
+    for asks, said in broken:
+        with pytest.raises(ValueError, match=said):
+            check_comparator(Pieces(asks), trial, simulated)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("way", "said"),
+    [
+        ("shape", "expected losses of shape"),
+        ("none", "expected losses of shape"),
+        ("sign", "losses must be finite and at least 0"),
+        ("mean", "the mean of the losses must be the distance"),
+        ("impure", "the same arguments must give the same losses"),
+        ("crowd", "the losses of run 1 must not depend on the other runs"),
+    ],
+)
+def test_the_contract_kit_sees_each_way_to_break_it_in_pieces(
+    way: str, said: str, logged_and_simulated: Both
+):
+    trial, _ = logged_and_simulated
+    comparator = Pieces(ClosedLoop(("joint_positions",)), way)
+
+    with pytest.raises(ValueError, match=said):
+        check_comparator(comparator, trial, runs_of_shape(trial, 300))
+
+
+def test_segments_are_given_their_commands_and_cannot_record_them(
+    quadruped: Robot, logged_and_simulated: Both
+):
+    trial, _ = logged_and_simulated
+    asks = replace(segments(trial), record=("joint_positions", "commands"))
+
+    with pytest.raises(InputError, match=r"'pieces' asked for the signals .*'commands'.*, of "):
+        Evidence(Simulator(quadruped, 1), Pieces(asks)).losses([INTACT], [trial])
+
+
+def test_what_a_trial_shows_is_cut_where_its_segments_begin(logged_and_simulated: Both):
+    trial, _ = logged_and_simulated
+    rows, signals = np.array([7, 40, 41]), ("joint_positions", "joint_velocities")
+    logged = trial.behaviour
+    asks = Segments(
+        states={signal: logged[signal][rows] for signal in signals},
+        commands=logged["commands"][rows[:, np.newaxis] + np.arange(-2, 10)],
+        lead=2,
+        record=("base_position", "sensors"),
+    )
+    perfect = shown(asks, trial)
+
+    assert perfect["sensors"].shape == (1, 3, 11, len(logged.names.sensors))
+    for segment, row in enumerate(rows):
+        np.testing.assert_array_equal(
+            perfect["base_position"][0, segment], logged["base_position"][row : row + 11]
+        )
+
+
+def test_what_no_trial_shows_is_said(logged_and_simulated: Both):
+    trial, _ = logged_and_simulated
+
+    with pytest.raises(ValueError, match="no step at which segment 0 could begin"):
+        shown(segments(trial), trial)

@@ -1,0 +1,145 @@
+"""Promises of ``gait-pattern``: it sees what a gait is like, and not when a stride begins."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from selfmodel.comparators import GAIT_PATTERN
+from selfmodel.comparators.gait_features import GROUPS
+from selfmodel.diagnosis.comparator_contract import check_comparator
+from selfmodel.errors import InputError
+from selfmodel.trials.behaviour import Behaviour
+from tests.helpers.gaits import TROT, WALK, batch, changed, gait, logged
+
+GROUP = list(GROUPS)
+
+
+@settings(deadline=None)
+@given(
+    frequency=st.floats(1.2, 2.5),
+    late=st.floats(0.0, 1.0),
+    phases=st.permutations(WALK).map(tuple),
+)
+def test_when_the_strides_begin_does_not_matter(
+    frequency: float, late: float, phases: tuple[float, ...]
+):
+    trial = logged(gait(phases, frequency=frequency))
+    same, slower = (
+        gait(phases, frequency=frequency, late=late),
+        gait(phases, frequency=frequency - 0.3, late=late),
+    )
+
+    shifted, other = GAIT_PATTERN.distances(batch(same, slower), trial)
+
+    # A reading comes on at a step, so a duty is known to a step in a stride.
+    assert shifted < 0.035
+    assert shifted < other / 3
+
+
+@pytest.mark.parametrize(
+    ("group", "different"),
+    [
+        ("duty", gait(duty=0.8)),
+        ("sequence", gait((0.0, 0.75, 0.5, 0.25))),
+        ("phase", gait(TROT)),
+        ("rhythm", gait(frequency=2.5)),
+        ("excursion", gait(swing=0.2)),
+        ("posture", changed(gait(), joint_positions=gait()["joint_positions"] + 0.2)),
+    ],
+)
+def test_each_group_sees_what_it_is_there_for(group: str, different: Behaviour):
+    losses = GAIT_PATTERN.losses(batch(gait(), different), logged(gait()))
+    by_group = losses.reshape(2, -1, len(GROUPS))
+
+    assert np.all(by_group[0] == 0)
+    assert np.all(by_group[1, :, GROUP.index(group)] > 0.2)
+
+
+def test_posture_alone_is_no_change_of_rhythm():
+    leaning = changed(gait(), joint_positions=gait()["joint_positions"] + 0.2)
+    losses = GAIT_PATTERN.losses(batch(leaning), logged(gait())).reshape(-1, len(GROUPS))
+
+    for group in ("duty", "sequence", "phase", "rhythm", "excursion"):
+        assert np.all(losses[:, GROUP.index(group)] < 1e-12)
+
+
+def still() -> Behaviour:
+    """A robot that lies still, its feet in the air."""
+    walking = gait()
+    return changed(
+        walking,
+        sensors=np.zeros_like(walking["sensors"]),
+        joint_positions=np.zeros_like(walking["joint_positions"]),
+    )
+
+
+@pytest.mark.parametrize("shown", [gait(), still(), gait(steps=30), gait(steps=2), gait(steps=1)])
+def test_degenerate_trials_keep_the_contract(shown: Behaviour):
+    runs = [shown, gait(TROT, steps=shown.steps), gait(frequency=3, steps=shown.steps)]
+    if shown.steps == 1000:
+        runs.append(still())
+
+    check_comparator(GAIT_PATTERN, logged(shown), batch(*runs))
+
+
+def test_a_robot_that_lies_still_is_far_from_one_that_walks():
+    to_walk = GAIT_PATTERN.distances(batch(gait(), still()), logged(still()))
+    to_lie = GAIT_PATTERN.distances(batch(gait(), still()), logged(gait()))
+
+    assert to_walk[0] > 0.3
+    assert to_lie[1] > 0.3
+
+
+def test_a_robot_without_touch_is_compared_by_its_joints():
+    walking = gait()
+    unknown = changed(walking, sensors=np.full_like(walking["sensors"], np.nan))
+    trial = logged(unknown)
+
+    assert GAIT_PATTERN.request(trial).record == ("joint_positions",)
+    same, trot = GAIT_PATTERN.distances(batch(gait(late=0.2), gait(TROT)), trial)
+    assert same < trot / 10
+
+
+def test_what_was_not_observed_is_not_compared():
+    walking = gait()
+    joints = walking["joint_positions"].copy()
+    joints[:, 1] = np.nan
+    joints[300:350] = np.nan
+    trial = logged(changed(walking, joint_positions=joints))
+    strange = walking["joint_positions"].copy()
+    strange[:, 1] = 7
+    strange[300:350] = 7
+    seen = walking["joint_positions"] + 0.1
+
+    runs = batch(
+        walking, changed(walking, joint_positions=strange), changed(walking, joint_positions=seen)
+    )
+
+    check_comparator(GAIT_PATTERN, trial, runs)
+    distances = GAIT_PATTERN.distances(runs, trial)
+    assert distances[1] == 0
+    assert distances[2] > 0
+
+
+def test_a_window_that_was_not_observed_does_not_dilute_the_others():
+    walking, trot = gait(), gait(TROT)
+    half = {
+        signal: np.where(np.arange(1000)[:, np.newaxis] < 500, walking[signal], np.nan)
+        for signal in ("sensors", "joint_positions")
+    }
+
+    whole = GAIT_PATTERN.distances(batch(trot), logged(walking))
+    part = GAIT_PATTERN.distances(batch(trot), logged(changed(walking, **half)))
+
+    np.testing.assert_allclose(part, whole, rtol=0.1)
+
+
+def test_a_log_without_readings_and_joints_is_refused():
+    walking = gait()
+    unknown = {
+        signal: np.full_like(walking[signal], np.nan) for signal in ("sensors", "joint_positions")
+    }
+
+    with pytest.raises(InputError, match="needs one at least of sensors, joint_positions"):
+        GAIT_PATTERN.request(logged(changed(walking, **unknown)))

@@ -1,0 +1,186 @@
+"""Promises of ``noisy-transfer``: noise counts as noise, and agreement as agreement."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from selfmodel.comparators import NOISY_TRANSFER
+from selfmodel.comparators.noisy_transfer import WINDOW
+from selfmodel.diagnosis.comparator_contract import check_comparator, shown
+from selfmodel.errors import InputError
+from selfmodel.simulation.requests import Ensemble
+from selfmodel.trials.behaviour import Behaviour
+from tests.helpers.gaits import TROT, batch, changed, gait, logged
+
+MEMBERS = 6
+
+
+def ensembles(*groups: list[Behaviour]) -> Behaviour:
+    """Ensembles of runs as a simulator gives them, ``(n, members, steps, width)``."""
+    members = [batch(*group) for group in groups]
+    signals = {
+        signal: np.stack([group[signal] for group in members]) for signal in members[0].signals
+    }
+    return Behaviour(members[0].names, members[0].time, signals)
+
+
+def turned(run: Behaviour, *by: float) -> list[Behaviour]:
+    """The run by members whose joints are all turned, each by so many rad."""
+    return [changed(run, joint_positions=run["joint_positions"] + angle) for angle in by]
+
+
+def around(middle: float, spread: float) -> list[Behaviour]:
+    """Members of the made-up walk, spread evenly around an error of their joints, rad."""
+    return turned(gait(), *(middle + spread * np.linspace(-1, 1, MEMBERS)))
+
+
+def distances(*groups: list[Behaviour]) -> np.ndarray:
+    return NOISY_TRANSFER.distances(ensembles(*groups), logged(gait()))
+
+
+def test_it_asks_for_a_small_ensemble_of_what_the_trial_has():
+    walking = gait()
+    blind = logged(changed(walking, sensors=np.full_like(walking["sensors"], np.nan)))
+
+    whole, rest = NOISY_TRANSFER.request(logged(walking)), NOISY_TRANSFER.request(blind)
+    assert whole == Ensemble(whole.record, members=MEMBERS, level=0.05)
+    assert set(whole.record) - set(rest.record) == {"sensors"}
+
+
+@settings(deadline=None, max_examples=25)
+@given(
+    swing=st.floats(0.01, 2), late=st.floats(0, 1), steps=st.integers(1, 260), seed=st.integers(0)
+)
+def test_an_ensemble_that_all_did_what_the_trial_shows_is_at_exactly_zero(
+    swing: float, late: float, steps: int, seed: int
+):
+    walking = gait(swing=swing, late=late, steps=steps)
+    hidden = np.random.default_rng(seed % 2**32).random((steps, 4)) < 0.3
+    joints = np.where(hidden, np.nan, walking["joint_positions"])
+    trial = logged(changed(walking, joint_positions=joints))
+
+    losses = NOISY_TRANSFER.losses(ensembles([walking] * MEMBERS), trial)
+    assert np.array_equal(losses, np.zeros((1, -(-steps // WINDOW))))
+
+
+@settings(deadline=None, max_examples=25)
+@given(error=st.floats(0.5, 5), spread=st.floats(0.2, 1))
+def test_members_that_disagree_forgive_more_than_members_that_agree(error: float, spread: float):
+    agreed, disagreed = distances(around(error, 0), around(error, spread * error))
+
+    assert disagreed < agreed
+
+
+@settings(deadline=None, max_examples=25)
+@given(spread=st.floats(0.01, 5))
+def test_an_ensemble_that_would_fit_anything_pays_for_it(spread: float):
+    narrow, wide = distances(around(0, spread), around(0, 2 * spread))
+
+    assert 0 < narrow < wide
+
+
+def test_a_run_among_the_members_is_closer_than_one_beyond_them():
+    among, beyond, far = distances(around(0, 0.3), around(0.6, 0.3), around(2, 0.3))
+
+    assert among < beyond < far
+
+
+def test_no_moment_outweighs_the_rest():
+    walking = gait()
+    joints = walking["joint_positions"].copy()
+    joints[100:125] += 1e6
+    mad = changed(walking, joint_positions=joints)
+    once, always = distances([mad] * MEMBERS, turned(walking, *[0.8] * MEMBERS))
+
+    assert once < always
+
+
+def test_a_piece_is_a_window_of_the_trial():
+    walking = gait(steps=210)
+    joints = walking["joint_positions"].copy()
+    joints[60:65] += 1
+    losses = NOISY_TRANSFER.losses(
+        ensembles([changed(walking, joint_positions=joints)] * MEMBERS), logged(walking)
+    )
+
+    assert losses.shape == (1, 9)
+    assert np.flatnonzero(losses[0]).tolist() == [60 // WINDOW]
+
+
+def test_motion_about_the_same_mean_is_told_from_stillness():
+    # Whole strides to a window.
+    walking = gait(frequency=100 / WINDOW)
+    still = changed(walking, joint_positions=np.zeros_like(walking["joint_positions"]))
+
+    assert NOISY_TRANSFER.distances(ensembles([still] * MEMBERS), logged(walking))[0] > 0.1
+
+
+def test_what_was_observed_now_and_then_counts_as_what_was_observed_throughout():
+    still = gait(swing=0)
+    glimpsed = still["joint_positions"].copy()
+    glimpsed[::3] = np.nan
+    runs = ensembles(turned(still, *np.linspace(0.2, 0.4, MEMBERS)))
+    throughout, now_and_then = (
+        NOISY_TRANSFER.distances(runs, logged(changed(still, joint_positions=joints)))
+        for joints in (still["joint_positions"], glimpsed)
+    )
+
+    np.testing.assert_allclose(now_and_then, throughout, rtol=1e-9)
+
+
+def test_a_base_that_was_logged_with_the_other_sign_is_the_same():
+    walking = gait()
+    away = changed(walking, base_orientation=-walking["base_orientation"])
+
+    assert distances([away] * MEMBERS) == 0
+
+
+def test_what_was_not_observed_is_not_compared():
+    walking = gait()
+    known = walking["sensors"].copy()
+    known[:120] = np.nan
+    known[:, 2] = np.nan
+    trial = logged(changed(walking, sensors=known))
+    strange = changed(walking, sensors=np.where(np.isnan(known), 5.0, walking["sensors"]))
+    lost = changed(walking, sensors=np.where(np.isnan(known), np.nan, walking["sensors"]))
+    elsewhere = changed(walking, sensors=1 - walking["sensors"])
+
+    runs = ensembles(*([run] * MEMBERS for run in (walking, strange, lost, elsewhere)))
+    found = NOISY_TRANSFER.distances(runs, trial)
+    assert np.array_equal(found[:3], [0, 0, 0])
+    assert found[3] > 0
+
+
+def test_a_window_of_which_nothing_was_observed_is_no_piece():
+    walking = gait(steps=200)
+    signals = {signal: values.copy() for signal, values in walking.signals.items()}
+    for values in signals.values():
+        values[30:110] = np.nan
+    trial = logged(changed(walking, **signals))
+
+    # Of steps 25 to 49 and 100 to 124 something was seen, of the two windows between nothing.
+    assert NOISY_TRANSFER.losses(ensembles([walking] * MEMBERS), trial).shape == (1, 6)
+
+
+@pytest.mark.parametrize("steps", [1, 24, 26, 130])
+def test_trials_of_any_length_keep_the_contract(steps: int):
+    trial = logged(gait(steps=steps))
+    perfect = shown(NOISY_TRANSFER.request(trial), trial)
+    walks = [gait(late=0.05 * late, steps=steps) for late in range(MEMBERS)]
+    trots = [gait(TROT, swing=0.1 * swing, steps=steps) for swing in range(MEMBERS)]
+    others = ensembles(walks, trots)
+    signals = {
+        signal: np.concatenate([values, others[signal]])
+        for signal, values in perfect.signals.items()
+    }
+
+    check_comparator(NOISY_TRANSFER, trial, Behaviour(trial.behaviour.names, perfect.time, signals))
+
+
+def test_a_log_with_nothing_to_compare_is_refused():
+    walking = gait()
+    nothing = {signal: np.full_like(walking[signal], np.nan) for signal in walking.signals}
+
+    with pytest.raises(InputError, match="noisy-transfer needs one at least of sensors"):
+        NOISY_TRANSFER.request(logged(changed(walking, **nothing)))

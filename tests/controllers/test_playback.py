@@ -1,0 +1,80 @@
+"""Promises of recorded commands: given again as they were, whatever the sensors say."""
+
+import numpy as np
+import pytest
+
+from selfmodel.controllers.driver import drive
+from selfmodel.controllers.playback import Playback, played_back
+from selfmodel.robot.robot import Robot
+from tests.conftest import random_controllers
+
+COMMANDS = np.array([[0.1, 0.2], [0.3, 0.4], [0.5, 0.6]])
+
+
+def test_commands_are_given_in_turn_and_the_last_one_stands():
+    robots = [Playback(("a", "b"), COMMANDS), Playback(("a", "b"), -COMMANDS[:1])]
+    brains = drive(robots, np.ones((2, 3)), sensors=4)
+    targets = np.zeros((2, 2))
+    given = []
+    for _ in range(5):
+        brains.readings[:] = np.random.default_rng(0).normal(size=brains.readings.shape)
+        brains.step(targets)
+        given.append(targets.copy())
+
+    assert np.array_equal([step[0] for step in given], COMMANDS[[0, 1, 2, 2, 2]])
+    assert np.array_equal([step[1] for step in given], -COMMANDS[[0] * 5])
+
+
+def test_two_recordings_are_equal_when_their_motors_and_bits_are():
+    same = Playback(("a", "b"), COMMANDS.copy())
+
+    assert Playback(("a", "b"), COMMANDS) == same
+    assert hash(Playback(("a", "b"), COMMANDS)) == hash(same)
+    assert Playback(("a", "c"), COMMANDS) != same
+    assert Playback(("a", "b"), COMMANDS + 1e-30) == same
+    assert Playback(("a", "b"), np.nextafter(COMMANDS, 1)) != same
+    assert same != "a recording"
+
+
+def test_a_command_that_was_lost_is_the_one_before_it():
+    lost = COMMANDS.copy()
+    lost[1, 0] = lost[1:, 1] = np.nan
+
+    expected = [[0.1, 0.2], [0.1, 0.2], [0.5, 0.2]]
+    assert np.array_equal(played_back(("a", "b"), lost).commands, expected)
+    lost[0] = np.nan
+    with pytest.raises(ValueError, match="of step 0 are not all known"):
+        played_back(("a", "b"), lost)
+
+
+@pytest.mark.parametrize(
+    ("commands", "match"),
+    [
+        (np.zeros((0, 2)), r"got \(0, 2\)"),
+        (np.zeros((3, 1)), r"got \(3, 1\)"),
+        (np.zeros(2), r"got \(2,\)"),
+        (np.array([[0.0, 1.0], [np.nan, 1.0]]), "of step 1 are not all known"),
+        (np.array([[0.0, np.inf]]), "of step 0 are not all known"),
+    ],
+)
+def test_commands_that_cannot_be_given_are_refused(commands: np.ndarray, match: str):
+    with pytest.raises(ValueError, match=match):
+        Playback(("a", "b"), commands)
+
+
+def test_a_recording_cannot_be_changed_from_outside():
+    values = COMMANDS.copy()
+    playback = Playback(("a", "b"), values)
+    values[:] = 9
+
+    assert np.array_equal(playback.commands, COMMANDS)
+    with pytest.raises(ValueError, match="read-only"):
+        playback.commands[0] = 1
+
+
+def test_robots_of_one_batch_are_driven_alike(quadruped: Robot):
+    motors = quadruped.anatomy.motors
+    (controller,) = random_controllers(quadruped, 1)
+    mixed = [controller, Playback(motors, np.zeros((1, len(motors))))]
+    with pytest.raises(ValueError, match="got 1 networks, 0 sets of oscillators and 1 recordings"):
+        drive(mixed, np.ones((2, 3)), sensors=8)

@@ -1,0 +1,277 @@
+"""Promises of the evidence: simulated once, remembered by trial; infinite where one diverged."""
+
+import dataclasses
+from collections import Counter
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+
+from selfmodel.comparators import FORWARD_DISPLACEMENT, SEGMENT_PREDICTION, SENSOR_SERIES
+from selfmodel.controllers.driver import Driver
+from selfmodel.diagnosis.comparator import Comparator
+from selfmodel.diagnosis.diagnose import Diagnose
+from selfmodel.diagnosis.evidence import Evidence
+from selfmodel.errors import InputError
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.notation import parse
+from selfmodel.faults.registry import PAPER_KINDS
+from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.simulation.outcome import Simulated
+from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
+from selfmodel.simulation.simulator import Run, Simulator
+from selfmodel.trials.behaviour import Behaviour, Signal
+from selfmodel.trials.trial import Plan, Trial
+from tests.conftest import exploding, random_controllers
+from tests.helpers.memory import MemoryJournal
+
+STEPS = 60
+SMALL = dataclasses.replace(Settings().scaled(12), generations=2, steps=600)
+TEXTS = ("intact", "jam:back_left_knee", "break:front_left_knee")
+
+CLOSED_LOOP = ClosedLoop(("base_position",))
+
+
+class CountingSimulator(Simulator):
+    """Counts how often each hypothesis is simulated for each driver or each set of segments."""
+
+    def __init__(self, robot: Robot) -> None:
+        super().__init__(robot, threads=1)
+        self.times: Counter = Counter()
+
+    def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> Simulated:
+        """Simulates as ever."""
+        self.times.update(runs)
+        return super().run(runs, steps, record)
+
+    def predict(
+        self,
+        hypotheses: Sequence[Hypothesis],
+        segments: Segments,
+        observed: Behaviour | None = None,
+    ) -> Simulated:
+        """Predicts as ever."""
+        self.times.update((one, segments.commands.tobytes()) for one in hypotheses)
+        return super().predict(hypotheses, segments, observed)
+
+    def run_ensemble(
+        self, hypotheses: Sequence[Hypothesis], driver: Driver, steps: int, ensemble: Ensemble
+    ) -> Simulated:
+        """Simulates as ever."""
+        self.times.update((one, driver) for one in hypotheses)
+        return super().run_ensemble(hypotheses, driver, steps, ensemble)
+
+
+@dataclasses.dataclass(frozen=True)
+class Plain:
+    """A comparator that does what it is told."""
+
+    asks: Request = CLOSED_LOOP
+    gives: Callable[[int], object] = np.ones
+    name: str = "plain"
+
+    def request(self, _trial: Trial) -> Request:
+        """Asks for what it was told to."""
+        return self.asks
+
+    def distances(self, simulated: Behaviour, _trial: Trial) -> object:
+        """Gives what it was told to."""
+        return self.gives(len(next(iter(simulated.signals.values()))))
+
+
+@dataclasses.dataclass(frozen=True)
+class InPieces(Plain):
+    """The same, which judges in pieces."""
+
+    def losses(self, simulated: Behaviour, trial: Trial) -> object:
+        """Gives what it was told to."""
+        return self.distances(simulated, trial)
+
+
+@pytest.fixture(scope="module")
+def trials(quadruped: Robot) -> list[Trial]:
+    """Two trials, each with a controller of its own."""
+    damaged = SimulatedRobot(quadruped, parse("break:front_left_knee", quadruped.anatomy))
+    return [
+        MemoryJournal(quadruped).record(damaged, Plan(f"{k}", "after", controller, STEPS, 0))
+        for k, controller in enumerate(random_controllers(quadruped, 3)[1:])
+    ]
+
+
+@pytest.fixture(scope="module")
+def three(quadruped: Robot) -> list[Hypothesis]:
+    return [parse(text, quadruped.anatomy) for text in TEXTS]
+
+
+REQUESTS = [
+    pytest.param(FORWARD_DISPLACEMENT, id="closed loop"),
+    pytest.param(SENSOR_SERIES, id="closed loop in pieces"),
+    pytest.param(SEGMENT_PREDICTION, id="segments"),
+    pytest.param(Plain(Ensemble(("base_position",), members=2, level=0.05)), id="ensemble"),
+]
+
+
+@pytest.mark.parametrize("comparator", REQUESTS)
+def test_nothing_is_simulated_twice(
+    comparator: Comparator, quadruped: Robot, trials: list[Trial], three: list[Hypothesis]
+):
+    simulator = CountingSimulator(quadruped)
+    evidence = Evidence(simulator, comparator)
+    evidence.distances([*three[:2], three[0]], trials[:1])
+    evidence.losses(three, trials)
+    evidence.distances(three[::-1], trials[::-1])
+
+    assert set(simulator.times.values()) == {1}
+    assert len(simulator.times) == len(three) * len(trials)
+    assert evidence.hypotheses == set(three)
+
+
+@pytest.mark.parametrize("comparator", REQUESTS)
+def test_what_is_looked_at_aside_is_not_simulated_again_and_is_not_ranked(
+    comparator: Comparator, quadruped: Robot, trials: list[Trial], three: list[Hypothesis]
+):
+    simulator = CountingSimulator(quadruped)
+    evidence = Evidence(simulator, comparator)
+    aside = evidence.aside()
+    ranked = evidence.losses(three[:2], trials)
+    looked_at = aside.losses(three, trials)
+
+    assert np.array_equal(looked_at[:2], ranked)
+    assert set(simulator.times.values()) == {1}
+    assert evidence.hypotheses == evidence.judged(trials) == set(three[:2])
+
+
+@pytest.mark.parametrize("comparator", REQUESTS)
+def test_the_distance_is_the_sum_over_the_trials_of_the_mean_over_the_pieces(
+    comparator: Comparator, quadruped: Robot, trials: list[Trial], three: list[Hypothesis]
+):
+    evidence = Evidence(Simulator(quadruped, 1), comparator)
+    losses = [evidence.losses(three, [trial]) for trial in trials]
+    together = evidence.losses(three, trials)
+
+    assert np.array_equal(together, np.concatenate(losses, axis=1))
+    assert np.array_equal(
+        evidence.distances(three, trials), sum(one.mean(axis=1) for one in losses)
+    )
+    assert not np.array_equal(losses[0], losses[1]) or isinstance(comparator, Plain)
+
+
+def test_a_diagnosis_simulates_nothing_twice_and_ranks_nothing_that_is_not_considered(
+    quadruped: Robot,
+):
+    gait = random_controllers(quadruped, 6)[5]
+    after, before = (
+        MemoryJournal(quadruped).record(
+            SimulatedRobot(quadruped, parse(truth, quadruped.anatomy)),
+            Plan(stage, stage, gait, SMALL.steps, 0),
+        )
+        for truth, stage in (("friction=0.3", "after"), ("intact", "before"))
+    )
+    simulator = CountingSimulator(quadruped)
+    search = Diagnose(simulator, SEGMENT_PREDICTION, SMALL, PAPER_KINDS, intact=[before])
+    found = search([after], [], np.random.default_rng(0), lambda _: None)
+
+    assert found.outside is not None
+    assert found.outside.kind == "friction"
+    assert set(simulator.times.values()) == {1}
+    simulated = {hypothesis for hypothesis, _ in simulator.times}
+    considered = {
+        one for one in simulated if {fault.kind for fault in one.faults} <= {*PAPER_KINDS}
+    }
+    assert search.distinct_hypotheses <= len(considered) < len(simulated)
+
+
+def test_what_is_remembered_is_what_was_simulated_whatever_was_asked_for_in_between(
+    quadruped: Robot, trials: list[Trial], three: list[Hypothesis]
+):
+    alone = [
+        Evidence(Simulator(quadruped, 1), SEGMENT_PREDICTION).losses([one], trials)[0]
+        for one in three
+    ]
+    evidence = Evidence(Simulator(quadruped, 1), SEGMENT_PREDICTION)
+    evidence.losses(three[1:], trials[1:])
+    evidence.losses(three[:2], trials)
+
+    assert np.array_equal(evidence.losses(three, trials), alone)
+
+
+def test_it_is_the_log_that_tells_one_trial_from_another(
+    quadruped: Robot, trials: list[Trial], three: list[Hypothesis]
+):
+    simulator = CountingSimulator(quadruped)
+    evidence = Evidence(simulator, FORWARD_DISPLACEMENT)
+    first = evidence.losses(three, trials[:1])
+    same_log = dataclasses.replace(trials[0])
+    other_log = dataclasses.replace(trials[0], path="elsewhere")
+
+    assert np.array_equal(evidence.losses(three, [same_log]), first)
+    assert set(simulator.times.values()) == {1}
+    assert np.array_equal(evidence.losses(three, [other_log]), first)
+    assert set(simulator.times.values()) == {2}
+
+
+@pytest.mark.parametrize("comparator", [FORWARD_DISPLACEMENT, SEGMENT_PREDICTION, SENSOR_SERIES])
+def test_a_hypothesis_that_diverges_is_infinitely_far_and_harms_no_other(
+    comparator: Comparator, quadruped: Robot, trials: list[Trial]
+):
+    alone = Evidence(Simulator(quadruped, 1), comparator).losses([INTACT], trials)
+    simulator = Simulator(quadruped, 1)
+    bad = exploding(simulator, "jam:front_left_knee")
+    evidence = Evidence(simulator, comparator)
+    losses = evidence.losses([bad, INTACT], trials)
+
+    assert simulator.tally.diverged == len(trials)
+    assert np.all(np.isinf(losses[0]))
+    assert np.array_equal(losses[1:], alone)
+    assert evidence.distances([bad], trials) == np.inf
+
+
+def test_only_a_comparator_that_judges_in_pieces_can_be_asked_for_a_test(quadruped: Robot):
+    simulator = Simulator(quadruped, 1)
+
+    assert Evidence(simulator, SEGMENT_PREDICTION).in_pieces
+    assert not Evidence(simulator, FORWARD_DISPLACEMENT).in_pieces
+
+
+@pytest.mark.parametrize(
+    ("comparator", "said"),
+    [
+        (Plain(gives=lambda _: 1.0), r"gave \(\) distances for 2 simulations"),
+        (Plain(gives=lambda n: np.ones((n, 1))), r"gave \(2, 1\) distances for 2"),
+        (Plain(gives=lambda n: np.full(n, -1.0)), "not a number of at least 0"),
+        (Plain(gives=lambda n: np.full(n, np.nan)), "not a number of at least 0"),
+        (InPieces(gives=np.ones), r"gave losses \(2,\) for 2 simulations"),
+        (InPieces(gives=lambda n: np.ones((n + 1, 3))), r"gave losses \(3, 3\) for 2"),
+        (InPieces(gives=lambda n: np.ones((n, 0))), r"gave losses \(2, 0\) for 2"),
+        (InPieces(gives=lambda n: np.full((n, 3), -1.0)), "not a number of at least 0"),
+        (InPieces(gives=lambda n: np.full((n, 3), np.nan)), "not a number of at least 0"),
+        (Plain(asks=ClosedLoop(())), r"asked for the signals \(\), of sensors, commands"),
+        (Plain(asks=ClosedLoop(("smell",))), r"asked for the signals \('smell',\), of sensors"),
+    ],
+)
+def test_a_comparator_that_breaks_its_contract_is_named_with_what_it_did(
+    comparator: Plain, said: str, quadruped: Robot, trials: list[Trial], three: list[Hypothesis]
+):
+    evidence = Evidence(Simulator(quadruped, 1), comparator)
+
+    with pytest.raises(InputError, match=f"the comparator 'plain' .*{said}.*check_comparator"):
+        evidence.distances(three[:2], trials)
+
+
+def test_all_trials_that_cannot_be_judged_are_named_at_once(quadruped: Robot, trials: list[Trial]):
+    first, second = (
+        dataclasses.replace(trial, behaviour=_blind(trial.behaviour), path=f"{k}.mcap")
+        for k, trial in enumerate(trials)
+    )
+    evidence = Evidence(Simulator(quadruped, 1), FORWARD_DISPLACEMENT)
+    evidence.check(trials)
+
+    with pytest.raises(InputError, match=r"0\.mcap: .* needs .*; 1\.mcap: .* needs "):
+        evidence.check([first, trials[0], second])
+
+
+def _blind(behaviour: Behaviour) -> Behaviour:
+    nothing = {signal: np.full_like(rows, np.nan) for signal, rows in behaviour.signals.items()}
+    return Behaviour(behaviour.names, behaviour.time, nothing)

@@ -1,0 +1,99 @@
+"""Promises about what only mends the self-model: it is no fault, and no rival lives by it."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pytest
+
+from selfmodel.comparators import SEGMENT_PREDICTION
+from selfmodel.controllers.network import Controller
+from selfmodel.diagnosis.diagnose import Diagnose
+from selfmodel.diagnosis.diagnosis import Diagnosis
+from selfmodel.diagnosis.loss_functions import Looks, Losses
+from selfmodel.diagnosis.model_error import mends, mends_in_part
+from selfmodel.experiments.reality import draw_reality
+from selfmodel.faults import FRICTION
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.notation import parse
+from selfmodel.faults.registry import PAPER_KINDS
+from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.trial import Plan, Stage, Trial
+from tests.conftest import random_controllers
+from tests.helpers.memory import MemoryJournal
+
+PIECES = 60
+SMALL = dataclasses.replace(Settings().scaled(12), generations=2, steps=400)
+SLIPPERY, KNEE = "friction=0.2", "break:front_left_knee"
+
+
+def of(robot: Robot, means: Mapping[str, float]) -> Losses:
+    """Losses with some scatter: of most hypotheses a mean of 1, of those named another."""
+    scatter = 0.01 * np.random.default_rng(0).normal(size=PIECES)
+    known = {parse(text, robot.anatomy): mean for text, mean in means.items()}
+    return lambda hypotheses: np.array([known.get(one, 1.0) * (1 + scatter) for one in hypotheses])
+
+
+def test_a_fault_that_alone_would_have_helped_before_mends(quadruped: Robot):
+    anatomy = quadruped.anatomy
+    both, knee = (parse(text, anatomy) for text in (f"{KNEE}+{SLIPPERY}", KNEE))
+    slippery = parse(SLIPPERY, anatomy)
+    after = of(quadruped, {str(both): 0.5, KNEE: 0.7, SLIPPERY: 0.8})
+    looks = Looks(after, after, of(quadruped, {SLIPPERY: 0.8, KNEE: 2.0}))
+
+    assert mends(both, knee, looks, anatomy)
+    assert not mends(both, slippery, looks, anatomy)
+    assert mends_in_part(both, looks, anatomy)
+    assert not mends_in_part(knee, looks, anatomy)
+    assert not mends_in_part(INTACT, looks, anatomy)
+
+
+def never(_: Sequence[Hypothesis]) -> np.ndarray:
+    raise AssertionError
+
+
+def test_where_nothing_from_before_can_be_compared_nothing_mends(quadruped: Robot):
+    knee = parse(KNEE, quadruped.anatomy)
+
+    assert not mends(knee, INTACT, Looks(never, never, None), quadruped.anatomy)
+
+
+def test_of_what_would_have_done_harm_nothing_else_is_asked(quadruped: Robot):
+    looks = Looks(never, never, of(quadruped, {KNEE: 2.0}))
+
+    assert not mends(parse(KNEE, quadruped.anatomy), INTACT, looks, quadruped.anatomy)
+
+
+def trial(robot: Robot, truth: str, gait: Controller, stage: Stage, number: int) -> Trial:
+    """A trial across a small gap, on ground that is slippery before the failure and after."""
+    reality = draw_reality(robot, 3, 0.02, structure=False)
+    hidden = parse("+".join({truth, SLIPPERY} - {"intact"}), robot.anatomy)
+    plan = Plan(f"{number:02d}-{stage}", stage, gait, SMALL.steps, 0)
+    return MemoryJournal(robot).record(reality.robot(robot, hidden, stream=number), plan)
+
+
+def diagnosed(robot: Robot, truth: str, *, looks_back: bool) -> Diagnosis:
+    gait = random_controllers(robot, 5)[2]
+    search = Diagnose(
+        Simulator(robot, 1),
+        SEGMENT_PREDICTION,
+        SMALL,
+        (*PAPER_KINDS, FRICTION),
+        intact=[trial(robot, "intact", gait, "before", 0)] if looks_back else (),
+    )
+    after = [trial(robot, truth, gait, "after", 1)]
+    return search(after, [], np.random.default_rng(0), lambda _: None)
+
+
+@pytest.mark.parametrize("truth", ["intact", "jam:front_left_knee"])
+def test_ground_that_always_was_slippery_is_no_change_nor_part_of_a_rival(
+    quadruped: Robot, truth: str
+):
+    alone = diagnosed(quadruped, truth, looks_back=False)
+    found = diagnosed(quadruped, truth, looks_back=True)
+
+    assert "friction" in str(alone.best)
+    assert str(found.best) == truth
+    assert not any("friction" in str(rival) for rival in found.rivals)

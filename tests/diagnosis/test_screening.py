@@ -1,0 +1,72 @@
+"""Promises of the screen of a diagnosis: what is cheap says what is looked at closely."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from selfmodel.arrays import FloatArray
+from selfmodel.comparators import COMPARATORS
+from selfmodel.diagnosis.diagnose import Diagnose
+from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.behaviour import Behaviour, collect
+from selfmodel.trials.trial import Plan, Trial
+from tests.conftest import random_controllers
+from tests.helpers.gaits import changed
+
+SMALL = dataclasses.replace(Settings().scaled(4), generations=1)
+
+
+@pytest.fixture
+def trial(quadruped: Robot) -> Trial:
+    plan = Plan("00-after", "after", random_controllers(quadruped, 1)[0], 300, 0)
+    samples = SimulatedRobot(quadruped).run(plan.controller, plan.steps)
+    run = collect(quadruped.anatomy.names, samples)
+    return Trial(plan, quadruped.name, run, "nowhere.mcap")
+
+
+@pytest.mark.parametrize("name", ["sensor-series", "gait-pattern", "noisy-transfer"])
+def test_a_comparator_of_whole_trials_screens_by_their_openings(
+    name: str, quadruped: Robot, trial: Trial
+):
+    steps = {"evidence": set[int](), "screen": set[int]()}
+    comparator = COMPARATORS[name]
+
+    class Watched:
+        name = comparator.name
+        request = staticmethod(comparator.request)
+        distances = staticmethod(comparator.distances)
+
+        @staticmethod
+        def losses(simulated: Behaviour, trial: Trial) -> FloatArray:
+            assert simulated.steps == trial.behaviour.steps
+            steps["evidence" if simulated.steps == 300 else "screen"].add(simulated.steps)
+            return comparator.losses(simulated, trial)
+
+    Diagnose(Simulator(quadruped, 1), Watched(), SMALL)(
+        [trial], [], np.random.default_rng(0), lambda _: None
+    )
+
+    assert steps == {"evidence": {300}, "screen": {100}}
+
+
+def test_where_the_opening_tells_nothing_the_whole_trial_is_the_screen(
+    quadruped: Robot, trial: Trial
+):
+    run = trial.behaviour
+    late = np.arange(run.steps) >= 150
+    hidden = {
+        signal: np.where(late[:, np.newaxis], values, np.nan)
+        for signal, values in run.signals.items()
+        if signal != "commands"
+    }
+    trial = dataclasses.replace(trial, behaviour=changed(run, **hidden))
+    search = Diagnose(Simulator(quadruped, 1), COMPARATORS["sensor-series"], SMALL)
+
+    search.check([trial])
+    found = search([trial], [], np.random.default_rng(0), lambda _: None)
+
+    assert np.isfinite(found.ranked[0].distance)

@@ -1,0 +1,267 @@
+"""Promises of a diagnosis about itself: what it explains, what it cannot tell, what it cannot say.
+
+At no reality gap, so that whatever is left unexplained is unexplained by the hypotheses.
+"""
+
+import dataclasses
+import itertools
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+
+from selfmodel.comparators import FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
+from selfmodel.controllers.network import Controller
+from selfmodel.diagnosis.comparator import Comparator
+from selfmodel.diagnosis.diagnose import EQUAL, Diagnose
+from selfmodel.diagnosis.diagnosis import Diagnosis
+from selfmodel.diagnosis.significance import TEST
+from selfmodel.faults import BROKEN, FRICTION, JAMMED
+from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
+from selfmodel.faults.kind import Kind
+from selfmodel.faults.notation import parse
+from selfmodel.faults.registry import KINDS, PAPER_KINDS
+from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.simulation.requests import ClosedLoop
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.tasks import ROBOTS
+from selfmodel.trials.behaviour import Behaviour, forward_displacement
+from selfmodel.trials.trial import Plan, Stage, Trial
+from tests.conftest import random_controllers
+from tests.helpers.memory import MemoryJournal
+
+SMALL = dataclasses.replace(Settings().scaled(12), generations=2, steps=300)
+CASES = ROBOTS["quadruped"].cases
+GAIT = 4
+"""The number of a random controller under which every failure below shows."""
+
+
+def trial(robot: Robot, truth: str, controller: Controller, stage: Stage = "after") -> Trial:
+    """A trial of a robot with something wrong."""
+    physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
+    plan = Plan(f"{stage}-{truth}-{hash(controller)}", stage, controller, SMALL.steps, 0)
+    return MemoryJournal(robot).record(physical, plan)
+
+
+def diagnosed(
+    robot: Robot,
+    trials: Sequence[Trial],
+    intact: Sequence[Trial] = (),
+    *,
+    comparator: Comparator = SEGMENT_PREDICTION,
+    kinds: Sequence[Kind] = PAPER_KINDS,
+    seeds: Sequence[Hypothesis] = (),
+) -> Diagnosis:
+    search = Diagnose(Simulator(robot, 1), comparator, SMALL, kinds, intact=intact)
+    return search(trials, seeds, np.random.default_rng(0), lambda _: None)
+
+
+@pytest.fixture(scope="module")
+def gait(quadruped: Robot) -> Controller:
+    return random_controllers(quadruped, 5)[GAIT]
+
+
+@pytest.fixture(scope="module")
+def before(quadruped: Robot, gait: Controller) -> list[Trial]:
+    return [trial(quadruped, "intact", gait, "before")]
+
+
+@pytest.mark.parametrize(
+    ("truth", "kinds"),
+    [
+        ("sensor:front_left_touch", "sensor,sensor-gain"),
+        ("jam:front_left_shoulder", "jam,jam-angle"),
+    ],
+)
+def test_a_fault_without_a_degree_is_explained_though_its_degree_is_considered(
+    quadruped: Robot, gait: Controller, before: list[Trial], truth: str, kinds: str
+):
+    """No trial could tell it from the same with a degree of next to nothing."""
+    chosen = tuple(KINDS[name] for name in kinds.split(","))
+    found = diagnosed(quadruped, [trial(quadruped, truth, gait)], before, kinds=chosen)
+
+    assert str(found.best) == truth
+    assert (found.verdict, found.rivals) == ("explained", ())
+
+
+class HardOfHearing:
+    """Takes a touch that is half felt for none, so that gains below a half are all the same."""
+
+    name = "hard of hearing"
+    request = staticmethod(SEGMENT_PREDICTION.request)
+
+    def losses(self, simulated: Behaviour, trial: Trial) -> np.ndarray:
+        """Those of short predictions, of what is felt."""
+        touch = [name.endswith("touch") for name in simulated.names.sensors]
+        readings = simulated["sensors"].copy()
+        readings[..., touch] = readings[..., touch] > 0.5
+        felt = Behaviour(
+            simulated.names, simulated.time, {**simulated.signals, "sensors": readings}
+        )
+        return SEGMENT_PREDICTION.losses(felt, trial)
+
+    def distances(self, simulated: Behaviour, trial: Trial) -> np.ndarray:
+        """Their means."""
+        return self.losses(simulated, trial).mean(axis=1)
+
+
+def test_faults_that_differ_by_a_degree_are_no_rivals(
+    quadruped: Robot, gait: Controller, before: list[Trial]
+):
+    truth = "sensor:front_left_touch"
+    trials = [trial(quadruped, truth, gait)]
+    found = diagnosed(
+        *(quadruped, trials, before),
+        comparator=HardOfHearing(),
+        kinds=(KINDS["sensor"], KINDS["sensor-gain"]),
+    )
+
+    assert str(found.best) == truth
+    assert any("=gain" in str(one.hypothesis) for one in found.ranked[1:3])
+    assert found.ranked[1].distance == found.ranked[0].distance
+    assert found.rivals == ()
+
+
+@pytest.mark.parametrize("case", [1, 2, 3, 6, 9])
+def test_a_failure_of_table_one_is_found_and_explained(
+    quadruped: Robot, gait: Controller, before: list[Trial], case: int
+):
+    found = diagnosed(quadruped, [trial(quadruped, CASES[case], gait)], before)
+
+    assert str(found.best) == CASES[case]
+    assert found.verdict == "explained"
+    assert found.rivals == ()
+    assert found.test == TEST
+    assert found.ranked[0].distance < 1e-9
+    assert (found.intact_distance > 1e-4) == (case != 9)
+
+
+def test_a_hidden_neuron_is_unexplained(quadruped: Robot, gait: Controller, before: list[Trial]):
+    found = diagnosed(quadruped, [trial(quadruped, CASES[10], gait)], before)
+
+    assert found.verdict == "unexplained"
+
+
+@pytest.mark.parametrize(
+    ("truth", "kinds"),
+    [
+        ("friction=0.3", PAPER_KINDS),
+        ("motor:front_left_knee=0.2", PAPER_KINDS),
+        ("break:front_left_shoulder", [JAMMED, FRICTION]),
+    ],
+)
+def test_what_is_of_no_kind_that_is_considered_is_not_explained(
+    quadruped: Robot, gait: Controller, before: list[Trial], truth: str, kinds: list[Kind]
+):
+    found = diagnosed(quadruped, [trial(quadruped, truth, gait)], before, kinds=kinds)
+
+    assert found.verdict == "unexplained"
+
+
+def test_without_a_trial_of_the_intact_robot_nothing_is_unexplained(
+    quadruped: Robot, gait: Controller
+):
+    found = diagnosed(quadruped, [trial(quadruped, CASES[10], gait)])
+
+    assert found.verdict in {"explained", "ambiguous"}
+
+
+@dataclasses.dataclass(frozen=True)
+class Coarse:
+    """The paper's comparator with a coarse ruler, m."""
+
+    ruler: float
+    name: str = "coarse"
+
+    def request(self, _trial: Trial) -> ClosedLoop:
+        """Asks for the way of the root body."""
+        return ClosedLoop(record=("base_position",))
+
+    def distances(self, simulated: Behaviour, trial: Trial) -> np.ndarray:
+        """Counts rulers."""
+        return np.floor(np.abs(forward_displacement(simulated) - trial.displacement) / self.ruler)
+
+
+@dataclasses.dataclass(frozen=True)
+class CoarseInPieces(Coarse):
+    """The same of every one of five pieces."""
+
+    def losses(self, simulated: Behaviour, trial: Trial) -> np.ndarray:
+        """The same for each."""
+        return np.repeat(self.distances(simulated, trial)[:, np.newaxis], 5, axis=1)
+
+
+@pytest.mark.parametrize(("make", "test"), [(Coarse, EQUAL), (CoarseInPieces, TEST)])
+def test_hypotheses_that_no_trial_tells_apart_are_rivals(
+    quadruped: Robot, gait: Controller, make: Callable[[float], Comparator], test: str
+):
+    anatomy = quadruped.anatomy
+    singles = [
+        canonical([fault], anatomy)
+        for kind in (BROKEN, JAMMED)
+        for fault in kind.candidates(anatomy)
+    ]
+    runs = [(one, gait) for one in (INTACT, *singles)]
+    outcome = Simulator(quadruped, 1).run(runs, SMALL.steps, ["base_position"])
+    intact, *ways = forward_displacement(outcome.behaviour)
+    apart, one, other = min(
+        (abs(ways[i] - ways[k]), singles[i], singles[k])
+        for i, k in itertools.combinations(range(len(singles)), 2)
+        if min(abs(ways[i] - intact), abs(ways[k] - intact)) > 3 * abs(ways[i] - ways[k])
+    )
+    found = diagnosed(
+        quadruped,
+        [trial(quadruped, str(one), gait)],
+        comparator=make(1.01 * apart),
+        seeds=[one, other],
+    )
+    distances = {candidate.hypothesis: candidate.distance for candidate in found.ranked}
+
+    assert found.verdict == "ambiguous"
+    assert found.test == test
+    assert {one, other} <= {found.best, *found.rivals}
+    assert found.best not in found.rivals
+    assert len(found.rivals) <= SMALL.kept
+    assert {distances.get(rival, 0.0) for rival in found.rivals} == {0.0}
+    assert found.intact_distance > 0
+
+
+def deaf(robot: Robot, gait: Controller, sensor: str) -> Controller:
+    """The same gait, which does not listen to one of its sensors."""
+    number = robot.anatomy.names.sensors.index(sensor)
+    genome = gait.genome.copy()
+    inputs = len(robot.anatomy.sensors) + 1
+    genome[number : robot.network.hidden * inputs : inputs] = 0
+    return Controller(robot.network, genome)
+
+
+def test_fewer_faults_win_and_what_only_says_more_is_no_rival(quadruped: Robot, gait: Controller):
+    # To a controller that is deaf to a sensor it makes no difference, to the bit, if it fails.
+    truth = parse("break:front_left_knee", quadruped.anatomy)
+    more = parse("break:front_left_knee+sensor:back_left_touch", quadruped.anatomy)
+    one = trial(quadruped, str(truth), deaf(quadruped, gait, "back_left_touch"))
+    found = diagnosed(quadruped, [one], comparator=FORWARD_DISPLACEMENT, seeds=[more])
+
+    assert [candidate.hypothesis for candidate in found.ranked[:2]] == [truth, more]
+    assert [candidate.distance for candidate in found.ranked[:2]] == [0, 0]
+    assert found.verdict == "explained"
+    assert found.rivals == ()
+
+
+def test_a_fault_that_the_trial_does_not_need_is_not_diagnosed(quadruped: Robot, gait: Controller):
+    more = parse("break:front_left_knee+sensor:back_left_angle", quadruped.anatomy)
+    one = trial(quadruped, "break:front_left_knee", gait)
+    found = diagnosed(quadruped, [one], seeds=[more])
+
+    assert str(found.best) == "break:front_left_knee"
+
+
+def test_intact_is_always_judged_whatever_the_search_looked_at(quadruped: Robot, gait: Controller):
+    one = trial(quadruped, "break:front_left_shoulder", gait)
+    search = Diagnose(Simulator(quadruped, 1), FORWARD_DISPLACEMENT, SMALL)
+    found = search([one], [], np.random.default_rng(3), lambda _: None)
+    (expected,) = search.evidence.distances([INTACT], [one])
+
+    assert found.intact_distance == expected > 0

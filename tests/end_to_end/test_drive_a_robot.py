@@ -1,0 +1,181 @@
+"""Promises of driving a robot in another process, over a socket, in real time.
+
+What is asserted are marks and messages; how fast this machine is, is not.
+"""
+
+import contextlib
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from selfmodel.logs.verify import verify
+from selfmodel.tasks.walking import environment, motion_capture
+from tests.helpers.command import selfmodel
+from tests.helpers.socket_robot import OBSERVED, STOP, TIMESTEP, slow_quadruped
+
+ROOT = Path(__file__).parents[2]
+EXAMPLE = ROOT / "examples" / "drive_a_robot.py"
+
+
+@contextmanager
+def robot(folder: Path, **failures: float | str) -> Iterator[str]:
+    """A robot in another process; gives its port."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "tests.socket_robot", folder / "heard", json.dumps(failures)],
+        cwd=ROOT,
+        env={**os.environ, "MUJOCO_GL": "disable"},
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert process.stdout is not None
+        yield process.stdout.readline().strip()
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def driver(folder: Path, port: str) -> subprocess.Popen[str]:
+    command = [sys.executable, EXAMPLE, "127.0.0.1", port, folder / "trial.mcap"]
+    return subprocess.Popen(
+        command,
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT), "MUJOCO_GL": "disable"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def heard(folder: Path) -> list[int]:
+    """The numbers of the messages that the robot has heard, in order."""
+    with contextlib.suppress(FileNotFoundError):
+        return [int(line) for line in (folder / "heard").read_text().split()]
+    return []
+
+
+def test_delays_and_silence_are_marked_and_the_trial_goes_on(tmp_path: Path):
+    with robot(tmp_path, **{"30": 0.04, "90": "silent", "91": "silent"}) as port:
+        told, errors = (process := driver(tmp_path, port)).communicate(timeout=120)
+    assert process.returncode == 0, errors
+    assert told == f"250 steps: {tmp_path / 'trial.mcap'}\n"
+    log, _ = verify(tmp_path / "trial.mcap")
+    behaviour, timing = log.trial.behaviour, log.timing
+
+    assert (log.status, log.reason, behaviour.steps) == ("finished", "", 250)
+    assert timing is not None
+    assert np.array_equal(behaviour.late, timing.late)
+    assert timing.late[[30, 90, 91]].all()
+    assert timing.missing[[90, 91]].all()
+    assert np.array_equal(np.isnan(behaviour["sensors"]).any(axis=1), timing.missing)
+    assert np.isfinite(behaviour["commands"]).all()
+    # Real time: a robot that moves 20 ms a step cannot be done sooner.
+    assert timing.elapsed[-1] > 249 * TIMESTEP
+    assert np.all(np.diff(timing.elapsed)[[29, 89, 90]] > [0.06, 0.1, 0.1])
+    assert heard(tmp_path) == [STOP, *range(250), STOP]
+    # The robot moves one step a message, so what it observed can be had again.
+    for k, seen in enumerate(observed(behaviour["commands"])):
+        for name in OBSERVED:
+            assert timing.missing[k] or np.array_equal(behaviour[name][k], seen[name])
+
+
+def observed(commands: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
+    """What the robot observes that follows some targets."""
+    env = environment(slow_quadruped(), "intact", 1e3, None, None)
+    observe = motion_capture(env)
+    yield observe(env.reset().observation)
+    for targets in commands[:-1]:
+        yield observe(env.step(targets).observation)
+
+
+def test_a_dropped_connection_stops_the_robot_and_leaves_a_whole_log(tmp_path: Path):
+    with robot(tmp_path, **{"70": "hang up"}) as port:
+        _, errors = (process := driver(tmp_path, port)).communicate(timeout=120)
+    log, _ = verify(tmp_path / "trial.mcap")
+
+    assert process.returncode == 1
+    assert "the environment failed: ConnectionError: the robot hung up" in errors
+    assert "the environment failed: ConnectionError: the robot hung up" in log.reason
+    assert (log.status, log.trial.behaviour.steps) == ("stopped", 70)
+    assert heard(tmp_path) == [STOP, *range(71), STOP]
+    told = selfmodel("logs", "info", "trial.mcap", cwd=tmp_path, PYTHONPATH=str(ROOT))
+    assert f"of quadruped, stopped: {log.reason}" in " ".join(told.stdout.split("\n"))
+    late, missing = log.timing.late.sum(), log.timing.missing.sum()
+    assert f"clock: {late} steps late, {missing} observations missing" in told.stdout
+    told = selfmodel("logs", "verify", "trial.mcap", cwd=tmp_path, PYTHONPATH=str(ROOT))
+    assert told.stdout == f"ok: trial.mcap: 70 steps, stopped ({log.reason})\n"
+
+
+def test_the_operator_is_told_that_the_robot_could_not_be_stopped(tmp_path: Path):
+    with robot(tmp_path, **{"40": "die"}) as port:
+        _, errors = (process := driver(tmp_path, port)).communicate(timeout=120)
+
+    assert process.returncode == 1
+    # Whether it hangs up, resets or refuses is a matter of the moment.
+    assert re.match(
+        r"the environment failed: Connection\w*Error: .*; "
+        r"the safe command could not be sent: Connection\w*Error: .*; what was observed",
+        errors,
+    )
+
+
+def test_a_robot_that_is_not_there_is_said_so_and_can_be_tried_again(tmp_path: Path):
+    for _ in range(2):
+        _, errors = (process := driver(tmp_path, "1")).communicate(timeout=120)  # nobody is there
+        assert process.returncode == 1
+        assert errors.startswith("the safe command could not be sent: ConnectionRefusedError: ")
+        assert errors.endswith("; there is no log\n")
+        assert list(tmp_path.iterdir()) == []
+    (tmp_path / "trial.mcap").touch()
+    _, errors = driver(tmp_path, "1").communicate(timeout=120)
+    assert errors.endswith("trial.mcap exists, and is not overwritten: choose another name\n")
+    assert "Traceback" not in errors
+
+
+def test_ctrl_c_stops_the_robot_and_leaves_a_whole_log(tmp_path: Path):
+    with robot(tmp_path) as port:
+        process = driver(tmp_path, port)
+        while len(heard(tmp_path)) < 60 and process.poll() is None:
+            time.sleep(0.02)
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=120)
+    log, _ = verify(tmp_path / "trial.mcap")
+
+    assert errors.strip().endswith("KeyboardInterrupt")
+    assert (log.status, log.reason) == ("stopped", "KeyboardInterrupt")
+    first, *commands, last = heard(tmp_path)
+    assert (first, last) == (STOP, STOP)
+    assert commands == list(range(len(commands)))
+    assert len(commands) - 1 <= log.trial.behaviour.steps <= len(commands)
+
+
+def test_the_driver_that_the_docs_show_is_the_example_s_and_has_forty_lines():
+    text = EXAMPLE.read_text(encoding="utf-8")
+    shown = text.split("# The driver begins here: the docs show it.\n")[1]
+    shown = shown.split("\n\n# The driver ends here.\n")[0].strip()
+    code = [line for line in shown.splitlines() if line.strip() and '"""' not in line]
+
+    assert len(code) <= 40
+    docs = (ROOT / "docs" / "real-robots.md").read_text(encoding="utf-8")
+    assert f"```python\n{shown}\n```" in docs
+
+
+def test_the_trial_of_the_docs_runs(tmp_path: Path):
+    docs = (ROOT / "docs" / "real-robots.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"```python\n(from pathlib.*?)```", docs, flags=re.DOTALL)
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "MUJOCO_GL": "disable"}
+    subprocess.run([sys.executable, "-c", block], cwd=tmp_path, env=environment, check=True)
+    log, _ = verify(tmp_path / "walk.mcap")
+
+    assert (log.status, log.trial.behaviour.steps) == ("finished", 300)
+    assert log.timing is not None
+    assert not log.timing.late.any()

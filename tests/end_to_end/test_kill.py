@@ -1,0 +1,108 @@
+"""Nothing lost: ``selfmodel trial`` is killed at random moments, and what it did is in its file."""
+
+import mmap
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from selfmodel.logs import LogError, TrialLog, read_log
+from selfmodel.logs.salvage import salvage
+from selfmodel.logs.writer import FLUSH_STEPS
+from selfmodel.trials.behaviour import SIGNALS
+
+ROOT = Path(__file__).parents[2]
+KILLS = 50
+STEPS = 1000
+
+TAPPED = """
+import mmap, sys
+from selfmodel.cli import main
+from selfmodel.physical import SimulatedRobot
+
+counter = open(sys.argv.pop(1), "r+b")
+page = mmap.mmap(counter.fileno(), 8)
+run = SimulatedRobot.run
+
+def tapped(self, controller, steps):
+    for k, sample in enumerate(run(self, controller, steps)):
+        page[:] = (k + 1).to_bytes(8, "little")
+        yield sample
+
+SimulatedRobot.run = tapped
+main()
+"""
+"""The command as it is, but that it counts its steps where they outlive a kill."""
+
+
+def start(folder: Path, number: int) -> tuple[subprocess.Popen[bytes], mmap.mmap]:
+    """Starts a trial; returns its process and the count of its steps."""
+    counter = folder / f"{number}.count"
+    counter.write_bytes(bytes(8))
+    with counter.open("r+b") as file:
+        page = mmap.mmap(file.fileno(), 8)
+    command = [sys.executable, "-c", TAPPED, counter, "trial", "quadruped", "--seed", "5"]
+    process = subprocess.Popen(
+        [*command, "--out", folder / f"{number}.mcap"],
+        cwd=ROOT,
+        env={**os.environ, "MUJOCO_GL": "disable"},
+        stdout=subprocess.DEVNULL,
+    )
+    return process, page
+
+
+def kill_at(process: subprocess.Popen[bytes], page: mmap.mmap, step: int, delay: float) -> int:
+    """Kills a trial some moment after a step; returns how many steps it had taken."""
+    while process.poll() is None and int.from_bytes(page, "little") < step:
+        time.sleep(2e-4)
+    time.sleep(delay)
+    process.kill()
+    process.wait()
+    return int.from_bytes(page, "little")
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a trial that nobody killed."""
+    folder = tmp_path_factory.mktemp("whole")
+    process, _ = start(folder, 0)
+    assert process.wait() == 0
+    return folder / "0.mcap"
+
+
+def what_is_left(log: Path) -> TrialLog:
+    """The trial in a log that verifies, or in what is salvaged of its part."""
+    if log.exists():
+        return read_log(log)
+    part = log.with_name(log.name + ".part")
+    try:
+        return read_log(part)  # whole, and killed before it got its name
+    except LogError:
+        saved = log.with_name("saved-" + log.name)
+        salvage(part, saved)
+        return read_log(saved)
+
+
+def test_no_kill_costs_more_than_the_steps_of_one_flush(whole: Path, tmp_path: Path):
+    true = read_log(whole).trial.behaviour
+    rng = np.random.default_rng(11)
+    moments = rng.integers(1, STEPS + 1, KILLS)
+    moments[rng.choice(KILLS, 8, replace=False)] = STEPS  # while the file is being finished
+    delays = rng.uniform(0, 0.02, KILLS)
+    ends = {"finished": 0, "interrupted": 0}
+    for number in range(KILLS):
+        process, page = start(tmp_path, number)
+        taken = kill_at(process, page, moments[number], delays[number])
+        read = what_is_left(tmp_path / f"{number}.mcap")
+        ends[read.status] += 1
+        behaviour = read.trial.behaviour
+        assert taken - FLUSH_STEPS <= behaviour.steps <= taken
+        for signal in SIGNALS:
+            assert behaviour[signal].tobytes() == true[signal][: behaviour.steps].tobytes()
+
+    assert sum(ends.values()) == KILLS
+    assert min(ends.values()) >= 2

@@ -1,0 +1,220 @@
+"""Promises of a grid: nothing is done twice, nothing is lost, and one failure stops no other."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from selfmodel.errors import InputError
+from selfmodel.experiments.grid import GridBegins, Job, PartEnds, difference, finished, run_grid
+
+ROOT = Path(__file__).parents[2]
+
+
+def work(job: Job, part: str, folder: Path) -> dict:
+    """Notes that it was called, waits, and fails if it is to."""
+    with (folder / "calls").open("a") as file:
+        file.write(f"{part}\n")
+    time.sleep(job.parameters.get("seconds", 0))
+    match job.parameters.get("fails"):
+        case "foreseen" if not (folder / "mended").exists():
+            raise InputError("the cause and the cure")
+        case "bug":
+            raise ZeroDivisionError
+        case "crash":
+            os._exit(7)
+    sys.stdout.write("a plug-in may print")
+    deaf = signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+    return {"part": part, "number": job.seed * job.parameters["factor"], "deaf": deaf}
+
+
+def jobs(count: int, parts: tuple[str, ...] = ("result",), **parameters: object) -> list[Job]:
+    return [
+        Job(f"run-{seed:02d}", {"factor": 10, **parameters}, seed, parts) for seed in range(count)
+    ]
+
+
+def calls(folder: Path) -> dict[str, list[str]]:
+    return {path.parent.name: path.read_text().split() for path in folder.glob("*/calls")}
+
+
+def silent(_event: GridBegins | PartEnds) -> None:
+    pass
+
+
+SCRIPT = """
+import sys
+from pathlib import Path
+from selfmodel.grid import run_grid
+from tests.experiments.test_grid import jobs, silent, work
+
+if __name__ == "__main__":
+    run_grid(Path(sys.argv[1]), jobs(6, seconds=0.3), work, workers=2, watch=print)
+"""
+
+
+@pytest.fixture(autouse=True)
+def _found_by_the_workers(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(ROOT))
+
+
+def start(folder: Path) -> subprocess.Popen[bytes]:
+    """Starts a slow grid in a process group of its own."""
+    folder.mkdir(exist_ok=True)
+    script = folder / "script.py"
+    script.write_text(SCRIPT)
+    return subprocess.Popen(
+        [sys.executable, script, folder / "runs"],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        start_new_session=True,
+    )
+
+
+def wait_for_a_result(folder: Path) -> None:
+    deadline = time.monotonic() + 60
+    while not list(folder.glob("runs/*/parts/*.json")):
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+def test_a_grid_does_every_part_once_and_not_again(tmp_path: Path):
+    events: list = []
+    first = run_grid(tmp_path, jobs(3, ("a", "b")), work, workers=2, watch=events.append)
+    again = run_grid(tmp_path, jobs(3, ("a", "b")), work, workers=2, watch=events.append)
+
+    assert (first, again) == ((), ())
+    assert calls(tmp_path) == {f"run-{seed:02d}": ["a", "b"] for seed in range(3)}
+    assert events[0] == GridBegins(total=6, finished=0)
+    assert [event.number for event in events[1:7]] == [1, 2, 3, 4, 5, 6]
+    assert events[7:] == [GridBegins(total=6, finished=6)]
+
+
+def test_the_results_do_not_depend_on_the_number_of_workers(tmp_path: Path):
+    for workers in (1, 2):
+        run_grid(tmp_path / str(workers), jobs(4, ("a", "b")), work, workers=workers, watch=silent)
+
+    one, two = ([*finished(tmp_path / folder)] for folder in ("1", "2"))
+
+    assert one == two
+    assert [each.result["number"] for each in one if each.part == "a"] == [0, 10, 20, 30]
+
+
+def test_a_run_is_extended_by_a_part_and_keeps_the_others(tmp_path: Path):
+    run_grid(tmp_path, jobs(2, ("a",)), work, workers=1, watch=silent)
+    run_grid(tmp_path, jobs(2, ("a", "package.module:b/c")), work, workers=1, watch=silent)
+
+    assert calls(tmp_path)["run-01"] == ["a", "package.module:b/c"]
+    assert {each.part for each in finished(tmp_path)} == {"a", "package.module:b/c"}
+
+
+@pytest.mark.parametrize(
+    ("fails", "sentence"),
+    [
+        ("foreseen", "the cause and the cure"),
+        ("bug", "its process ended with status 1; standard error may say more"),
+        ("crash", "its process ended with status 7; standard error may say more"),
+    ],
+)
+def test_a_failure_is_kept_and_stops_no_other(tmp_path: Path, fails: str, sentence: str):
+    bad = Job("bad", {"factor": 1, "fails": fails}, 0, ("a", "b"))
+    failed = run_grid(tmp_path, [bad, *jobs(2)], work, workers=1, watch=silent)
+
+    assert [(each.key, each.part, each.error) for each in failed] == [
+        ("bad", "a", sentence),
+        ("bad", "b", sentence),
+    ]
+    kept = json.loads((tmp_path / "bad" / "parts" / "a.json").read_text())
+    assert (kept["status"], kept["error"]) == ("failed", sentence)
+    assert [each.key for each in finished(tmp_path)] == ["run-00", "run-01"]
+
+
+def test_what_failed_is_tried_again(tmp_path: Path):
+    assert run_grid(tmp_path, jobs(1, fails="foreseen"), work, workers=1, watch=silent)
+    (tmp_path / "run-00" / "mended").touch()
+
+    assert run_grid(tmp_path, jobs(1, fails="foreseen"), work, workers=1, watch=silent) == ()
+
+
+def test_a_run_whose_results_were_deleted_is_made_again(tmp_path: Path):
+    run_grid(tmp_path, jobs(2), work, workers=1, watch=silent)
+    shutil.rmtree(tmp_path / "run-01" / "parts")
+
+    assert run_grid(tmp_path, jobs(2), work, workers=1, watch=silent) == ()
+    assert calls(tmp_path) == {"run-00": ["result"], "run-01": ["result", "result"]}
+
+
+def test_a_run_made_of_something_else_is_refused_before_anything_is_done(tmp_path: Path):
+    run_grid(tmp_path, jobs(1), work, workers=1, watch=silent)
+    other = [Job("new", {"factor": 1}, 0), Job("run-00", {"factor": 11}, 0)]
+
+    with pytest.raises(InputError, match=r"run-00 .*parameters.factor is 10 there, asked is 11"):
+        run_grid(tmp_path, other, work, workers=1, watch=silent)
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_grid_that_was_killed_goes_on_where_it_was(tmp_path: Path):
+    process = start(tmp_path)
+    wait_for_a_result(tmp_path)
+    process.kill()
+    process.communicate()
+    done = {each.key for each in finished(tmp_path / "runs")}
+    assert 0 < len(done) < 6
+
+    run_grid(tmp_path / "runs", jobs(6, seconds=0.3), work, workers=2, watch=silent)
+
+    assert [each.seed for each in finished(tmp_path / "runs")] == list(range(6))
+    assert all(calls(tmp_path / "runs")[key] == ["result"] for key in done)
+
+
+def test_an_interrupt_ends_every_process_at_once_and_quietly(tmp_path: Path):
+    process = start(tmp_path)
+    wait_for_a_result(tmp_path)
+    os.killpg(process.pid, signal.SIGINT)  # a terminal's Ctrl-C reaches the workers too
+    _, told = process.communicate(timeout=30)  # ends when the last of them has closed it
+    started = len(calls(tmp_path / "runs"))
+    time.sleep(0.5)
+
+    assert told.count(b"Traceback") == 1  # the script's own KeyboardInterrupt
+    assert len(calls(tmp_path / "runs")) == started < 6
+
+
+def test_a_worker_never_sees_an_interrupt_not_even_while_it_starts(tmp_path: Path):
+    run_grid(tmp_path, jobs(2), work, workers=2, watch=silent)
+
+    assert all(each.result["deaf"] for each in finished(tmp_path))
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+
+
+def test_two_processes_at_one_grid_do_nothing_twice(tmp_path: Path):
+    both = [start(tmp_path), start(tmp_path)]
+
+    told = [process.communicate(timeout=60) for process in both]
+    assert [process.returncode for process in both] == [0, 0]
+    assert calls(tmp_path / "runs") == {f"run-{seed:02d}": ["result"] for seed in range(6)}
+    assert not any(b"a plug-in may print" in out for out, _ in told)
+
+
+@pytest.mark.parametrize("key", ["", "..", "a/b", ".hidden", "a b"])
+def test_a_key_that_cannot_name_a_folder_is_refused(key: str):
+    with pytest.raises(ValueError, match="able to name a folder"):
+        Job(key, {}, 0)
+
+
+@given(
+    st.recursive(
+        st.none() | st.booleans() | st.floats(allow_nan=False) | st.text(),
+        lambda inner: st.dictionaries(st.text(), inner) | st.lists(inner),
+    )
+)
+def test_a_value_does_not_differ_from_what_its_file_says(value: object):
+    assert difference(json.loads(json.dumps(value)), value) is None

@@ -1,0 +1,140 @@
+"""Promises of the edits: a broken joint is a deleted limb, a jammed one a weld.
+
+The ground truth has another layout, so it can be compared for as long as contact has not blown
+up the last bits: over the first 100 control steps (1 s) of a motion that moves every joint, all
+joint angles and the root's pose agree within TOLERANCE. (Measured: below 1e-13 for broken joints,
+below 3e-9 for jammed ones.)
+"""
+
+import mujoco
+import numpy as np
+import pytest
+
+from selfmodel.faults.build import build
+from selfmodel.faults.notation import parse
+from selfmodel.robot.anatomy import Joint
+from selfmodel.robot.robot import Robot
+from selfmodel.tasks import ROBOTS
+from tests.conftest import random_motion
+
+STEPS = 100
+TOLERANCE = 1e-7
+HELD = 1e-6
+"""How far a held joint may give way in 10 s, rad."""
+
+JOINTS = [
+    (name, joint.name) for name, entry in ROBOTS.items() for joint in entry.robot().anatomy.joints
+]
+
+
+def without_limb(robot: Robot, joint: Joint) -> mujoco.MjModel:
+    """The robot's model with the limb beyond a joint deleted."""
+    spec = mujoco.MjSpec.from_string(robot.mjcf)
+    first = next(b for b in joint.bodies if spec.body(b).parent.name not in joint.bodies)
+    spec.delete(spec.body(first))
+    return spec.compile()
+
+
+def with_weld(robot: Robot, joint: Joint, angle: float) -> mujoco.MjModel:
+    """The robot's model with a joint's bodies welded at an angle: there is no joint."""
+    spec = mujoco.MjSpec.from_string(robot.mjcf)
+    for name in joint.hinges:
+        hinge = spec.joint(name)
+        body = hinge.parent
+        np.testing.assert_array_equal(hinge.pos, 0)  # else turning the body would move the pivot
+        turn, frame = np.empty(4), np.empty(4)
+        mujoco.mju_axisAngle2Quat(turn, np.array(hinge.axis), angle)
+        mujoco.mju_mulQuat(frame, np.array(body.quat), turn)
+        body.quat = frame
+        users = [motor for motor in spec.actuators if motor.target == name]
+        users += [sensor for sensor in spec.sensors if sensor.objname == name]
+        for user in users:
+            spec.delete(user)
+        spec.delete(hinge)
+    return spec.compile()
+
+
+def follow(robot: Robot, model: mujoco.MjModel, steps: int) -> dict[str, np.ndarray]:
+    """Runs motor targets on a model and returns the path of its root and of each of its hinges."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    hinges = {model.joint(j).name for j in range(model.njnt)} & set(robot.anatomy.hinges)
+    motors = {model.actuator(m).name for m in range(model.nu)}
+    paths: dict[str, list] = {name: [] for name in (robot.root, *hinges)}
+    for targets in random_motion(robot, steps):
+        for motor, target in zip(robot.anatomy.motors, targets, strict=True):
+            if motor in motors:
+                data.actuator(motor).ctrl = target
+        mujoco.mj_step(model, data, robot.substeps)
+        paths[robot.root].append(data.qpos[:7].copy())
+        for hinge in hinges:
+            paths[hinge].append(float(data.joint(hinge).qpos[0]))
+    return {name: np.array(path) for name, path in paths.items()}
+
+
+def assert_same_paths(edited: dict[str, np.ndarray], truth: dict[str, np.ndarray]):
+    assert len(truth) > 1
+    for name, path in truth.items():
+        np.testing.assert_allclose(edited[name], path, atol=TOLERANCE, rtol=0, err_msg=name)
+
+
+@pytest.mark.parametrize(("name", "joint"), JOINTS)
+def test_a_broken_joint_moves_like_a_model_without_the_limb(name: str, joint: str):
+    robot = ROBOTS[name].robot()
+    edited = build(robot, parse(f"break:{joint}", robot.anatomy)).model
+    truth = without_limb(robot, robot.anatomy.joint(joint))
+
+    assert truth.nv < edited.nv == robot.model.nv
+    assert_same_paths(follow(robot, edited, STEPS), follow(robot, truth, STEPS))
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3, -0.5])
+@pytest.mark.parametrize(("name", "joint"), JOINTS)
+def test_a_jammed_joint_moves_like_a_welded_one(name: str, joint: str, angle: float):
+    robot = ROBOTS[name].robot()
+    edited = build(robot, parse(f"jam:{joint}={angle}", robot.anatomy)).model
+    truth = with_weld(robot, robot.anatomy.joint(joint), angle)
+
+    assert truth.nv < edited.nv == robot.model.nv
+    assert_same_paths(follow(robot, edited, STEPS), follow(robot, truth, STEPS))
+
+
+@pytest.mark.parametrize(("name", "joint"), JOINTS)
+def test_a_jammed_joint_stays_where_it_is_for_a_whole_run(name: str, joint: str):
+    robot = ROBOTS[name].robot()
+    edited = build(robot, parse(f"jam:{joint}=0.2", robot.anatomy)).model
+    paths = follow(robot, edited, 1000)
+
+    for hinge in robot.anatomy.joint(joint).hinges:
+        np.testing.assert_allclose(paths[hinge], 0.2, atol=HELD, rtol=0)
+
+
+def test_building_a_hypothesis_leaves_the_robot_as_it_was(robot: Robot):
+    sizes = mujoco.mj_sizeModel(robot.model)
+    before, after = np.empty(sizes, np.uint8), np.empty(sizes, np.uint8)
+    mujoco.mj_saveModel(robot.model, None, before)
+    for joint in robot.anatomy.joints:
+        build(robot, parse(f"break:{joint.name}", robot.anatomy))
+        build(robot, parse(f"jam:{joint.name}=0.1", robot.anatomy))
+    mujoco.mj_saveModel(robot.model, None, after)
+
+    assert before.tobytes() == after.tobytes()
+
+
+def test_lost_and_failed_sensors_read_zero_and_jammed_ones_their_angle(quadruped: Robot):
+    names = quadruped.anatomy.names.sensors
+
+    def fixed(text: str) -> dict[str, float]:
+        built = build(quadruped, parse(text, quadruped.anatomy))
+        return {
+            name: float(offset)
+            for name, gain, offset in zip(names, built.gain, built.offset, strict=True)
+            if gain == 0
+        }
+
+    assert fixed("sensor:back_left_touch") == {"back_left_touch": 0.0}
+    assert fixed("break:front_left_knee") == {"front_left_touch": 0.0}
+    assert fixed("break:front_left_shoulder") == {"front_left_touch": 0.0, "front_left_angle": 0.0}
+    half = quadruped.anatomy.sensor("front_left_angle").half_range
+    assert fixed("jam:front_left_shoulder=0.3") == {"front_left_angle": 0.3 / half}
+    assert fixed("jam:front_left_knee=0.3") == {}

@@ -1,0 +1,111 @@
+"""Promises of canonical form: equal hypotheses are equal robots, in the fewest words."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from selfmodel.faults.hypothesis import INTACT, canonical
+from selfmodel.faults.kind import Fault
+from selfmodel.faults.notation import parse
+from selfmodel.faults.registry import KINDS
+from selfmodel.tasks import ROBOTS
+from tests.helpers.strategies import faults
+
+ANATOMIES = {name: entry.robot().anatomy for name, entry in ROBOTS.items()}
+
+
+@pytest.mark.parametrize("name", ANATOMIES)
+@given(data=st.data())
+def test_order_and_repetition_do_not_matter(name: str, data: st.DataObject):
+    anatomy = ANATOMIES[name]
+    chosen = data.draw(st.lists(faults(anatomy, graded=False), max_size=6))
+    shuffled = data.draw(st.permutations(chosen + chosen[:2]))
+
+    assert canonical(chosen, anatomy) == canonical(shuffled, anatomy)
+
+
+@pytest.mark.parametrize("name", ANATOMIES)
+@given(data=st.data())
+def test_canonical_form_is_a_fixed_point(name: str, data: st.DataObject):
+    anatomy = ANATOMIES[name]
+    chosen = data.draw(st.lists(faults(anatomy, graded=True), max_size=6))
+    once = canonical(chosen, anatomy)
+
+    assert canonical(once.faults, anatomy) == once
+
+
+@pytest.mark.parametrize(
+    ("said", "meant"),
+    [
+        ("break:front_left_shoulder+break:front_left_knee", "break:front_left_shoulder"),
+        ("break:front_left_shoulder+jam:front_left_knee", "break:front_left_shoulder"),
+        ("break:front_left_shoulder+jam:front_left_shoulder", "break:front_left_shoulder"),
+        ("break:front_left_knee+sensor:front_left_touch", "break:front_left_knee"),
+        ("break:front_left_shoulder+sensor:front_left_angle", "break:front_left_shoulder"),
+        ("jam:front_left_shoulder+sensor:front_left_angle", "jam:front_left_shoulder"),
+        ("jam:front_left_shoulder+sensor:front_left_angle=gain0.2", "jam:front_left_shoulder"),
+        ("break:front_left_knee+jam:front_left_knee=0.2", "break:front_left_knee"),
+        ("break:front_left_shoulder+motor:front_left_knee=0.5", "break:front_left_shoulder"),
+        ("break:front_left_knee+motor:front_left_knee=0.5", "break:front_left_knee"),
+        (
+            "break:front_left_shoulder+sensor:front_left_angle=noise0.1",
+            "break:front_left_shoulder",
+        ),
+        ("jam:front_left_knee+motor:front_left_knee=0.5", "jam:front_left_knee"),
+        ("jam:front_left_knee=0.2+motor:front_left_knee=0.5", "jam:front_left_knee=0.2"),
+        ("sensor:back_left_angle+sensor:back_left_angle=gain0.5", "sensor:back_left_angle"),
+        ("sensor:back_left_angle=gain0", "sensor:back_left_angle"),
+        ("sensor:back_left_angle=gain0+sensor:back_left_angle", "sensor:back_left_angle"),
+        (
+            "sensor:back_left_angle=gain0+sensor:back_left_angle=bias0.3",
+            "sensor:back_left_angle=bias0.3+sensor:back_left_angle=gain0.0",
+        ),
+        ("sensor:back_left_angle+sensor:back_left_angle=bias0.5", "sensor:back_left_angle"),
+        ("sensor:back_left_angle=noise0.5+sensor:back_left_angle", "sensor:back_left_angle"),
+    ],
+)
+def test_what_another_fault_leaves_without_effect_is_absorbed(said: str, meant: str):
+    assert str(parse(said, ANATOMIES["quadruped"])) == meant
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "break:front_left_knee+jam:front_left_shoulder",
+        "break:front_left_knee+sensor:front_left_angle",
+        "break:front_left_shoulder+sensor:front_right_touch",
+        "jam:front_left_knee+sensor:front_left_touch",
+        "jam:front_left_shoulder=0.3+sensor:front_left_angle",
+        "jam:front_left_shoulder=0.3+sensor:front_left_angle=gain0.2",
+        "jam:front_left_shoulder+sensor:front_left_angle=bias0.2",
+        "jam:front_left_shoulder+motor:front_left_knee=0.2",
+        "break:front_left_knee+motor:front_left_shoulder=0.2",
+        "sensor:front_left_angle=gain0.5+sensor:front_left_angle=bias0.2",
+        "break:front_left_shoulder+friction=0.4",
+        "wind=5+crosswind=5",
+    ],
+)
+def test_faults_that_both_matter_are_both_kept(said: str):
+    assert len(parse(said, ANATOMIES["quadruped"])) == 2
+
+
+def test_no_faults_mean_intact():
+    assert canonical([], ANATOMIES["quadruped"]) == INTACT
+    assert str(INTACT) == "intact"
+
+
+def test_one_degree_a_part_is_kept():
+    kind = KINDS["jam-angle"]
+    twice = [Fault(kind, "front_left_knee", 0.1), Fault(kind, "front_left_knee", 0.2)]
+
+    assert canonical(twice, ANATOMIES["quadruped"]).faults == (twice[0],)
+
+
+def test_of_a_joint_said_to_be_jammed_at_zero_and_at_an_angle_zero_counts():
+    both = [
+        Fault(KINDS["jam"], "front_left_knee"),
+        Fault(KINDS["jam-angle"], "front_left_knee", 0.2),
+    ]
+
+    assert str(canonical(both, ANATOMIES["quadruped"])) == "jam:front_left_knee"
+    assert str(canonical(both[::-1], ANATOMIES["quadruped"])) == "jam:front_left_knee"

@@ -1,0 +1,179 @@
+"""The contract of every kind of fault and of environment: add one, and it is tested."""
+
+import dataclasses
+import importlib.util
+from itertools import permutations
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from selfmodel.controllers.playback import Playback
+from selfmodel.diagnosis.kind_contract import check_kind
+from selfmodel.errors import InputError
+from selfmodel.experiments import plugins as resolve
+from selfmodel.faults.build import build
+from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.faults.kind import Fault, Kind, between, grid
+from selfmodel.faults.notation import parse
+from selfmodel.faults.registry import ALL_KINDS, KINDS, PAPER_KINDS, known
+from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.robot import Robot
+from selfmodel.simulation.simulator import Simulator
+from tests.conftest import random_motion
+
+
+def example(name: str) -> ModuleType:
+    """An example, imported as its user would import it."""
+    path = Path(__file__).parents[2] / "examples" / f"{name}.py"
+    spec = importlib.util.spec_from_file_location(name, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+PAYLOAD = example("payload").PAYLOAD
+
+
+@pytest.mark.parametrize("kind", [*KINDS.values(), PAYLOAD], ids=lambda kind: kind.name)
+def test_a_kind_keeps_its_contract(kind: Kind, robot: Robot):
+    check_kind(kind, robot)
+
+
+def test_the_registry_knows_each_kind_by_its_name():
+    assert all(KINDS[name].name == name for name in KINDS)
+    assert [kind.name for kind in PAPER_KINDS] == ["break", "jam", "sensor"]
+    assert set(KINDS.values()) - set(ALL_KINDS) == {KINDS["neuron"]}
+
+
+@pytest.mark.parametrize("name", [kind.name for kind in ALL_KINDS if kind.degrees])
+def test_a_kind_of_degree_proposes_a_few_levels(name: str, robot: Robot):
+    kind = KINDS[name]
+
+    for part in kind.parts(robot.anatomy):
+        levels = kind.levels(robot.anatomy, part)
+        assert 3 <= len(levels) <= 16
+        assert list(levels) == sorted(set(levels))
+
+
+def test_what_a_joint_absorbs_would_not_move_the_robot(robot: Robot):
+    """The pair, built as it is said, moves like the canonical form."""
+    anatomy = robot.anatomy
+    driver = Playback(anatomy.motors, random_motion(robot, 60))
+    first = anatomy.joints[0]
+    faults = [
+        fault
+        for kind in ALL_KINDS
+        for fault in {fault.part: fault for fault in kind.candidates(anatomy)}.values()
+        if fault.part in (first.name, *first.lost)
+    ]
+    absorbed = [
+        (one, other)
+        for one, other in permutations(faults, 2)
+        if one.kind.absorbs(one, other, anatomy)
+        # These contradict each other: the canonical form decides which is meant.
+        and (one.kind.name, other.kind.name) != ("jam", "jam-angle")
+    ]
+    assert {one.kind.name for one, _ in absorbed} == {"break", "jam", "jam-angle", "sensor"}
+    runs = [
+        (Hypothesis(tuple(sorted(said))), driver) for pair in absorbed for said in (pair, pair[:1])
+    ]
+    path = Simulator(robot, 2).run(runs, 60, ["base_position"]).behaviour["base_position"]
+
+    for pair, said, meant in zip(absorbed, path[::2], path[1::2], strict=True):
+        np.testing.assert_allclose(said, meant, atol=1e-9, rtol=0, err_msg=str(pair))
+
+
+def nothing(_embodiment: Embodiment, _anatomy: Anatomy, _fault: Fault) -> None:
+    """Strikes nothing."""
+
+
+def heavier_each_time(_embodiment: Embodiment, _anatomy: Anatomy, _fault: Fault) -> None:
+    """Is another fault each time."""
+    heavier_each_time.times += 1
+    _embodiment.model.body_mass[1] += heavier_each_time.times
+
+
+heavier_each_time.times = 0
+
+GRADED = Kind(
+    name="odd", word="odd", strike=PAYLOAD.strike, degrees=between(0, 2), levels=grid(1.0)
+)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"name": "two words"}, "needs a name without spaces"),
+        ({"word": "a:b"}, "needs a word without spaces"),
+        ({"parts": lambda _anatomy: ()}, "nothing can be proposed"),
+        ({"levels": grid()}, "nothing can be proposed"),
+        ({"levels": grid(3.0)}, "not between 0 and 2"),
+        ({"degrees": None}, "the kind no degrees"),
+        ({"special": {1.0: None}}, "alone it means intact"),
+        ({"word": "friction"}, "is read back as friction=1.0"),
+        ({"absorbs": lambda _fault, _other, _anatomy: True}, "absorbs itself"),
+        ({"strike": nothing}, "changes nothing about a robot"),
+        ({"strike": heavier_each_time}, "does not make the same robot every time"),
+        ({"feel": lambda _own, _fault, points: points.fill(0)}, "changes the points"),
+    ],
+)
+def test_the_contract_kit_sees_each_way_to_break_it(change: dict, said: str, quadruped: Robot):
+    check_kind(GRADED, quadruped)
+
+    with pytest.raises((ValueError, InputError), match=said):
+        check_kind(dataclasses.replace(GRADED, **change), quadruped)
+
+
+def test_the_contract_kit_sees_a_kind_that_edits_the_robot_itself():
+    robot = resolve.robot("quadruped", 0.01)
+
+    def wrong(_embodiment: Embodiment, _anatomy: Anatomy, _fault: Fault) -> None:
+        robot.model.body_mass[1] = 5.0
+
+    with pytest.raises(ValueError, match=r"does not make the same robot|changes the robot itself"):
+        check_kind(dataclasses.replace(GRADED, strike=wrong), robot)
+
+
+def test_kinds_are_chosen_by_name(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / "examples"))
+
+    assert resolve.kinds("break,jam,sensor") == PAPER_KINDS
+    assert resolve.kinds("all") == ALL_KINDS
+    assert resolve.kinds(" friction , break") == (KINDS["friction"], KINDS["break"])
+    assert resolve.kinds("jam,all") == (KINDS["jam"], *(k for k in ALL_KINDS if k.name != "jam"))
+    assert [kind.name for kind in resolve.kinds("jam,payload:PAYLOAD")] == ["jam", "payload"]
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        ("brake", "unknown kind 'brake': did you mean break"),
+        ("", "unknown kind ''"),
+        ("break,", "unknown kind ''"),
+        ("neuron", "unknown kind 'neuron'"),
+        ("nowhere:KIND", "cannot find the kind 'nowhere:KIND'"),
+        ("selfmodel.faults:Kind", "is no kind: expected a selfmodel.faults.Kind"),
+        ("tests.faults.test_kinds:SECOND_WIND", "are called 'second-wind', or 'wind' in notation"),
+        ("tests.faults.test_kinds:OTHER_JAM", "are called 'jam', or 'cling' in notation"),
+    ],
+)
+def test_a_name_of_no_kind_says_what_was_meant(names: str, said: str):
+    with pytest.raises(InputError, match=said):
+        resolve.kinds(names)
+
+
+SECOND_WIND = dataclasses.replace(GRADED, name="second-wind", word="wind")
+OTHER_JAM = dataclasses.replace(GRADED, name="jam", word="cling")
+
+
+def test_notation_names_a_third_party_s_kind_where_it_is_considered(quadruped: Robot):
+    said = parse("break:front_left_knee+payload=2.5", quadruped.anatomy, known([PAYLOAD]))
+
+    assert str(said) == "break:front_left_knee+payload=2.5"
+    torso = build(quadruped, said).model.body("torso")
+    assert torso.mass == quadruped.model.body("torso").mass + 2.5
+    with pytest.raises(InputError, match="unknown kind of fault"):
+        parse("payload=2.5", quadruped.anatomy)

@@ -1,0 +1,95 @@
+"""Promises of the notation: it reads back what it writes, and says which term is wrong."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from selfmodel.errors import InputError
+from selfmodel.faults.notation import parse
+from selfmodel.tasks import ROBOTS
+from tests.helpers.strategies import hypotheses
+
+ANATOMIES = {name: entry.robot().anatomy for name, entry in ROBOTS.items()}
+
+
+@pytest.mark.parametrize("name", ANATOMIES)
+@given(data=st.data())
+def test_what_a_hypothesis_prints_parses_back_to_it(name: str, data: st.DataObject):
+    hypothesis = data.draw(hypotheses(ANATOMIES[name], graded=True))
+
+    assert parse(str(hypothesis), ANATOMIES[name]) == hypothesis
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "cannot read the term ''"),
+        ("break", "cannot read the term 'break'"),
+        ("break:", "cannot read the term 'break:'"),
+        (":front_left_knee", "cannot read the term ':front_left_knee'"),
+        ("break:front_left_knee+", "cannot read the term ''"),
+        ("intact+break:front_left_knee", "cannot read the term 'intact'"),
+        ("brake:front_left_knee", "unknown kind of fault .*'brake': did you mean break?"),
+        ("break:front_left_nee", "'front_left_nee': did you mean front_left_knee"),
+        ("sensor:front_left_knee", "for sensor 'front_left_knee'"),
+        ("neuron:3", "'neuron:3'"),
+        ("jam:front_left_knee=", "needs a number from -0.5236 to 0.5236 rad after '=', got ''"),
+        ("jam:front_left_knee=x", "got 'x'"),
+        ("jam:front_left_knee=nan", "got 'nan'"),
+        ("jam:front_left_knee=1", "got '1'"),
+        ("break:front_left_knee=1", "break knows none: write no '='"),
+        ("friction", "cannot read the term 'friction'|needs a number from 0.01 to 3"),
+        ("friction=", "needs a number from 0.01 to 3 .* after '=', got ''"),
+        ("friction=-1", "got '-1'"),
+        ("friction:ground=0.4", "friction has none: write no ':'"),
+        ("break=0.4", "cannot read the term 'break=0.4'"),
+        ("motor:front_left_knee", "needs a number from 0 to 1 of its torque after '=', got ''"),
+        ("sensor:front_left_angle=0.2", "needs noise or gain or bias after '='"),
+        ("sensor:front_left_angle=gain", "after '=gain', got ''"),
+        ("sensor:front_left_angle=bias2", "after '=bias', got '2'"),
+        ("sensor:front_left_touch=noise0.1", "for sensor 'front_left_touch'"),
+        ("slope=0.1+slope=0.2", "gives slope two degrees, 0.1 and 0.2"),
+        ("jam:front_left_knee+jam:front_left_knee=0.2", "two degrees, 0.0 and 0.2"),
+        ("jam:front_left_knee=0.1+jam:front_left_knee=0.2", "two degrees, 0.1 and 0.2"),
+    ],
+)
+def test_a_malformed_notation_says_which_term_and_why(text: str, said: str):
+    with pytest.raises(InputError, match=said):
+        parse(text, ANATOMIES["quadruped"])
+
+
+@pytest.mark.parametrize(
+    ("said", "printed"),
+    [
+        ("friction=0.4+break:front_left_knee", "break:front_left_knee+friction=0.4"),
+        ("wind=-5", "wind=-5.0"),
+        ("crosswind=3+roughness=.03", "crosswind=3.0+roughness=0.03"),
+        ("motor:front_left_knee=0.50", "motor:front_left_knee=0.5"),
+        ("sensor:front_left_angle=gain0.2", "sensor:front_left_angle=gain0.2"),
+        ("sensor:front_left_angle=bias-1e-1", "sensor:front_left_angle=bias-0.1"),
+        ("sensor:front_left_angle=noise1e-5", "sensor:front_left_angle=noise1e-05"),
+        ("jam:front_left_knee=-0", "jam:front_left_knee"),
+        ("motor:front_left_knee=1", "intact"),
+        ("slope=0+wind=-0.0+sensor:front_left_touch=gain1", "intact"),
+    ],
+)
+def test_a_degree_is_printed_as_it_parses(said: str, printed: str):
+    hypothesis = parse(said, ANATOMIES["quadruped"])
+
+    assert str(hypothesis) == printed
+    assert parse(printed, ANATOMIES["quadruped"]) == hypothesis
+
+
+def test_spaces_around_terms_are_welcome():
+    spaced = parse(" break:front_left_knee + sensor:back_left_touch ", ANATOMIES["quadruped"])
+
+    assert str(spaced) == "break:front_left_knee+sensor:back_left_touch"
+
+
+@given(text=st.text(max_size=40))
+def test_any_text_is_either_a_hypothesis_or_an_input_error(text: str):
+    try:
+        hypothesis = parse(text, ANATOMIES["quadruped"])
+    except InputError:
+        return
+    assert parse(str(hypothesis), ANATOMIES["quadruped"]) == hypothesis

@@ -1,0 +1,113 @@
+"""Promises of what a diagnosis considers: what can strike the robot, under whatever name."""
+
+import dataclasses
+from pathlib import Path
+
+import pytest
+
+from selfmodel.comparators import SEGMENT_PREDICTION
+from selfmodel.diagnosis.diagnose import Diagnose
+from selfmodel.diagnosis.kind_contract import check_kind
+from selfmodel.errors import InputError
+from selfmodel.faults.kind import Fault, Kind, between, grid
+from selfmodel.faults.notation import parse
+from selfmodel.faults.registry import ALL_KINDS, KINDS, PAPER_KINDS, considered, known
+from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.recovery.explain import explain
+from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.trial import Plan
+from tests.conftest import random_controllers
+from tests.helpers.command import selfmodel
+from tests.helpers.memory import MemoryJournal
+
+SMALL = dataclasses.replace(Settings().scaled(12), generations=2, steps=300)
+ANGLES = (KINDS["break"], KINDS["jam-angle"])
+
+BARE = """\
+<mujoco><option timestep="0.005"/><worldbody>
+  <geom type="plane" size="0 0 1"/>
+  <body name="trunk" pos="0 0 0.5"><freejoint/><geom type="box" size="0.1 0.1 0.1"/>
+    <body name="leg"><joint name="hip" axis="0 1 0" range="-60 60"/>
+      <geom type="capsule" fromto="0 0 0 0 0 -0.3" size="0.02"/></body></body>
+</worldbody>
+<actuator><position name="hip" joint="hip" kp="50" ctrlrange="-1 1"/></actuator></mujoco>
+"""
+"""A robot without a sensor."""
+
+
+def test_what_strikes_a_robot_stays_in_its_order_and_brings_its_other_names(robot: Robot):
+    assert considered(PAPER_KINDS, robot.anatomy) == PAPER_KINDS
+    assert considered(ALL_KINDS, robot.anatomy) == ALL_KINDS
+    assert considered(ANGLES, robot.anatomy) == (*ANGLES, KINDS["jam"])
+    gains = (KINDS["sensor-gain"], KINDS["motor"])
+    assert considered(gains, robot.anatomy) == (*gains, KINDS["sensor"])
+
+
+def test_a_kind_that_cannot_strike_a_robot_is_passed_over_and_alone_refused():
+    anatomy = Robot("bare", BARE, 0.02).anatomy
+
+    assert considered(PAPER_KINDS, anatomy) == (KINDS["break"], KINDS["jam"])
+    with pytest.raises(InputError, match="no part that sensor, sensor-gain can strike"):
+        considered((KINDS["sensor"], KINDS["sensor-gain"]), anatomy)
+
+
+def test_a_kind_that_no_diagnosis_may_propose_is_refused(robot: Robot):
+    with pytest.raises(InputError, match="no diagnosis may propose neuron: leave it out"):
+        considered((KINDS["break"], KINDS["neuron"]), robot.anatomy)
+
+
+def test_kinds_that_a_fault_is_of_at_some_degree_can_be_named(quadruped: Robot):
+    """What a diagnosis says is read back from its log."""
+    sticky = Kind(name="sticky", word="sticky", strike=strike)
+    stick = Kind(
+        name="stick",
+        word="stick",
+        strike=strike,
+        degrees=between(0, 2),
+        levels=grid(1.0, 2.0),
+        special={0.0: sticky, 0.5: None},
+    )
+
+    check_kind(stick, quadruped)
+    assert considered((stick,), quadruped.anatomy) == (stick, sticky)
+    assert str(parse("stick=0", quadruped.anatomy, known((stick,)))) == "sticky"
+    for wrong in (KINDS["neuron"], KINDS["slope"]):
+        with pytest.raises(ValueError, match=f"stick is {wrong.name} at some degree"):
+            check_kind(dataclasses.replace(stick, special={0.0: wrong}), quadruped)
+
+
+def strike(embodiment: Embodiment, _anatomy: Anatomy, fault: Fault) -> None:
+    """More friction in every joint."""
+    embodiment.model.dof_frictionloss[6:] += 0.1 + fault.degree
+
+
+def test_a_recovery_of_a_robot_with_nothing_to_strike_is_refused_before_any_trial(tmp_path: Path):
+    (tmp_path / "bare.xml").write_text(BARE, encoding="utf-8")
+    nothing = ("--set", "touch=[]", "--set", "angle=[]", "--controller", "cpg")
+    done = selfmodel(
+        *("recover", "bare.xml", "--damage", "break:hip", "--kinds", "sensor", *nothing),
+        *("--out", "run"),
+        cwd=tmp_path,
+    )
+
+    assert done.returncode == 2
+    assert "no part that sensor can strike" in done.stderr
+    assert list(tmp_path.rglob("*.mcap*")) == []
+
+
+def test_a_joint_that_turns_out_to_be_jammed_at_0_is_found_among_angles_trial_after_trial(
+    quadruped: Robot,
+):
+    hidden = parse("jam:front_left_shoulder", quadruped.anatomy)
+    journal, physical = MemoryJournal(quadruped), SimulatedRobot(quadruped, hidden)
+    trials = [
+        journal.record(physical, Plan(f"{number:02d}-after", "after", gait, SMALL.steps, 0))
+        for number, gait in enumerate(random_controllers(quadruped, 4)[1:])
+    ]
+    search = Diagnose(Simulator(quadruped, 1), SEGMENT_PREDICTION, SMALL, ANGLES)
+
+    assert explain(trials, search, 0, lambda _: None).best == hidden

@@ -1,0 +1,34 @@
+"""Strategies for property-based tests: faults and hypotheses about a robot."""
+
+from hypothesis import strategies as st
+
+from selfmodel.faults.hypothesis import Hypothesis, canonical
+from selfmodel.faults.kind import Fault, Kind
+from selfmodel.faults.registry import KINDS, PAPER_KINDS
+from selfmodel.robot.anatomy import Anatomy
+
+
+def faults(anatomy: Anatomy, *, graded: bool) -> st.SearchStrategy[Fault]:
+    """Faults of the paper's kinds, and of any degree of all kinds where ``graded``."""
+    kinds = list(KINDS.values()) if graded else list(PAPER_KINDS)
+    return st.sampled_from(kinds).flatmap(lambda kind: _fault(kind, anatomy))
+
+
+def hypotheses(
+    anatomy: Anatomy, *, most: int = 4, graded: bool = False
+) -> st.SearchStrategy[Hypothesis]:
+    """Hypotheses in canonical form."""
+    sets = st.lists(faults(anatomy, graded=graded), max_size=most)
+    return sets.map(lambda chosen: canonical(chosen, anatomy))
+
+
+def _fault(kind: Kind, anatomy: Anatomy) -> st.SearchStrategy[Fault]:
+    parts = st.sampled_from(kind.parts(anatomy))
+    if kind.degrees is None:
+        return parts.map(lambda part: Fault(kind, part))
+    degrees = kind.degrees
+    return parts.flatmap(
+        lambda part: st.floats(*degrees(anatomy, part)).map(
+            lambda degree: Fault(kind, part, degree + 0.0)
+        )
+    )

@@ -1,0 +1,224 @@
+"""Promises of disagreement: it tells hypotheses apart, and no robot is made to fall."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from selfmodel.controllers.network import Controller, Network
+from selfmodel.controllers.playback import Playback
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.faults.notation import parse
+from selfmodel.recovery.disagreement import (
+    EARLY,
+    LOWEST,
+    SCALES,
+    Dispute,
+    disagreements,
+    first_falls,
+)
+from selfmodel.robot.robot import Robot
+from selfmodel.simulation.outcome import Simulated
+from selfmodel.simulation.simulator import Run, Simulator
+from selfmodel.trials.behaviour import Behaviour, Names, Signal
+from tests.conftest import random_controllers
+
+NAMES = Names(sensors=("touch",), motors=("motor",), hinges=("hinge",))
+UP = np.array([0.0, 0.0, 1.0])
+HEIGHT = 0.3
+
+
+@dataclass(frozen=True)
+class Fate:
+    """What is predicted of a controller.
+
+    Attributes:
+        spread: How far the joint's positions under the two hypotheses are apart, rad.
+        falls: The step at which the robot falls under the second hypothesis, if it does.
+        diverges: Whether the simulation of the second hypothesis does.
+        late: Whether they part only after what is read off.
+    """
+
+    spread: float
+    falls: int | None = None
+    diverges: bool = False
+    late: bool = False
+
+
+class Oracle:
+    """A simulator that knows the fate of each controller."""
+
+    robot = SimpleNamespace(
+        standing_height=HEIGHT, build=lambda _hypothesis: SimpleNamespace(normal=UP)
+    )
+
+    def __init__(self, fates: Sequence[Fate]) -> None:
+        network = Network(NAMES.sensors, NAMES.motors)
+        weights = np.arange(len(fates)) / 100
+        self.controllers = [
+            Controller(network, np.full(network.weights, weight)) for weight in weights
+        ]
+        self._fates = dict(zip(self.controllers, fates, strict=True))
+
+    def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> Simulated:
+        """Predicts what the fates say; only the second hypothesis is not uneventful."""
+        known = dict(enumerate(self.controllers))
+        shapes = {signal: (len(runs), steps, NAMES.width(signal)) for signal in record}
+        signals = {signal: np.zeros(shape) for signal, shape in shapes.items()}
+        signals["base_position"][..., 2] = HEIGHT
+        signals["base_orientation"][..., 0] = 1
+        diverged = np.zeros(len(runs), dtype=bool)
+        for row, (hypothesis, driver) in enumerate(runs):
+            # What a controller commands is its number.
+            controller = known[driver.commands[0, 0]] if isinstance(driver, Playback) else driver
+            signals["commands"][row] = self.controllers.index(controller)
+            fate = self._fates[controller]
+            if hypothesis == INTACT:
+                continue
+            signals["joint_positions"][row, EARLY if fate.late else 0 :] = fate.spread
+            if fate.falls is not None:
+                signals["base_position"][row, fate.falls :, 2] = 0.4 * HEIGHT
+            if fate.diverges:
+                diverged[row] = True
+                signals["joint_positions"][row, -1] = np.nan
+        time = np.arange(steps) * 0.01
+        return Simulated(Behaviour(NAMES, time, signals), diverged)
+
+
+def chosen(quadruped: Robot, fates: Sequence[Fate], steps: int = 400) -> int:
+    """Which of the controllers with these fates is chosen."""
+    oracle = Oracle(fates)
+    hypotheses = [INTACT, parse("break:front_left_knee", quadruped.anatomy)]
+    one = Dispute(hypotheses, oracle, steps).most_telling(oracle.controllers)
+    return oracle.controllers.index(one)
+
+
+def moving(robot: Robot, motor: str) -> Controller:
+    """A controller that turns one joint and leaves the others where they are."""
+    network, genome = robot.network, np.zeros(robot.network.weights)
+    to_motors = genome[-len(network.motors) * (network.hidden + 1) :]
+    to_motors.reshape(len(network.motors), -1)[network.motors.index(motor), -1] = 1.0
+    return Controller(network, genome)
+
+
+def test_the_controller_that_makes_two_hypotheses_differ_is_chosen(quadruped: Robot):
+    hypotheses = [INTACT, parse("jam:front_left_knee", quadruped.anatomy)]
+    motors = ("back_left_knee", "back_right_knee", "front_left_knee", "front_right_knee")
+    pool = [moving(quadruped, motor) for motor in motors]
+
+    one = Dispute(hypotheses, Simulator(quadruped, 2), 120).most_telling(pool)
+    assert one == moving(quadruped, "front_left_knee")
+
+
+def test_a_dead_sensor_is_asked_for_where_it_would_read_most(quadruped: Robot):
+    # What the controllers would make of the reading, another motion, is not evidence.
+    simulator = Simulator(quadruped, 2)
+    hypotheses = [INTACT, parse("sensor:front_left_touch", quadruped.anatomy)]
+    pool = random_controllers(quadruped, 12)
+    touch = [sensor.name for sensor in quadruped.anatomy.sensors].index("front_left_touch")
+    runs = simulator.run([(INTACT, one) for one in pool], EARLY, ("sensors",))
+    touches = runs.behaviour["sensors"][..., touch].mean(axis=1)
+
+    assert len(set(touches)) > 4
+    assert Dispute(hypotheses, simulator, EARLY).most_telling(pool) == pool[int(np.argmax(touches))]
+
+
+def test_what_differs_most_is_chosen_and_of_equals_the_first(quadruped: Robot):
+    assert chosen(quadruped, [Fate(0.1), Fate(0.2), Fate(0.2), Fate(0.15)]) == 1
+
+
+def test_what_differs_only_later_counts_for_nothing(quadruped: Robot):
+    assert chosen(quadruped, [Fate(0.01), Fate(0.3, late=True)]) == 0
+
+
+@pytest.mark.parametrize("step", [0, EARLY - 1, EARLY, 399])
+def test_a_controller_with_which_the_robot_falls_at_any_time_is_out(quadruped: Robot, step: int):
+    assert chosen(quadruped, [Fate(0.05), Fate(0.2, falls=step), Fate(0.1)]) == 2
+
+
+def test_a_controller_whose_simulation_diverges_is_out(quadruped: Robot):
+    assert chosen(quadruped, [Fate(0.2, diverges=True), Fate(0.1)]) == 1
+
+
+@pytest.mark.parametrize("steps", [(5, 50, 30), (150, 399, 200), (20, 300, 7)])
+def test_where_the_robot_always_falls_the_latest_fall_is_chosen(
+    quadruped: Robot, steps: tuple[int, ...]
+):
+    fates = [Fate(0.3 - 0.1 * k, falls=step) for k, step in enumerate(steps)]
+
+    assert chosen(quadruped, [Fate(0.3, diverges=True), *fates]) == 2
+
+
+@given(lean=st.floats(0, np.pi), heading=st.floats(-np.pi, np.pi), about=st.floats(-np.pi, np.pi))
+def test_a_base_has_fallen_when_it_leans_by_more_than_sixty_degrees_whatever_its_heading(
+    lean: float, heading: float, about: float
+):
+    axis = np.array([np.cos(about), np.sin(about), 0])
+    turned = Rotation.from_rotvec(lean * axis) * Rotation.from_euler("z", heading)
+    x, y, z, w = turned.as_quat()
+    orientation = np.array([[1, 0, 0, 0], [w, x, y, z]])
+    signals = {"base_position": np.full((2, 3), HEIGHT), "base_orientation": orientation}
+    falls = first_falls(Behaviour(NAMES, np.array([0, 0.01]), signals), UP, HEIGHT)
+
+    if abs(lean - np.pi / 3) > 1e-6:
+        assert falls == (1 if lean > np.pi / 3 else 2)
+
+
+@pytest.mark.parametrize("height", [0.0, -0.1])
+def test_a_base_that_begins_on_the_ground_has_no_height_to_fall_from(height: float):
+    signals = {"base_position": np.full((2, 3), height), "base_orientation": np.eye(4)[[0, 0]]}
+    signals["base_position"][1] -= 0.01
+
+    assert first_falls(Behaviour(NAMES, np.array([0, 0.01]), signals), UP, height) == 2
+
+
+@given(start=st.integers(0, 2**31), lean=st.floats(0, np.pi))
+def test_a_base_leans_from_where_it_started(start: int, lean: float):
+    lying = Rotation.random(random_state=start)
+    about = Rotation.from_rotvec(lean * np.array([0.6, 0.8, 0]))
+    turns = Rotation.concatenate([lying, about * lying]).as_quat(scalar_first=True)
+    signals = {"base_position": np.full((2, 3), HEIGHT), "base_orientation": turns}
+    falls = first_falls(Behaviour(NAMES, np.array([0, 0.01]), signals), UP, HEIGHT)
+
+    if abs(lean - np.pi / 3) > 1e-6:
+        assert falls == (1 if lean > np.pi / 3 else 2)
+
+
+@given(way=st.floats(-10, 10), height=st.floats(0, 2), slope=st.floats(-0.3, 0.3))
+def test_a_base_has_fallen_when_it_is_near_the_ground_however_far_up_or_down_a_slope_it_is(
+    way: float, height: float, slope: float
+):
+    along = np.array([np.cos(slope), 0, np.sin(slope)])
+    normal = np.array([-np.sin(slope), 0, np.cos(slope)])
+    position = np.array([HEIGHT * normal, way * along + height * normal])
+    signals = {"base_position": position, "base_orientation": np.tile([1.0, 0, 0, 0], (2, 1))}
+    falls = first_falls(Behaviour(NAMES, np.array([0, 0.01]), signals), normal, HEIGHT)
+
+    if abs(height - LOWEST * HEIGHT) > 1e-6:
+        assert falls == (1 if height < LOWEST * HEIGHT else 2)
+
+
+@settings(deadline=None)
+@given(seed=st.integers(0, 2**32), hypotheses=st.integers(1, 4), size=st.floats(0, 10))
+def test_disagreement_is_a_part_of_one_and_knows_no_order_of_the_hypotheses(
+    seed: int, hypotheses: int, size: float
+):
+    rng = np.random.default_rng(seed)
+    shape = (2, hypotheses, 7)
+    signals = {signal: size * rng.normal(size=(*shape, NAMES.width(signal))) for signal in SCALES}
+    turned = Rotation.from_rotvec(size * rng.normal(size=(np.prod(shape), 3)))
+    signals["base_orientation"] = turned.as_quat(scalar_first=True).reshape(*shape, 4)
+    order = rng.permutation(hypotheses)
+    time = np.arange(7) * 0.01
+    found = disagreements(Behaviour(NAMES, time, signals))
+    shuffled = {signal: values[:, order] for signal, values in signals.items()}
+
+    assert np.all((found >= 0) & (found <= 1))
+    assert disagreements(Behaviour(NAMES, time, shuffled)) == pytest.approx(found, abs=1e-12)
+    if hypotheses == 1 or size == 0:
+        assert np.all(found == 0)

@@ -1,0 +1,213 @@
+"""Promises of choosing the next trial: what it asks, and of which controllers."""
+
+import dataclasses
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from selfmodel.controllers.playback import Playback
+from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, Verdict
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.notation import parse
+from selfmodel.recovery.database import Database
+from selfmodel.recovery.disagreement import EARLY, Dispute
+from selfmodel.recovery.events import Event, Question
+from selfmodel.recovery.next_trial import (
+    GENERATIONS,
+    Situation,
+    by_disagreement,
+    by_repair,
+    candidates,
+    in_the_running,
+    telling_apart,
+)
+from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.simulation.outcome import Simulated
+from selfmodel.simulation.simulator import Run, Simulator
+from selfmodel.trials.behaviour import Behaviour, Signal
+from selfmodel.trials.trial import Plan, Trial
+from tests.conftest import random_controllers
+
+SMALL = dataclasses.replace(Settings().scaled(12), steps=150)
+
+
+def diagnosis(*texts: str, robot: Robot, rivals: int = 0, verdict: Verdict) -> Diagnosis:
+    """A diagnosis with these hypotheses, best first; the first few after the best are rivals."""
+    found = [parse(text, robot.anatomy) for text in texts]
+    return Diagnosis(
+        ranked=tuple(Candidate(one, float(rank)) for rank, one in enumerate(found)),
+        trials=1,
+        intact_distance=9.0,
+        rivals=tuple(found[1 : 1 + rivals]),
+        verdict=verdict,
+        test="by decree",
+    )
+
+
+def test_the_rivals_are_in_the_running_and_without_any_those_that_follow(quadruped: Robot):
+    texts = [f"break:{joint.name}" for joint in quadruped.anatomy.joints]
+    known = [parse(text, quadruped.anatomy) for text in texts]
+
+    def running(rivals: int) -> tuple[Hypothesis, ...]:
+        return in_the_running(
+            diagnosis(*texts, robot=quadruped, rivals=rivals, verdict="ambiguous")
+        )
+
+    assert running(1) == tuple(known[:2])
+    assert running(7) == running(0) == tuple(known[:5])
+
+
+def test_what_may_be_wrong_besides_is_in_the_running_after_the_rivals(quadruped: Robot):
+    texts = ("intact", "break:front_left_knee", "jam:front_left_knee")
+    found = diagnosis(*texts, robot=quadruped, rivals=1, verdict="ambiguous")
+    touch = parse("sensor:front_left_touch", quadruped.anatomy)
+    best, rival, _ = (one.hypothesis for one in found.ranked)
+
+    assert in_the_running(dataclasses.replace(found, unseen=(touch,))) == (best, rival, touch)
+    assert in_the_running(dataclasses.replace(found, rivals=(), unseen=(touch,))) == (best, touch)
+
+
+def test_what_explains_too_little_is_held_against_what_follows_it_first(quadruped: Robot):
+    found = diagnosis(
+        "intact", "break:front_left_knee", robot=quadruped, rivals=0, verdict="unexplained"
+    )
+    touch = parse("sensor:front_left_touch", quadruped.anatomy)
+    best, follower = (one.hypothesis for one in found.ranked)
+
+    assert in_the_running(dataclasses.replace(found, unseen=(touch,))) == (best, follower, touch)
+
+
+def test_a_hypothesis_that_diverges_is_not_in_the_running(quadruped: Robot):
+    found = diagnosis("intact", "break:front_left_knee", robot=quadruped, verdict="explained")
+    apart = dataclasses.replace(found.ranked[1], distance=float("inf"))
+
+    assert in_the_running(dataclasses.replace(found, ranked=(found.ranked[0], apart))) == (INTACT,)
+
+
+@settings(deadline=None)
+@given(
+    seed=st.integers(0, 2**32),
+    known=st.integers(1, 4),
+    mutation=st.sampled_from([0.0, 0.01, 1.0]),
+)
+def test_the_controller_that_was_run_last_is_no_candidate_and_the_others_are(
+    quadruped: Robot, seed: int, known: int, mutation: float
+):
+    tried = random_controllers(quadruped, known, seed % 97)
+    numbers = dataclasses.replace(SMALL, mutation=mutation, crossovers=0)
+    pool = candidates(tried, numbers, np.random.default_rng(seed))
+
+    assert tried[0] not in pool
+    assert pool[: known - 1] == tried[1:]
+    assert 1 <= len(pool) == len(set(pool)) <= max(1, known - 1 + numbers.population)
+
+
+def test_offspring_is_bred_of_every_controller_that_was_tried(quadruped: Robot):
+    tried = random_controllers(quadruped, 3)
+    numbers = dataclasses.replace(SMALL, mutation=0.05, crossovers=0)
+    pool = candidates(tried, numbers, np.random.default_rng(0))
+    kin = [[np.mean(child.genome == parent.genome) > 0.8 for parent in tried] for child in pool[2:]]
+
+    assert np.all(np.sum(kin, axis=1) == 1)
+    assert np.all(np.any(kin, axis=0))
+
+
+def test_what_is_asked_is_bred_to_ask_more(quadruped: Robot):
+    simulator, known = Simulator(quadruped, 2), random_controllers(quadruped, 2)
+    touch = parse("sensor:front_left_touch", quadruped.anatomy)
+    found = diagnosis("intact", robot=quadruped, verdict="explained")
+    found = dataclasses.replace(found, unseen=(touch,))
+    first = candidates(known, SMALL, np.random.default_rng(1))
+    best = Dispute([INTACT, touch], simulator, SMALL.steps).most_telling(first)
+    bred = telling_apart(found, known, simulator, SMALL, np.random.default_rng(1))
+
+    column = [sensor.name for sensor in quadruped.anatomy.sensors].index("front_left_touch")
+    runs = simulator.run([(INTACT, one) for one in (best, bred)], EARLY, ("sensors",))
+    less, more = runs.behaviour["sensors"][..., column].mean(axis=1)
+    assert more > less
+    assert bred not in first
+
+
+class CountingSimulator(Simulator):
+    """Counts how often each controller is simulated for so many steps under each hypothesis."""
+
+    def __init__(self, robot: Robot) -> None:
+        super().__init__(robot, threads=2)
+        self.times: Counter = Counter()
+
+    def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> Simulated:
+        """Simulates as ever."""
+        self.times.update((run, steps) for run in runs if not isinstance(run[1], Playback))
+        return super().run(runs, steps, record)
+
+
+def test_what_is_bred_of_is_not_looked_at_again(quadruped: Robot):
+    simulator = CountingSimulator(quadruped)
+    found = diagnosis("intact", "jam:front_left_knee", robot=quadruped, verdict="ambiguous")
+    telling_apart(
+        found, random_controllers(quadruped, 2), simulator, SMALL, np.random.default_rng(1)
+    )
+
+    assert len(simulator.times) > GENERATIONS * SMALL.survivors
+    assert set(simulator.times.values()) == {1}
+
+
+def test_the_same_stream_chooses_the_same_at_any_number_of_threads(quadruped: Robot):
+    found = diagnosis(
+        *("jam:front_left_knee", "jam:front_left_shoulder"),
+        robot=quadruped,
+        rivals=1,
+        verdict="ambiguous",
+    )
+    tried = random_controllers(quadruped, 2)
+    one, other = (
+        telling_apart(found, tried, Simulator(quadruped, n), SMALL, np.random.default_rng(3))
+        for n in (1, 2)
+    )
+
+    assert one == other != tried[0]
+
+
+@pytest.mark.parametrize(
+    ("verdict", "unseen", "trials_left", "asks"),
+    [
+        ("ambiguous", [0], 2, True),
+        ("unexplained", [0], 2, True),
+        ("explained", [0], 2, False),
+        ("explained", [1], 2, True),
+        ("explained", [2, 1], 2, True),
+        ("explained", [1, 1], 2, False),
+        ("ambiguous", [1, 1], 2, True),
+        ("ambiguous", [1], 1, False),
+    ],
+)
+def test_hypotheses_are_told_apart_until_one_explains_all_or_asking_is_in_vain(
+    quadruped: Robot, verdict: Verdict, unseen: list[int], trials_left: int, *, asks: bool
+):
+    # How much is unseen after each trial.
+    gait, compensating = random_controllers(quadruped, 2)
+    besides = [parse(f"jam:{joint.name}", quadruped.anatomy) for joint in quadruped.anatomy.joints]
+    told = diagnosis("jam:front_left_knee", "intact", robot=quadruped, verdict=verdict)
+    diagnoses = [dataclasses.replace(told, unseen=tuple(besides[:count])) for count in unseen]
+    found = diagnoses[-1]
+    empty = Behaviour(quadruped.anatomy.names, np.zeros(1), {})
+    tried = Trial(Plan("01-after", "after", gait, 1, 0), "quadruped", empty, "01-after")
+    events: list[Event] = []
+    situation = Situation(
+        known=Database((tried,), tuple(diagnoses)),
+        trials_left=trials_left,
+        simulator=Simulator(quadruped, 1),
+        settings=SMALL,
+        rng=np.random.default_rng(0),
+        repaired=lambda: compensating,
+        watch=events.append,
+    )
+
+    assert by_repair(situation) == compensating
+    assert (by_disagreement(situation) != compensating) == asks
+    assert events == ([Question(in_the_running(found))] if asks else [])

@@ -1,0 +1,340 @@
+"""Promises of the algorithm: the paper's loop, no run simulated twice, no look at the truth."""
+
+import dataclasses
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.random import Generator
+
+from selfmodel.comparators import FORWARD_DISPLACEMENT
+from selfmodel.controllers.network import Controller
+from selfmodel.diagnosis.diagnosis import Diagnosis
+from selfmodel.diagnosis.genome import encode
+from selfmodel.evolution import Draw, Evolution, Generation
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.notation import parse
+from selfmodel.logs import read_truth
+from selfmodel.logs.journal import open_journal
+from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.recovery.database import Journal
+from selfmodel.recovery.events import Event, SearchBegins
+from selfmodel.recovery.next_trial import NextTrial, Situation, by_repair, telling_apart
+from selfmodel.recovery.recover import Recovery, recover
+from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.simulation.outcome import Simulated
+from selfmodel.simulation.simulator import Run, Simulator
+from selfmodel.trials.behaviour import Sample, Signal
+from selfmodel.trials.trial import Trial
+from tests.conftest import random_controllers
+from tests.helpers.memory import MemoryJournal
+
+SMALL = dataclasses.replace(Settings().scaled(20), generations=5, steps=200)
+
+
+class CountingSimulator(Simulator):
+    """Counts how often each pair of hypothesis and controller is simulated for each record."""
+
+    def __init__(self, robot: Robot) -> None:
+        super().__init__(robot, threads=2)
+        self.seen: Counter = Counter()
+        self.on_run: Callable[[Sequence[Run]], object] = lambda _runs: None
+
+    def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> Simulated:
+        """Simulates as ever."""
+        self.seen.update((*run, steps) for run in runs)
+        self.on_run(runs)
+        return super().run(runs, steps, record)
+
+
+class Sealed:
+    """A physical robot of which nothing but ``run`` can be reached."""
+
+    def __init__(self, robot: SimulatedRobot) -> None:
+        self.__robot = robot  # mangled: no other name leads to it
+
+    def run(self, controller: Controller, steps: int) -> Iterator[Sample]:
+        """Runs a controller."""
+        return self.__robot.run(controller, steps)
+
+    def __getattribute__(self, name: str) -> object:
+        if name not in ("run", "_Sealed__robot"):
+            raise AssertionError(f"the algorithm reached for {name} of the physical robot")
+        return object.__getattribute__(self, name)
+
+
+def recovery(
+    robot: Robot,
+    truth: Hypothesis,
+    simulator: Simulator,
+    events: list[Event],
+    *,
+    sealed: bool = True,
+    seed: int = 5,
+    trials: int = 3,
+    gait: Controller | None = None,
+    next_trial: NextTrial = by_repair,
+) -> Recovery:
+    """A small recovery from a failure."""
+    physical = SimulatedRobot(robot), SimulatedRobot(robot, truth)
+    healthy, damaged = (Sealed(one) for one in physical) if sealed else physical
+    return recover(
+        healthy=healthy,
+        damaged=damaged,
+        simulator=simulator,
+        comparator=FORWARD_DISPLACEMENT,
+        journal=MemoryJournal(robot),
+        settings=dataclasses.replace(SMALL, trials=trials),
+        seed=seed,
+        watch=events.append,
+        gait=gait,
+        next_trial=next_trial,
+    )
+
+
+def test_a_recovery_tells_the_papers_story(robot: Robot):
+    events: list[Event] = []
+    truth = parse(f"break:{robot.anatomy.joints[0].name}", robot.anatomy)
+    outcome = recovery(robot, truth, Simulator(robot, 2), events)
+    story = [
+        event.kind if isinstance(event, SearchBegins) else type(event).__name__
+        for event in events
+        if not isinstance(event, Generation)
+    ]
+
+    once = ["diagnostic", "Diagnosis", "repair", "Trial"]
+    assert story == ["repair", "Trial", "Trial", *once, *once, *once, "diagnostic", "Diagnosis"]
+    stages = [trial.plan.stage for trial in outcome.trials]
+    assert stages == ["before", "after", "recovery", "recovery", "recovery"]
+    assert outcome.trials[0].plan.controller == outcome.trials[1].plan.controller
+    assert outcome.tried[:2] == (INTACT, INTACT)
+    repairs = [e for e in events if isinstance(e, SearchBegins) and e.kind == "repair"]
+    assert [search.hypothesis for search in repairs] == [INTACT, *outcome.tried[2:]]
+    diagnoses = [event for event in events if isinstance(event, Diagnosis)]
+    assert [diagnosis.trials for diagnosis in diagnoses] == [1, 2, 3, 4]
+    assert [diagnosis.best for diagnosis in diagnoses[:3]] == list(outcome.tried[2:])
+    assert outcome.repair_evaluations == outcome.diagnostic_evaluations == 4 * (20 + 4 * 10)
+    assert outcome.recovered == max(trial.displacement for trial in outcome.trials[2:])
+
+
+def test_nothing_is_simulated_twice(quadruped: Robot):
+    simulator = CountingSimulator(quadruped)
+    events: list[Event] = []
+    outcome = recovery(
+        quadruped, parse("jam:front_left_knee", quadruped.anatomy), simulator, events
+    )
+    trials = Counter(trial.plan.controller for trial in outcome.trials[1:])
+
+    # Once for its fitness in a repair; a controller that was tried, once more for each trial that
+    # a diagnosis compares it with; and intact, for the trial that shows how well it is predicted.
+    before = INTACT, outcome.trials[0].plan.controller
+    for (hypothesis, controller, _), times in simulator.seen.items():
+        assert times <= 1 + trials[controller] + ((hypothesis, controller) == before)
+    asked = outcome.repair_evaluations + outcome.diagnostic_evaluations
+    assert len(simulator.seen) < asked
+
+
+def test_the_algorithm_cannot_see_what_is_hidden(quadruped: Robot):
+    truth = parse("break:back_left_knee", quadruped.anatomy)
+    open_events: list[Event] = []
+    recovery(quadruped, truth, Simulator(quadruped, 2), open_events, sealed=False)
+    events: list[Event] = []
+    recovery(quadruped, truth, Simulator(quadruped, 1), events)
+
+    def facts(told: list[Event]) -> list[object]:
+        diagnoses = [event for event in told if isinstance(event, Diagnosis)]
+        return [*diagnoses, *(event.displacement for event in told if isinstance(event, Trial))]
+
+    assert facts(events) == facts(open_events)
+    with pytest.raises(AssertionError, match="reached for _embodiment"):
+        _ = Sealed(SimulatedRobot(quadruped, truth))._embodiment
+
+
+def test_the_truth_changes_a_diagnosis_only_through_what_the_robot_did(quadruped: Robot):
+    """A robot that hides another fault but replays the same samples gets the same diagnosis."""
+
+    class Replay:
+        def __init__(self, source: SimulatedRobot, hidden: Hypothesis) -> None:
+            self._source, self.hidden = source, hidden
+
+        def run(self, controller: Controller, steps: int) -> Iterator[Sample]:
+            """Runs a controller."""
+            return self._source.run(controller, steps)
+
+    truth = parse("break:back_left_knee", quadruped.anatomy)
+    diagnoses = []
+    for hidden in (truth, INTACT):
+        events: list[Event] = []
+        damaged = Replay(SimulatedRobot(quadruped, truth), hidden)
+        recover(
+            healthy=SimulatedRobot(quadruped),
+            damaged=damaged,
+            simulator=Simulator(quadruped, 2),
+            comparator=FORWARD_DISPLACEMENT,
+            journal=MemoryJournal(quadruped),
+            settings=dataclasses.replace(SMALL, trials=1),
+            seed=1,
+            watch=events.append,
+        )
+        diagnoses.append([event for event in events if isinstance(event, Diagnosis)])
+
+    assert diagnoses[0] == diagnoses[1]
+
+
+def test_the_same_seed_recovers_the_same_way_at_any_number_of_threads(quadruped: Robot):
+    truth = parse("jam:front_left_shoulder", quadruped.anatomy)
+    outcomes = [recovery(quadruped, truth, Simulator(quadruped, n), []) for n in (1, 2)]
+
+    assert outcomes[0].diagnosis == outcomes[1].diagnosis
+    ways = [[trial.displacement for trial in outcome.trials] for outcome in outcomes]
+    assert ways[0] == ways[1]
+
+
+def test_every_search_starts_from_what_the_database_holds(
+    quadruped: Robot, monkeypatch: pytest.MonkeyPatch
+):
+    started: list[list[bytes]] = []
+
+    class Spy(Evolution):
+        def __init__(
+            self, length: int, draw: Draw, settings: Settings, rng: Generator, seeds: list
+        ) -> None:
+            started.append([np.asarray(seed).tobytes() for seed in seeds])
+            super().__init__(length, draw, settings, rng, seeds)
+
+    monkeypatch.setattr("selfmodel.recovery.repair.Evolution", Spy)
+    monkeypatch.setattr("selfmodel.diagnosis.diagnose.Evolution", Spy)
+    events: list[Event] = []
+    truth = parse("break:back_left_knee", quadruped.anatomy)
+    outcome = recovery(quadruped, truth, Simulator(quadruped, 2), events)
+    diagnoses = [event for event in events if isinstance(event, Diagnosis)]
+    genomes = [trial.plan.controller.genome.tobytes() for trial in outcome.trials]
+    encoded = [
+        [encode(c.hypothesis, SMALL.genes, quadruped.anatomy).tobytes() for c in d.ranked]
+        for d in diagnoses
+    ]
+
+    def newest_first(count: int) -> list[bytes]:
+        return list(dict.fromkeys(reversed(genomes[:count])))
+
+    assert started[0] == []
+    assert started[1::2] == [[], *encoded[:3]]
+    assert started[2::2] == [newest_first(2), newest_first(3), newest_first(4)]
+
+
+def test_every_repair_simulates_the_robot_that_was_diagnosed(quadruped: Robot):
+    simulator, events = CountingSimulator(quadruped), []
+    batches: list[tuple[object, set[Hypothesis]]] = []
+    simulator.on_run = lambda runs: batches.append((events[-1], {h for h, _ in runs}))
+    truth = parse("break:back_left_knee", quadruped.anatomy)
+    recovery(quadruped, truth, simulator, events)
+    repairs = [event for event in events if isinstance(event, SearchBegins) and event.hypothesis]
+
+    assert {event.hypothesis for event in repairs} - {INTACT}
+    searched = [(event, hypotheses) for event, hypotheses in batches if event in repairs]
+    assert searched
+    assert all(hypotheses == {event.hypothesis} for event, hypotheses in searched)
+
+
+def test_another_seed_recovers_another_way(quadruped: Robot):
+    truth = parse("jam:front_left_shoulder", quadruped.anatomy)
+    simulator = Simulator(quadruped, 2)
+    gaits = {
+        recovery(quadruped, truth, simulator, [], seed=seed, trials=1).trials[0].plan.controller
+        for seed in (1, 2)
+    }
+
+    assert len(gaits) == 2
+
+
+def test_a_gait_that_is_given_changes_nothing_but_the_search_for_it(quadruped: Robot):
+    truth = parse("jam:front_left_shoulder", quadruped.anatomy)
+    evolved = recovery(quadruped, truth, Simulator(quadruped, 2), [], trials=1)
+    gait = evolved.trials[0].plan.controller
+    given = recovery(quadruped, truth, Simulator(quadruped, 2), [], trials=1, gait=gait)
+
+    assert given.diagnosis == evolved.diagnosis
+    assert [t.displacement for t in given.trials] == [t.displacement for t in evolved.trials]
+    assert given.repair_evaluations < evolved.repair_evaluations
+
+
+def test_a_journal_of_files_shows_the_algorithm_no_more_than_its_three_methods(
+    quadruped: Robot, tmp_path: Path
+):
+    class SealedJournal:
+        def __init__(self, journal: Journal) -> None:
+            self.record, self.note, self.read = journal.record, journal.note, journal.read
+
+    truth = parse("break:back_left_knee", quadruped.anatomy)
+    outcomes = []
+    for name, hidden in (("told", {"after": str(truth)}), ("not-told", {})):
+        journal = open_journal(tmp_path / name, quadruped, SMALL, hidden)
+        outcomes.append(
+            recover(
+                healthy=SimulatedRobot(quadruped),
+                damaged=SimulatedRobot(quadruped, truth),
+                simulator=Simulator(quadruped, 2),
+                comparator=FORWARD_DISPLACEMENT,
+                journal=SealedJournal(journal),
+                settings=dataclasses.replace(SMALL, trials=1),
+                seed=1,
+                watch=lambda _: None,
+            )
+        )
+
+    assert outcomes[0].diagnosis == outcomes[1].diagnosis
+    assert read_truth(tmp_path / "told" / "trials" / "01-after.mcap") == str(truth)
+    assert read_truth(tmp_path / "not-told" / "trials" / "01-after.mcap") is None
+
+
+def test_the_way_to_choose_is_asked_before_each_trial_and_obeyed(quadruped: Robot):
+    met: list[Situation] = []
+    given = random_controllers(quadruped, 3)
+
+    def choose(situation: Situation) -> Controller:
+        met.append(situation)
+        return given[len(met) - 1]
+
+    truth = parse("break:back_left_knee", quadruped.anatomy)
+    events: list[Event] = []
+    outcome = recovery(quadruped, truth, Simulator(quadruped, 2), events, next_trial=choose)
+
+    assert [trial.plan.controller for trial in outcome.trials[2:]] == given
+    assert [situation.trials_left for situation in met] == [3, 2, 1]
+    assert [len(situation.known.diagnoses) for situation in met] == [1, 2, 3]
+    assert [len(situation.known.evidence) for situation in met] == [1, 2, 3]
+    assert len({situation.rng.random() for situation in met}) == 3
+    assert not [e for e in events if isinstance(e, SearchBegins) and e.kind == "repair"][1:]
+
+
+def test_trials_that_tell_apart_differ_from_the_one_before_and_are_the_same_at_any_threads(
+    quadruped: Robot,
+):
+    def ask(situation: Situation) -> Controller:
+        diagnosis = situation.known.diagnoses[-1]
+        return telling_apart(
+            diagnosis,
+            situation.known.controllers,
+            situation.simulator,
+            situation.settings,
+            situation.rng,
+        )
+
+    truth = parse("sensor:front_left_touch", quadruped.anatomy)
+    gait = random_controllers(quadruped, 1)[0]
+    drivers = [
+        [
+            trial.plan.controller
+            for trial in recovery(
+                quadruped, truth, Simulator(quadruped, n), [], trials=2, gait=gait, next_trial=ask
+            ).trials[1:]
+        ]
+        for n in (1, 2)
+    ]
+
+    assert drivers[0] == drivers[1]
+    assert all(one != other for one, other in pairwise(drivers[0]))

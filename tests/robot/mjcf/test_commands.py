@@ -1,0 +1,107 @@
+"""Promises of the command line about a robot's MJCF."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.helpers.command import SMALL, selfmodel
+from tests.robot.mjcf.awkward import LEG, mjcf
+from tests.robot.mjcf.samples import SAMPLES
+
+
+@pytest.fixture
+def ant(tmp_path: Path) -> Path:
+    """A copy of somebody's robot."""
+    return Path(shutil.copy(SAMPLES["gymnasium ant"], tmp_path / "ant.xml"))
+
+
+def test_a_robot_of_ones_own_is_recovered_and_diagnosed_from_its_logs(ant: Path, tmp_path: Path):
+    before = ant.read_bytes()
+    damage = ("--damage", "break:ankle_1", "--trials", "1", *SMALL)
+    done = selfmodel("recover", "ant.xml", *damage, "--out", "run", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+
+    logs = sorted(str(path) for path in (tmp_path / "run" / "trials").glob("*.mcap"))
+    alone = selfmodel("diagnose", *logs, "--json", cwd=tmp_path)
+    with_file = selfmodel("diagnose", *logs, "--robot", "ant.xml", "--json", cwd=tmp_path)
+
+    assert (told["robot"], told["truth"]) == ("ant", "break:ankle_1")
+    assert alone.returncode == with_file.returncode == 0, alone.stderr + with_file.stderr
+    for found in (alone, with_file):
+        assert json.loads(found.stdout)["diagnosis"] == told["diagnosis"]
+    assert ant.read_bytes() == before
+
+
+def test_the_file_of_a_logs_robot_is_made_ready_as_the_logs_was(tmp_path: Path):
+    key = '<keyframe><key qpos="0 0 .6 1 0 0 0 .3 -.3"/></keyframe>'
+    felt = "".join(
+        f'<touch name="{leg}_touch" site="{leg}"/><jointpos name="{leg}" joint="{leg}_hip"/>'
+        for leg in ("left", "right")
+    )
+    legs = "".join(
+        LEG.format(leg, place).replace("</body>", f'<site name="{leg}"/></body>')
+        for leg, place in (("left", ".1"), ("right", "-.1"))
+    )
+    text = mjcf(legs=legs, more=f"{key}<sensor>{felt}</sensor>")
+    (tmp_path / "robot.xml").write_text(text, encoding="utf-8")
+    done = selfmodel("trial", "robot.xml", "--out", "t.mcap", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+
+    alone = selfmodel("replay", "t.mcap", "--json", cwd=tmp_path)
+    with_file = selfmodel("replay", "t.mcap", "--robot", "robot.xml", "--json", cwd=tmp_path)
+
+    assert alone.returncode == with_file.returncode == 0, alone.stderr + with_file.stderr
+    assert json.loads(with_file.stdout)["rms"] == json.loads(alone.stdout)["rms"]
+
+
+def test_what_was_found_is_shown(ant: Path, tmp_path: Path):
+    told = json.loads(selfmodel("robots", str(ant), "--json", cwd=tmp_path).stdout)
+    shown = selfmodel("robots", str(ant), cwd=tmp_path, COLUMNS="60").stdout
+
+    assert told["root"] == {"body": "torso", "floats": True}
+    assert told["joint_details"][1]["limb"] == ["ankle_1"]
+    assert told["motor_details"][0]["drives"] == ["hip_4"]
+    assert {"break", "jam", "sensor", "motor", "friction"} <= {f["kind"] for f in told["faults"]}
+    assert "8 angle sensors and 4 touch sensors were added" in told["notes"]
+    assert all(name in shown for name in ("torso", "ankle_1_touch", "break:", "note: "))
+    assert max(map(len, shown.splitlines()[:-2])) <= 60
+
+
+def test_settings_are_options_too(ant: Path, tmp_path: Path):
+    options = ("--set", "control_timestep=0.02", "--set", "touch=[]", "--set", "neurons=4")
+    told = json.loads(selfmodel("robots", str(ant), *options, "--json", cwd=tmp_path).stdout)
+
+    assert (told["control_timestep"], told["hidden_neurons"]) == (0.02, 4)
+    assert not any(sensor["kind"] == "touch" for sensor in told["sensor_details"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("recover", "ant.xml", "--case", "11"), "unknown case"),
+        (("recover", "ant.xml"), "a notation is like break:ankle_1"),
+        (("recover", "ant.xml", "--damage", "break:hipp"), "did you mean hip_"),
+        (("recover", "quadruped", "--case", "1", "--set", "forward=y"), "has all that it needs"),
+        (("robots", "ant.xml", "--set", "forwards=y"), "did you mean forward"),
+        (("robots", "ant.xml", "--set", "y"), "a setting such as forward=-x, got 'y'"),
+        (("robots", "ant.xml", "--set", "touch=['torso_geom']"), "unknown body"),
+        (("robots", "no.xml"), "no.xml: expected an MJCF file"),
+        (("trial", "bad.xml", "--out", "t.mcap"), "ctrlrange=[-1, 1]"),
+    ],
+)
+def test_what_cannot_be_done_is_said_before_anything_is_run(
+    ant: Path, tmp_path: Path, arguments: tuple[str, ...], said: str
+):
+    bad = mjcf(motors='<motor name="m" joint="left_hip"/>')
+    (tmp_path / "bad.xml").write_text(bad, encoding="utf-8")
+
+    done = selfmodel(*arguments, cwd=tmp_path)
+
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert done.stderr.startswith("error: ")
+    assert done.stderr.count("\n") == 1
+    assert {path.name for path in tmp_path.iterdir()} == {ant.name, "bad.xml"}

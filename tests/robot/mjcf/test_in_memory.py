@@ -1,0 +1,57 @@
+"""Promises about models in memory: dm_control's domains, and meshes that are only seen."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+from dm_control.suite import dog, quadruped, swimmer
+
+from selfmodel.errors import InputError
+from selfmodel.robot.mjcf.adaptation import adapt_text
+from selfmodel.robot.mjcf.load import robot_from
+from selfmodel.robot.mjcf.settings import MjcfSettings
+from selfmodel.robot.mjcf.untrusted import LARGEST_FILES
+from selfmodel.robot.robot import Robot
+from tests.robot.mjcf.awkward import CUBE, MESH, TORSO, mjcf
+
+
+def made(name: str, mjcf: str | bytes, files: Mapping[str, Any]) -> Robot:
+    text = mjcf.decode() if isinstance(mjcf, bytes) else mjcf
+    return robot_from(adapt_text(name, text, files, MjcfSettings()), name)
+
+
+def test_domains_of_the_suite_are_robots():
+    four_legs = made("quadruped", quadruped.make_model(floor_size=10), quadruped.common.ASSETS)
+    snake = made("swimmer", *swimmer.get_model_and_assets(6))
+
+    assert (len(four_legs.anatomy.joints), len(snake.anatomy.joints)) == (12, 5)
+    assert sum(sensor.kind == "touch" for sensor in four_legs.anatomy.sensors) == 4
+
+
+def test_bones_that_are_only_seen_are_left_out_and_still_weigh():
+    mjcf_text, files = dog.get_model_and_assets(floor_size=10, remove_ball=True)
+    theirs = mujoco.MjModel.from_xml_string(mjcf_text, files)
+    robot = made("dog", mjcf_text, files)
+
+    assert sum(map(len, robot.assets.values())) <= LARGEST_FILES
+    for name in (theirs.body(body).name for body in range(1, theirs.nbody)):
+        mine, other = robot.model.body(name), theirs.body(name)
+        assert np.allclose(mine.mass, other.mass)
+        assert np.allclose(mine.inertia, other.inertia)
+        assert np.allclose(mine.ipos, other.ipos, atol=1e-9)
+
+
+def test_meshes_that_touch_and_are_too_large_are_refused():
+    text = mjcf(more=MESH.format("m", "m.obj"), torso=TORSO + '<geom type="mesh" mesh="m"/>')
+    large = CUBE + "# a comment of many bytes\n" * (LARGEST_FILES // 20)
+
+    with pytest.raises(InputError, match=r"every trial's log carries them.*: simplify the meshes"):
+        made("cube", text, {"m.obj": large})
+    assert made("cube", text, {"m.obj": CUBE}).assets.keys() == {"m.obj"}
+
+
+def test_a_file_that_was_not_given_is_named():
+    with pytest.raises(InputError, match=r"cube: it names .*'m\.obj'.* not given with it"):
+        made("cube", mjcf(more=MESH.format("m", "m.obj")), {})

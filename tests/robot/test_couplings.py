@@ -1,0 +1,211 @@
+"""Promises of tendons and constraints: what couples a limb goes with it, and stays if it jams."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from selfmodel.faults.build import build
+from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.faults.notation import parse
+from selfmodel.robot.robot import Robot
+
+MJCF = """
+<mujoco>
+  <compiler angle="radian"/>
+  <option timestep="0.002"/>
+  <worldbody>
+    <geom name="ground" type="plane" size="0 0 1" pos="0 0 -9"/>
+    <body name="torso" pos="0 0 1">
+      <freejoint/>
+      <geom name="trunk" size=".2"/>
+      <body name="upper" pos=".3 0 0">
+        <joint name="hip" axis="0 1 0" range="-1 1" damping=".1"/>
+        <geom size=".05"/>
+        <site name="knob" pos="0 0 -.1"/>
+        <body name="lower" pos=".3 0 0">
+          <joint name="knee" axis="0 1 0" range="-1 1" damping=".1"/>
+          <geom size=".05"/>
+          <site name="cuff" pos="0 0 -.1"/>
+          <body name="foot" pos=".3 0 0">
+            <joint name="ankle" axis="0 1 0" range="-1 1" damping=".1"/>
+            <geom name="toe" size=".05" contype="0" conaffinity="0"/>
+            <site name="toe"/>
+          </body>
+        </body>
+      </body>
+      <body name="tail" pos="-.3 0 0">
+        <joint name="tail" axis="0 1 0" range="-1 1" damping=".1"/>
+        <geom size=".05"/>
+      </body>
+    </body>
+  </worldbody>
+  <tendon>
+    <fixed name="whole"><joint joint="hip" coef="1"/><joint joint="ankle" coef="-1"/></fixed>
+    <fixed name="lower" stiffness="5" damping="1" limited="true" range="-.1 .1" frictionloss=".1">
+      <joint joint="knee" coef="1"/><joint joint="ankle" coef="1"/>
+    </fixed>
+    <spatial name="string" stiffness="9"><site site="knob"/><site site="cuff"/></spatial>
+  </tendon>
+  <equality>{equality}</equality>
+  <contact><pair geom1="toe" geom2="trunk" margin="3"/></contact>
+  <actuator>
+    <motor name="hip" joint="hip" ctrlrange="-1 1"/>
+    <motor name="whole" tendon="whole" ctrlrange="-1 1"/>
+    <motor name="string" tendon="string" ctrlrange="-1 1"/>
+    <motor name="tail" joint="tail" ctrlrange="-1 1"/>
+  </actuator>
+  <sensor><touch name="touch" site="toe"/></sensor>
+</mujoco>
+"""
+JOINTED = '<joint joint1="ankle" joint2="hip" polycoef="0.1 0.5 0.3 0 0" solref="0.02 1"/>'
+TENDONS = '<tendon tendon1="lower" polycoef="0 1 0 0 0"/>'
+BODIES = '<connect body1="foot" body2="tail" anchor="0 0 0"/>'
+SITES = '<weld site1="cuff" site2="knob"/>'
+
+
+def made(*equality: str) -> Robot:
+    return Robot("coupled", MJCF.format(equality="".join(equality)), 0.01)
+
+
+def built(robot: Robot, text: str) -> mujoco.MjModel:
+    return build(robot, parse(text, robot.anatomy)).model
+
+
+def test_a_motor_moves_the_joints_that_its_tendon_turns_and_counts_to_the_first():
+    joints = {joint.name: joint for joint in made().anatomy.joints}
+
+    assert set(joints) == {"hip", "knee", "ankle", "tail"}
+    assert joints["hip"].motors == ("hip", "whole")
+    assert joints["knee"].motors == ("string",)  # which spans the knee alone
+    assert joints["ankle"].motors == ()
+    assert joints["hip"].idle == {"hip"}
+    assert joints["knee"].idle == {"string"}
+    assert joints["ankle"].slack == {"whole"}
+    assert joints["knee"].slack == {"whole", "string"}
+
+
+@pytest.mark.parametrize(
+    ("text", "left"),
+    [
+        ("break:ankle", {"string", "hip", "tail"}),
+        ("break:knee", {"hip", "tail"}),
+        ("break:tail", {"hip", "whole", "string"}),
+        ("jam:knee", {"hip", "whole", "tail"}),
+        ("jam:ankle", {"hip", "whole", "string", "tail"}),
+        ("jam:ankle+jam:hip", {"string", "tail"}),
+    ],
+)
+def test_a_motor_has_force_while_what_it_moves_is_there_and_not_all_held(text: str, left: set[str]):
+    model = built(made(), text)
+    forces = {model.actuator(m).name for m in range(model.nu) if model.actuator_gainprm[m].any()}
+
+    assert forces == left
+
+
+@pytest.mark.parametrize(
+    ("text", "slack"),
+    [
+        ("break:ankle", {"lower"}),
+        ("break:knee", {"lower", "string"}),
+        ("break:tail", set()),
+        ("jam:ankle", set()),
+        ("jam:knee", {"string"}),
+        ("jam:ankle+jam:knee", {"lower", "string"}),
+    ],
+)
+def test_a_tendon_slackens_that_needs_what_is_lost_or_moves_only_what_is_held(
+    text: str, slack: set[str]
+):
+    model, names = built(made(), text), ("lower", "string")
+
+    assert {n for n in names if not model.tendon_stiffness[model.tendon(n).id]} == slack
+    lower = model.tendon("lower").id
+    forces = (model.tendon_limited, model.tendon_damping, model.tendon_frictionloss)
+    for force in forces:
+        assert bool(force[lower]) == ("lower" not in slack)
+
+
+@pytest.mark.parametrize("text", ["break:ankle", "break:knee", "break:hip", "break:tail"])
+def test_a_constraint_ends_with_any_body_that_it_involves(text: str):
+    robot = made(JOINTED, TENDONS, BODIES, SITES)
+    lost = robot.anatomy.joint(text.removeprefix("break:")).bodies
+    involved = ({"foot", "upper"}, {"lower", "foot"}, {"foot", "tail"}, {"lower", "upper"})
+
+    assert built(robot, text).eq_active0.tolist() == [not lost & bodies for bodies in involved]
+    assert robot.model.eq_active0.all()
+
+
+def test_a_constraint_of_held_joints_alone_ends():
+    robot = made(JOINTED, TENDONS)
+
+    assert built(robot, "jam:ankle").eq_active0.tolist() == [1, 1]
+    assert built(robot, "jam:ankle+jam:knee").eq_active0.tolist() == [1, 0]
+    assert built(robot, "jam:ankle+jam:hip").eq_active0.tolist() == [0, 1]
+
+
+def floating(equality: str) -> Robot:
+    """The robot with nothing but the constraint that acts on it."""
+    robot = made(equality)
+    robot.model.opt.gravity[:] = 0
+    robot.model.pair_margin[:] = 0
+    for force in ("limited", "stiffness", "damping", "frictionloss"):
+        getattr(robot.model, f"tendon_{force}")[:] = 0
+    return robot
+
+
+def settled(model: mujoco.MjModel) -> mujoco.MjData:
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, 2000)
+    return data
+
+
+@pytest.mark.parametrize("angle", [-0.09, 0.3])
+@pytest.mark.parametrize(("held", "other"), [("hip", "ankle"), ("ankle", "hip")])
+def test_joints_are_coupled_as_before_where_one_of_them_is_held(
+    held: str, other: str, angle: float
+):
+    robot = floating(JOINTED)
+    data = settled(built(robot, f"jam:{held}={angle}"))
+    hip, ankle = (float(data.joint(name).qpos[0]) for name in ("hip", "ankle"))
+
+    assert {"hip": hip, "ankle": ankle}[held] == pytest.approx(angle, abs=1e-5)
+    assert ankle == pytest.approx(0.1 + 0.5 * hip + 0.3 * hip**2, abs=1e-3), other
+
+
+def test_a_tendon_is_as_long_as_before_where_one_of_its_joints_is_held():
+    robot = floating(TENDONS)
+    data = settled(built(robot, "jam:knee=0.3"))
+
+    assert data.joint("ankle").qpos[0] == pytest.approx(-0.3, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "contacts"), [("intact", 1), ("break:tail", 1), ("break:knee", 0)]
+)
+def test_a_lost_body_touches_nothing_even_in_a_named_pair(text: str, contacts: int):
+    model = built(made(), text)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+
+    assert np.count_nonzero(data.contact.efc_address >= 0) == contacts
+
+
+def test_faults_of_motors_that_move_nothing_any_more_are_absorbed():
+    anatomy = made().anatomy
+
+    def settled_text(text: str) -> Hypothesis:
+        return parse(text, anatomy)
+
+    # The hip has a motor of its own left, the knee has none.
+    assert str(settled_text("break:knee+motor:hip=0.5")) == "break:knee+motor:hip=0.5"
+    assert str(settled_text("jam:knee+motor:knee=0.5")) == "jam:knee"
+    assert str(settled_text("jam:hip+motor:hip=0.5")) == "jam:hip+motor:hip=0.5"
+    assert str(settled_text("break:tail+motor:tail=0.5")) == "break:tail"
+
+
+def test_a_joint_without_a_motor_of_its_own_has_no_weak_one():
+    anatomy = made().anatomy
+
+    with pytest.raises(ValueError, match="ankle"):
+        parse("motor:ankle=0.5", anatomy)
+    assert np.isclose(built(made(), "motor:hip=0.5").actuator("whole").gainprm[0], 0.5)

@@ -1,0 +1,178 @@
+"""Promises of parameters: a robot's text says them, however its model says its masses."""
+
+import dataclasses
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from selfmodel.robot.custom_numerics import CONTROL_DELAY
+from selfmodel.robot.parameters import (
+    Parameters,
+    edited_model,
+    factor_names,
+    from_factors,
+    nominal,
+    with_parameters,
+)
+from selfmodel.robot.robot import Robot
+
+FIELDS = (
+    *("body_mass", "body_inertia", "body_ipos", "body_iquat", "body_subtreemass"),
+    *("geom_friction", "pair_friction", "dof_damping", "dof_dampingpoly", "dof_invweight0"),
+    *("actuator_gainprm", "actuator_biasprm", "actuator_forcerange", "actuator_gear"),
+)
+
+LEGS = """
+<mujoco>
+  <compiler {compiler}/>
+  <option timestep="0.01"/>
+  <default>
+    <joint damping="0.3"/>
+    <default class="leg"><joint damping="{damping}"/><geom friction="0.7 0.01 0.001"/></default>
+  </default>
+  <worldbody>
+    <geom name="floor" type="plane" size="1 1 1"/>
+    <body name="base" pos="0 0 1">
+      <freejoint/>{inertial}<geom name="base" type="box" size=".1 .2 .05"/>
+      <body {upper}>
+        <joint name="hip" axis="0 1 0" range="-1 1" class="leg"/>
+        <geom class="leg" type="capsule" fromto="0 0 0 .1 0 -.2" size=".02"/>
+        <body {lower} pos=".1 0 -.2">
+          <joint name="knee" axis="0 1 0" range="-1 1"/>
+          <geom type="capsule" fromto="0 0 0 .1 0 -.2" size=".02"/>
+        </body>
+      </body>
+      <body {still} pos="0 .2 0"><geom type="sphere" size=".03"/></body>
+    </body>
+  </worldbody>
+  <contact><pair geom1="floor" geom2="base" friction="0.6 0.7 0.01"/></contact>
+  <actuator>
+    <position name="servo" joint="hip" kp="5" kv="0.3"/>
+    <motor name="drive" joint="knee" gear="2"/>
+  </actuator>
+</mujoco>
+"""
+NAMED = {"upper": 'name="upper"', "lower": 'name="lower"', "still": 'name="still"'}
+UNNAMED = dict.fromkeys(NAMED, "")
+WAYS = {
+    "from the geoms": {},
+    "of bodies without a name": UNNAMED,
+    "by a full matrix": {
+        "inertial": '<inertial mass="3" pos="0 0 .02" fullinertia=".1 .2 .15 .01 .02 .03"/>'
+    },
+    "by a turned diagonal": {
+        "inertial": '<inertial mass="3" pos="0 0 .02" euler="10 20 30" diaginertia=".1 .2 .15"/>'
+    },
+    "from the geoms whatever is said": {
+        "compiler": 'inertiafromgeom="true"',
+        "inertial": '<inertial mass="3" pos="0 0 .02" diaginertia=".1 .2 .15"/>',
+    },
+    "by their sum": {"compiler": 'settotalmass="5"'},
+    "with a least mass": {"compiler": 'boundmass="1" boundinertia="0.1"'},
+    "of bodies that are fused": {"compiler": 'fusestatic="true"'},
+    "with damping that grows with speed": {"damping": "0.7 0.2 0.1"},
+}
+
+
+def some(robot: Robot, delay: int = 2) -> Parameters:
+    motors = tuple(np.linspace(0.5, 1.5, robot.model.nu).tolist())
+    return Parameters(1.3, 0.7, 1.2, 0.8, motors, delay)
+
+
+def assert_alike(one: mujoco.MjModel, other: mujoco.MjModel) -> None:
+    for field in FIELDS:
+        expected = getattr(one, field)
+        tolerance = 1e-5 * np.abs(expected).max(initial=1.0)
+        np.testing.assert_allclose(
+            getattr(other, field), expected, rtol=1e-5, atol=tolerance, err_msg=field
+        )
+
+
+def test_friction_is_that_of_geoms_and_of_contact_pairs():
+    robot = Robot("legs", LEGS.format(compiler="", inertial="", damping="0.7", **NAMED), 0.02)
+    model = edited_model(robot, some(robot))
+
+    np.testing.assert_allclose(model.geom_friction[:, 0], robot.model.geom_friction[:, 0] * 1.2)
+    np.testing.assert_allclose(model.pair_friction, [[0.72, 0.84, 0.01, 0.0001, 0.0001]])
+
+
+def test_a_robots_text_says_its_parameters(robot: Robot):
+    parameters = some(robot)
+    said = with_parameters(robot, parameters)
+
+    assert_alike(edited_model(robot, parameters), said.model)
+    assert said.control_delay == 2
+    assert said.anatomy.names == robot.anatomy.names
+    assert [joint.name for joint in said.anatomy.joints] == [
+        joint.name for joint in robot.anatomy.joints
+    ]
+    assert (said.name, said.root, said.control_timestep) == (
+        *(robot.name, robot.root),
+        robot.control_timestep,
+    )
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.filterwarnings("ignore:compiler attribute 'settotalmass' is deprecated")
+def test_masses_are_said_whatever_way_the_model_says_them(way: str):
+    text = LEGS.format(**{"compiler": "", "inertial": "", "damping": "0.7"} | NAMED | WAYS[way])
+    robot = Robot("legs", text, 0.01)
+    edited = edited_model(robot, some(robot))
+    before = robot.model
+
+    np.testing.assert_allclose(edited.body("base").mass, 1.3 * before.body("base").mass)
+    np.testing.assert_allclose(edited.body_mass[2:], 0.7 * before.body_mass[2:])
+    assert_alike(edited, with_parameters(robot, some(robot)).model)
+
+
+def test_a_delay_that_is_said_takes_the_place_of_the_one_before(quadruped: Robot):
+    late = with_parameters(quadruped, some(quadruped, delay=3))
+    again = with_parameters(late, dataclasses.replace(nominal(late), delay=1))
+
+    assert nominal(late).delay == 3
+    assert again.control_delay == 1
+    assert again.mjcf.count("selfmodel_control_delay") == 1
+
+
+def test_nominal_parameters_change_nothing(robot: Robot):
+    parameters = nominal(robot)
+
+    assert set(parameters.factors) == {1.0}
+    assert parameters.delay == 0
+    assert_alike(robot.model, edited_model(robot, parameters))
+    assert len(factor_names(robot)) == len(parameters.factors)
+    assert len(set(factor_names(robot))) == len(parameters.factors)
+
+
+@given(
+    factors=st.lists(st.floats(0.3, 3.3), min_size=5, max_size=30),
+    delay=st.integers(0, 5),
+)
+@settings(max_examples=50, deadline=None)
+def test_a_row_of_factors_is_the_parameters(factors: list[float], delay: int):
+    parameters = from_factors(np.array(factors), delay)
+
+    assert parameters.factors.tolist() == factors
+    assert parameters.delay == delay
+    assert from_factors(parameters.factors, delay) == parameters
+
+
+def test_the_robot_stays_as_it_was(quadruped: Robot):
+    before = quadruped.model.body_mass.copy(), quadruped.model.dof_damping.copy()
+    edited_model(quadruped, some(quadruped))
+    with_parameters(quadruped, some(quadruped))
+
+    np.testing.assert_array_equal(quadruped.model.body_mass, before[0])
+    np.testing.assert_array_equal(quadruped.model.dof_damping, before[1])
+
+
+@pytest.mark.parametrize("said", ["-3", "nan", "1e300", "2.5", "6"])
+def test_a_delay_that_cannot_be_is_refused(quadruped: Robot, said: str):
+    numeric = f'<custom><numeric name="{CONTROL_DELAY}" data="{said}"/></custom></mujoco>'
+    mjcf = quadruped.mjcf.replace("</mujoco>", numeric)
+
+    with pytest.raises(ValueError, match="must be a whole number from 0 to 5"):
+        Robot(quadruped.name, mjcf, quadruped.control_timestep)

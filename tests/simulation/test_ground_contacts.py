@@ -1,0 +1,163 @@
+"""Promises about rough ground: feet feel its shape, and a diagnosis of it is made from that."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy.ndimage import map_coordinates
+
+from selfmodel.comparators import SEGMENT_PREDICTION
+from selfmodel.controllers.cpg import Oscillators
+from selfmodel.diagnosis.evidence import Evidence
+from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.faults.notation import parse
+from selfmodel.faults.terrain import CELL, HALF_EXTENT, PLACES, TOUCHES, felt_heights, unit_heights
+from selfmodel.physical.simulated_robot import OWN_SEED, SimulatedRobot
+from selfmodel.robot.robot import Robot
+from selfmodel.simulation.ground_contacts import felt_points
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.tasks import suite_bodies
+from selfmodel.trials.behaviour import Behaviour, collect
+from selfmodel.trials.trial import Plan, Trial
+
+STEPS = 1500
+MARGIN = 0.01
+"""From which distance on MuJoCo lets the robot's feet touch, m."""
+SHAPE = unit_heights(OWN_SEED)
+"""Of the terrain that the physical robot walks on, which is not the self-model's."""
+
+
+def height(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Of the terrain of roughness 1 at some places."""
+    return map_coordinates(
+        SHAPE, [(y + HALF_EXTENT[1]) / CELL, (x + HALF_EXTENT[0]) / CELL], order=1
+    )
+
+
+@pytest.fixture(scope="module")
+def walk(quadruped: Robot) -> Oscillators:
+    """A gait that leaves the flat ground around the start, made without a search."""
+    rng = np.random.default_rng(0)
+    genomes = rng.uniform(-1, 1, (40, quadruped.cpg.weights))
+    drivers = [Oscillators(quadruped.cpg, genome) for genome in genomes]
+    intact = Hypothesis()
+    runs = [(intact, driver) for driver in drivers]
+    way = Simulator(quadruped, 2).run(runs, STEPS, ["base_position"]).behaviour["base_position"]
+    return drivers[int(np.argmax(np.linalg.norm(way[:, -1, :2], axis=1)))]
+
+
+def observed(robot: Robot, truth: str, walk: Oscillators) -> Behaviour:
+    physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
+    return collect(robot.anatomy.names, physical.run(walk, STEPS))
+
+
+@pytest.mark.parametrize("roughness", [0.02, 0.04])
+def test_feet_feel_the_ground_where_they_are(quadruped: Robot, walk: Oscillators, roughness: float):
+    points = felt_points(quadruped, observed(quadruped, f"roughness={roughness}", walk))
+    x, y, z = points.T
+
+    assert len(points) > STEPS / 2
+    assert np.linalg.norm(points[:, :2], axis=1).max() > 1.2, "it walked on flat ground only"
+    assert np.median(np.abs(z - MARGIN - roughness * height(x, y))) < 0.003
+
+
+def test_on_level_ground_they_feel_no_height(quadruped: Robot, walk: Oscillators):
+    z = felt_points(quadruped, observed(quadruped, "intact", walk))[:, 2]
+
+    assert np.median(np.abs(z - MARGIN)) < 0.001
+
+
+@pytest.mark.parametrize("truth", ["intact", "roughness=0.01", "roughness=0.02", "roughness=0.04"])
+@pytest.mark.parametrize("slope", ["", "slope=0.1"])
+def test_the_right_roughness_predicts_best_though_its_bumps_are_unknown(
+    quadruped: Robot, walk: Oscillators, truth: str, slope: str
+):
+    def both(text: str) -> str:
+        return "+".join(filter(None, (slope, text.removeprefix("intact")))) or "intact"
+
+    plan = Plan("00-after", "after", walk, STEPS, 0)
+    behaviour = observed(quadruped, both(truth), walk)
+    trial = Trial(plan, quadruped.name, behaviour, "nowhere.mcap")
+    said = ["intact", "roughness=0.01", "roughness=0.02", "roughness=0.04"]
+    hypotheses = [parse(both(one), quadruped.anatomy) for one in said]
+    losses = Evidence(Simulator(quadruped, 1), SEGMENT_PREDICTION).distances(hypotheses, [trial])
+
+    assert said[int(np.argmin(losses))] == truth
+
+
+def test_the_shape_that_was_felt_is_that_of_the_terrain_however_high():
+    rng = np.random.default_rng(1)
+    places = rng.uniform((-4, -1), (4, 1), (20_000, 2))
+    z = 0.03 * height(*places.T) + 0.01
+    shape = felt_heights(np.column_stack([places, z]))
+    row, column = np.round((places[:, ::-1] + HALF_EXTENT[::-1]) / CELL).astype(int).T
+
+    assert np.corrcoef(shape[row, column], SHAPE[row, column])[0, 1] > 0.97
+    assert np.median(np.abs(shape[row, column] - SHAPE[row, column])) < 0.15
+
+
+def test_where_too_little_was_felt_the_ground_is_level():
+    few = np.array([[2 + 0.2 * k, 0, 0.01 * k] for k in range(PLACES - 1)]).repeat(TOUCHES, axis=0)
+    near = np.random.default_rng(2).uniform(-0.5, 0.5, (5000, 3))
+    beyond = np.random.default_rng(2).uniform(50, 60, (5000, 3))
+
+    for points in (np.empty((0, 3)), few, near, beyond):
+        assert not felt_heights(points).any()
+
+
+def test_a_touch_that_errs_does_not_raise_the_ground():
+    rng = np.random.default_rng(3)
+    cells = np.round(rng.uniform((-30, -10), (30, 10), (500, 2))) * CELL
+    right = np.column_stack([cells, 0.03 * height(*cells.T)]).repeat(9, axis=0)
+    wrong, once = right.copy(), np.array([[3.4, 1.4, 5.0]])
+    wrong[: len(wrong) // 2 : 9, 2] += 0.5
+
+    np.testing.assert_array_equal(felt_heights(wrong), felt_heights(right))
+    np.testing.assert_array_equal(felt_heights(np.vstack([right, once])), felt_heights(right))
+
+
+def test_what_was_not_observed_is_not_felt(quadruped: Robot, walk: Oscillators):
+    whole = observed(quadruped, "intact", walk)
+    blind = {signal: values.copy() for signal, values in whole.signals.items()}
+    blind["base_position"][100:] = np.nan
+    silent = {signal: values.copy() for signal, values in whole.signals.items()}
+    silent["sensors"][:, :4] = np.nan
+
+    assert 0 < len(felt_points(quadruped, dataclasses.replace(whole, signals=blind))) <= 400
+    assert felt_points(quadruped, dataclasses.replace(whole, signals=silent)).shape == (0, 3)
+
+
+def test_a_robot_on_its_back_or_far_away_feels_nothing_and_is_diagnosed_all_the_same(
+    quadruped: Robot, walk: Oscillators
+):
+    whole = observed(quadruped, "intact", walk)
+    in_the_air = {signal: values.copy() for signal, values in whole.signals.items()}
+    in_the_air["base_position"][:, 2] += 20
+    on_its_back = {signal: values.copy() for signal, values in whole.signals.items()}
+    on_its_back["sensors"][:, :4] = 0
+    plan = Plan("00-after", "after", walk, STEPS, 0)
+    for number, signals in enumerate((in_the_air, on_its_back)):
+        behaviour = dataclasses.replace(whole, signals=signals)
+        trial = Trial(plan, quadruped.name, behaviour, f"{number}.mcap")
+        evidence = Evidence(Simulator(quadruped, 1), SEGMENT_PREDICTION)
+        rough = parse("roughness=0.02", quadruped.anatomy)
+
+        assert felt_points(quadruped, behaviour).shape == (0, 3)
+        assert np.isfinite(evidence.distances([rough], [trial])).all()
+
+
+def test_the_ground_is_the_plane_that_lies_level_not_a_wall(quadruped: Robot, walk: Oscillators):
+    wall = '<worldbody><geom type="plane" size="5 5 1" pos="9 0 0" euler="0 -90 0"/>'
+    walled = dataclasses.replace(quadruped, mjcf=quadruped.mjcf.replace("<worldbody>", wall, 1))
+    behaviour = observed(quadruped, "intact", walk)
+
+    np.testing.assert_allclose(
+        felt_points(walled, behaviour), felt_points(quadruped, behaviour), atol=1e-9
+    )
+
+
+def test_a_robot_without_touch_feels_nothing():
+    swimmer = suite_bodies.robot("swimmer", "swimmer6")
+    behaviour = Behaviour(swimmer.anatomy.names, np.arange(2.0), {})
+
+    assert felt_points(swimmer, behaviour).shape == (0, 3)

@@ -1,0 +1,159 @@
+"""Promises of the suite's bodies: its own time steps, environment and rewards, to the bit."""
+
+import numpy as np
+import pytest
+from dm_control import suite
+
+from selfmodel.errors import InputError
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.faults.notation import parse
+from selfmodel.physical.interface import Timed
+from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.recovery.repair import Repair
+from selfmodel.settings import Settings
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.tasks import ROBOTS, entry, load, suite_bodies
+from selfmodel.trials.behaviour import SIGNALS, Behaviour, collect
+from tests.conftest import random_controllers
+
+STEPS = 60
+FIRST = [(domain, tasks[0]) for domain, tasks in suite_bodies.DOMAINS.items()]
+TOUCHING = ("dog",)
+"""Domains whose reward is also of contact forces, which are those of another physics step."""
+
+
+@pytest.mark.parametrize(("domain", "task"), FIRST)
+def test_the_simulated_return_is_that_of_the_suites_own_environment(domain: str, task: str):
+    own = entry(suite_bodies.name(domain, task))
+    robot, score = own.robot(), own.episode_return
+    assert score is not None
+    driver = random_controllers(robot, 1)[0]
+    simulated = Simulator(robot, 1).run([(INTACT, driver)], STEPS, score.record).behaviour
+    # The suite's own model and task; only the start is the model's and not one that is drawn.
+    env = suite.load(domain, task, task_kwargs={"random": 0})
+    targets = env.physics.model.geom_pos.copy()
+    env.reset()
+    env.physics.model.geom_pos[:] = targets
+    with env.physics.reset_context():
+        env.physics.data.qpos[:] = robot.model.qpos0
+    earned = sum(env.step(command).reward for command in simulated["commands"][0, :-1])
+
+    exact = 1e-9 if domain not in TOUCHING else 0.01
+    assert earned == pytest.approx(score.of(robot, INTACT, simulated)[0], rel=exact)
+    assert earned != 0 or domain == "hopper"
+    turned = np.flatnonzero(robot.model.qpos0 != env.physics.model.qpos0)
+    assert turned.tolist() == ([2] if domain == "swimmer" else [])
+
+
+@pytest.mark.parametrize("name", ["suite-walker-walk", "suite-quadruped-walk", "suite-hopper-hop"])
+@pytest.mark.parametrize("case", [1, 3, 6, 10])
+def test_the_environment_of_a_damaged_body_is_its_simulation_to_the_bit(name: str, case: int):
+    own = entry(name)
+    robot, score = own.robot(), own.episode_return
+    truth = parse(own.cases[case], robot.anatomy)
+    driver = random_controllers(robot, 1)[0]
+    assert own.physical is not None
+    assert score is not None
+    physical = own.physical(robot, truth)
+    expected = collect(robot.anatomy.names, SimulatedRobot(robot, truth).run(driver, STEPS))
+    for _ in range(2):  # every episode begins alike
+        got = collect(robot.anatomy.names, physical.run(driver, STEPS))
+        for signal in SIGNALS:
+            assert got[signal].tobytes() == expected[signal].tobytes(), signal
+
+    assert isinstance(physical, Timed)
+    assert got.late is not None
+    assert not got.late.any()
+    batch = {signal: got[signal][np.newaxis] for signal in score.record}
+    worth = score.of(robot, truth, Behaviour(got.names, got.time, batch))
+    assert physical.returns == pytest.approx([worth[0]] * 2, rel=1e-9)
+
+
+def test_the_return_of_a_run_does_not_depend_on_the_others():
+    own = entry("suite-quadruped-walk")
+    robot, score = own.robot(), own.episode_return
+    assert score is not None
+    runs = [(INTACT, driver) for driver in random_controllers(robot, 3)]
+    every = Simulator(robot, 1).run(runs, STEPS, score.record).behaviour
+    alone = Simulator(robot, 1).run(runs[2:], STEPS, score.record).behaviour
+
+    returns = score.of(robot, INTACT, every)
+    assert len(set(returns)) == 3
+    assert returns[2:].tobytes() == score.of(robot, INTACT, alone).tobytes()
+
+
+def test_a_repair_for_the_return_finds_another_controller_than_one_for_the_way():
+    own = entry("suite-walker-stand")
+    robot, score = own.robot(), own.episode_return
+    assert score is not None
+    settings = Settings(steps=STEPS, generations=2).scaled(8)
+    simulator = Simulator(robot, 1)
+    stands = Repair(simulator, settings, score=score)
+    goes = Repair(simulator, settings)
+    found = [
+        repair(INTACT, (), np.random.default_rng(0), lambda _: None) for repair in (stands, goes)
+    ]
+    shown = simulator.run([(INTACT, one) for one in found], STEPS, score.record).behaviour
+    returns = score.of(robot, INTACT, shown)
+    way = shown["base_position"][:, -1, 0] - shown["base_position"][:, 0, 0]
+
+    assert found[0] != found[1]
+    assert returns[0] > returns[1]
+    assert way[0] < way[1]
+
+
+def test_the_return_of_our_walking_task_is_the_sum_of_its_rewards():
+    own = ROBOTS["quadruped"]
+    robot, score = own.robot(), own.episode_return
+    assert score is not None
+    driver = random_controllers(robot, 1)[0]
+    record = (*score.record, "commands")
+    simulated = Simulator(robot, 1).run([(INTACT, driver)], STEPS, record).behaviour
+    env = load("quadruped", "walk")
+    env.reset()
+    earned = sum(env.step(command).reward for command in simulated["commands"][0, :-1])
+
+    assert earned == pytest.approx(score.of(robot, INTACT, simulated)[0], rel=1e-9)
+
+
+@pytest.mark.parametrize(("domain", "task"), FIRST)
+def test_time_steps_and_episodes_are_the_suites(domain: str, task: str):
+    robot = entry(suite_bodies.name(domain, task)).robot()
+    env = suite.load(domain, task)
+
+    assert robot.control_timestep == pytest.approx(env.control_timestep(), rel=1e-12)
+    assert float(robot.model.opt.timestep) == env.physics.timestep()
+    assert env.action_spec().shape == (len(robot.anatomy.motors),)
+    assert round(env._step_limit) == 1000
+
+
+def test_hypotheses_of_a_body_take_little_memory():
+    walker, dog = (entry(name).robot() for name in ("suite-walker-walk", "suite-dog-walk"))
+    kept = Simulator(dog, 1)._embodiment.cache_parameters()["maxsize"]
+
+    assert walker.model.nbuffer < 2**18  # as the suite has it, 12 MB of sky and floor
+    assert kept * dog.model.nbuffer <= 2**29
+
+
+def test_every_task_of_a_domain_is_known_but_those_with_more_than_the_body():
+    left_out = {("quadruped", "escape"), ("quadruped", "fetch"), ("dog", "fetch")}
+    known = {(domain, task) for domain, tasks in suite_bodies.DOMAINS.items() for task in tasks}
+
+    assert known | left_out == {
+        (domain, task) for domain, task in suite.ALL_TASKS if domain in suite_bodies.DOMAINS
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "nearest"),
+    [
+        ("suite-walker-fly", "suite-walker-"),
+        ("suite-walker", "suite-walker-"),
+        ("walker", "suite-walker-"),
+        ("suite-walke-run", "suite-DOMAIN-TASK"),
+        ("hexapd", "did you mean hexapod"),
+    ],
+)
+def test_a_robot_that_there_is_not_is_refused_with_the_nearest(name: str, nearest: str):
+    with pytest.raises(InputError, match=nearest):
+        entry(name)

@@ -1,0 +1,306 @@
+"""Promises of our tasks in dm_control's world: the checks that its own suite passes, and more.
+
+They run over every task with every failure of Table I and with every environment: a damaged body is
+as good a task as a whole one.
+"""
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from functools import partial
+
+import dm_env
+import numpy as np
+import pytest
+from dm_control.rl import control
+from dm_control.viewer import runtime
+from dm_env import specs
+
+from selfmodel import tasks
+from selfmodel.errors import InputError
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.faults.kind import Fault, Kind, between, grid
+from selfmodel.faults.notation import parse
+from selfmodel.faults.registry import KINDS
+from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.embodiment import Embodiment
+from selfmodel.tasks import ALL_TASKS, ROBOTS, SUITE, TASKS_BY_DOMAIN
+from tests.helpers.opengl import WORKS, draws
+
+FASTEST = 50.0
+"""A speed that no robot of ours has, m/s."""
+
+WORLDS = ("friction=0.4", "slope=0.17", "roughness=0.03", "wind=-5", "crosswind=3")
+OTHERS = ("motor:{joint}=0.5+sensor:{sensor}=gain0.5", "jam:{joint}=0.2+slope=-0.1+friction=0.6")
+
+
+def damages(domain: str) -> Iterator[str]:
+    """The failures of Table I, every environment, and faults of degree beside environments."""
+    yield from ROBOTS[domain].cases.values()
+    yield from WORLDS
+    anatomy = ROBOTS[domain].robot().anatomy
+    for text in OTHERS:
+        yield text.format(joint=anatomy.joints[0].name, sensor=anatomy.sensors[0].name)
+
+
+EVERY = [(domain, task, text) for domain, task in ALL_TASKS for text in damages(domain)]
+every_task = pytest.mark.parametrize(("domain", "task"), ALL_TASKS)
+every_body = pytest.mark.parametrize(("domain", "task", "hypothesis"), EVERY)
+
+
+def load(
+    domain: str, task: str, hypothesis: str = "intact", limit: float = 0.1, **environment: object
+) -> control.Environment:
+    kwargs = {"hypothesis": hypothesis, "time_limit": limit, "random": 0}
+    return tasks.load(domain, task, kwargs, environment)
+
+
+def episodes(
+    environment: control.Environment, count: int, seed: int = 0
+) -> Iterator[dm_env.TimeStep]:
+    """Every time step of some episodes with random actions in range."""
+    rng, spec = np.random.default_rng(seed), environment.action_spec()
+    for _ in range(count):
+        step = environment.reset()
+        yield step
+        while not step.last():
+            step = environment.step(rng.uniform(spec.minimum, spec.maximum))
+            yield step
+
+
+def test_the_suite_names_each_task_once_and_loads_it():
+    assert len(set(ALL_TASKS)) == len(ALL_TASKS) == sum(map(len, TASKS_BY_DOMAIN.values())) > 0
+    assert set(TASKS_BY_DOMAIN) == set(SUITE) == set(ROBOTS)
+    for domain, task in ALL_TASKS:
+        assert callable(SUITE[domain][task])
+        assert task in TASKS_BY_DOMAIN[domain]
+
+
+@every_body
+def test_every_time_step_is_finite_and_in_its_specs(domain: str, task: str, hypothesis: str):
+    environment = load(domain, task, hypothesis)
+    expected = environment.observation_spec()
+    steps = list(episodes(environment, 2))
+
+    assert [step.step_type.name for step in steps] == 2 * ["FIRST", *["MID"] * 9, "LAST"]
+    for step in steps:
+        assert list(step.observation) == list(expected)
+        for name, spec in expected.items():
+            spec.validate(step.observation[name])
+            assert step.observation[name].dtype == spec.dtype == np.float64
+            assert np.isfinite(step.observation[name]).all(), name
+        if step.first():
+            assert (step.reward, step.discount) == (None, None)
+            continue
+        assert isinstance(step.reward, float)
+        assert isinstance(step.discount, float)
+        environment.reward_spec().validate(step.reward)
+        environment.discount_spec().validate(step.discount)
+        assert abs(step.reward) < FASTEST
+        assert step.discount == 1  # to walk has no end but time's
+        assert np.abs(step.observation["sensors"]).max() < 2  # touch is 0 or 1, angles nearly
+
+
+def test_a_robot_may_have_a_fault_of_a_kind_of_ones_own():
+    def lighter(embodiment: Embodiment, _anatomy: Anatomy, fault: Fault) -> None:
+        embodiment.model.body_mass[1] *= fault.degree
+
+    kind = Kind(
+        name="lighter", word="lighter", strike=lighter, degrees=between(0.1, 0.9), levels=grid(0.5)
+    )
+    robot = ROBOTS["quadruped"].robot()
+    made = parse("lighter=0.5", robot.anatomy, (*KINDS.values(), kind))
+    whole, light = (
+        tasks.load("quadruped", "walk", {"hypothesis": one}).physics.model.body_mass
+        for one in (INTACT, made)
+    )
+
+    np.testing.assert_array_equal(whole, robot.model.body_mass)
+    assert light[1] == 0.5 * whole[1]
+
+
+@every_body
+def test_the_same_seed_and_actions_give_the_same_bits(domain: str, task: str, hypothesis: str):
+    one, other = (episodes(load(domain, task, hypothesis), 2, seed=7) for _ in range(2))
+    for first, second in zip(one, other, strict=True):
+        assert first.step_type is second.step_type
+        assert (first.reward, first.discount) == (second.reward, second.discount)
+        for name, values in first.observation.items():
+            assert values.tobytes() == second.observation[name].tobytes(), name
+
+
+@every_body
+def test_every_episode_starts_in_the_same_place(domain: str, task: str, hypothesis: str):
+    firsts = [step for step in episodes(load(domain, task, hypothesis), 3) if step.first()]
+
+    assert len(firsts) == 3
+    for first in firsts[1:]:
+        for name, values in first.observation.items():
+            np.testing.assert_array_equal(values, firsts[0].observation[name], name)
+
+
+@every_task
+def test_actions_are_the_motors_targets_in_their_range(domain: str, task: str):
+    robot = ROBOTS[domain].robot()
+    spec = load(domain, task).action_spec()
+
+    assert isinstance(spec, specs.BoundedArray)
+    assert (spec.shape, spec.dtype) == ((len(robot.anatomy.motors),), np.float64)
+    np.testing.assert_array_equal(spec.minimum, robot.model.actuator_ctrlrange[:, 0])
+    np.testing.assert_array_equal(spec.maximum, robot.model.actuator_ctrlrange[:, 1])
+    assert np.all(spec.minimum < spec.maximum)
+    assert np.isfinite([spec.minimum, spec.maximum]).all()
+
+
+@every_task
+def test_the_time_limit_ends_an_episode_and_none_never_does(domain: str, task: str):
+    environment = load(domain, task, limit=0.05)
+    control_timestep = ROBOTS[domain].robot().control_timestep
+
+    assert environment.control_timestep() == pytest.approx(control_timestep)
+    lengths = [len(list(episodes(load(domain, task, limit=t), 1))) - 1 for t in (0.05, 0.2)]
+    assert lengths == [round(t / control_timestep) for t in (0.05, 0.2)]
+    steps = list(episodes(environment, 1))
+    assert steps[-1].last()
+    assert environment.step(np.zeros(environment.action_spec().shape)).first()  # begins anew
+    endless = load(domain, task, limit=float("inf"))
+    endless.reset()
+    action = np.zeros(endless.action_spec().shape)
+    assert not any(endless.step(action).last() for _ in range(1010))
+
+
+@every_task
+def test_observations_can_be_flat(domain: str, task: str):
+    flat, plain = load(domain, task, flat_observation=True), load(domain, task)
+    spec = flat.observation_spec()[control.FLAT_OBSERVATION_KEY]
+
+    assert list(flat.observation_spec()) == [control.FLAT_OBSERVATION_KEY]
+    for one, other in zip(episodes(flat, 1), episodes(plain, 1), strict=True):
+        values = one.observation[control.FLAT_OBSERVATION_KEY]
+        spec.validate(values)
+        np.testing.assert_array_equal(values, np.concatenate([*other.observation.values()]))
+
+
+@every_task
+def test_an_observation_stays_as_it_is_while_the_robot_goes_on(domain: str, task: str):
+    environment = load(domain, task)
+    first = environment.reset()
+    kept = {name: values.copy() for name, values in first.observation.items()}
+    second = environment.step(environment.action_spec().maximum)
+
+    for name, values in first.observation.items():
+        assert not np.may_share_memory(values, second.observation[name]), name
+        np.testing.assert_array_equal(values, kept[name])
+    data = environment.physics.data
+    for name, values in second.observation.items():
+        assert not np.may_share_memory(values, data.qpos), name
+        assert not np.may_share_memory(values, data.qvel), name
+
+
+@every_task
+def test_all_that_is_observed_of_a_whole_robot_changes(domain: str, task: str):
+    """What never changes in an observation tells an agent nothing."""
+    seen: dict[str, list[np.ndarray]] = {}
+    for step in episodes(load(domain, task, limit=1.0), 2):
+        for name, values in step.observation.items():
+            seen.setdefault(name, []).append(values)
+    for name, rows in seen.items():
+        assert np.ptp(rows, axis=0).min() > 0, name
+
+
+@every_task
+def test_every_part_of_the_model_has_a_name(domain: str, task: str):
+    model = load(domain, task).physics.model
+    sizes = {"body": "nbody", "joint": "njnt", "geom": "ngeom", "site": "nsite", "camera": "ncam"}
+    sizes |= {"light": "nlight", "texture": "ntex", "material": "nmat", "actuator": "nu"}
+    sizes |= {"sensor": "nsensor"}
+    for kind, size in sizes.items():
+        names = [model.id2name(k, kind) for k in range(getattr(model, size))]
+        assert all(names), kind
+        assert len(set(names)) == len(names), kind
+
+
+@every_task
+def test_the_suites_own_arguments_are_taken_by_place_and_by_name(domain: str, task: str):
+    environment = tasks.load(domain, task, {"time_limit": 0.02}, None, False)
+    by_name = tasks.load(domain_name=domain, task_name=task, visualize_reward=False)
+
+    assert len(list(episodes(environment, 1))) == 3
+    assert by_name.task.visualize_reward is False
+    with pytest.raises(InputError, match="the reward is a speed and has no colours"):
+        tasks.load(domain, task, visualize_reward=True)
+
+
+@every_body
+def test_the_viewers_runtime_runs_episodes(domain: str, task: str, hypothesis: str):
+    """What ``dm_control.viewer.launch`` does with an environment, but for the window."""
+    environment = partial(load, domain, task, hypothesis, limit=0.06)()
+    viewed = runtime.Runtime(environment, policy=None)
+    errors: list[object] = []
+    viewed.on_error += errors.append
+    viewed.tick(0.03, paused=True)
+    assert viewed.get_time() == 0
+    for _ in range(4):
+        viewed.tick(0.03, paused=False)
+    assert viewed.state is runtime.State.STOPPED  # at the time limit
+    assert viewed.get_time() == pytest.approx(0.06)
+    viewed.restart()
+    viewed.tick(0.01, paused=False)
+    viewed.single_step()
+    assert viewed.state is runtime.State.RUNNING
+    assert errors == []
+
+
+LAUNCHED = """
+import sys
+from functools import partial
+from unittest import mock
+
+import numpy as np
+from dm_control import viewer
+from dm_control.viewer import gui
+
+from selfmodel import tasks
+
+domain, task = sys.argv[1:]
+pictures = []
+
+class Window:
+    def __init__(self, width, height, title):
+        self.shape, self.mouse, self.keyboard = (320, 240), mock.MagicMock(), mock.MagicMock()
+    def event_loop(self, tick_func):
+        pictures.extend(tick_func().copy() for _ in range(3))
+    def close(self):
+        pass
+
+gui.RenderWindow = Window
+kwargs = {"hypothesis": tasks.ROBOTS[domain].cases[2]}
+viewer.launch(environment_loader=partial(tasks.load, domain, task, kwargs))
+assert [picture.shape for picture in pictures] == [(240, 320, 3)] * 3
+assert np.ptp(pictures[-1]) > 100
+environment = tasks.load(domain, task, kwargs)
+environment.reset()
+for camera in range(-1, environment.physics.model.ncam):
+    assert np.ptp(environment.physics.render(48, 64, camera_id=camera)) > 100
+print("seen")
+sys.stdout.flush()
+import os
+os._exit(0)  # the order in which OpenGL's parts go is not ours
+"""
+
+
+@draws
+@every_task
+def test_the_viewer_shows_a_damaged_robot_in_a_window_of_ours(domain: str, task: str):
+    """``dm_control.viewer.launch`` itself, with a window that needs no screen."""
+    done = subprocess.run(
+        [sys.executable, "-c", LAUNCHED, domain, task],
+        env={**os.environ, "MUJOCO_GL": str(WORKS)},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
+
+    assert done.stdout.endswith("seen\n"), done.stderr

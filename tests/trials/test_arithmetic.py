@@ -1,0 +1,131 @@
+"""Promises of the check of a controller's arithmetic: exact, silent where nothing is known."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from selfmodel.comparators.arithmetic import command_errors, command_spans
+from selfmodel.controllers.network import Controller
+from selfmodel.controllers.playback import Playback
+from selfmodel.faults.notation import parse
+from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.robot.robot import Robot
+from selfmodel.trials.behaviour import SIGNALS, Behaviour
+from selfmodel.trials.trial import Plan, Trial
+from tests.conftest import random_controllers, random_oscillators
+from tests.helpers.memory import MemoryJournal
+
+STEPS = 60
+
+
+def trial(robot: Robot, truth: str = "intact", number: int = 0) -> Trial:
+    controller = random_controllers(robot, number + 1)[number]
+    physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
+    return MemoryJournal(robot).record(physical, Plan("t", "after", controller, STEPS, 0))
+
+
+def with_signals(one: Trial, **signals: np.ndarray) -> Trial:
+    behaviour = one.behaviour
+    changed = {**{signal: behaviour[signal] for signal in SIGNALS}, **signals}
+    return dataclasses.replace(one, behaviour=Behaviour(behaviour.names, behaviour.time, changed))
+
+
+@pytest.mark.parametrize("truth", ["intact", "break:front_left_knee", "sensor:front_left_angle"])
+def test_a_controller_that_works_errs_by_exactly_nothing_whatever_else_is_wrong(
+    robot: Robot, truth: str
+):
+    one = trial(robot, truth.replace("front_left_knee", robot.anatomy.joints[0].name))
+
+    assert np.array_equal(command_errors(one), np.zeros((STEPS, len(robot.anatomy.motors))))
+
+
+def rhythmic(robot: Robot, truth: str) -> Trial:
+    """A trial that oscillators drive."""
+    (driver,) = random_oscillators(robot, 1)
+    physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
+    return MemoryJournal(robot).record(physical, Plan("t", "after", driver, STEPS, 0))
+
+
+@pytest.mark.parametrize("truth", ["intact", "sensor:front_left_angle"])
+def test_oscillators_err_by_exactly_nothing_too(robot: Robot, truth: str):
+    assert not command_errors(rhythmic(robot, truth)).any()
+
+
+def test_oscillators_that_hear_other_readings_are_at_another_phase_from_then_on(quadruped: Robot):
+    one = rhythmic(quadruped, "intact")
+    readings = one.behaviour["sensors"].copy()
+    readings[30, 5] += 5
+    errors = command_errors(with_signals(one, sensors=readings))
+
+    assert not errors[:31].any()
+    assert errors[31:].all(axis=1).any()
+
+
+def test_a_motor_s_error_is_weighed_by_its_own_range(quadruped: Robot):
+    one = trial(quadruped)
+    network = quadruped.network
+    wide = dataclasses.replace(network, ranges=((0.0, np.pi / 2), *network.ranges[1:]))
+    driver = Controller(wide, one.plan.controller.genome)
+    other = dataclasses.replace(one, plan=dataclasses.replace(one.plan, controller=driver))
+
+    assert np.array_equal(command_spans(one), np.ones(8))
+    assert np.array_equal(command_spans(other), [2, *np.ones(7)])
+
+
+@pytest.mark.parametrize("neuron", [0, 1, 2])
+def test_a_silent_neuron_shows_from_the_first_step_in_every_motor(robot: Robot, neuron: int):
+    errors = command_errors(trial(robot, f"neuron:{neuron}"))
+
+    assert np.abs(errors[0]).max() > 0.01
+    assert np.all(np.abs(errors).max(axis=0) > 0.01)
+
+
+def test_a_wrong_command_shows_at_its_step_in_its_motor_by_how_much_it_is_wrong(quadruped: Robot):
+    one = trial(quadruped)
+    commands = one.behaviour["commands"].copy()
+    commands[20, 3] += 0.25
+    errors = command_errors(with_signals(one, commands=commands))
+
+    assert errors[20, 3] == pytest.approx(0.25)
+    errors[20, 3] = 0
+    assert not errors.any()
+
+
+def test_a_network_that_is_fed_with_other_readings_gives_other_commands(quadruped: Robot):
+    one = trial(quadruped)
+    readings = one.behaviour["sensors"].copy()
+    readings[30, 5] += 0.5
+    errors = command_errors(with_signals(one, sensors=readings))
+
+    assert not errors[:30].any()
+    assert errors[30].any()
+    assert errors[31].any()  # its neurons remember
+
+
+def test_from_the_first_unknown_reading_on_nothing_is_known(quadruped: Robot):
+    one = trial(quadruped)
+    readings = one.behaviour["sensors"].copy()
+    readings[25, 2] = np.nan
+    errors = command_errors(with_signals(one, sensors=readings))
+
+    assert np.array_equal(errors[:25], np.zeros((25, len(quadruped.anatomy.motors))))
+    assert np.isnan(errors[25:]).all()
+
+
+def test_of_a_command_that_was_not_observed_alone_nothing_is_known(quadruped: Robot):
+    one = trial(quadruped)
+    commands = one.behaviour["commands"].copy()
+    commands[10] = np.nan
+    errors = command_errors(with_signals(one, commands=commands))
+
+    assert np.isnan(errors[10]).all()
+    assert not np.delete(errors, 10, axis=0).any()
+
+
+def test_of_what_other_software_commanded_nothing_is_held_against_it(quadruped: Robot):
+    one = trial(quadruped, "neuron:0")
+    driver = Playback(quadruped.anatomy.motors, one.behaviour["commands"])
+    played = dataclasses.replace(one, plan=dataclasses.replace(one.plan, controller=driver))
+
+    assert np.array_equal(command_errors(played), np.zeros((STEPS, len(driver.motors))))

@@ -1,0 +1,90 @@
+"""Promises of the difference between two orientations, beside scipy's rotations."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from selfmodel.trials.rotation import cross, rotation_between
+
+
+def quaternion(rotation: Rotation) -> np.ndarray:
+    """In MuJoCo's order, w first."""
+    return np.roll(rotation.as_quat(), 1, axis=-1)
+
+
+def rotations(count: int, seed: int = 0) -> Rotation:
+    return Rotation.random(count, rng=np.random.default_rng(seed))
+
+
+vectors = st.tuples(*[st.floats(-0.05, 0.05)] * 3).map(np.array)
+
+
+@given(vectors, st.integers(0, 1000))
+def test_a_small_turn_is_its_axis_times_its_angle_in_the_frame_of_the_start(
+    turn: np.ndarray, seed: int
+):
+    (start,) = rotations(1, seed)
+    to = start * Rotation.from_rotvec(turn)
+
+    np.testing.assert_allclose(
+        rotation_between(quaternion(to), quaternion(start)), turn, rtol=1e-3, atol=1e-12
+    )
+
+
+def test_any_turn_is_twice_the_vector_part():
+    start, turn = rotations(50), rotations(50, seed=1)
+    vector = turn.as_rotvec()
+    angle = np.linalg.norm(vector, axis=1, keepdims=True)
+
+    np.testing.assert_allclose(
+        rotation_between(quaternion(start * turn), quaternion(start)),
+        2 * np.sin(angle / 2) * vector / angle,
+        atol=1e-12,
+    )
+
+
+def test_a_quaternion_and_its_negative_are_the_same_orientation():
+    one, other = quaternion(rotations(50)), quaternion(rotations(50, seed=1))
+    between = rotation_between(one, other)
+
+    np.testing.assert_array_equal(rotation_between(-one, other), between)
+    np.testing.assert_array_equal(rotation_between(one, -other), between)
+    np.testing.assert_array_equal(rotation_between(one, -one), np.zeros((50, 3)))
+
+
+def test_there_and_back_are_opposite_turns_of_the_same_length():
+    one, other = quaternion(rotations(50)), quaternion(rotations(50, seed=1))
+    there, back = rotation_between(one, other), rotation_between(other, one)
+
+    np.testing.assert_allclose(there, -back, atol=1e-12)
+    assert np.linalg.norm(there, axis=1).max() <= 2 + 1e-12
+
+
+def test_no_turn_is_exactly_nothing():
+    same = quaternion(rotations(20))
+
+    assert not rotation_between(same, same).any()
+
+
+@pytest.mark.parametrize("shape", [(3, 5, 4), (5, 4), (4,)])
+def test_a_start_is_shared_by_all_that_broadcast(shape: tuple[int, ...]):
+    to = quaternion(rotations(15)).reshape(3, 5, 4)
+    start = np.broadcast_to(quaternion(rotations(15, seed=1)).reshape(3, 5, 4)[0, 0], shape)
+    expected = [
+        [rotation_between(to[i, j], np.broadcast_to(start, to.shape)[i, j]) for j in range(5)]
+        for i in range(3)
+    ]
+
+    np.testing.assert_array_equal(rotation_between(to, start), expected)
+
+
+@pytest.mark.parametrize(
+    "shapes", [((3,), (3,)), ((3,), (7, 3)), ((7, 3), (7, 3)), ((5, 1, 3), (7, 3))]
+)
+def test_cross_products_are_numpy_s_to_the_bit(shapes: tuple[tuple[int, ...], tuple[int, ...]]):
+    rng = np.random.default_rng(0)
+    first, second = (rng.normal(size=shape) for shape in shapes)
+
+    np.testing.assert_array_equal(cross(first, second), np.cross(first, second))

@@ -1,0 +1,140 @@
+"""Promises of the estimated state: exact where there is no noise, closer to the truth where is."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from selfmodel.controllers.driver import Driver
+from selfmodel.controllers.playback import played_back
+from selfmodel.faults.notation import parse
+from selfmodel.robot.robot import Robot
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.tasks import ROBOTS, entry
+from selfmodel.trials.behaviour import SIGNALS, Behaviour, Signal
+from selfmodel.trials.state_estimation import IMU, JOINTS, STATE, estimated_states
+from tests.conftest import random_controllers, random_motion
+
+QUADRUPED = ROBOTS["quadruped"].robot()
+REACH = {"joint_positions": 3, "base_position": 6}
+"""Steps to either side that an average takes in."""
+
+
+def runs(robot: Robot, text: str, drivers: Sequence[Driver], steps: int = 300) -> list[Behaviour]:
+    hypothesis = parse(text, robot.anatomy)
+    pairs = [(hypothesis, driver) for driver in drivers]
+    batch = Simulator(robot, 1).run(pairs, steps, SIGNALS).behaviour
+    return [
+        Behaviour(batch.names, batch.time, {signal: batch[signal][i] for signal in SIGNALS})
+        for i in range(len(drivers))
+    ]
+
+
+def smooth(robot: Robot, count: int, steps: int = 300) -> list[Driver]:
+    """Drivers that move every joint once a second."""
+    motors = robot.anatomy.motors
+    return [played_back(motors, random_motion(robot, steps, seed)) for seed in range(count)]
+
+
+def changed(run: Behaviour, **signals: np.ndarray) -> Behaviour:
+    return Behaviour(run.names, run.time, {**run.signals, **signals})
+
+
+(RUN,) = runs(QUADRUPED, "intact", smooth(QUADRUPED, 1))
+
+
+@pytest.mark.parametrize("text", ["intact", "break:{joint}", "jam:{joint}=0.2"])
+def test_without_noise_the_state_is_what_was_logged_to_the_bit(robot: Robot, text: str):
+    joint = robot.anatomy.joints[0].name
+    for run in runs(robot, text.format(joint=joint), smooth(robot, 12)):
+        assert set(estimated_states(run)) == set(STATE)
+        assert is_as_logged(run)
+
+
+def test_without_noise_a_jerky_run_is_what_was_logged_too():
+    drivers = random_controllers(QUADRUPED, 12)
+
+    assert all(is_as_logged(run) for run in runs(QUADRUPED, "intact", drivers))
+
+
+@pytest.mark.parametrize("name", ["suite-cheetah-run", "suite-swimmer-swimmer6"])
+def test_without_noise_a_robot_that_trembles_at_every_step_is_as_logged(name: str):
+    robot = entry(name).robot()
+    to_and_fro = np.where(np.arange(300)[:, np.newaxis] % 2, 1.0, -1.0)
+    motors = robot.anatomy.motors
+    (run,) = runs(robot, "intact", [played_back(motors, to_and_fro * np.ones(len(motors)))])
+
+    assert is_as_logged(run)
+
+
+def is_as_logged(run: Behaviour) -> bool:
+    states = estimated_states(run)
+    return all(states[signal].tobytes() == run[signal].tobytes() for signal in STATE)
+
+
+@given(seed=st.integers(0, 2**32), level=st.floats(0.02, 0.3))
+@settings(max_examples=50, deadline=None)
+def test_with_noise_positions_are_nearer_to_the_truth_than_what_was_logged(seed: int, level: float):
+    rng = np.random.default_rng(seed)
+
+    def noisy(signal: Signal, scale: float) -> np.ndarray:
+        return RUN[signal] + level * scale * rng.standard_normal(RUN[signal].shape)
+
+    run = changed(
+        RUN,
+        joint_positions=noisy("joint_positions", 0.5),
+        joint_velocities=noisy("joint_velocities", 2.0),
+        base_position=noisy("base_position", 0.1),
+        base_linear_velocity=noisy("base_linear_velocity", 0.5),
+    )
+    states = estimated_states(run)
+    for signal in REACH:
+        error = np.std(states[signal] - RUN[signal])
+
+        assert error < 0.8 * np.std(run[signal] - RUN[signal]), signal
+    for signal in set(STATE) - set(REACH):
+        assert states[signal].tobytes() == run[signal].tobytes(), signal
+
+
+@given(
+    seed=st.integers(0, 2**32),
+    lost=st.lists(st.integers(0, RUN.steps - 1), max_size=5),
+    of=st.sampled_from(["base_position", "base_linear_velocity"]),
+)
+@settings(max_examples=50, deadline=None)
+def test_a_state_is_unknown_where_what_it_is_made_of_was_not_observed(
+    seed: int, lost: list[int], of: Signal
+):
+    rng = np.random.default_rng(seed)
+    position = RUN["base_position"] + 0.01 * rng.standard_normal(RUN["base_position"].shape)
+    run = changed(RUN, base_position=position)
+    values = run[of].copy()
+    values[lost] = np.nan
+    state = estimated_states(changed(run, **{of: values}))["base_position"]
+    near = np.zeros(RUN.steps, dtype=bool)
+    for step in lost:
+        near[max(step - 6, 0) : step + 7] = True
+
+    assert np.isnan(state[near]).all()
+    assert np.isfinite(state[~near]).all()
+
+
+def test_what_was_never_observed_stays_unknown():
+    unknown = np.full_like(RUN["base_position"], np.nan)
+    run = changed(RUN, base_position=unknown, base_linear_velocity=unknown)
+    states = estimated_states(run)
+
+    assert np.isnan(states["base_position"]).all()
+    assert states["joint_positions"].tobytes() == RUN["joint_positions"].tobytes()
+
+
+def test_only_what_is_asked_for_is_estimated():
+    assert set(estimated_states(RUN, JOINTS + IMU)) == set(JOINTS + IMU)
+
+
+def test_a_trial_of_one_step_is_its_own_state():
+    run = Behaviour(RUN.names, RUN.time[:1], {signal: RUN[signal][:1] for signal in SIGNALS})
+
+    assert all(estimated_states(run)[s].tobytes() == run[s].tobytes() for s in STATE)
