@@ -24,7 +24,7 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.physical.reality_gap import Gap, draw_gap, perturbed
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.recovery.random_streams import gap_stream, repair_stream
-from selfmodel.recovery.repair import Repair
+from selfmodel.recovery.repair import RepairSearch
 from selfmodel.robot.parameters import Parameters, with_model, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
@@ -32,7 +32,7 @@ from selfmodel.simulation.calibrate import calibrate, prediction_error
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import collect
-from selfmodel.trials.trial import Plan, Trial
+from selfmodel.trials.trial import Trial, TrialPlan
 
 RESULTS = Path(__file__).with_suffix(".json")
 NO_NOISE = 1e-12
@@ -141,13 +141,13 @@ def _against_truth(robot: Robot, gap: Gap, found: Parameters, deviations: Sequen
 def _trial(robot: Robot, physical: SimulatedRobot, driver: Evolved) -> Trial:
     steps = Settings().steps
     behaviour = collect(robot.anatomy.names, physical.run(driver, steps))
-    return Trial(Plan("trial", "before", driver, steps, 0), robot.name, behaviour, "a trial")
+    return Trial(TrialPlan("trial", "before", driver, steps, 0), robot.name, behaviour, "a trial")
 
 
 def _gait(robot: Robot, number: int, bank: Path | None) -> Evolved:
     if bank is not None:
         return gait(bank, robot.name, number)
-    repair = Repair(Simulator(robot, threads=1), Settings())
+    repair = RepairSearch(Simulator(robot, threads=1), Settings())
     return repair(INTACT, (), repair_stream(number, 0), lambda _generation: None)
 
 

@@ -16,7 +16,7 @@ from benchmarks.results import Facts
 from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT
 from selfmodel.controllers.driver import Evolved
 from selfmodel.diagnosis.comparator import Comparator, Piecewise
-from selfmodel.diagnosis.diagnose import Diagnose
+from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.evidence import simulate
 from selfmodel.diagnosis.genome import VALUES, decode
 from selfmodel.experiments.ablation.bank import gait
@@ -30,7 +30,7 @@ from selfmodel.simulation.requests import Ensemble
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import collect
-from selfmodel.trials.trial import Plan, Stage, Trial
+from selfmodel.trials.trial import Stage, Trial, TrialPlan
 
 if TYPE_CHECKING:
     from selfmodel.evolution import Generation
@@ -127,7 +127,7 @@ def _known(name: str, threads: int, settings: Settings) -> Known:
     gaits = [gait(BANK, name, number) for number in range(HEALTHY_TRIALS)]
 
     def trial(stage: Stage, truth: str, number: int, controller: Evolved) -> Trial:
-        plan = Plan(f"{number:02d}-{stage}", stage, controller, settings.steps, 0)
+        plan = TrialPlan(f"{number:02d}-{stage}", stage, controller, settings.steps, 0)
         physical = reality.robot(robot, parse(truth, robot.anatomy), stream=number)
         behaviour = collect(robot.anatomy.names, physical.run(controller, plan.steps))
         return Trial(plan, name, behaviour, f"{plan.name}.mcap")
@@ -162,7 +162,7 @@ def _share_once(known: Known, comparator: Comparator, threads: int, settings: Se
         comparator.distances(simulated, trial)
     return {
         "arithmetic_seconds": asked + perf_counter() - start,
-        "physics_seconds": simulator.tally.physics_seconds,
+        "physics_seconds": simulator.stats.physics_seconds,
     }
 
 
@@ -171,7 +171,7 @@ def _diagnosis(
 ) -> Facts:
     """Seconds of one diagnosis and of its search, and how much they looked at."""
     simulator = Simulator(known.model, threads)
-    diagnose = Diagnose(simulator, comparator, settings, intact=known.intact)
+    diagnose = DiagnosticSearch(simulator, comparator, settings, intact=known.intact)
     generations: list[Generation] = []
     start = perf_counter()
     diagnose([trial], [], np.random.default_rng(0), generations.append)
@@ -181,7 +181,7 @@ def _diagnosis(
         "search_seconds": generations[-1].seconds,
         "search_evaluations": generations[-1].evaluations,
         "distinct_hypotheses": diagnose.distinct_hypotheses,
-        "control_steps": simulator.tally.steps,
+        "control_steps": simulator.stats.steps,
     }
 
 

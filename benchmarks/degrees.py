@@ -6,15 +6,15 @@
 """
 
 import csv
+import math
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from math import degrees
 from pathlib import Path
 
 from selfmodel.experiments.confidence_intervals import proportion
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.faults.kind import WORLD, Fault
+from selfmodel.faults.kind import ENVIRONMENT, Fault
 from selfmodel.faults.notation import parse
 from selfmodel.tasks import ROBOTS
 
@@ -77,13 +77,13 @@ def _found(row: Mapping[str, str]) -> Found:
 
 
 def _by_place(faults: Iterable[Fault]) -> dict[tuple[str, str, str], Fault]:
-    return {(fault.kind.word, fault.kind.prefix, fault.part): fault for fault in faults}
+    return {(fault.kind.keyword, fault.kind.prefix, fault.part): fault for fault in faults}
 
 
 def _near(said: Fault, true: Fault) -> bool:
-    if said.degree is None and true.degree is None:
+    if said.severity is None and true.severity is None:
         return True
-    return _NEAR.get(true.kind.name, _within)(said.degree or 0.0, true.degree or 0.0)
+    return _NEAR.get(true.kind.name, _within)(said.severity or 0.0, true.severity or 0.0)
 
 
 def _within(said: float, true: float) -> bool:
@@ -92,7 +92,7 @@ def _within(said: float, true: float) -> bool:
 
 _NEAR: Mapping[str, Callable[[float, float], bool]] = {
     "friction": lambda said, true: abs(said / true - 1) <= 0.15,
-    "slope": lambda said, true: abs(degrees(said - true)) <= 1.5,
+    "slope": lambda said, true: abs(math.degrees(said - true)) <= 1.5,
     "wind": lambda said, true: abs(said / true - 1) <= 0.2,
     "crosswind": lambda said, true: abs(said / true - 1) <= 0.2,
     "roughness": lambda said, true: _class(said) == _class(true),
@@ -104,7 +104,7 @@ def _class(roughness: float) -> float:
 
 
 def _sides(hypothesis: Hypothesis) -> set[bool]:
-    return {fault.part == WORLD for fault in hypothesis.faults}
+    return {fault.part == ENVIRONMENT for fault in hypothesis.faults}
 
 
 def _print_line(name: str, rows: list[Found]) -> None:

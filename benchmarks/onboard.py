@@ -50,7 +50,7 @@ def main() -> None:
     if not jobs:
         raise SystemExit(f"{options.folder} has no run of an ablation with these robots and seeds")
     diagnose = partial(_diagnoses, options.folder / "runs")
-    failed = run_grid(options.out / "runs", jobs, diagnose, workers=options.workers, watch=_tell)
+    failed = run_grid(options.out / "runs", jobs, diagnose, workers=options.workers, on_event=_tell)
     print(table(write_results(options.out).scores))
     if failed:
         raise SystemExit("\n".join(f"{part.key} failed: {part.error}" for part in failed))

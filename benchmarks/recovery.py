@@ -28,7 +28,7 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import Sample
-from selfmodel.trials.trial import Plan, Trial
+from selfmodel.trials.trial import Trial, TrialPlan
 
 ROUNDS = 5
 
@@ -65,7 +65,7 @@ class TimedJournal:
         """Seconds so far."""
         return self._seconds - sum(robot.seconds for robot in self._robots)
 
-    def record(self, physical: PhysicalRobot, plan: Plan) -> Trial:
+    def record(self, physical: PhysicalRobot, plan: TrialPlan) -> Trial:
         """Runs and logs a trial."""
         start = perf_counter()
         trial = self._journal.record(physical, plan)
@@ -115,16 +115,16 @@ def measure_once() -> dict[str, float]:
             journal=timed,
             settings=settings,
             seed=0,
-            watch=lambda _: None,
+            on_event=lambda _: None,
         )
     seconds = perf_counter() - start
     return {
         "recover_seconds": seconds,
-        "physics_share_of_recover": simulator.tally.physics_seconds / seconds,
+        "physics_share_of_recover": simulator.stats.physics_seconds / seconds,
         "logs_share_of_recover": timed.seconds / seconds,
         "physical_robot_share_of_recover": (healthy.seconds + damaged.seconds) / seconds,
         "recover_peak_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
-        "recover_simulated_steps": simulator.tally.steps,
+        "recover_simulated_steps": simulator.stats.steps,
     }
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.controllers.driver import Evolved
-from selfmodel.diagnosis.diagnose import Diagnose
+from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.logs import TrialLog, read_log
@@ -19,14 +19,14 @@ from selfmodel.logs.rosbag.importer import import_bag, write_recording
 from selfmodel.logs.rosbag.mapping_file import parse_mapping
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.simulated_robot import SimulatedRobot
-from selfmodel.recovery.explain import explain
+from selfmodel.recovery.explain import diagnose_trials
 from selfmodel.recovery.random_streams import repair_stream
-from selfmodel.recovery.repair import Repair
+from selfmodel.recovery.repair import RepairSearch
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
-from selfmodel.trials.trial import Plan
+from selfmodel.trials.trial import TrialPlan
 from tests.logs.rosbag import driver
 
 SETTINGS = Settings()
@@ -38,7 +38,7 @@ def main() -> None:
     robot = ROBOTS["quadruped"].robot()
     simulator = Simulator(robot, os.cpu_count() or 1)
     rng = repair_stream(SEED, 0)
-    gait = Repair(simulator, SETTINGS)(INTACT, (), rng, lambda _: None)
+    gait = RepairSearch(simulator, SETTINGS)(INTACT, (), rng, lambda _: None)
     print("| fault | exact log | imported, with its controller | imported, commands played back |")
     print("|---|---|---|---|")
     for truth in single_faults(robot):
@@ -58,7 +58,7 @@ def single_faults(robot: Robot) -> list[Hypothesis]:
 def recorded(folder: Path, robot: Robot, truth: Hypothesis, gait: Evolved) -> list[TrialLog]:
     """Returns one trial as simulated, as imported, and as imported without its controller."""
     steps = SETTINGS.steps
-    plan = Plan("trial", "single", gait, steps, SEED)
+    plan = TrialPlan("trial", "single", gait, steps, SEED)
     samples = SimulatedRobot(robot, truth).run(gait, steps)
     exact = write_trial(folder / "exact.mcap", robot, plan, samples, settings=SETTINGS)
     bag = driver.record(folder / "bag", robot, truth, gait, steps)
@@ -74,8 +74,8 @@ def recorded(folder: Path, robot: Robot, truth: Hypothesis, gait: Evolved) -> li
 def judged(log: TrialLog, truth: Hypothesis) -> str:
     """Returns what the diagnosis of a log says, and how far the truth is from it."""
     simulator = Simulator(robot_of(log), os.cpu_count() or 1)
-    search = Diagnose(simulator, FORWARD_DISPLACEMENT, log.settings)
-    best = explain([log.trial], search, SEED, lambda _: None).best
+    search = DiagnosticSearch(simulator, FORWARD_DISPLACEMENT, log.settings)
+    best = diagnose_trials([log.trial], search, SEED, lambda _: None).best
     distance = 1000 * float(search.evidence.distances([truth], [log.trial])[0])
     said = "right" if best == truth else f"`{best}`"
     return f"{said}, {distance:.2f} mm"

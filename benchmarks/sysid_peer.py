@@ -18,7 +18,7 @@ from absl import logging
 from selfmodel.arrays import FloatArray
 from selfmodel.robot.parameters import Parameters, edited_model, factor_names, from_factors
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state_access import places, writer
+from selfmodel.robot.state_access import signal_fields, writer
 from selfmodel.simulation.calibrate import BOUND, DELAYS, SCALES
 from selfmodel.simulation.calibration_segments import HORIZON, LEAD, SEGMENTS
 from selfmodel.trials.behaviour import Signal
@@ -120,7 +120,7 @@ class _Residual:
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
-        self._where = places(robot)
+        self._where = signal_fields(robot)
 
     def __call__(
         self,

@@ -29,7 +29,7 @@ from selfmodel.experiments.experiment import Experiment, run
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.logs import load_controller, save_controller
-from selfmodel.recovery.repair import Repair
+from selfmodel.recovery.repair import RepairSearch
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
@@ -72,7 +72,7 @@ def evolve_gait(name: str, seed: int, out: Path) -> Facts:
         folder.mkdir(parents=True)
         # The first of the streams that `recover` draws from: the same gait as its own.
         (stream,) = np.random.default_rng(seed).spawn(1)
-        repair = Repair(Simulator(robot, threads=1), settings)
+        repair = RepairSearch(Simulator(robot, threads=1), settings)
         gait = repair(INTACT, [], stream, lambda _: None)
         seconds = perf_counter() - start
         save_controller(folder / "gait.npz", gait)

@@ -18,7 +18,7 @@ from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Sample
-from selfmodel.trials.trial import Plan
+from selfmodel.trials.trial import TrialPlan
 
 ROUNDS = 7
 
@@ -34,7 +34,7 @@ def measure(robot: Robot) -> dict[str, float]:
     genome = draw_weights(np.random.default_rng(0), (robot.network.weights,))
     controller = Controller(robot.network, genome)
     samples = list(SimulatedRobot(robot).run(controller, settings.steps))
-    plan = Plan("trial", "single", controller, settings.steps, 0)
+    plan = TrialPlan("trial", "single", controller, settings.steps, 0)
     duration = settings.steps * robot.control_timestep
     rows = []
     with tempfile.TemporaryDirectory() as folder:
@@ -65,7 +65,7 @@ def measure(robot: Robot) -> dict[str, float]:
     }
 
 
-def _write(path: Path, robot: Robot, plan: Plan, samples: Sequence[Sample]) -> list[float]:
+def _write(path: Path, robot: Robot, plan: TrialPlan, samples: Sequence[Sample]) -> list[float]:
     """Writes a trial; returns for how many seconds each step waited for the log."""
     delays = []
     with TrialWriter(path, robot, plan, settings=Settings()) as writer:

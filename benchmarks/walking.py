@@ -9,7 +9,7 @@ from selfmodel.controllers.driver import Evolved, drive
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.sensing import Senses
+from selfmodel.robot.sensing import SensorReader
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ def walk(robot: Robot, controller: Evolved, steps: int) -> Walk:
     embodiment = build(robot, INTACT)
     model, data = embodiment.model, mujoco.MjData(embodiment.model)
     mujoco.mj_forward(model, data)
-    senses = Senses(model, robot.anatomy, [embodiment])
+    senses = SensorReader(model, robot.anatomy, [embodiment])
     brain = drive([controller], embodiment.neurons[np.newaxis], len(robot.anatomy.sensors))
     start, heights, deepest = data.qpos[0], [data.qpos[2]], 0.0
     for step in range(steps):

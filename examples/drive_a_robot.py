@@ -22,7 +22,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import Signal
-from selfmodel.trials.trial import Plan
+from selfmodel.trials.trial import TrialPlan
 
 OBSERVED: tuple[Signal, ...] = (
     *("sensors", "joint_positions", "joint_velocities", "base_position", "base_orientation"),
@@ -98,7 +98,7 @@ def main(host: str, port: int, path: Path) -> None:
     """Runs five seconds of a random controller, and logs them."""
     robot = dataclasses.replace(ROBOTS["quadruped"].robot(), control_timestep=0.02)
     weights = draw_weights(np.random.default_rng(0), (robot.network.weights,))
-    plan = Plan(path.stem, "single", Controller(robot.network, weights), steps=250, seed=0)
+    plan = TrialPlan(path.stem, "single", Controller(robot.network, weights), steps=250, seed=0)
     driver = SocketRobot((host, port), robot)
     physical = EnvironmentRobot(
         driver, robot, stop=driver.stop, limits=[joint_limits(robot, 0.2), tilt_limit(1.0)]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import mujoco
 
-from selfmodel.faults.kind import Fault, Kind, between, grid
+from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
 from selfmodel.robot.anatomy import Anatomy
 
 if TYPE_CHECKING:
@@ -19,15 +19,15 @@ def load(embodiment: "Embodiment", _anatomy: Anatomy, fault: Fault) -> None:
     """Adds a point mass at the centre of mass of the body that moves freely."""
     model = embodiment.model
     (free,) = (model.jnt_type == mujoco.mjtJoint.mjJNT_FREE).nonzero()[0]
-    model.body_mass[model.jnt_bodyid[free]] += fault.degree
+    model.body_mass[model.jnt_bodyid[free]] += fault.severity
 
 
-PAYLOAD = Kind(
+PAYLOAD = FaultKind(
     name="payload",
-    word="payload",
-    strike=load,
-    degrees=between(-2.0, 10.0),
-    levels=grid(-2.0, -1.0, -0.5, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0),
+    keyword="payload",
+    apply=load,
+    severity_bounds=uniform_bounds(-2.0, 10.0),
+    levels=uniform_levels(-2.0, -1.0, -0.5, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0),
     special={0.0: None},
     unit="kg",
 )

@@ -29,7 +29,7 @@ def main(folder: Path) -> None:
         journal=open_journal(folder, robot, settings, hidden={}),
         settings=settings,
         seed=0,
-        watch=lambda _event: None,
+        on_event=lambda _event: None,
     )
     print(f"best explanation: {recovery.diagnosis.best} (the truth: {truth})")
     print(f"{recovery.before:.2f} m, {recovery.after:.2f} m, {recovery.recovered:.2f} m")

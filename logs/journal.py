@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, get_args
 
-from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, Outside, Verdict
+from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, UnsearchedFault, Verdict
 from selfmodel.errors import InputError
-from selfmodel.faults.kind import Kind
+from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import KINDS
 from selfmodel.logs.errors import CorruptError, SchemaMismatchError
@@ -17,12 +17,12 @@ from selfmodel.logs.files import replace
 from selfmodel.logs.reader import read_log
 from selfmodel.logs.records import checked_name
 from selfmodel.logs.writer import write_trial
-from selfmodel.physical.interface import PhysicalRobot, Timed
+from selfmodel.physical.interface import PhysicalRobot, TimedRobot
 from selfmodel.recovery.database import Database
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trials.trial import Plan, Stage, Trial
+from selfmodel.trials.trial import Stage, Trial, TrialPlan
 
 TRIALS = "trials"
 DIAGNOSES = "diagnoses.json"
@@ -49,9 +49,9 @@ class FolderJournal:
     settings: Settings
     _hidden: Mapping[Stage, str] = field(repr=False)
     _gap: str | None = field(default=None, repr=False)
-    _kinds: Sequence[Kind] = field(default=EVERY_KIND, repr=False)
+    _kinds: Sequence[FaultKind] = field(default=EVERY_KIND, repr=False)
 
-    def record(self, physical: PhysicalRobot, plan: Plan) -> Trial:
+    def record(self, physical: PhysicalRobot, plan: TrialPlan) -> Trial:
         """Runs a trial, logs it while it runs, and returns it as its file says it.
 
         Raises:
@@ -64,7 +64,7 @@ class FolderJournal:
             self.robot,
             plan,
             physical.run(plan.controller, plan.steps),
-            timed=isinstance(physical, Timed),
+            timed=isinstance(physical, TimedRobot),
             settings=self.settings,
             hidden=self._hidden.get(plan.stage),
             gap=self._gap,
@@ -89,7 +89,7 @@ def open_journal(
     hidden: Mapping[Stage, str],
     *,
     gap: str | None = None,
-    kinds: Sequence[Kind] = EVERY_KIND,
+    kinds: Sequence[FaultKind] = EVERY_KIND,
 ) -> FolderJournal:
     """Makes the folder of a new run.
 
@@ -123,7 +123,9 @@ def open_journal(
     return FolderJournal(folder, robot, settings, dict(hidden), gap, tuple(kinds))
 
 
-def read_database(folder: Path, anatomy: Anatomy, kinds: Sequence[Kind] = EVERY_KIND) -> Database:
+def read_database(
+    folder: Path, anatomy: Anatomy, kinds: Sequence[FaultKind] = EVERY_KIND
+) -> Database:
     """Returns what the folder of a run holds: every finished trial and every diagnosis.
 
     A ``.part``, which is a trial that was interrupted, is passed over.
@@ -161,11 +163,11 @@ def _as_json(diagnosis: Diagnosis) -> dict[str, Any]:
     return {
         "trials": diagnosis.trials,
         "intact_distance": _finite(diagnosis.intact_distance),
-        "rivals": [str(rival) for rival in diagnosis.rivals],
-        "unseen": [str(one) for one in diagnosis.unseen],
+        "rivals": [str(rival) for rival in diagnosis.indistinguishable],
+        "unseen": [str(one) for one in diagnosis.undetectable],
         "verdict": diagnosis.verdict,
         "test": diagnosis.test,
-        "outside": diagnosis.outside.as_object() if diagnosis.outside else None,
+        "outside": diagnosis.unsearched.as_object() if diagnosis.unsearched else None,
         "ranked": [
             {
                 "hypothesis": str(candidate.hypothesis),
@@ -185,10 +187,14 @@ def _read_finite(distance: float | None) -> float:
     return math.inf if distance is None else float(distance)
 
 
-def _read_outside(item: Any, anatomy: Anatomy, kinds: Sequence[Kind]) -> Outside | None:  # noqa: ANN401  # JSON
+def _read_outside(
+    item: Any,  # noqa: ANN401  # JSON
+    anatomy: Anatomy,
+    kinds: Sequence[FaultKind],
+) -> UnsearchedFault | None:
     if item is None:
         return None
-    return Outside(parse(item["hypothesis"], anatomy, kinds), str(item["kind"]))
+    return UnsearchedFault(parse(item["hypothesis"], anatomy, kinds), str(item["kind"]))
 
 
 def _read_verdict(text: str) -> Verdict:
@@ -199,7 +205,9 @@ def _read_verdict(text: str) -> Verdict:
     return found
 
 
-def _read_diagnoses(folder: Path, anatomy: Anatomy, kinds: Sequence[Kind]) -> tuple[Diagnosis, ...]:
+def _read_diagnoses(
+    folder: Path, anatomy: Anatomy, kinds: Sequence[FaultKind]
+) -> tuple[Diagnosis, ...]:
     path = folder / DIAGNOSES
     try:
         items: Any = json.loads(path.read_bytes())
@@ -214,11 +222,11 @@ def _read_diagnoses(folder: Path, anatomy: Anatomy, kinds: Sequence[Kind]) -> tu
                 ),
                 trials=int(item["trials"]),
                 intact_distance=_read_finite(item["intact_distance"]),
-                rivals=tuple(parse(rival, anatomy, kinds) for rival in item["rivals"]),
+                indistinguishable=tuple(parse(rival, anatomy, kinds) for rival in item["rivals"]),
                 verdict=_read_verdict(item["verdict"]),
                 test=str(item["test"]),
-                outside=_read_outside(item.get("outside"), anatomy, kinds),
-                unseen=tuple(parse(one, anatomy, kinds) for one in item.get("unseen", ())),
+                unsearched=_read_outside(item.get("outside"), anatomy, kinds),
+                undetectable=tuple(parse(one, anatomy, kinds) for one in item.get("unseen", ())),
             )
             for item in items
         )

@@ -32,13 +32,13 @@ from selfmodel.logs.topics import DESCRIPTION, DESCRIPTION_TYPE, description
 from selfmodel.logs.urdf import urdf
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trials.trial import Plan
+from selfmodel.trials.trial import TrialPlan
 
 
 def write_preamble(
     log: LogFile,
     robot: Robot,
-    plan: Plan,
+    plan: TrialPlan,
     *,
     timed: bool,
     settings: Settings,

@@ -49,7 +49,7 @@ from selfmodel.logs.signals import read_behaviour
 from selfmodel.logs.timing import Timing, read_timing
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Behaviour
-from selfmodel.trials.trial import Plan, Trial
+from selfmodel.trials.trial import Trial, TrialPlan
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +119,7 @@ def interpret(path: Path, contents: Contents) -> TrialLog:
     if timing is not None:
         behaviour = replace(behaviour, late=timing.late)
     driver = controller or _playback(path, behaviour)
-    plan = Plan(record.name, record.stage, driver, record.steps, record.seed)
+    plan = TrialPlan(record.name, record.stage, driver, record.steps, record.seed)
     trial = Trial(plan, record.robot, behaviour, str(path))
     # As texts, for a robot that was lost to sight: nan is nan.
     if repr(result.displacement) != repr(trial.displacement):

@@ -15,7 +15,7 @@ from selfmodel.logs.topics import TIMING
 
 @dataclass(frozen=True, eq=False)
 class Timing:
-    """The moments of a trial's steps; see ``selfmodel.trials.behaviour.Moment``.
+    """The moments of a trial's steps; see ``selfmodel.trials.behaviour.StepTiming``.
 
     Attributes:
         elapsed: ``(steps,)`` s; NaN where it is not known.

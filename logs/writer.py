@@ -21,7 +21,7 @@ from selfmodel.physical.cleanup import Ending
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Names, Sample
-from selfmodel.trials.trial import Plan
+from selfmodel.trials.trial import TrialPlan
 
 FLUSH_STEPS = 50
 """How many steps a kill can cost at most. It makes the file 1 % larger than never flushing."""
@@ -30,7 +30,7 @@ FLUSH_STEPS = 50
 def write_trial(
     path: Path,
     robot: Robot,
-    plan: Plan,
+    plan: TrialPlan,
     samples: Iterable[Sample],
     *,
     timed: bool = False,
@@ -48,7 +48,7 @@ def write_trial(
         samples: What happens, as it happens; not more than the plan's steps are asked for, and what
             has ``close``, as a generator has, is closed before the log is, which stops the robot.
             To look at them on their way, use ``TrialWriter``: a ``map`` over a generator has none.
-        timed: Whether the robot is ``physical.interface.Timed``: its samples have moments.
+        timed: Whether the robot is ``physical.interface.TimedRobot``: its samples have moments.
         settings: The paper's numbers, for the record.
         hidden: What is wrong with a simulated robot, in notation; for ``read_truth`` only.
         gap: How else it differs from its model, as JSON; for ``read_gap`` only.
@@ -105,7 +105,7 @@ class TrialWriter:
         self,
         path: Path,
         robot: Robot,
-        plan: Plan,
+        plan: TrialPlan,
         *,
         timed: bool = False,
         settings: Settings,

@@ -32,7 +32,7 @@ class Generation:
     seconds: float
 
 
-Observe = Callable[[Generation], None]
+GenerationCallback = Callable[[Generation], None]
 """Is told of every generation; what it does with that is its own affair."""
 
 
@@ -107,10 +107,10 @@ class Evolution:
         count = settings.population - settings.survivors
         # Survivors are sorted, so the winner of a tournament is its lowest index.
         entrants = rng.integers(len(self._genomes), size=(count, settings.tournament))
-        return varied(self._genomes[entrants.min(axis=1)], self._draw, settings, rng)
+        return reproduce(self._genomes[entrants.min(axis=1)], self._draw, settings, rng)
 
 
-def varied(
+def reproduce(
     parents: FloatArray, draw: Draw, settings: Settings, rng: np.random.Generator
 ) -> FloatArray:
     """Returns a child of each genome: mutated, and some of the pairs of neighbours then crossed.
@@ -133,19 +133,21 @@ def varied(
 
 
 def evolve(
-    search: Evolution, fitness: Callable[[FloatArray], FloatArray], observe: Observe
+    search: Evolution,
+    fitness: Callable[[FloatArray], FloatArray],
+    on_generation: GenerationCallback,
 ) -> None:
     """Runs a search to its end.
 
     Args:
         search: Where to start; afterwards its ``best`` is the best genome found.
         fitness: From genomes ``(n, length)`` to a fitness each ``(n,)``.
-        observe: Is told of every generation.
+        on_generation: Is told of every generation.
     """
     start = perf_counter()
     while not search.stop():
         search.tell(fitness(search.ask()))
-        observe(
+        on_generation(
             Generation(
                 number=search.generation,
                 total=search.generations,

@@ -19,8 +19,8 @@ from selfmodel.recovery.fitness import Score
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.mjcf.mujoco_errors import told_by_mujoco
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.sensing import Senses
-from selfmodel.robot.state_access import places, present, writer
+from selfmodel.robot.sensing import SensorReader
+from selfmodel.robot.state_access import present, signal_fields, writer
 from selfmodel.simulation.activations import activations_of
 from selfmodel.trials.behaviour import SIGNALS, Behaviour, Sample, Signal
 
@@ -75,7 +75,7 @@ class _Stepped:
     def __init__(self, task: Any, robot: Robot, embodiment: Embodiment) -> None:  # noqa: ANN401
         self._task = task
         self._robot, self._embodiment = robot, embodiment
-        self._places = places(robot)
+        self._places = signal_fields(robot)
         self.returns: list[float] = []
 
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401  # the task's own
@@ -83,7 +83,7 @@ class _Stepped:
 
     def initialize_episode(self, _physics: Any) -> None:  # noqa: ANN401
         """Leaves the robot as the physics' reset has put it."""
-        self._senses = Senses(self._embodiment.model, self._robot.anatomy, [self._embodiment])
+        self._senses = SensorReader(self._embodiment.model, self._robot.anatomy, [self._embodiment])
         self.returns.append(0.0)
 
     def get_reward(self, physics: Any) -> float:  # noqa: ANN401

@@ -16,8 +16,8 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.sensing import Senses
-from selfmodel.robot.state_access import places, present
+from selfmodel.robot.sensing import SensorReader
+from selfmodel.robot.state_access import present, signal_fields
 from selfmodel.trials.behaviour import Signal
 
 
@@ -88,8 +88,8 @@ class Walk(base.Task):
         super().__init__(random=random)
         self._robot = robot
         self._embodiment = embodiment
-        self._senses = Senses(embodiment.model, robot.anatomy, [embodiment])
-        self._places = places(robot, embodiment.model)
+        self._senses = SensorReader(embodiment.model, robot.anatomy, [embodiment])
+        self._places = signal_fields(robot, embodiment.model)
         self._start = self._end = 0.0
 
     def initialize_episode(self, physics: mujoco.Physics) -> None:

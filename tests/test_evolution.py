@@ -8,7 +8,7 @@ import pytest
 from selfmodel.errors import InputError
 from selfmodel.evolution import Evolution, Generation, evolve
 from selfmodel.settings import Settings
-from selfmodel.simulation.cache import Memo
+from selfmodel.simulation.cache import Cache
 
 LENGTH = 12
 
@@ -193,7 +193,7 @@ def test_a_memo_computes_every_key_once():
         computed.extend(keys)
         return np.array([[len(key), -len(key)] for key in keys])
 
-    memo: Memo[str] = Memo()
+    memo: Cache[str] = Cache()
 
     assert np.array_equal(memo.values(["a", "bb", "a"], compute), [[1, -1], [2, -2], [1, -1]])
     assert np.array_equal(memo.values(["bb", "ccc"], compute), [[2, -2], [3, -3]])
@@ -202,9 +202,9 @@ def test_a_memo_computes_every_key_once():
 
 
 def test_a_memo_learns_from_another_what_is_asked_for_and_no_more():
-    other: Memo[str] = Memo()
+    other: Cache[str] = Cache()
     other.values(["a", "bb"], lambda keys: np.array([[len(key)] for key in keys]))
-    memo: Memo[str] = Memo()
+    memo: Cache[str] = Cache()
     memo.learn(other, ["bb", "ccc"])
 
     assert list(memo) == ["bb"]

@@ -30,7 +30,7 @@ from selfmodel.logs.writer import write_trial
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import SIGNALS, Behaviour, Sample, Signal
-from selfmodel.trials.trial import Plan
+from selfmodel.trials.trial import TrialPlan
 
 LONGEST = 1_000_000
 """Control steps that an import may have: one wrong stamp must not fill the memory."""
@@ -137,7 +137,7 @@ def write_recording(
     return write_trial(
         path,
         robot,
-        Plan("imported", mapping.stage, driver, behaviour.steps, seed=0),
+        TrialPlan("imported", mapping.stage, driver, behaviour.steps, seed=0),
         _samples(behaviour),
         settings=Settings(),
         imported=Imported(recording.facts(), mapping.document.text),

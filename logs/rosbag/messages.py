@@ -29,7 +29,7 @@ Rows = tuple[tuple[str, ...], FloatArray]
 
 
 @dataclass(frozen=True)
-class Kind:
+class FaultKind:
     """A type of message that can be read.
 
     Attributes:
@@ -153,16 +153,16 @@ def _wxyz(quaternion: "ros.geometry_msgs__msg__Quaternion") -> list[float]:
     return [quaternion.w, quaternion.x, quaternion.y, quaternion.z]
 
 
-KINDS: Mapping[str, Kind] = MappingProxyType(
+KINDS: Mapping[str, FaultKind] = MappingProxyType(
     {
-        JOINT_STATE: Kind(stamped=True, rows=_joint_state),
-        TRAJECTORY: Kind(stamped=True, rows=_trajectory),
-        ARRAY: Kind(stamped=False, rows=_array),
-        ODOMETRY: Kind(stamped=True, rows=_odometry),
-        POSE: Kind(stamped=True, rows=_pose_stamped),
-        IMU: Kind(stamped=True, rows=_imu),
-        WRENCH: Kind(stamped=True, rows=_wrench),
-        **dict.fromkeys(NUMBERS, Kind(stamped=False, rows=_number)),
+        JOINT_STATE: FaultKind(stamped=True, rows=_joint_state),
+        TRAJECTORY: FaultKind(stamped=True, rows=_trajectory),
+        ARRAY: FaultKind(stamped=False, rows=_array),
+        ODOMETRY: FaultKind(stamped=True, rows=_odometry),
+        POSE: FaultKind(stamped=True, rows=_pose_stamped),
+        IMU: FaultKind(stamped=True, rows=_imu),
+        WRENCH: FaultKind(stamped=True, rows=_wrench),
+        **dict.fromkeys(NUMBERS, FaultKind(stamped=False, rows=_number)),
     }
 )
 """Every type that can be read.

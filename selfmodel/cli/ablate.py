@@ -99,7 +99,10 @@ def ablate(
     )
     part = lists.share("--only", only)
     failed = grid_command.run_shown(
-        lambda watch: run(ablation, workers=resolve.threads(workers), watch=watch, only=part), out
+        lambda on_event: run(
+            ablation, workers=resolve.threads(workers), on_event=on_event, only=part
+        ),
+        out,
     )
     results = write_results(out)
     if as_json:

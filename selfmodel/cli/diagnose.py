@@ -47,10 +47,10 @@ def diagnose(
     # Whatever brings MuJoCo waits until the command runs.
     from selfmodel.cli.output.display import display  # noqa: PLC0415
     from selfmodel.cli.output.ranking import as_values, sureness  # noqa: PLC0415
-    from selfmodel.diagnosis.diagnose import Diagnose  # noqa: PLC0415
+    from selfmodel.diagnosis.diagnose import DiagnosticSearch  # noqa: PLC0415
     from selfmodel.experiments import plugins as resolve  # noqa: PLC0415
     from selfmodel.experiments.fitting import calibration_values, fitted  # noqa: PLC0415
-    from selfmodel.recovery.explain import explain  # noqa: PLC0415
+    from selfmodel.recovery.explain import diagnose_trials  # noqa: PLC0415
     from selfmodel.simulation.simulator import Simulator  # noqa: PLC0415
 
     start = perf_counter()
@@ -64,13 +64,13 @@ def diagnose(
     intact = [log.trial for log in logs if log not in used]
     fit = fitted(model, intact, resolve.threads(threads)) if calibrate and intact else None
     simulator = Simulator(fit.robot if fit else model, resolve.threads(threads))
-    search = Diagnose(simulator, judge, first.settings, considered, intact=intact)
+    search = DiagnosticSearch(simulator, judge, first.settings, considered, intact=intact)
     for note in _notes(used):
         typer.echo(f"note: {note}", err=True)
-    with display() as watch:
+    with display() as on_event:
         if fit:
-            watch(fit)
-        diagnosis = explain([log.trial for log in used], search, chosen, watch)
+            on_event(fit)
+        diagnosis = diagnose_trials([log.trial for log in used], search, chosen, on_event)
     result = {
         "robot": model.name,
         "comparator": judge.name,

@@ -94,8 +94,8 @@ def recover(
         physical=entry.physical,
     )
     try:
-        with display() as watch:
-            outcome = run(experiment, watch)
+        with display() as on_event:
+            outcome = run(experiment, on_event)
     except KeyboardInterrupt:
         typer.echo(f"interrupted: the finished trials are in {experiment.folder}", err=True)
         raise typer.Exit(130) from None

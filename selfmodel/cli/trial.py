@@ -63,7 +63,7 @@ def trial(
     from selfmodel.logs import read_log  # noqa: PLC0415
     from selfmodel.logs.writer import write_trial  # noqa: PLC0415
     from selfmodel.settings import Settings  # noqa: PLC0415
-    from selfmodel.trials.trial import Plan  # noqa: PLC0415
+    from selfmodel.trials.trial import TrialPlan  # noqa: PLC0415
 
     kind = "network" if controller is None else str(controller)
     made = resolve.with_neurons(
@@ -84,7 +84,7 @@ def trial(
         driver = resolve.controller(Path(kind), made)
     resolve.check_neurons(hidden, driver)
     settings = Settings()
-    plan = Plan("trial", resolve.stage(stage), driver, settings.steps, seed)
+    plan = TrialPlan("trial", resolve.stage(stage), driver, settings.steps, seed)
     samples = reality.robot(made, hidden).run(driver, settings.steps)
     try:
         write_trial(

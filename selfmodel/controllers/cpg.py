@@ -177,7 +177,7 @@ class Rhythms:
         outputs = np.cos(2 * np.pi * turned)
         outputs *= self._amplitudes
         outputs += self._offsets
-        outputs *= grown(self._step * self._timestep)
+        outputs *= amplitude_rise(self._step * self._timestep)
         self._commands.write(outputs, targets)
         # einsum sums each row by itself, in an order that the number of rows does not change.
         speed = 1 + np.einsum("ns,ns->n", self._feedback, self.readings)
@@ -186,7 +186,7 @@ class Rhythms:
         self._step += 1
 
 
-def grown(time: float) -> float:
+def amplitude_rise(time: float) -> float:
     """Returns what part of their amplitude oscillators have after some time, s.
 
     It is the solution of r'' = a (a (1 - r) / 4 - r') from rest, where a is ``GROWTH``: critically

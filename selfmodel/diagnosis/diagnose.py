@@ -7,21 +7,21 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis.comparator import Comparator
-from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, Outside, Verdict
+from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, UnsearchedFault, Verdict
 from selfmodel.diagnosis.evidence import Evidence
 from selfmodel.diagnosis.genome import VALUES, decode, encode
-from selfmodel.diagnosis.loss_functions import Looks
-from selfmodel.diagnosis.model_error import mends_in_part
+from selfmodel.diagnosis.loss_functions import LossFunctions
+from selfmodel.diagnosis.model_error import any_fault_is_model_error
 from selfmodel.diagnosis.refine import refined
 from selfmodel.diagnosis.screening import screen_of
 from selfmodel.diagnosis.severity import coarse_candidates
-from selfmodel.diagnosis.significance import TEST, is_better, is_worse_than_ever
-from selfmodel.diagnosis.undetectable import unseen
-from selfmodel.diagnosis.unsearched import better_outside
-from selfmodel.evolution import Evolution, Observe, evolve
+from selfmodel.diagnosis.significance import TEST, exceeds_healthy_loss, is_better
+from selfmodel.diagnosis.undetectable import undetectable_faults
+from selfmodel.diagnosis.unsearched import best_unsearched_fault
+from selfmodel.evolution import Evolution, GenerationCallback, evolve
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
-from selfmodel.faults.kind import Kind
-from selfmodel.faults.registry import PAPER_KINDS, considered
+from selfmodel.faults.kind import FaultKind
+from selfmodel.faults.registry import PAPER_KINDS, applicable_kinds
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Trial
@@ -33,7 +33,7 @@ EQUAL = "equal distances"
 """The test of a comparator that gives one number for a trial."""
 
 
-class Diagnose:
+class DiagnosticSearch:
     """Evolves hypotheses against logged trials; it remembers every distance.
 
     Fitness is minus the sum of the distances over all trials. Source: the paper, section III.
@@ -56,13 +56,13 @@ class Diagnose:
         simulator: Simulator,
         comparator: Comparator,
         settings: Settings,
-        kinds: Sequence[Kind] = PAPER_KINDS,
+        kinds: Sequence[FaultKind] = PAPER_KINDS,
         *,
         intact: Sequence[Trial] = (),
     ) -> None:
         self._anatomy = simulator.robot.anatomy
         self._settings = settings
-        self._kinds = considered(kinds, self._anatomy)
+        self._kinds = applicable_kinds(kinds, self._anatomy)
         self._intact = tuple(intact)
         self.evidence = Evidence(simulator, comparator)
         self._screen = screen_of(comparator, simulator, self.evidence)
@@ -75,7 +75,7 @@ class Diagnose:
         trials: Sequence[Trial],
         seeds: Sequence[Hypothesis],
         rng: np.random.Generator,
-        observe: Observe,
+        on_generation: GenerationCallback,
     ) -> Diagnosis:
         """Returns the hypotheses that explain the trials best.
 
@@ -83,28 +83,32 @@ class Diagnose:
             trials: At least one.
             seeds: Hypotheses to start from, beside random ones.
             rng: Every random choice comes from it.
-            observe: Is told of every generation.
+            on_generation: Is told of every generation.
         """
-        found = self._evolved(trials, seeds, rng, observe)
+        found = self._evolved(trials, seeds, rng, on_generation)
         best, aside = found[0], self._looks_aside(trials)
-        if self.evidence.in_pieces:
+        if self.evidence.is_piecewise:
             best = self._refined(trials, found[:KNOWN], aside)
         judged = list(self.evidence.judged(trials) | {best, INTACT})
         totals = dict(zip(judged, map(float, self.evidence.distances(judged, trials)), strict=True))
         others = [one for one in _ranked(totals) if one != best]
-        rivals = self._rivals(best, others, aside)
-        better = better_outside(best, self._kinds, self._anatomy, aside)
-        besides = unseen(best, self._kinds, self._anatomy, aside) if self.evidence.in_pieces else []
+        indistinguishable = self._indistinguishable(best, others, aside)
+        better = best_unsearched_fault(best, self._kinds, self._anatomy, aside)
+        besides = (
+            undetectable_faults(best, self._kinds, self._anatomy, aside)
+            if self.evidence.is_piecewise
+            else []
+        )
         kept = self._settings.kept
         return Diagnosis(
             ranked=tuple(Candidate(one, totals[one]) for one in [best, *others][:kept]),
             trials=len(trials),
             intact_distance=totals[INTACT],
-            rivals=rivals[:kept],
-            verdict=self._verdict(best, rivals, better, aside),
-            test=TEST if self.evidence.in_pieces else EQUAL,
-            outside=better,
-            unseen=tuple(besides[:kept]),
+            indistinguishable=indistinguishable[:kept],
+            verdict=self._verdict(best, indistinguishable, better, aside),
+            test=TEST if self.evidence.is_piecewise else EQUAL,
+            unsearched=better,
+            undetectable=tuple(besides[:kept]),
         )
 
     def check(self, trials: Sequence[Trial]) -> None:
@@ -126,7 +130,7 @@ class Diagnose:
         trials: Sequence[Trial],
         seeds: Sequence[Hypothesis],
         rng: np.random.Generator,
-        observe: Observe,
+        on_generation: GenerationCallback,
     ) -> list[Hypothesis]:
         """The hypotheses that the EA looked at, closest first."""
         genes, anatomy = self._settings.genes, self._anatomy
@@ -146,19 +150,19 @@ class Diagnose:
             rng,
             [encode(hypothesis, genes, anatomy, self._kinds) for hypothesis in seeds],
         )
-        evolve(search, fitness, observe)
+        evolve(search, fitness, on_generation)
         self.evaluations += search.evaluations
         return _ranked(totals)
 
-    def _looks_aside(self, trials: Sequence[Trial]) -> Looks:
+    def _looks_aside(self, trials: Sequence[Trial]) -> LossFunctions:
         """How badly hypotheses predict the trials, without a trace in what is ranked.
 
         Pieces of a whole trial, closed loop, hang together: what helps there may be luck, and is
         not compared with what helped before.
         """
         known = [*self._intact, *trials]
-        comparable = self.evidence.in_pieces and self.evidence.in_segments(known)
-        return Looks(
+        comparable = self.evidence.is_piecewise and self.evidence.uses_segments(known)
+        return LossFunctions(
             after=partial(self._aside.losses, trials=trials),
             screen=partial(self._screen_aside.losses, trials=trials),
             before=partial(self._aside.losses, trials=self._intact)
@@ -167,14 +171,14 @@ class Diagnose:
         )
 
     def _refined(
-        self, trials: Sequence[Trial], known: Sequence[Hypothesis], aside: Looks
+        self, trials: Sequence[Trial], known: Sequence[Hypothesis], aside: LossFunctions
     ) -> Hypothesis:
         """The best hypothesis around those known."""
         return refined(
             known,
             coarse_candidates(self._kinds, self._anatomy),
             self._settings.genes,
-            Looks(
+            LossFunctions(
                 after=partial(self.evidence.losses, trials=trials),
                 screen=partial(self._screen.losses, trials=trials),
                 before=aside.before,
@@ -182,38 +186,40 @@ class Diagnose:
             self._anatomy,
         )
 
-    def _rivals(
-        self, best: Hypothesis, others: Sequence[Hypothesis], aside: Looks
+    def _indistinguishable(
+        self, best: Hypothesis, others: Sequence[Hypothesis], aside: LossFunctions
     ) -> tuple[Hypothesis, ...]:
         """Those that cannot be told from the best, but for those that only say more of the same."""
-        said = _without_degrees(best)
-        candidates = [other for other in others if not said <= _without_degrees(other)]
+        said = _without_severities(best)
+        candidates = [other for other in others if not said <= _without_severities(other)]
         mine, *theirs = aside.after([best, *candidates])
-        if self.evidence.in_pieces:
+        if self.evidence.is_piecewise:
             told = [is_better(mine, losses) for losses in theirs]
         else:
             told = [bool(losses.sum() != mine.sum()) for losses in theirs]
         untold = [other for other, apart in zip(candidates, told, strict=True) if not apart]
-        return tuple(one for one in untold if not mends_in_part(one, aside, self._anatomy))
+        return tuple(
+            one for one in untold if not any_fault_is_model_error(one, aside, self._anatomy)
+        )
 
     def _verdict(
         self,
         best: Hypothesis,
-        rivals: Sequence[Hypothesis],
-        better: Outside | None,
-        aside: Looks,
+        indistinguishable: Sequence[Hypothesis],
+        better: UnsearchedFault | None,
+        aside: LossFunctions,
     ) -> Verdict:
         if better is not None:
             return "unexplained"
         if self._intact:
             usual = self._aside.losses([INTACT], self._intact)[0]
-            if is_worse_than_ever(aside.after([best])[0], usual):
+            if exceeds_healthy_loss(aside.after([best])[0], usual):
                 return "unexplained"
-        return "ambiguous" if rivals else "explained"
+        return "ambiguous" if indistinguishable else "explained"
 
 
-def _without_degrees(hypothesis: Hypothesis) -> set[tuple[Kind, str]]:
-    return {(fault.kind.without_degree, fault.part) for fault in hypothesis.faults}
+def _without_severities(hypothesis: Hypothesis) -> set[tuple[FaultKind, str]]:
+    return {(fault.kind.without_severity, fault.part) for fault in hypothesis.faults}
 
 
 def _ranked(totals: dict[Hypothesis, float]) -> list[Hypothesis]:

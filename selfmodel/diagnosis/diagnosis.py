@@ -27,7 +27,7 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Outside:
+class UnsearchedFault:
     """A hypothesis with a fault that was not considered.
 
     Attributes:
@@ -54,23 +54,23 @@ class Diagnosis:
             comes first.
         trials: How many trials they had to explain.
         intact_distance: The distance that "nothing changed" gets.
-        rivals: Other hypotheses that the trials cannot tell from the best, closest first.
+        indistinguishable: Hypotheses not significantly worse than the best, closest first.
         unseen: The best hypothesis with one fault more, each that the trials neither show nor rule
-            out, closest first, no more than are ranked; see ``unseen.unseen``.
+            out, closest first, no more than are ranked; see ``unseen.undetectable``.
         verdict: Whether the best hypothesis explains the trials.
         test: By which test the rivals were told from the others.
         outside: The best hypothesis with a fault of a kind that was not considered, where that
-            predicts the trials significantly better; see ``outside.better_outside``.
+            predicts the trials significantly better; see ``outside.best_unsearched_fault``.
     """
 
     ranked: tuple[Candidate, ...]
     trials: int
     intact_distance: float
-    rivals: tuple[Hypothesis, ...]
+    indistinguishable: tuple[Hypothesis, ...]
     verdict: Verdict
     test: str
-    outside: Outside | None = None
-    unseen: tuple[Hypothesis, ...] = ()
+    unsearched: UnsearchedFault | None = None
+    undetectable: tuple[Hypothesis, ...] = ()
 
     @property
     def best(self) -> Hypothesis:

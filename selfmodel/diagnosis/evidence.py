@@ -10,8 +10,8 @@ from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis.comparator import Comparator, Piecewise
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.simulation.cache import Memo
-from selfmodel.simulation.outcome import Simulated
+from selfmodel.simulation.cache import Cache
+from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments, recordable
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
@@ -33,18 +33,18 @@ class Evidence:
         self._simulator = simulator
         self._comparator = comparator
         self._beside = beside
-        self._losses: dict[str, Memo[Hypothesis]] = {}  # by the trial's log
+        self._losses: dict[str, Cache[Hypothesis]] = {}  # by the trial's log
 
     def aside(self) -> "Evidence":
         """Returns evidence that remembers apart, and simulates nothing that this one knows."""
         return Evidence(self._simulator, self._comparator, beside=self)
 
     @property
-    def in_pieces(self) -> bool:
+    def is_piecewise(self) -> bool:
         """Whether the comparator judges in pieces, so that two hypotheses can be tested."""
         return isinstance(self._comparator, Piecewise)
 
-    def in_segments(self, trials: Sequence[Trial]) -> bool:
+    def uses_segments(self, trials: Sequence[Trial]) -> bool:
         """Returns whether the comparator judges all trials by short predictions."""
         return all(isinstance(self._comparator.request(trial), Segments) for trial in trials)
 
@@ -57,9 +57,9 @@ class Evidence:
         """Returns the hypotheses that were simulated for every one of some trials."""
         return set.intersection(*(set(self.known(trial)) for trial in trials))
 
-    def known(self, trial: Trial) -> Memo[Hypothesis]:
+    def known(self, trial: Trial) -> Cache[Hypothesis]:
         """Returns what is remembered of a trial."""
-        return self._losses.get(trial.path, Memo())
+        return self._losses.get(trial.path, Cache())
 
     def check(self, trials: Sequence[Trial]) -> None:
         """Checks that the comparator can judge all trials, before any search.
@@ -95,10 +95,10 @@ class Evidence:
         return np.concatenate([np.array(self._of(hypotheses, trial)) for trial in trials], axis=1)
 
     def _of(self, hypotheses: Sequence[Hypothesis], trial: Trial) -> list[FloatArray]:
-        memo = self._losses.setdefault(trial.path, Memo())
+        memo = self._losses.setdefault(trial.path, Cache())
         if self._beside is not None:
-            memo.learn(self._beside.known(trial), hypotheses)
-        return memo.values(hypotheses, partial(self._simulate, trial))
+            memo.update_from(self._beside.known(trial), hypotheses)
+        return memo.get_or_compute(hypotheses, partial(self._simulate, trial))
 
     def _simulate(self, trial: Trial, hypotheses: list[Hypothesis]) -> FloatArray:
         outcome = self._simulated(trial, hypotheses)
@@ -124,7 +124,7 @@ class Evidence:
             raise self._broken(f"gave {distances.shape} distances for {count} simulations")
         return np.asarray(distances[:, np.newaxis])
 
-    def _simulated(self, trial: Trial, hypotheses: list[Hypothesis]) -> Simulated:
+    def _simulated(self, trial: Trial, hypotheses: list[Hypothesis]) -> SimulationResult:
         request = self._comparator.request(trial)
         possible = recordable(request)
         if not request.record or not set(request.record) <= set(possible):
@@ -142,7 +142,7 @@ class Evidence:
 
 def simulate(
     simulator: Simulator, request: Request, trial: Trial, hypotheses: Sequence[Hypothesis]
-) -> Simulated:
+) -> SimulationResult:
     """Simulates what a comparator requested to judge a trial.
 
     Args:

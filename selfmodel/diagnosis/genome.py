@@ -11,7 +11,7 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import Hypothesis, canonical
-from selfmodel.faults.kind import Fault, Kind
+from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.robot.anatomy import Anatomy
 
@@ -19,7 +19,9 @@ VALUES = 4
 """Values of a gene, each in [0, 1): active from 0.5 on, kind, part, degree."""
 
 
-def decode(genome: FloatArray, anatomy: Anatomy, kinds: Sequence[Kind] = PAPER_KINDS) -> Hypothesis:
+def decode(
+    genome: FloatArray, anatomy: Anatomy, kinds: Sequence[FaultKind] = PAPER_KINDS
+) -> Hypothesis:
     """Returns the hypothesis that a genome encodes.
 
     Args:
@@ -39,7 +41,7 @@ def decode(genome: FloatArray, anatomy: Anatomy, kinds: Sequence[Kind] = PAPER_K
 
 
 def encode(
-    hypothesis: Hypothesis, genes: int, anatomy: Anatomy, kinds: Sequence[Kind] = PAPER_KINDS
+    hypothesis: Hypothesis, genes: int, anatomy: Anatomy, kinds: Sequence[FaultKind] = PAPER_KINDS
 ) -> FloatArray:
     """Returns a genome of ``(genes * 4,)`` values that decodes to ``hypothesis``.
 
@@ -63,7 +65,7 @@ def encode(
             )
         parts = fault.kind.parts(anatomy)
         levels = fault.kind.levels(anatomy, fault.part)
-        nearest = int(np.argmin(np.abs(np.array(levels) - fault.degree)))
+        nearest = int(np.argmin(np.abs(np.array(levels) - fault.severity)))
         gene[:] = (
             0.75,
             _middle(kinds.index(fault.kind), len(kinds)),

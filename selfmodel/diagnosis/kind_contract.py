@@ -7,7 +7,7 @@ from selfmodel.controllers.network import Controller
 from selfmodel.diagnosis.genome import decode, encode
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
-from selfmodel.faults.kind import Fault, Kind
+from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import known
 from selfmodel.robot.embodiment import Embodiment
@@ -19,8 +19,8 @@ STEPS = 20
 """Control steps that are simulated to see that robots with the fault share a batch with others."""
 
 
-def check_kind(kind: Kind, robot: Robot) -> None:
-    """Checks that a kind does what ``Kind`` says.
+def check_kind(kind: FaultKind, robot: Robot) -> None:
+    """Checks that a kind does what ``FaultKind`` says.
 
     Args:
         kind: The one to check; one that no diagnosis may propose is checked alike.
@@ -30,7 +30,7 @@ def check_kind(kind: Kind, robot: Robot) -> None:
         ValueError: It breaks its contract; the message says in which way.
         InputError: Its own notation cannot be read back.
     """
-    for what, text in (("name", kind.name), ("word", kind.word)):
+    for what, text in (("name", kind.name), ("word", kind.keyword)):
         if not text or set(text) & set(" ,:+="):
             raise ValueError(f"a kind needs a {what} without spaces and any of ,:+=, got {text!r}")
     candidates = kind.candidates(robot.anatomy)
@@ -42,7 +42,7 @@ def check_kind(kind: Kind, robot: Robot) -> None:
         if kind.absorbs(fault, fault, robot.anatomy):
             raise ValueError(f"{fault} absorbs itself, so it can never be said")
     for other in kind.others:
-        if other.degrees is not None or (kind.hypothesised and not other.hypothesised):
+        if other.severity_bounds is not None or (kind.searchable and not other.searchable):
             raise ValueError(
                 f"{kind.name} is {other.name} at some degree, which must be a kind without degrees "
                 f"that a diagnosis may propose"
@@ -54,12 +54,12 @@ def check_kind(kind: Kind, robot: Robot) -> None:
 
 
 def _check_degree(fault: Fault, robot: Robot) -> None:
-    if fault.kind.degrees is None:
-        if fault.degree != 0:
-            raise ValueError(f"{fault} has the level {fault.degree}, and the kind no degrees")
+    if fault.kind.severity_bounds is None:
+        if fault.severity != 0:
+            raise ValueError(f"{fault} has the level {fault.severity}, and the kind no degrees")
         return
-    lowest, highest = fault.kind.degrees(robot.anatomy, fault.part)
-    if not lowest <= fault.degree <= highest:
+    lowest, highest = fault.kind.severity_bounds(robot.anatomy, fault.part)
+    if not lowest <= fault.severity <= highest:
         raise ValueError(f"the level of {fault} is not between {lowest} and {highest}")
 
 
@@ -76,7 +76,7 @@ def _check_words(fault: Fault, robot: Robot) -> None:
         raise ValueError(f"{alone} comes back from the genome as {coded}")
 
 
-def _check_edits(kind: Kind, candidates: tuple[Fault, ...], robot: Robot) -> None:
+def _check_edits(kind: FaultKind, candidates: tuple[Fault, ...], robot: Robot) -> None:
     before, intact = _saved(robot.model), _contents(build(robot, INTACT))
     changed = False
     for fault in candidates:
@@ -90,7 +90,7 @@ def _check_edits(kind: Kind, candidates: tuple[Fault, ...], robot: Robot) -> Non
         raise ValueError(f"{kind.name} changes nothing about a robot")
 
 
-def _check_batch(kind: Kind, robot: Robot) -> None:
+def _check_batch(kind: FaultKind, robot: Robot) -> None:
     """One candidate a part, beside an intact robot, and alone."""
     firsts = {fault.part: fault for fault in reversed(kind.candidates(robot.anatomy))}
     hypotheses = [INTACT, *(Hypothesis((fault,)) for fault in firsts.values())]
@@ -107,7 +107,7 @@ def _check_batch(kind: Kind, robot: Robot) -> None:
             raise ValueError(f"a robot with {run[0]} moves differently in a batch and alone")
 
 
-def _check_feel(kind: Kind, candidates: tuple[Fault, ...], robot: Robot) -> None:
+def _check_feel(kind: FaultKind, candidates: tuple[Fault, ...], robot: Robot) -> None:
     """On ground that was felt, and on ground that was not."""
     on_a_step = np.array([[x, 0.0, 0.02 * (x > 2)] for x in np.linspace(1.5, 3, 200)])
     for fault in candidates:

@@ -10,7 +10,7 @@ Losses = Callable[[Sequence[Hypothesis]], FloatArray]
 """How badly hypotheses predict each piece of some trials, ``(n, pieces)``."""
 
 
-class Looks(NamedTuple):
+class LossFunctions(NamedTuple):
     """How badly hypotheses predict the trials that a diagnosis looks at, ``(n, pieces)`` each.
 
     Attributes:

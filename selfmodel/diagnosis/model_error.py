@@ -2,13 +2,15 @@
 
 from itertools import combinations
 
-from selfmodel.diagnosis.loss_functions import Looks
-from selfmodel.diagnosis.significance import only_mends
+from selfmodel.diagnosis.loss_functions import LossFunctions
+from selfmodel.diagnosis.significance import gain_is_model_error
 from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
 from selfmodel.robot.anatomy import Anatomy
 
 
-def mends(hypothesis: Hypothesis, fewer: Hypothesis, looks: Looks, anatomy: Anatomy) -> bool:
+def is_model_error(
+    hypothesis: Hypothesis, fewer: Hypothesis, looks: LossFunctions, anatomy: Anatomy
+) -> bool:
     """Returns whether what a hypothesis says more than another would have helped before as well.
 
     Args:
@@ -28,10 +30,12 @@ def mends(hypothesis: Hypothesis, fewer: Hypothesis, looks: Looks, anatomy: Anat
     if not with_it.mean() < without.mean():
         return False
     with_more, with_fewer = looks.after([hypothesis, fewer])
-    return only_mends(with_more, with_fewer, with_it, without)
+    return gain_is_model_error(with_more, with_fewer, with_it, without)
 
 
-def mends_in_part(hypothesis: Hypothesis, looks: Looks, anatomy: Anatomy) -> bool:
+def any_fault_is_model_error(
+    hypothesis: Hypothesis, looks: LossFunctions, anatomy: Anatomy
+) -> bool:
     """Returns whether one of the faults of a hypothesis would have helped before as well.
 
     Args:
@@ -40,6 +44,6 @@ def mends_in_part(hypothesis: Hypothesis, looks: Looks, anatomy: Anatomy) -> boo
         anatomy: The robot's parts.
     """
     return any(
-        mends(hypothesis, canonical(rest, anatomy), looks, anatomy)
+        is_model_error(hypothesis, canonical(rest, anatomy), looks, anatomy)
         for rest in combinations(hypothesis.faults, max(len(hypothesis) - 1, 0))
     )

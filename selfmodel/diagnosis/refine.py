@@ -9,12 +9,12 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from selfmodel.diagnosis.loss_functions import Looks, Losses
-from selfmodel.diagnosis.model_error import mends
-from selfmodel.diagnosis.severity import with_fitted_degrees, with_mean_degrees
+from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
+from selfmodel.diagnosis.model_error import is_model_error
+from selfmodel.diagnosis.severity import with_fitted_severities, with_mean_severities
 from selfmodel.diagnosis.significance import is_better
 from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
-from selfmodel.faults.kind import Fault, Kind
+from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.robot.anatomy import Anatomy
 
 SHORTLIST = 8
@@ -28,7 +28,7 @@ def refined(
     known: Iterable[Hypothesis],
     faults: Sequence[Fault],
     most: int,
-    looks: Looks,
+    looks: LossFunctions,
     anatomy: Anatomy,
 ) -> Hypothesis:
     """Returns the best hypothesis of which every fault is worth its while.
@@ -55,14 +55,14 @@ def refined(
     for hypothesis in sorted(finest, key=lambda one: (len(one), search.total(one), one)):
         if search.is_better(hypothesis, best):
             best = hypothesis
-    mean = with_mean_degrees(best, looks.after, anatomy)
+    mean = with_mean_severities(best, looks.after, anatomy)
     return mean if search.spared(mean) == mean else best
 
 
 def _closest_parts(search: "_Search") -> list[Hypothesis]:
     """The single faults, closest first, each kind at each part at its best degree only."""
     singles = search.with_one_more(INTACT)
-    parts: dict[tuple[Kind, str], Hypothesis] = {}
+    parts: dict[tuple[FaultKind, str], Hypothesis] = {}
     for single in search.ordered(singles):
         (fault,) = single.faults
         parts.setdefault((fault.kind, fault.part), single)
@@ -79,7 +79,9 @@ def _ordered(hypotheses: Sequence[Hypothesis], losses: Losses) -> list[Hypothesi
 class _Search:
     """Changes of one fault, and what they bring."""
 
-    def __init__(self, faults: Sequence[Fault], most: int, looks: Looks, anatomy: Anatomy) -> None:
+    def __init__(
+        self, faults: Sequence[Fault], most: int, looks: LossFunctions, anatomy: Anatomy
+    ) -> None:
         self._faults, self._most, self._anatomy = faults, most, anatomy
         self._looks = looks
 
@@ -87,10 +89,10 @@ class _Search:
         return float(self._looks.after([hypothesis])[0].sum())
 
     def fitted(self, hypothesis: Hypothesis) -> Hypothesis:
-        return with_fitted_degrees(hypothesis, self._looks.screen, self._anatomy)
+        return with_fitted_severities(hypothesis, self._looks.screen, self._anatomy)
 
     def fitted_finely(self, hypothesis: Hypothesis) -> Hypothesis:
-        return with_fitted_degrees(hypothesis, self._looks.after, self._anatomy)
+        return with_fitted_severities(hypothesis, self._looks.after, self._anatomy)
 
     def is_better(self, one: Hypothesis, other: Hypothesis) -> bool:
         return is_better(*self._looks.after([one, other]))
@@ -146,7 +148,7 @@ class _Search:
 
     def _is_worth_it(self, hypothesis: Hypothesis, fewer: Hypothesis) -> bool:
         """Whether what a hypothesis says more than another tells what has changed."""
-        return self.is_better(hypothesis, fewer) and not mends(
+        return self.is_better(hypothesis, fewer) and not is_model_error(
             hypothesis, fewer, self._looks, self._anatomy
         )
 
@@ -172,9 +174,9 @@ class _Search:
         faults = hypothesis.faults
         fewer = [faults[:i] + faults[i + 1 :] for i in range(len(hypothesis))]
         simpler = [
-            (*faults[:i], dataclasses.replace(fault, degree=special), *faults[i + 1 :])
+            (*faults[:i], dataclasses.replace(fault, severity=special), *faults[i + 1 :])
             for i, fault in enumerate(faults)
-            if fault.degree not in fault.kind.alone
+            if fault.severity not in fault.kind.alone
             for special in (*fault.kind.special, *fault.kind.alone)
         ]
         return self._distinct(hypothesis, [*fewer, *simpler])

@@ -56,7 +56,7 @@ def screen_of(comparator: Comparator, simulator: Simulator, evidence: Evidence) 
         simulator: The self-model.
         evidence: What the comparator makes of whole trials.
     """
-    if not evidence.in_pieces:
+    if not evidence.is_piecewise:
         return Screen(evidence, lambda trial: trial)
     if isinstance(comparator, Screened):
         return Screen(Evidence(simulator, comparator.screen), lambda trial: trial)

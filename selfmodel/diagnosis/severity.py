@@ -9,7 +9,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis.loss_functions import Losses
 from selfmodel.diagnosis.significance import NEGLIGIBLE, is_better, paired_z
 from selfmodel.faults.hypothesis import Hypothesis, canonical
-from selfmodel.faults.kind import Fault, Kind
+from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.robot.anatomy import Anatomy
 
 COARSE = 4
@@ -23,7 +23,7 @@ DECIMALS = 4
 """What a degree is rounded to: nobody measures the ten-thousandth part of it."""
 
 
-def coarse_candidates(kinds: Sequence[Kind], anatomy: Anatomy) -> list[Fault]:
+def coarse_candidates(kinds: Sequence[FaultKind], anatomy: Anatomy) -> list[Fault]:
     """Returns every kind of fault at every part, each at a few degrees.
 
     Args:
@@ -39,7 +39,7 @@ def coarse_candidates(kinds: Sequence[Kind], anatomy: Anatomy) -> list[Fault]:
     ]
 
 
-def with_fitted_degrees(hypothesis: Hypothesis, losses: Losses, anatomy: Anatomy) -> Hypothesis:
+def with_fitted_severities(hypothesis: Hypothesis, losses: Losses, anatomy: Anatomy) -> Hypothesis:
     """Returns the hypothesis with those degrees by which it predicts best.
 
     Degrees are fitted one after another: the best of a kind's levels, then closer and closer.
@@ -60,7 +60,7 @@ def with_fitted_degrees(hypothesis: Hypothesis, losses: Losses, anatomy: Anatomy
     return current
 
 
-def with_mean_degrees(hypothesis: Hypothesis, losses: Losses, anatomy: Anatomy) -> Hypothesis:
+def with_mean_severities(hypothesis: Hypothesis, losses: Losses, anatomy: Anatomy) -> Hypothesis:
     """Returns the hypothesis with the means of the degrees that cannot be told from the best.
 
     Contact makes losses rugged over a degree, and where they are lowest is luck. A degree that
@@ -83,16 +83,16 @@ def with_mean_degrees(hypothesis: Hypothesis, losses: Losses, anatomy: Anatomy) 
 def _averaged(hypothesis: Hypothesis, place: int, losses: Losses, anatomy: Anatomy) -> Hypothesis:
     fault = hypothesis.faults[place]
     limits = _limits(fault, anatomy)
-    if limits is None or fault.kind.reshape:
+    if limits is None or fault.kind.edit_spec:
         return hypothesis
-    known = [fault.degree, *fault.kind.levels(anatomy, fault.part)]
-    degrees = sorted({*known, *_around(fault.degree, known, limits)})
-    if len(degrees) == 1:
+    known = [fault.severity, *fault.kind.levels(anatomy, fault.part)]
+    severities = sorted({*known, *_around(fault.severity, known, limits)})
+    if len(severities) == 1:
         return hypothesis
-    rows = losses([_with(hypothesis, place, degree, anatomy) for degree in degrees])
+    rows = losses([_with(hypothesis, place, severity, anatomy) for severity in severities])
     weights = _weights(rows)
     # They lie closer to each other around the best.
-    mean = np.trapezoid(weights * degrees, degrees) / np.trapezoid(weights, degrees)
+    mean = np.trapezoid(weights * severities, severities) / np.trapezoid(weights, severities)
     return _with(hypothesis, place, round(float(mean), DECIMALS), anatomy)
 
 
@@ -114,29 +114,29 @@ def _fitted(hypothesis: Hypothesis, place: int, losses: Losses, anatomy: Anatomy
     limits = _limits(fault, anatomy)
     if limits is None:
         return hypothesis
-    degrees = [fault.degree, *fault.kind.levels(anatomy, fault.part)]
+    severities = [fault.severity, *fault.kind.levels(anatomy, fault.part)]
     # What reshapes the model, such as rough terrain, has classes and no degrees in between.
-    for _ in range(1 if fault.kind.reshape else 1 + ZOOMS):
-        tried = [_with(hypothesis, place, degree, anatomy) for degree in degrees]
+    for _ in range(1 if fault.kind.edit_spec else 1 + ZOOMS):
+        tried = [_with(hypothesis, place, severity, anatomy) for severity in severities]
         chosen = int(np.argmin(losses(tried).sum(axis=1)))
-        degree, best = degrees[chosen], tried[chosen]
-        degrees = [degree, *_around(degree, degrees, limits)]
+        severity, best = severities[chosen], tried[chosen]
+        severities = [severity, *_around(severity, severities, limits)]
     return best
 
 
 def _limits(fault: Fault, anatomy: Anatomy) -> tuple[float, float] | None:
-    return fault.kind.degrees(anatomy, fault.part) if fault.kind.degrees else None
+    return fault.kind.severity_bounds(anatomy, fault.part) if fault.kind.severity_bounds else None
 
 
-def _around(degree: float, known: Sequence[float], limits: tuple[float, float]) -> list[float]:
+def _around(severity: float, known: Sequence[float], limits: tuple[float, float]) -> list[float]:
     """Degrees from the next smaller one that is known to the next larger one, or to a limit."""
-    low = max((other for other in known if other < degree), default=limits[0])
-    high = min((other for other in known if other > degree), default=limits[1])
+    low = max((other for other in known if other < severity), default=limits[0])
+    high = min((other for other in known if other > severity), default=limits[1])
     around: list[float] = np.linspace(low, high, POINTS).round(DECIMALS).tolist()
     return around
 
 
-def _with(hypothesis: Hypothesis, place: int, degree: float, anatomy: Anatomy) -> Hypothesis:
+def _with(hypothesis: Hypothesis, place: int, severity: float, anatomy: Anatomy) -> Hypothesis:
     faults = list(hypothesis.faults)
-    faults[place] = dataclasses.replace(faults[place], degree=degree)
+    faults[place] = dataclasses.replace(faults[place], severity=severity)
     return canonical(faults, anatomy)

@@ -56,7 +56,7 @@ def paired_z(larger: FloatArray, smaller: FloatArray) -> float:
     return float(difference.mean() / error) if error > 0 else 0.0
 
 
-def has_become_better(
+def gain_exceeds_healthy_gain(
     one: FloatArray, other: FloatArray, one_before: FloatArray, other_before: FloatArray
 ) -> bool:
     """Returns whether a hypothesis predicts significantly better since something is wrong.
@@ -77,7 +77,7 @@ def has_become_better(
     return paired_z(other, one) >= WORSE and more >= WORSE * error
 
 
-def only_mends(
+def gain_is_model_error(
     one: FloatArray, other: FloatArray, one_before: FloatArray, other_before: FloatArray
 ) -> bool:
     """Returns whether what predicts better mends the model, and tells of no change.
@@ -109,7 +109,7 @@ def _gains(
     return other - one, other_before - one_before
 
 
-def is_worse_than_ever(losses: FloatArray, usual: FloatArray) -> bool:
+def exceeds_healthy_loss(losses: FloatArray, usual: FloatArray) -> bool:
     """Returns whether losses are significantly higher than those of a model that was right.
 
     Args:

@@ -4,15 +4,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from selfmodel.diagnosis.loss_functions import Looks, Losses
+from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
 from selfmodel.diagnosis.significance import is_better
 from selfmodel.faults.hypothesis import Hypothesis, canonical
-from selfmodel.faults.kind import Kind
+from selfmodel.faults.kind import FaultKind
 from selfmodel.robot.anatomy import Anatomy
 
 
-def unseen(
-    best: Hypothesis, kinds: Sequence[Kind], anatomy: Anatomy, looks: Looks
+def undetectable_faults(
+    best: Hypothesis, kinds: Sequence[FaultKind], anatomy: Anatomy, looks: LossFunctions
 ) -> list[Hypothesis]:
     """Returns the hypotheses of one fault more that the trials cannot tell from the best.
 
@@ -29,7 +29,7 @@ def unseen(
     Returns:
         Closest first; none where the best itself diverges.
     """
-    exact = [kind for kind in kinds if kind.degrees is None]
+    exact = [kind for kind in kinds if kind.severity_bounds is None]
     faults = [fault for kind in exact for fault in kind.candidates(anatomy)]
     made = dict.fromkeys(canonical([*best.faults, fault], anatomy) for fault in faults)
     more = [one for one in made if len(one) > len(best)]

@@ -4,12 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from selfmodel.diagnosis.diagnosis import Outside
-from selfmodel.diagnosis.loss_functions import Looks
+from selfmodel.diagnosis.diagnosis import UnsearchedFault
+from selfmodel.diagnosis.loss_functions import LossFunctions
 from selfmodel.diagnosis.severity import coarse_candidates
-from selfmodel.diagnosis.significance import NEGLIGIBLE, has_become_better, paired_z
+from selfmodel.diagnosis.significance import NEGLIGIBLE, gain_exceeds_healthy_gain, paired_z
 from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
-from selfmodel.faults.kind import Fault, Kind
+from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.faults.registry import ALL_KINDS
 from selfmodel.robot.anatomy import Anatomy
 
@@ -17,9 +17,9 @@ SHORTLIST = 8
 """Hypotheses that are looked at closely, of those that the screen likes."""
 
 
-def better_outside(
-    best: Hypothesis, considered: Sequence[Kind], anatomy: Anatomy, looks: Looks
-) -> Outside | None:
+def best_unsearched_fault(
+    best: Hypothesis, considered: Sequence[FaultKind], anatomy: Anatomy, looks: LossFunctions
+) -> UnsearchedFault | None:
     """Returns the best hypothesis with a fault that was not considered, if that explains more.
 
     One fault of one kind that comes with selfmodel is added to the best hypothesis, or takes the
@@ -46,19 +46,19 @@ def better_outside(
     for candidate in _shortlist(best, candidates, looks):
         alone = canonical([candidates[candidate]], anatomy)
         usual, with_it = looks.before([INTACT, alone])
-        if has_become_better(looks.after([candidate])[0], mine, with_it, usual):
-            return Outside(candidate, candidates[candidate].kind.name)
+        if gain_exceeds_healthy_gain(looks.after([candidate])[0], mine, with_it, usual):
+            return UnsearchedFault(candidate, candidates[candidate].kind.name)
     return None
 
 
 def _candidates(
-    best: Hypothesis, considered: Sequence[Kind], anatomy: Anatomy
+    best: Hypothesis, considered: Sequence[FaultKind], anatomy: Anatomy
 ) -> dict[Hypothesis, Fault]:
     """Hypotheses, and what each says that was not considered.
 
     What reshapes the model, such as rough terrain, is left out: each needs a model of its own.
     """
-    outside = [kind for kind in ALL_KINDS if kind not in considered and kind.reshape is None]
+    outside = [kind for kind in ALL_KINDS if kind not in considered and kind.edit_spec is None]
     found: dict[Hypothesis, Fault] = {}
     for fault in coarse_candidates(outside, anatomy):
         others = [other for other in best.faults if other.part != fault.part]
@@ -69,7 +69,7 @@ def _candidates(
 
 
 def _shortlist(
-    best: Hypothesis, candidates: dict[Hypothesis, Fault], looks: Looks
+    best: Hypothesis, candidates: dict[Hypothesis, Fault], looks: LossFunctions
 ) -> list[Hypothesis]:
     """Those that the screen likes most, the closest first."""
     if not candidates:

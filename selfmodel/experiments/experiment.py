@@ -13,7 +13,7 @@ from selfmodel.experiments.plugins import NEXT_TRIAL
 from selfmodel.experiments.reality import draw_reality
 from selfmodel.experiments.scoring import is_correct
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
-from selfmodel.faults.kind import Kind
+from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import PAPER_KINDS, known
 from selfmodel.logs.journal import open_journal
 from selfmodel.physical.interface import PhysicalRobot
@@ -22,7 +22,7 @@ from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.recover import Recovery, recover
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.outcome import Tally
+from selfmodel.simulation.outcome import SimulationStats
 from selfmodel.simulation.simulator import Simulator
 
 
@@ -62,7 +62,7 @@ class Experiment:
     gait: Evolved | None = None
     gap: float = 0.0
     structure: bool = False
-    kinds: tuple[Kind, ...] = PAPER_KINDS
+    kinds: tuple[FaultKind, ...] = PAPER_KINDS
     calibrated: bool = True
     next_trial: str = "repair"
     design: Design | None = None
@@ -77,17 +77,17 @@ class Outcome:
     Attributes:
         recovery: How the recovery went.
         correct: Whether the diagnosis is right.
-        tally: What the self-model simulated, up to the judgement.
+        stats: What the self-model simulated, up to the judgement.
         seconds: Wall time of the recovery.
     """
 
     recovery: Recovery
     correct: bool
-    tally: Tally
+    stats: SimulationStats
     seconds: float
 
 
-def run(experiment: Experiment, watch: Callable[[Event], None]) -> Outcome:
+def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
     """Runs an experiment; the algorithm gets physical robots and a journal, and no truth."""
     start = perf_counter()
     robot, truth = experiment.robot, experiment.truth
@@ -112,7 +112,7 @@ def run(experiment: Experiment, watch: Callable[[Event], None]) -> Outcome:
         ),
         settings=experiment.settings,
         seed=experiment.seed,
-        watch=watch,
+        on_event=on_event,
         gait=experiment.gait,
         design=experiment.design,
         kinds=experiment.kinds,
@@ -124,7 +124,7 @@ def run(experiment: Experiment, watch: Callable[[Event], None]) -> Outcome:
     )
     return Outcome(
         recovery=recovery,
-        tally=simulator.tally,
+        stats=simulator.stats,
         seconds=perf_counter() - start,
         correct=is_correct(
             recovery.diagnosis.best,

@@ -110,7 +110,7 @@ def run_grid(
     work: Work,
     *,
     workers: int,
-    watch: Callable[[GridBegins | PartEnds], None],
+    on_event: Callable[[GridBegins | PartEnds], None],
 ) -> tuple[PartEnds, ...]:
     """Does what is not done yet, and returns what failed.
 
@@ -122,7 +122,7 @@ def run_grid(
         jobs: The runs, each with a key of its own.
         work: Does one part; the processes get it pickled, so it stands at the top of a module.
         workers: Processes at a time.
-        watch: Is told what happens.
+        on_event: Is told what happens.
 
     Raises:
         InputError: A run was made of something else; nothing has been done then.
@@ -140,7 +140,7 @@ def run_grid(
     ]
     total = sum(len(job.parts) for job in jobs)
     before = total - sum(map(len, chains))
-    watch(GridBegins(total, before))
+    on_event(GridBegins(total, before))
     failed = []
     with closing(work_off(partial(_perform, folder, work), chains, workers)) as answers:
         for number, ((job, part), answer) in enumerate(answers, start=before + 1):
@@ -148,7 +148,7 @@ def run_grid(
             ends = PartEnds(job.key, part, number, total, seconds, error)
             if error is not None:
                 failed.append(ends)
-            watch(ends)
+            on_event(ends)
     return tuple(failed)
 
 

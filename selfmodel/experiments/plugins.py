@@ -16,7 +16,7 @@ from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.faults.kind import Kind
+from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.neuron import SILENT_NEURON
 from selfmodel.faults.registry import ALL_KINDS, KINDS
 from selfmodel.faults.table_one import cases_of
@@ -144,7 +144,7 @@ def stage(name: str) -> Stage:
     return found
 
 
-def kinds(names: str) -> tuple[Kind, ...]:
+def kinds(names: str) -> tuple[FaultKind, ...]:
     """Returns the kinds of fault and of environment that are meant, for a diagnosis or in notation.
 
     Args:
@@ -155,27 +155,29 @@ def kinds(names: str) -> tuple[Kind, ...]:
         InputError: There is none of a name, an object is no kind, or notation could not tell two
             kinds apart.
     """
-    chosen: list[Kind] = []
+    chosen: list[FaultKind] = []
     for name in (name.strip() for name in names.split(",")):
         chosen += ALL_KINDS if name == "all" else [_kind(name)]
-    taken: dict[object, Kind] = {}
+    taken: dict[object, FaultKind] = {}
     for kind in (*KINDS.values(), *chosen):
-        for called in (kind.name, (kind.word, kind.prefix, kind.degrees is None)):
+        for called in (kind.name, (kind.keyword, kind.prefix, kind.severity_bounds is None)):
             if taken.setdefault(called, kind) is not kind:
                 raise InputError(
-                    f"two of the kinds are called {kind.name!r}, or {kind.word!r} in notation: "
+                    f"two of the kinds are called {kind.name!r}, or {kind.keyword!r} in notation: "
                     f"give yours a name and a word of its own"
                 )
     return tuple(dict.fromkeys(chosen))
 
 
-def _kind(name: str) -> Kind:
+def _kind(name: str) -> FaultKind:
     own = {kind.name: kind for kind in ALL_KINDS}
     if name in own:
         return own[name]
     found = _plugged_in("kind", name, (*own, "all"))
-    if not isinstance(found, Kind):
-        raise InputError(f"{name!r} is no kind: expected a selfmodel.faults.Kind, got {found!r}")
+    if not isinstance(found, FaultKind):
+        raise InputError(
+            f"{name!r} is no kind: expected a selfmodel.faults.FaultKind, got {found!r}"
+        )
     return found
 
 

@@ -3,7 +3,7 @@
 from selfmodel.faults.broken import BROKEN
 from selfmodel.faults.ground import FRICTION, SLOPE
 from selfmodel.faults.jammed import JAMMED, JAMMED_AT_ANGLE
-from selfmodel.faults.kind import WORLD, Fault, Kind, between, grid
+from selfmodel.faults.kind import ENVIRONMENT, Fault, FaultKind, uniform_bounds, uniform_levels
 from selfmodel.faults.motor import WEAK_MOTOR
 from selfmodel.faults.neuron import SILENT_NEURON
 from selfmodel.faults.registry import ALL_KINDS, KINDS, PAPER_KINDS, known
@@ -15,6 +15,7 @@ __all__ = [
     "ALL_KINDS",
     "BROKEN",
     "CROSSWIND",
+    "ENVIRONMENT",
     "FAILED_SENSOR",
     "FRICTION",
     "JAMMED",
@@ -29,10 +30,9 @@ __all__ = [
     "SLOPE",
     "WEAK_MOTOR",
     "WIND",
-    "WORLD",
     "Fault",
-    "Kind",
-    "between",
-    "grid",
+    "FaultKind",
     "known",
+    "uniform_bounds",
+    "uniform_levels",
 ]

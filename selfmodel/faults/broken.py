@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from selfmodel.faults.kind import Fault, Kind
+from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.faults.motor import WEAK_MOTOR
 from selfmodel.robot.anatomy import Anatomy
 
@@ -10,11 +10,11 @@ if TYPE_CHECKING:
     from selfmodel.robot.embodiment import Embodiment
 
 
-def _strike(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+def _apply(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
     """Loses the limb, and with it its readings."""
     lost = anatomy.joint(fault.part).bodies
     for name in lost:
-        embodiment.lose_body(name)
+        embodiment.detach_body(name)
     for column, sensor in enumerate(anatomy.sensors):
         if sensor.body in lost:
             embodiment.fix_reading(column, 0.0)
@@ -35,6 +35,6 @@ def _joints_with_limbs(anatomy: Anatomy) -> tuple[str, ...]:
     return tuple(joint.name for joint in anatomy.joints if "" not in joint.bodies)
 
 
-BROKEN = Kind(
-    name="break", word="break", parts=_joints_with_limbs, strike=_strike, absorbs=_absorbs
+BROKEN = FaultKind(
+    name="break", keyword="break", parts=_joints_with_limbs, apply=_apply, absorbs=_absorbs
 )

@@ -55,13 +55,13 @@ def compile_model(
         seed: As for ``build``.
         edits: As for ``build``.
     """
-    faults = hypothesis.shape.faults
+    faults = hypothesis.spec_part.faults
     if not faults and not edits:
         return robot.model
     spec = robot.specification()
     for fault in faults:
-        if fault.kind.reshape:
-            fault.kind.reshape(spec, fault, seed)
+        if fault.kind.edit_spec:
+            fault.kind.edit_spec(spec, fault, seed)
     for edit in edits:
         edit(spec)
     return spec.compile()
@@ -82,7 +82,7 @@ def apply_faults(
     if not hypothesis.faults:
         return embodiment
     for fault in hypothesis.faults:
-        fault.kind.strike(embodiment, anatomy, fault)
+        fault.kind.apply(embodiment, anatomy, fault)
     # One MjData for both models, whose layouts are the same: its allocation costs the most here.
     data = mujoco.MjData(model)
     nominal = _mean_inertia(model, data)

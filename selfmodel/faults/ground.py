@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from selfmodel.faults.kind import Fault, Kind, between, grid
+from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
 from selfmodel.robot.anatomy import Anatomy
 
 if TYPE_CHECKING:
@@ -10,30 +10,30 @@ if TYPE_CHECKING:
 
 
 def _grip(embodiment: "Embodiment", _anatomy: Anatomy, fault: Fault) -> None:
-    embodiment.set_friction(fault.degree)
+    embodiment.set_friction(fault.severity)
 
 
 def _tilt(embodiment: "Embodiment", _anatomy: Anatomy, fault: Fault) -> None:
-    embodiment.tilt_ground(fault.degree)
+    embodiment.tilt_ground(fault.severity)
 
 
-FRICTION = Kind(
+FRICTION = FaultKind(
     name="friction",
-    word="friction",
-    strike=_grip,
-    degrees=between(0.01, 3.0),
-    levels=grid(0.1, 0.13, 0.16, 0.2, 0.25, 0.32, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.2, 1.5),
+    keyword="friction",
+    apply=_grip,
+    severity_bounds=uniform_bounds(0.01, 3.0),
+    levels=uniform_levels(0.1, 0.13, 0.16, 0.2, 0.25, 0.32, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.2, 1.5),
     unit="(coefficient)",
 )
 """The coefficient of sliding friction between the ground and everything that touches it. It has no
 degree that means nothing: which friction is nominal is the model's affair."""
 
-SLOPE = Kind(
+SLOPE = FaultKind(
     name="slope",
-    word="slope",
-    strike=_tilt,
-    degrees=between(-0.6, 0.6),
-    levels=grid(-0.3, -0.25, -0.2, -0.15, -0.1, -0.05, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3),
+    keyword="slope",
+    apply=_tilt,
+    severity_bounds=uniform_bounds(-0.6, 0.6),
+    levels=uniform_levels(-0.3, -0.25, -0.2, -0.15, -0.1, -0.05, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3),
     special={0.0: None},
     unit="rad",
 )

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from selfmodel.faults.kind import Fault, Kind
+from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.robot.anatomy import Anatomy
 
 
@@ -27,14 +27,14 @@ class Hypothesis:
         return len(self.faults)
 
     @property
-    def motion(self) -> "Hypothesis":
+    def dynamics_part(self) -> "Hypothesis":
         """What of it changes how the robot moves under given commands."""
-        return Hypothesis(tuple(fault for fault in self.faults if fault.kind.moves))
+        return Hypothesis(tuple(fault for fault in self.faults if fault.kind.affects_dynamics))
 
     @property
-    def shape(self) -> "Hypothesis":
+    def spec_part(self) -> "Hypothesis":
         """What of it is worked into the model before that is compiled."""
-        return Hypothesis(tuple(fault for fault in self.faults if fault.kind.reshape))
+        return Hypothesis(tuple(fault for fault in self.faults if fault.kind.edit_spec))
 
 
 INTACT = Hypothesis()
@@ -48,7 +48,7 @@ def canonical(faults: Iterable[Fault], anatomy: Anatomy) -> Hypothesis:
     a broken joint is gone, whatever else was wrong with it. So is one whose degree says that
     nothing is wrong. Of several degrees of one kind on one part the first counts.
     """
-    distinct: dict[tuple[Kind, str], Fault] = {}
+    distinct: dict[tuple[FaultKind, str], Fault] = {}
     for fault in filter(None, (said.settled for said in faults)):
         distinct.setdefault((fault.kind, fault.part), fault)
     for fault in list(distinct.values()):

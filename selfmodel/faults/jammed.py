@@ -6,7 +6,7 @@ A hinge that cannot be at 0 is held at the end of its range that is nearest.
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from selfmodel.faults.kind import Fault, Kind, joints
+from selfmodel.faults.kind import Fault, FaultKind, joints
 from selfmodel.faults.motor import WEAK_MOTOR
 from selfmodel.faults.sensor import FAILED_SENSOR, SENSOR_GAIN
 from selfmodel.robot.anatomy import Anatomy, Joint
@@ -25,12 +25,12 @@ def _strike_at_zero(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) ->
 
 def _strike_at_angle(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
     hinges = anatomy.joint(fault.part).hinges
-    _hold(embodiment, anatomy, dict.fromkeys(hinges, fault.degree))
+    _hold(embodiment, anatomy, dict.fromkeys(hinges, fault.severity))
 
 
 def _hold(embodiment: "Embodiment", anatomy: Anatomy, angles: Mapping[str, float]) -> None:
     for hinge, angle in angles.items():
-        embodiment.hold_hinge(hinge, angle)
+        embodiment.weld_hinge(hinge, angle)
     for column, sensor in enumerate(anatomy.sensors):
         if sensor.hinge in angles:
             embodiment.fix_reading(column, sensor.reading(angles[sensor.hinge]))
@@ -82,17 +82,17 @@ def _levels(anatomy: Anatomy, part: str) -> tuple[float, ...]:
     return tuple(dict.fromkeys(round(angle, 3) + 0.0 for angle in angles if round(angle, 3)))
 
 
-JAMMED = Kind(
-    name="jam", word="jam", parts=joints, strike=_strike_at_zero, absorbs=_absorbs_at_zero
+JAMMED = FaultKind(
+    name="jam", keyword="jam", parts=joints, apply=_strike_at_zero, absorbs=_absorbs_at_zero
 )
 
-JAMMED_AT_ANGLE = Kind(
+JAMMED_AT_ANGLE = FaultKind(
     name="jam-angle",
-    word="jam",
+    keyword="jam",
     parts=_joints_with_angles,
-    strike=_strike_at_angle,
+    apply=_strike_at_angle,
     absorbs=_absorbs_motor,
-    degrees=_degrees,
+    severity_bounds=_degrees,
     levels=_levels,
     special={0.0: JAMMED},
     unit="rad",

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 Values = TypeVar("Values")
 
-WORLD = ""
+ENVIRONMENT = ""
 """The part that an environment strikes: the world, which notation does not name."""
 
 
@@ -24,22 +24,22 @@ def joints(anatomy: Anatomy) -> tuple[str, ...]:
     return tuple(joint.name for joint in anatomy.joints)
 
 
-def in_the_world(_anatomy: Anatomy) -> tuple[str, ...]:
+def environment_part(_anatomy: Anatomy) -> tuple[str, ...]:
     """The parts of a kind of environment."""
-    return (WORLD,)
+    return (ENVIRONMENT,)
 
 
-def harmless(_fault: "Fault", _other: "Fault", _anatomy: Anatomy) -> bool:
+def absorbs_nothing(_fault: "Fault", _other: "Fault", _anatomy: Anatomy) -> bool:
     """A kind whose faults leave every other fault its effect."""
     return False
 
 
-def between(lowest: float, highest: float) -> Callable[[Anatomy, str], tuple[float, float]]:
+def uniform_bounds(lowest: float, highest: float) -> Callable[[Anatomy, str], tuple[float, float]]:
     """Returns the bounds of the degree of a kind for which all parts are alike."""
     return partial(_same_for_all, (lowest, highest))
 
 
-def grid(*levels: float) -> Callable[[Anatomy, str], tuple[float, ...]]:
+def uniform_levels(*levels: float) -> Callable[[Anatomy, str], tuple[float, ...]]:
     """Returns the levels of a kind for which all parts are alike."""
     return partial(_same_for_all, levels)
 
@@ -49,11 +49,12 @@ def _same_for_all(values: Values, _anatomy: Anatomy, _part: str) -> Values:
 
 
 @dataclass(frozen=True, order=True, kw_only=True)
-class Kind:
+class FaultKind:
     """One kind of fault or of environment; known, compared and sorted by its name.
 
-    In notation, a fault is ``word``, ``word:part``, ``word=degree`` or ``word:part=degree``, with
-    the prefix in front of the degree's number. Kinds may share a word, but not word and prefix:
+    In notation, a fault is ``keyword``, ``keyword:part``, ``keyword=severity`` or
+    ``keyword:part=severity``, with the prefix in front of the severity's number. Kinds may share
+    a keyword, but not keyword and prefix:
     ``sensor:X`` and ``sensor:X=gain0.2`` are of two kinds.
 
     Attributes:
@@ -68,7 +69,7 @@ class Kind:
             the points, ``(n, 3)``, world frame, m: for what is random, and known only where the
             robot has been. It is asked when stretches of that trial are predicted.
         parts: The names of the parts it can strike, in the order of the genome's third value; an
-            environment strikes ``WORLD`` alone.
+            environment strikes ``ENVIRONMENT`` alone.
         absorbs: Whether the first fault, of this kind, leaves the second without any effect.
         degrees: Lowest and highest degree a part can have, or None where a degree has no meaning.
         levels: The degrees that a genome or a local search proposes for a part, in the order of
@@ -80,56 +81,58 @@ class Kind:
             has failed, unless it has a bias too.
         prefix: Letters in front of the degree's number in notation.
         unit: The unit of the degree.
-        moves: Whether it changes how a robot moves under given commands; if not, it changes
-            readings only, and needs no simulation of its own where the commands are given.
-        hypothesised: Whether a diagnosis may propose it; otherwise only a physical robot has it.
+        affects_dynamics: Whether it changes how a robot moves under given commands; if not, it
+            changes readings only, and needs no simulation of its own where the commands are given.
+        searchable: Whether a diagnosis may propose it; otherwise only a physical robot has it.
     """
 
     name: str
-    word: str = field(compare=False)
-    strike: Callable[["Embodiment", Anatomy, "Fault"], None] = field(compare=False, repr=False)
-    reshape: Callable[["MjSpec", "Fault", int], None] | None = field(
+    keyword: str = field(compare=False)
+    apply: Callable[["Embodiment", Anatomy, "Fault"], None] = field(compare=False, repr=False)
+    edit_spec: Callable[["MjSpec", "Fault", int], None] | None = field(
         default=None, compare=False, repr=False
     )
     feel: Callable[["Embodiment", "Fault", FloatArray], None] | None = field(
         default=None, compare=False, repr=False
     )
     parts: Callable[[Anatomy], tuple[str, ...]] = field(
-        default=in_the_world, compare=False, repr=False
+        default=environment_part, compare=False, repr=False
     )
     absorbs: Callable[["Fault", "Fault", Anatomy], bool] = field(
-        default=harmless, compare=False, repr=False
+        default=absorbs_nothing, compare=False, repr=False
     )
-    degrees: Callable[[Anatomy, str], tuple[float, float]] | None = field(
+    severity_bounds: Callable[[Anatomy, str], tuple[float, float]] | None = field(
         default=None, compare=False, repr=False
     )
     levels: Callable[[Anatomy, str], tuple[float, ...]] = field(
-        default=grid(0.0), compare=False, repr=False
+        default=uniform_levels(0.0), compare=False, repr=False
     )
-    special: Mapping[float, "Kind | None"] = field(default_factory=dict, compare=False, repr=False)
-    alone: Mapping[float, "Kind"] = field(default_factory=dict, compare=False, repr=False)
+    special: Mapping[float, "FaultKind | None"] = field(
+        default_factory=dict, compare=False, repr=False
+    )
+    alone: Mapping[float, "FaultKind"] = field(default_factory=dict, compare=False, repr=False)
     prefix: str = field(default="", compare=False, repr=False)
     unit: str = field(default="", compare=False, repr=False)
-    moves: bool = field(default=True, compare=False, repr=False)
-    hypothesised: bool = field(default=True, compare=False, repr=False)
+    affects_dynamics: bool = field(default=True, compare=False, repr=False)
+    searchable: bool = field(default=True, compare=False, repr=False)
 
     @property
-    def others(self) -> tuple["Kind", ...]:
+    def others(self) -> tuple["FaultKind", ...]:
         """The kinds that a fault of this kind is of at some degree."""
         found = (*self.special.values(), *self.alone.values())
         return tuple(dict.fromkeys(kind for kind in found if kind is not None))
 
     @property
-    def without_degree(self) -> "Kind":
+    def without_severity(self) -> "FaultKind":
         """The kind that a fault of this kind is at one of its degrees, if any; else this one."""
         return self.others[0] if self.others else self
 
     def candidates(self, anatomy: Anatomy) -> tuple["Fault", ...]:
         """Returns every fault that a genome or a local search proposes: each part, each level."""
         return tuple(
-            Fault(self, part, degree)
+            Fault(self, part, severity)
             for part in self.parts(anatomy)
-            for degree in self.levels(anatomy, part)
+            for severity in self.levels(anatomy, part)
         )
 
 
@@ -139,28 +142,32 @@ class Fault:
 
     Attributes:
         kind: What kind of thing.
-        part: The joint, sensor or neuron it strikes; ``WORLD`` for an environment.
-        degree: How far, in the kind's own unit; 0 for a kind without degrees.
+        part: The joint, sensor or neuron it strikes; ``ENVIRONMENT`` for an environment.
+        severity: How far, in the kind's own unit; 0 for a kind without degrees.
     """
 
-    kind: Kind
+    kind: FaultKind
     part: str
-    degree: float = 0.0
+    severity: float = 0.0
 
     def __str__(self) -> str:
-        term = f"{self.kind.word}:{self.part}" if self.part else self.kind.word
-        return term if self.kind.degrees is None else f"{term}={self.kind.prefix}{self.degree!r}"
+        term = f"{self.kind.keyword}:{self.part}" if self.part else self.kind.keyword
+        return (
+            term
+            if self.kind.severity_bounds is None
+            else f"{term}={self.kind.prefix}{self.severity!r}"
+        )
 
     @property
     def settled(self) -> "Fault | None":
         """The same in the fewest words; None where its degree says that nothing is wrong."""
-        if self.degree not in self.kind.special:
+        if self.severity not in self.kind.special:
             return self
-        kind = self.kind.special[self.degree]
+        kind = self.kind.special[self.severity]
         return None if kind is None else Fault(kind, self.part)
 
     @property
     def settled_alone(self) -> "Fault":
         """The same in the fewest words where nothing else is wrong with the part."""
-        kind = self.kind.alone.get(self.degree)
+        kind = self.kind.alone.get(self.severity)
         return self if kind is None else Fault(kind, self.part)

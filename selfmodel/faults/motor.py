@@ -2,16 +2,16 @@
 
 from typing import TYPE_CHECKING
 
-from selfmodel.faults.kind import Fault, Kind, between, grid
+from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
 from selfmodel.robot.anatomy import Anatomy
 
 if TYPE_CHECKING:
     from selfmodel.robot.embodiment import Embodiment
 
 
-def _strike(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+def _apply(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
     motors = [anatomy.motors.index(motor) for motor in anatomy.joint(fault.part).motors]
-    embodiment.weaken_motors(motors, fault.degree)
+    embodiment.weaken_motors(motors, fault.severity)
 
 
 def _joints_with_motors(anatomy: Anatomy) -> tuple[str, ...]:
@@ -19,13 +19,13 @@ def _joints_with_motors(anatomy: Anatomy) -> tuple[str, ...]:
     return tuple(joint.name for joint in anatomy.joints if joint.motors)
 
 
-WEAK_MOTOR = Kind(
+WEAK_MOTOR = FaultKind(
     name="motor",
-    word="motor",
+    keyword="motor",
     parts=_joints_with_motors,
-    strike=_strike,
-    degrees=between(0.0, 1.0),
-    levels=grid(0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9),
+    apply=_apply,
+    severity_bounds=uniform_bounds(0.0, 1.0),
+    levels=uniform_levels(0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9),
     special={1.0: None},
     unit="of its torque",
 )

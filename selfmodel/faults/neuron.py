@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from selfmodel.faults.kind import Fault, Kind
+from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.robot.anatomy import Anatomy
 
 if TYPE_CHECKING:
@@ -13,8 +13,10 @@ def _parts(anatomy: Anatomy) -> tuple[str, ...]:
     return tuple(str(neuron) for neuron in range(anatomy.neurons))
 
 
-def _strike(embodiment: "Embodiment", _anatomy: Anatomy, fault: Fault) -> None:
+def _apply(embodiment: "Embodiment", _anatomy: Anatomy, fault: Fault) -> None:
     embodiment.neurons[int(fault.part)] = 0.0
 
 
-SILENT_NEURON = Kind(name="neuron", word="neuron", parts=_parts, strike=_strike, hypothesised=False)
+SILENT_NEURON = FaultKind(
+    name="neuron", keyword="neuron", parts=_parts, apply=_apply, searchable=False
+)

@@ -6,7 +6,7 @@ readings, in which touch is 0 or 1 and an angle is 1 at the end of its joint's r
 
 from typing import TYPE_CHECKING
 
-from selfmodel.faults.kind import Fault, Kind, between, grid
+from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
 from selfmodel.robot.anatomy import Anatomy
 
 if TYPE_CHECKING:
@@ -31,15 +31,15 @@ def _fail(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
 
 
 def _scale(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
-    embodiment.scale_reading(_column(anatomy, fault), fault.degree)
+    embodiment.scale_reading(_column(anatomy, fault), fault.severity)
 
 
 def _shift(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
-    embodiment.bias[_column(anatomy, fault)] = fault.degree
+    embodiment.bias[_column(anatomy, fault)] = fault.severity
 
 
 def _blur(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
-    embodiment.noise[_column(anatomy, fault)] = fault.degree
+    embodiment.noise[_column(anatomy, fault)] = fault.severity
 
 
 def _silences(fault: Fault, other: Fault, _anatomy: Anatomy) -> bool:
@@ -47,47 +47,52 @@ def _silences(fault: Fault, other: Fault, _anatomy: Anatomy) -> bool:
     return other.part == fault.part and other.kind in (SENSOR_GAIN, SENSOR_BIAS, SENSOR_NOISE)
 
 
-FAILED_SENSOR = Kind(
-    name="sensor", word="sensor", parts=_sensors, strike=_fail, absorbs=_silences, moves=False
+FAILED_SENSOR = FaultKind(
+    name="sensor",
+    keyword="sensor",
+    parts=_sensors,
+    apply=_fail,
+    absorbs=_silences,
+    affects_dynamics=False,
 )
 
-SENSOR_GAIN = Kind(
+SENSOR_GAIN = FaultKind(
     name="sensor-gain",
-    word="sensor",
+    keyword="sensor",
     prefix="gain",
     parts=_sensors,
-    strike=_scale,
-    moves=False,
-    degrees=between(0.0, 2.0),
-    levels=grid(0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.2, 1.4, 1.6, 1.8, 2.0),
+    apply=_scale,
+    affects_dynamics=False,
+    severity_bounds=uniform_bounds(0.0, 2.0),
+    levels=uniform_levels(0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.2, 1.4, 1.6, 1.8, 2.0),
     special={1.0: None},
     # With a bias, a gain of 0 is a reading that is stuck.
     alone={0.0: FAILED_SENSOR},
     unit="times",
 )
 
-SENSOR_BIAS = Kind(
+SENSOR_BIAS = FaultKind(
     name="sensor-bias",
-    word="sensor",
+    keyword="sensor",
     prefix="bias",
     parts=_sensors,
-    strike=_shift,
-    moves=False,
-    degrees=between(-1.0, 1.0),
-    levels=grid(-0.9, -0.7, -0.5, -0.35, -0.2, -0.1, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9),
+    apply=_shift,
+    affects_dynamics=False,
+    severity_bounds=uniform_bounds(-1.0, 1.0),
+    levels=uniform_levels(-0.9, -0.7, -0.5, -0.35, -0.2, -0.1, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9),
     special={0.0: None},
     unit="of the reading's range",
 )
 
-SENSOR_NOISE = Kind(
+SENSOR_NOISE = FaultKind(
     name="sensor-noise",
-    word="sensor",
+    keyword="sensor",
     prefix="noise",
     parts=_angle_sensors,
-    strike=_blur,
-    moves=False,
-    degrees=between(0.0, 1.0),
-    levels=grid(0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8),
+    apply=_blur,
+    affects_dynamics=False,
+    severity_bounds=uniform_bounds(0.0, 1.0),
+    levels=uniform_levels(0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8),
     special={0.0: None},
     unit="of the reading's range",
 )

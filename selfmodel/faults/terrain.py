@@ -7,7 +7,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
-from selfmodel.faults.kind import Fault, Kind, between, grid
+from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.trials.rotation import rotated
 
@@ -73,7 +73,7 @@ def _reshape(spec: "MjSpec", fault: Fault, seed: int) -> None:
     planes = [geom for geom in spec.worldbody.geoms if geom.type == mujoco.mjtGeom.mjGEOM_PLANE]
     if not planes:
         raise InputError("roughness takes the place of a plane, and the model's world has none")
-    heights = fault.degree * unit_heights(seed)
+    heights = fault.severity * unit_heights(seed)
     low, high = float(heights.min()), float(heights.max())
     spec.add_hfield(
         name=TERRAIN,
@@ -140,23 +140,23 @@ def _feel(embodiment: "Embodiment", fault: Fault, points: FloatArray) -> None:
     back = model.geom_quat[geom] * (1.0, -1.0, -1.0, -1.0)
     in_its_frame = rotated(points - model.geom_pos[geom], back)
     # The data is in parts of the field's height, from the lowest of the heights that were drawn.
-    lowest = fault.degree * float(unit_heights(embodiment.seed).min())
-    parts = (fault.degree * felt_heights(in_its_frame) - lowest) / field.size[2]
+    lowest = fault.severity * float(unit_heights(embodiment.seed).min())
+    parts = (fault.severity * felt_heights(in_its_frame) - lowest) / field.size[2]
     field.data[:] = np.clip(parts, 0, 1)
 
 
-def _strike(_embodiment: "Embodiment", _anatomy: Anatomy, _fault: Fault) -> None:
+def _apply(_embodiment: "Embodiment", _anatomy: Anatomy, _fault: Fault) -> None:
     """The terrain is in the model already."""
 
 
-ROUGHNESS = Kind(
+ROUGHNESS = FaultKind(
     name="roughness",
-    word="roughness",
-    strike=_strike,
-    reshape=_reshape,
+    keyword="roughness",
+    apply=_apply,
+    edit_spec=_reshape,
     feel=_feel,
-    degrees=between(0.0, 0.1),
-    levels=grid(0.01, 0.02, 0.04),
+    severity_bounds=uniform_bounds(0.0, 0.1),
+    levels=uniform_levels(0.01, 0.02, 0.04),
     special={0.0: None},
     unit="m",
 )

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from selfmodel.faults.kind import Fault, Kind, between, grid
+from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
 from selfmodel.robot.anatomy import Anatomy
 
 if TYPE_CHECKING:
@@ -14,8 +14,8 @@ AIR_DENSITY = 1.2
 AIR_VISCOSITY = 1.8e-5
 """Of the same air, Pa s."""
 
-_BOUNDS = between(-40.0, 40.0)
-_LEVELS = grid(
+_BOUNDS = uniform_bounds(-40.0, 40.0)
+_LEVELS = uniform_levels(
     -30.0, -25.0, -20.0, -16.0, -12.0, -8.0, -4.0, 4.0, 8.0, 12.0, 16.0, 20.0, 25.0, 30.0
 )
 
@@ -28,29 +28,29 @@ def _blow(embodiment: "Embodiment", axis: int, speed: float) -> None:
 
 
 def _along(embodiment: "Embodiment", _anatomy: Anatomy, fault: Fault) -> None:
-    _blow(embodiment, 0, fault.degree)
+    _blow(embodiment, 0, fault.severity)
 
 
 def _across(embodiment: "Embodiment", _anatomy: Anatomy, fault: Fault) -> None:
-    _blow(embodiment, 1, fault.degree)
+    _blow(embodiment, 1, fault.severity)
 
 
-WIND = Kind(
+WIND = FaultKind(
     name="wind",
-    word="wind",
-    strike=_along,
-    degrees=_BOUNDS,
+    keyword="wind",
+    apply=_along,
+    severity_bounds=_BOUNDS,
     levels=_LEVELS,
     special={0.0: None},
     unit="m/s",
 )
 """Along forward: positive wind blows from behind, -5 is against the robot."""
 
-CROSSWIND = Kind(
+CROSSWIND = FaultKind(
     name="crosswind",
-    word="crosswind",
-    strike=_across,
-    degrees=_BOUNDS,
+    keyword="crosswind",
+    apply=_across,
+    severity_bounds=_BOUNDS,
     levels=_LEVELS,
     special={0.0: None},
     unit="m/s",

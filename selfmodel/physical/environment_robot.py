@@ -19,7 +19,7 @@ from selfmodel.physical.step_timing import TIME, Stopwatch
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import SIGNALS, Names, Sample, Signal
 
-Observe = Callable[[Any], Mapping[str, Any] | None]
+GenerationCallback = Callable[[Any], Mapping[str, Any] | None]
 """Turns an observation into our signals, each ``(width,)``, and perhaps ``time``; what it leaves
 out, and what is NaN, was not observed. None: nothing was."""
 
@@ -90,7 +90,7 @@ class EnvironmentRobot:
         env: dm_env.Environment,
         robot: Robot,
         *,
-        observe: Observe = by_name,
+        observe: GenerationCallback = by_name,
         stop: Callable[[], object] | None = None,
         safe: FloatArray | None = None,
         limits: Sequence[Limit] = (),
@@ -159,7 +159,7 @@ class EnvironmentRobot:
             for signal in SIGNALS
             if signal in needed or signal == "sensors"
         }
-        watch = Stopwatch(timestep, self._tolerance)
+        on_event = Stopwatch(timestep, self._tolerance)
         ended = False
         for k in range(steps):
             if ended:
@@ -170,7 +170,7 @@ class EnvironmentRobot:
             seen = self._act(commands[0] if k else None)
             ended = seen is not None and seen.last()
             told = self._observe(seen.observation) if seen is not None else None
-            moment = watch.look(self.clock(), told)
+            moment = on_event.look(self.clock(), told)
             values = _rows(names, {} if moment.missing or told is None else told)
             for signal, counts in silent.items():
                 unread = np.isnan(values[signal]) & (signal in needed or moment.missing)

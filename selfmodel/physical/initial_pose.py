@@ -6,7 +6,7 @@ import numpy as np
 from selfmodel.physical.measurement_noise import turned
 from selfmodel.robot.embodiment import WELD_ARMATURE
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state_access import fields_of, places, present, writer
+from selfmodel.robot.state_access import fields_of, present, signal_fields, writer
 
 ANGLES = 0.2
 """Standard deviation of the joint angles at the start, rad, at a level of 1."""
@@ -15,7 +15,7 @@ TILT = 0.1
 """That of the base's roll and of its pitch."""
 
 
-def jitter_start(
+def randomize_initial_pose(
     robot: Robot, model: mujoco.MjModel, data: mujoco.MjData, level: float, rng: np.random.Generator
 ) -> None:
     """Moves a robot from its reference pose to one nearby, and lifts it out of the ground.
@@ -30,7 +30,7 @@ def jitter_start(
         level: The gap's.
         rng: Where the pose is drawn from.
     """
-    where, write = places(robot, model), writer(robot, fields_of(data), model)
+    where, write = signal_fields(robot, model), writer(robot, fields_of(data), model)
     deepest = _depth(robot, model, data)
     angles = level * ANGLES * rng.standard_normal(len(robot.anatomy.hinges))
     for name, angle in zip(robot.anatomy.hinges, angles, strict=True):

@@ -22,13 +22,13 @@ class PhysicalRobot(Protocol):
         Yields:
             The state, the readings and the commands of each step, ``steps`` of them. Times are
             those that the control loop aims at, multiples of the control time step to the bit;
-            when a step really was is its ``moment``, on a robot that is ``Timed``.
+            when a step really was is its ``moment``, on a robot that is ``TimedRobot``.
         """
         ...
 
 
 @runtime_checkable
-class Timed(PhysicalRobot, Protocol):
+class TimedRobot(PhysicalRobot, Protocol):
     """A physical robot with a clock of its own: each of its samples has a ``moment``.
 
     No trial of it can be made again as it was. So one that is stopped before its end is kept as a

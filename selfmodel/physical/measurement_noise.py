@@ -22,30 +22,30 @@ FULL_SCALE: dict[Signal, float] = {
 A joint position's is half the range of its hinge. Commands have none: they are known."""
 
 
-class Instruments(Protocol):
+class Measurement(Protocol):
     """Turns what is into what is received and logged."""
 
-    def receive(self, readings: FloatArray) -> None:
+    def corrupt_readings(self, readings: FloatArray) -> None:
         """Turns the readings, ``(sensors,)``, into those that the controller gets, in place."""
         ...
 
-    def observe(self, signal: Signal, values: FloatArray) -> FloatArray:
+    def measure(self, signal: Signal, values: FloatArray) -> FloatArray:
         """Returns what is logged of a row of a signal, ``(width,)``; it may be the row itself."""
         ...
 
 
-class ExactInstruments:
+class ExactMeasurement:
     """Instruments that tell what is."""
 
-    def receive(self, readings: FloatArray) -> None:
+    def corrupt_readings(self, readings: FloatArray) -> None:
         """Leaves the readings."""
 
-    def observe(self, _signal: Signal, values: FloatArray) -> FloatArray:
+    def measure(self, _signal: Signal, values: FloatArray) -> FloatArray:
         """Returns the values."""
         return values
 
 
-class NoisyInstruments:
+class NoisyMeasurement:
     """Instruments with white noise, of a part of their full scale.
 
     An angle reading gets normal noise of ``level`` (half its range reads as 1). A touch reading is
@@ -69,7 +69,7 @@ class NoisyInstruments:
         # A hinge without limits turns half way round to either side.
         self._half_ranges = np.array([(high - low) / 2 or np.pi for low, high in ranges])
 
-    def receive(self, readings: FloatArray) -> None:
+    def corrupt_readings(self, readings: FloatArray) -> None:
         """Adds noise to the readings."""
         # The same numbers are drawn whatever is dead, so that a fault moves no other noise.
         wrong = self._rng.random(readings.shape) < self._level / 2
@@ -78,7 +78,7 @@ class NoisyInstruments:
         noisy = np.where(self._touch, flipped, readings + noise)
         readings[:] = np.where(self._dead, 0.0, noisy)
 
-    def observe(self, signal: Signal, values: FloatArray) -> FloatArray:
+    def measure(self, signal: Signal, values: FloatArray) -> FloatArray:
         """Returns the values with noise."""
         if signal in ("sensors", "commands"):
             return values

@@ -13,14 +13,14 @@ from selfmodel.errors import TrialError
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.physical.debris import add_debris, drop_debris, lost_limbs
-from selfmodel.physical.initial_pose import jitter_start
-from selfmodel.physical.measurement_noise import ExactInstruments, Instruments, NoisyInstruments
+from selfmodel.physical.initial_pose import randomize_initial_pose
+from selfmodel.physical.measurement_noise import ExactMeasurement, Measurement, NoisyMeasurement
 from selfmodel.physical.reality_gap import Gap, perturbed
 from selfmodel.physical.structural_mismatch import Structure, add_structure
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.sensing import Senses
-from selfmodel.robot.state_access import fields_of, places
+from selfmodel.robot.sensing import SensorReader
+from selfmodel.robot.state_access import fields_of, signal_fields
 from selfmodel.trials.behaviour import SIGNALS, Sample
 
 OWN_SEED = 1
@@ -87,35 +87,35 @@ class SimulatedRobot:
     ) -> Iterator[Sample]:
         robot = self._robot
         model, data = embodiment.model, mujoco.MjData(embodiment.model)
-        instruments: Instruments = ExactInstruments()
+        measurement: Measurement = ExactMeasurement()
         delay, substeps = (
             robot.control_delay,
             round(robot.control_timestep / float(model.opt.timestep)),
         )
         if self._gap is not None:
-            instruments = NoisyInstruments(self._gap.level, robot.anatomy, embodiment, rng)
+            measurement = NoisyMeasurement(self._gap.level, robot.anatomy, embodiment, rng)
             delay += self._gap.delay
-            jitter_start(robot, model, data, self._gap.level, rng)
+            randomize_initial_pose(robot, model, data, self._gap.level, rng)
             drop_debris(model, data, self._limbs)
         mujoco.mj_forward(model, data)
-        senses = Senses(model, robot.anatomy, [embodiment])
+        senses = SensorReader(model, robot.anatomy, [embodiment])
         brain = drive([controller], embodiment.neurons[np.newaxis], len(robot.anatomy.sensors))
         commands = np.zeros((1, model.nu))
         underway = deque(np.zeros((delay, model.nu)))
         # What is logged as commanded is what the controller said, not what the motors have got.
-        where = places(robot, model)
+        where = signal_fields(robot, model)
         live = {signal: place.reader(fields_of(data)) for signal, place in where.items()}
         live |= {"sensors": lambda: brain.readings, "commands": lambda: commands}
         for k in range(steps):
             senses.read(data.sensordata[np.newaxis], data.qpos[np.newaxis], brain.readings)
-            instruments.receive(brain.readings[0])
+            measurement.corrupt_readings(brain.readings[0])
             brain.step(commands)
             underway.append(commands[0].copy())
             data.ctrl[:] = underway.popleft()
             yield Sample(
                 time=k * robot.control_timestep,
                 values={
-                    signal: instruments.observe(signal, live[signal]()[0]).copy()
+                    signal: measurement.measure(signal, live[signal]()[0]).copy()
                     for signal in SIGNALS
                 },
             )

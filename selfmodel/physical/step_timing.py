@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from selfmodel.trials.behaviour import Moment
+from selfmodel.trials.behaviour import StepTiming
 
 TIME = "time"
 """What an observation may tell beside our signals: when it was made, s, by the robot's clock."""
@@ -27,7 +27,7 @@ class Stopwatch:
         self._since = 0
         self._stamped = False
 
-    def look(self, now: float, told: Mapping[str, Any] | None) -> Moment:
+    def look(self, now: float, told: Mapping[str, Any] | None) -> StepTiming:
         """Returns the moment of the next step.
 
         An observation that is not newer than the one before is that one again: it is missing.
@@ -47,8 +47,10 @@ class Stopwatch:
         if math.isnan(elapsed) or (self._stamped and elapsed <= self._last):
             # Without a time an observation may be of any moment.
             unknown = math.isnan(elapsed) and told is not None
-            return Moment(math.nan, late=unknown, missing=not unknown)
+            return StepTiming(math.nan, late=unknown, missing=not unknown)
         off = abs(elapsed - self._last - self._since * self._timestep)
         self._last, self._since = elapsed, 0
         # Nothing is before the first: its NaN is never late.
-        return Moment(elapsed, late=off > self._tolerance * self._timestep, missing=told is None)
+        return StepTiming(
+            elapsed, late=off > self._tolerance * self._timestep, missing=told is None
+        )

@@ -7,7 +7,7 @@ from selfmodel.controllers.driver import Evolved
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.physical.interface import PhysicalRobot
-from selfmodel.trials.trial import Plan, Trial
+from selfmodel.trials.trial import Trial, TrialPlan
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ class Database:
 class Journal(Protocol):
     """Keeps a recovery in files; the algorithm knows of the past only what it reads back here."""
 
-    def record(self, physical: PhysicalRobot, plan: Plan) -> Trial:
+    def record(self, physical: PhysicalRobot, plan: TrialPlan) -> Trial:
         """Runs a trial, logs it while it runs, and returns it as its file says it."""
         ...
 

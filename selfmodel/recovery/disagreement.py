@@ -15,8 +15,8 @@ from selfmodel.controllers.driver import Driver, Evolved
 from selfmodel.controllers.playback import Playback
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.simulation.cache import Memo
-from selfmodel.simulation.outcome import Simulated
+from selfmodel.simulation.cache import Cache
+from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour, Signal
 from selfmodel.trials.rotation import directions
@@ -49,7 +49,7 @@ STEEPEST = np.radians(60)
 """A base that leans by more than at the start has fallen, rad."""
 
 
-class Dispute:
+class Disagreement:
     """What some hypotheses disagree on; no controller is looked at twice.
 
     The predictions that are compared are of the same commands, those that the first hypothesis
@@ -65,9 +65,9 @@ class Dispute:
     def __init__(self, hypotheses: Sequence[Hypothesis], simulator: Simulator, steps: int) -> None:
         self._hypotheses, self._simulator, self._steps = tuple(hypotheses), simulator, steps
         self._early = min(steps, EARLY)
-        self._seen: Memo[Evolved] = Memo()
+        self._seen: Cache[Evolved] = Cache()
 
-    def most_telling(self, candidates: Sequence[Evolved]) -> Evolved:
+    def most_discriminative(self, candidates: Sequence[Evolved]) -> Evolved:
         """Returns the controller whose trial is predicted to tell the hypotheses apart best.
 
         A controller with which the robot falls under any of the hypotheses, or whose simulation
@@ -86,7 +86,7 @@ class Dispute:
                 return candidates[i]
         return candidates[int(falls.argmax())]
 
-    def most_telling_first(self, candidates: Sequence[Evolved]) -> list[Evolved]:
+    def most_discriminative_first(self, candidates: Sequence[Evolved]) -> list[Evolved]:
         """Returns the controllers, those on which the hypotheses disagree most first.
 
         Those with which the robot falls at once come last, the earliest fall at the end.
@@ -95,7 +95,7 @@ class Dispute:
 
     def _ordered(self, candidates: Sequence[Evolved]) -> tuple[IndexArray, list[int]]:
         """When the robot first falls with each, and the numbers of all, the most telling first."""
-        falls, telling = np.array(self._seen.values(candidates, self._looked_at)).T
+        falls, telling = np.array(self._seen.get_or_compute(candidates, self._looked_at)).T
         return falls.astype(np.intp), np.lexsort((-telling, -falls)).tolist()
 
     def _looked_at(self, candidates: Sequence[Evolved]) -> FloatArray:
@@ -112,13 +112,13 @@ class Dispute:
             telling[upright] = np.where(found.diverged.any(axis=1), -1.0, parted)
         return np.stack([falls, telling], axis=1)
 
-    def _predicted(self, drivers: Sequence[Driver], steps: int) -> Simulated:
+    def _predicted(self, drivers: Sequence[Driver], steps: int) -> SimulationResult:
         """Each driver under each hypothesis, ``(drivers, hypotheses, steps, width)``."""
         runs = [(hypothesis, one) for one in drivers for hypothesis in self._hypotheses]
         outcome = self._simulator.run(runs, steps, (*SCALES, "commands"))
         return outcome.grouped(len(drivers), len(self._hypotheses))
 
-    def _first_falls(self, simulated: Simulated) -> IndexArray:
+    def _first_falls(self, simulated: SimulationResult) -> IndexArray:
         """When the robot first falls under any of the hypotheses; what diverges falls at once."""
         robot = self._simulator.robot
         normals = np.array([build(robot, hypothesis).normal for hypothesis in self._hypotheses])

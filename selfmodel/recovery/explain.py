@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Collection, Sequence
 
-from selfmodel.diagnosis.diagnose import Diagnose
+from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.errors import InputError
 from selfmodel.recovery.database import Database
@@ -11,11 +11,11 @@ from selfmodel.recovery.random_streams import diagnosis_stream
 from selfmodel.trials.trial import Trial
 
 
-def explain(
+def diagnose_trials(
     trials: Sequence[Trial],
-    diagnose: Diagnose,
+    diagnose: DiagnosticSearch,
     seed: int,
-    watch: Callable[[Event], None],
+    on_event: Callable[[Event], None],
     after: Collection[int] | None = None,
 ) -> Diagnosis:
     """Returns the hypotheses that explain all trials, ranked.
@@ -27,7 +27,7 @@ def explain(
         trials: Those since something is wrong, in the order in which they were run.
         diagnose: The diagnostic EA.
         seed: Every random choice comes from it.
-        watch: Is told what happens.
+        on_event: Is told what happens.
         after: After how many trials a diagnosis is made, the last one included; after each, if none
             are given.
 
@@ -39,10 +39,10 @@ def explain(
     diagnose.check(trials)
     known = Database()
     for number in range(1, len(trials) + 1) if after is None else sorted(after):
-        watch(SearchBegins("diagnostic"))
+        on_event(SearchBegins("diagnostic"))
         diagnosis = diagnose(
-            trials[:number], known.hypotheses, diagnosis_stream(seed, number), watch
+            trials[:number], known.hypotheses, diagnosis_stream(seed, number), on_event
         )
         known = Database(diagnoses=(diagnosis,))
-        watch(diagnosis)
+        on_event(diagnosis)
     return diagnosis

@@ -9,10 +9,10 @@ import numpy as np
 from selfmodel.controllers.driver import Evolved
 from selfmodel.controllers.network import draw_weights
 from selfmodel.diagnosis.diagnosis import Diagnosis
-from selfmodel.evolution import varied
+from selfmodel.evolution import reproduce
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.recovery.database import Database
-from selfmodel.recovery.disagreement import Dispute
+from selfmodel.recovery.disagreement import Disagreement
 from selfmodel.recovery.events import Event, Question
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
@@ -36,7 +36,7 @@ class Situation:
         settings: The paper's numbers.
         rng: Every random choice comes from it.
         repaired: Evolves the controller that compensates for what the last diagnosis says.
-        watch: Is told what happens.
+        on_event: Is told what happens.
     """
 
     known: Database
@@ -45,7 +45,7 @@ class Situation:
     settings: Settings
     rng: np.random.Generator
     repaired: Callable[[], Evolved]
-    watch: Callable[[Event], None]
+    on_event: Callable[[Event], None]
 
 
 NextTrial = Callable[[Situation], Evolved]
@@ -65,12 +65,12 @@ def by_disagreement(situation: Situation) -> Evolved:
     bring the robot back, and what is never tried restores nothing.
     """
     *earlier, diagnosis = situation.known.diagnoses
-    asked = bool(earlier) and earlier[-1].unseen == diagnosis.unseen
-    sure = diagnosis.verdict == "explained" and (asked or not diagnosis.unseen)
+    asked = bool(earlier) and earlier[-1].undetectable == diagnosis.undetectable
+    sure = diagnosis.verdict == "explained" and (asked or not diagnosis.undetectable)
     if sure or situation.trials_left == 1:
         return situation.repaired()
-    situation.watch(Question(in_the_running(diagnosis)))
-    return telling_apart(
+    situation.on_event(Question(candidates_to_separate(diagnosis)))
+    return discriminating_controller(
         diagnosis,
         situation.known.controllers,
         situation.simulator,
@@ -79,7 +79,7 @@ def by_disagreement(situation: Situation) -> Evolved:
     )
 
 
-def telling_apart(
+def discriminating_controller(
     diagnosis: Diagnosis,
     known: Sequence[Evolved],
     simulator: Simulator,
@@ -95,24 +95,26 @@ def telling_apart(
         settings: The paper's numbers.
         rng: Every random choice comes from it.
     """
-    dispute = Dispute(in_the_running(diagnosis), simulator, settings.steps)
+    dispute = Disagreement(candidates_to_separate(diagnosis), simulator, settings.steps)
     pool = candidates(known, settings, rng)
     for _ in range(GENERATIONS):
-        best = dispute.most_telling_first(pool)[: settings.survivors]
+        best = dispute.most_discriminative_first(pool)[: settings.survivors]
         children = offspring(best, settings, rng)
         pool = [one for one in dict.fromkeys([*best, *children]) if one != known[0]]
-    return dispute.most_telling(pool)
+    return dispute.most_discriminative(pool)
 
 
-def in_the_running(diagnosis: Diagnosis) -> tuple[Hypothesis, ...]:
+def candidates_to_separate(diagnosis: Diagnosis) -> tuple[Hypothesis, ...]:
     """Returns the best hypothesis and those that a trial should tell from it, five at most.
 
     They are its rivals, or where it has none and explains too little those that follow it in the
     ranking; then what may be wrong besides. Where that is nothing, they are those that follow it.
     """
     followers = tuple(one.hypothesis for one in diagnosis.ranked[1:] if math.isfinite(one.distance))
-    others = diagnosis.rivals or (followers if diagnosis.verdict == "unexplained" else ())
-    untold = dict.fromkeys([*others, *diagnosis.unseen]) or followers
+    others = diagnosis.indistinguishable or (
+        followers if diagnosis.verdict == "unexplained" else ()
+    )
+    untold = dict.fromkeys([*others, *diagnosis.undetectable]) or followers
     return (diagnosis.best, *untold)[:MOST]
 
 
@@ -147,7 +149,7 @@ def offspring(
         rng: Every random choice comes from it.
     """
     genomes = np.array([parent.genome for parent in parents])
-    bred = varied(
+    bred = reproduce(
         np.resize(genomes, (settings.population, genomes.shape[1])), draw_weights, settings, rng
     )
     return [parents[0].design.controller(genome) for genome in bred]

@@ -7,22 +7,22 @@ from functools import partial
 
 from selfmodel.controllers.driver import Design, Evolved
 from selfmodel.diagnosis.comparator import Comparator
-from selfmodel.diagnosis.diagnose import Diagnose
+from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
-from selfmodel.faults.kind import Kind
-from selfmodel.faults.registry import PAPER_KINDS, considered
+from selfmodel.faults.kind import FaultKind
+from selfmodel.faults.registry import PAPER_KINDS, applicable_kinds
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery.database import Journal
 from selfmodel.recovery.events import Event, SearchBegins
 from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.next_trial import NextTrial, Situation, by_repair
 from selfmodel.recovery.random_streams import choice_stream, diagnosis_stream, repair_stream
-from selfmodel.recovery.repair import Repair
+from selfmodel.recovery.repair import RepairSearch
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibrate import Calibration
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.trial import Plan, Stage, Trial
+from selfmodel.trials.trial import Stage, Trial, TrialPlan
 
 
 @dataclass(frozen=True)
@@ -76,10 +76,10 @@ def recover(
     journal: Journal,
     settings: Settings,
     seed: int,
-    watch: Callable[[Event], None],
+    on_event: Callable[[Event], None],
     gait: Evolved | None = None,
     design: Design | None = None,
-    kinds: Sequence[Kind] = PAPER_KINDS,
+    kinds: Sequence[FaultKind] = PAPER_KINDS,
     calibrate: Callable[[Sequence[Trial]], Calibration] | None = None,
     next_trial: NextTrial = by_repair,
     score: Score = DISPLACEMENT,
@@ -94,7 +94,7 @@ def recover(
         journal: Keeps the trials and diagnoses; everything about the past is read back from it.
         settings: The paper's numbers.
         seed: Every random choice comes from it.
-        watch: Is told what happens.
+        on_event: Is told what happens.
         gait: How the robot walks before it fails; evolved if there is none. The rest of the
             recovery is the same whether a gait was evolved here, or earlier from the same seed.
         design: The kind of controller to evolve; the paper's network if none is given.
@@ -109,44 +109,44 @@ def recover(
     """
     # As the robot's own model says: a fitted one is written with fewer digits.
     design = simulator.robot.network if design is None else design
-    repair = Repair(simulator, settings, design, score=score)
+    repair = RepairSearch(simulator, settings, design, score=score)
     tried: list[Hypothesis] = []
 
     def evolve_controller(hypothesis: Hypothesis) -> Evolved:
-        watch(SearchBegins("repair", hypothesis))
+        on_event(SearchBegins("repair", hypothesis))
         known = journal.read()
         rng = repair_stream(seed, len(known.diagnoses))
-        return repair(hypothesis, known.controllers, rng, watch)
+        return repair(hypothesis, known.controllers, rng, on_event)
 
-    def explain() -> Diagnosis:
-        watch(SearchBegins("diagnostic"))
+    def diagnose_trials() -> Diagnosis:
+        on_event(SearchBegins("diagnostic"))
         known = journal.read()
         rng = diagnosis_stream(seed, len(known.diagnoses) + 1)
-        diagnosis = diagnose(known.evidence, known.hypotheses, rng, watch)
+        diagnosis = diagnose(known.evidence, known.hypotheses, rng, on_event)
         journal.note(diagnosis)
-        watch(diagnosis)
+        on_event(diagnosis)
         return diagnosis
 
     def act(robot: PhysicalRobot, stage: Stage, believed: Hypothesis, by: Evolved) -> None:
-        plan = Plan(f"{len(tried):02d}-{stage}", stage, by, settings.steps, seed)
+        plan = TrialPlan(f"{len(tried):02d}-{stage}", stage, by, settings.steps, seed)
         tried.append(believed)
-        watch(journal.record(robot, plan))
+        on_event(journal.record(robot, plan))
 
-    considered(kinds, simulator.robot.anatomy)  # before any trial is spent
+    applicable_kinds(kinds, simulator.robot.anatomy)  # before any trial is spent
     if gait is None:
         gait = evolve_controller(INTACT)
     act(healthy, "before", INTACT, gait)
     intact = journal.read().trials
     calibration = calibrate(intact) if calibrate else None
     if calibration is not None:
-        watch(calibration)
+        on_event(calibration)
         if calibration.robot is not simulator.robot:
-            simulator = Simulator(calibration.robot, simulator.threads, simulator.tally)
-            repair = Repair(simulator, settings, design, repair.evaluations, score)
-    diagnose = Diagnose(simulator, comparator, settings, kinds, intact=intact)
+            simulator = Simulator(calibration.robot, simulator.threads, simulator.stats)
+            repair = RepairSearch(simulator, settings, design, repair.evaluations, score)
+    diagnose = DiagnosticSearch(simulator, comparator, settings, kinds, intact=intact)
     act(damaged, "after", INTACT, gait)
     for trials_left in range(settings.trials, 0, -1):
-        believed = explain().best
+        believed = diagnose_trials().best
         known = journal.read()
         situation = Situation(
             known=known,
@@ -155,10 +155,10 @@ def recover(
             settings=settings,
             rng=choice_stream(seed, len(known.diagnoses)),
             repaired=partial(evolve_controller, believed),
-            watch=watch,
+            on_event=on_event,
         )
         act(damaged, "recovery", believed, next_trial(situation))
-    diagnosis = explain()
+    diagnosis = diagnose_trials()
 
     return Recovery(
         trials=journal.read().trials,

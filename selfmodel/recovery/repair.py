@@ -7,16 +7,16 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.driver import Design, Evolved
 from selfmodel.controllers.network import draw_weights
-from selfmodel.evolution import Evolution, Observe, evolve
+from selfmodel.evolution import Evolution, GenerationCallback, evolve
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.settings import Settings
-from selfmodel.simulation.cache import Memo
+from selfmodel.simulation.cache import Cache
 from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.trials.behaviour import Behaviour
 
 
-class Repair:
+class RepairSearch:
     """Evolves controllers in simulation; it remembers the fitness of every run.
 
     Fitness is the forward displacement in metres, or another score. Source: the paper, section III.
@@ -41,7 +41,7 @@ class Repair:
         self._simulator = simulator
         self._settings = settings
         self._design = simulator.robot.network if design is None else design
-        self._fitness: Memo[Run] = Memo()
+        self._fitness: Cache[Run] = Cache()
         self._score = score
         self.evaluations = evaluations
 
@@ -50,7 +50,7 @@ class Repair:
         hypothesis: Hypothesis,
         seeds: Sequence[Evolved],
         rng: np.random.Generator,
-        observe: Observe,
+        on_generation: GenerationCallback,
     ) -> Evolved:
         """Returns the best controller found.
 
@@ -59,13 +59,13 @@ class Repair:
             seeds: Controllers to start from, beside random ones; those of another design are left
                 out.
             rng: Every random choice comes from it.
-            observe: Is told of every generation.
+            on_generation: Is told of every generation.
         """
         design = self._design
 
         def fitness(genomes: FloatArray) -> FloatArray:
             runs: list[Run] = [(hypothesis, design.controller(genome)) for genome in genomes]
-            return np.array(self._fitness.values(runs, self._simulate))
+            return np.array(self._fitness.get_or_compute(runs, self._simulate))
 
         search = Evolution(
             design.weights,
@@ -74,7 +74,7 @@ class Repair:
             rng,
             [controller.genome for controller in seeds if controller.design == design],
         )
-        evolve(search, fitness, observe)
+        evolve(search, fitness, on_generation)
         self.evaluations += search.evaluations
         return design.controller(search.best)
 

@@ -27,7 +27,7 @@ def read_anatomy(model: mujoco.MjModel, root: int, neurons: int = HIDDEN_NEURONS
     controller.
 
     Args:
-        model: A compiled MJCF that ``carried.check_carried`` lets through.
+        model: A compiled MJCF that ``carried.check_model`` lets through.
         root: The number of the root body, whose own joints are not the limbs'.
         neurons: Hidden neurons of its controller.
 

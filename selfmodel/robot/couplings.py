@@ -26,19 +26,19 @@ def cut(model: mujoco.MjModel, body: int) -> None:
     _separate(model, body)
 
 
-def settle(model: mujoco.MjModel, held: frozenset[int]) -> None:
+def settle(model: mujoco.MjModel, welded: frozenset[int]) -> None:
     """Ends the limits and constraints of joints that are all held: they would push against a weld.
 
     Args:
         model: Changed; its layout is not.
-        held: The numbers of all joints that are held still.
+        welded: The numbers of all joints that are held still.
     """
     for tendon in range(model.ntendon):
-        if tendon_joints(model, tendon) <= held:
+        if tendon_joints(model, tendon) <= welded:
             _slacken(model, tendon)
     for constraint in range(model.neq):
         joints = _joints(model, constraint)
-        if joints and joints <= held:
+        if joints and joints <= welded:
             model.eq_active0[constraint] = 0
 
 

@@ -16,7 +16,7 @@ from selfmodel.robot import couplings
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.transmission import motor_bodies, motor_joints
 
-GHOST_ARMATURE = 1.0
+DETACHED_ARMATURE = 1.0
 """Rotor inertia of a lost hinge, kg m^2; any positive value keeps the mass matrix invertible, and
 nothing couples it to what is left of the robot."""
 
@@ -38,8 +38,8 @@ class Embodiment:
         bias: Is added to that, whatever the sensor measures, ``(sensors,)``.
         noise: Standard deviation of what is added last, ``(sensors,)``; see ``robot.noise``.
         neurons: 1 for each hidden neuron that works, 0 for a silent one, ``(hidden,)``.
-        held: Of each hinge that is held still its places in ``qpos`` and ``qvel`` and its angle.
-        loose: The joints of lost bodies, by name: nothing moves them.
+        welded: Of each hinge that is held still its places in ``qpos`` and ``qvel`` and its angle.
+        detached: The joints of lost bodies, by name: nothing moves them.
         seed: Of what is random in it: the noise, and the shape of rough terrain.
         normal: Unit vector that stands on the ground, world frame, ``(3,)``.
     """
@@ -50,8 +50,8 @@ class Embodiment:
     bias: FloatArray
     noise: FloatArray
     neurons: FloatArray
-    held: list[tuple[int, int, float]] = field(default_factory=list)
-    loose: set[str] = field(default_factory=set)
+    welded: list[tuple[int, int, float]] = field(default_factory=list)
+    detached: set[str] = field(default_factory=set)
     seed: int = 0
     normal: FloatArray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
 
@@ -75,16 +75,16 @@ class Embodiment:
             seed=seed,
         )
 
-    def lose_body(self, name: str) -> None:
+    def detach_body(self, name: str) -> None:
         """Makes a body a ghost: no mass, no collisions, no force from its motors and couplings."""
         model, body = self.model, self.model.body(name).id
-        self.loose.update(model.joint(j).name for j in np.flatnonzero(model.jnt_bodyid == body))
+        self.detached.update(model.joint(j).name for j in np.flatnonzero(model.jnt_bodyid == body))
         model.body_mass[body] = 0.0
         model.body_inertia[body] = 0.0
         model.geom_contype[model.geom_bodyid == body] = 0
         model.geom_conaffinity[model.geom_bodyid == body] = 0
         degrees = model.dof_bodyid == body
-        model.dof_armature[degrees] = GHOST_ARMATURE
+        model.dof_armature[degrees] = DETACHED_ARMATURE
         model.dof_frictionloss[degrees] = 0.0
         model.jnt_stiffness[model.jnt_bodyid == body] = 0.0
         model.jnt_stiffnesspoly[model.jnt_bodyid == body] = 0.0
@@ -95,7 +95,7 @@ class Embodiment:
                 self.release_motor(motor)
         couplings.cut(model, body)
 
-    def hold_hinge(self, name: str, angle: float) -> None:
+    def weld_hinge(self, name: str, angle: float) -> None:
         """Holds a hinge rigidly at an angle, rad.
 
         The angle becomes the reference of the hinge and part of its body's frame, as in a model
@@ -117,14 +117,14 @@ class Embodiment:
         model.dof_armature[hinge.dofadr[0]] = WELD_ARMATURE
         # A limit that it touches must not push against the weld.
         model.jnt_limited[hinge.id] = 0
-        self.held.append((int(hinge.qposadr[0]), int(hinge.dofadr[0]), angle))
+        self.welded.append((int(hinge.qposadr[0]), int(hinge.dofadr[0]), angle))
         couplings.keep_meaning(model, int(hinge.id), shift)
-        places = [position for position, _, _ in self.held]
-        held = frozenset(np.flatnonzero(np.isin(model.jnt_qposadr, places)).tolist())
-        couplings.settle(model, held)
+        places = [position for position, _, _ in self.welded]
+        welded = frozenset(np.flatnonzero(np.isin(model.jnt_qposadr, places)).tolist())
+        couplings.settle(model, welded)
         for motor in range(model.nu):
             moved = motor_joints(model, motor)
-            if moved and moved <= held:
+            if moved and moved <= welded:
                 self.release_motor(motor)
 
     def release_motor(self, motor: int) -> None:

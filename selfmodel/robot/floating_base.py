@@ -22,7 +22,7 @@ Reader = Callable[[], FloatArray]
 
 
 @dataclass(frozen=True)
-class Place:
+class StateField:
     """A field of MjData, and the columns of it that hold a signal."""
 
     field: str
@@ -35,7 +35,7 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Derived:
+class DerivedSignal:
     """A signal that follows from positions and velocities."""
 
     compute: Callable[[FloatArray, FloatArray], FloatArray]
@@ -58,7 +58,7 @@ class FreeRoot:
     position: int
     velocity: int
 
-    def places(self) -> dict[Signal, Place | Derived]:
+    def signal_fields(self) -> dict[Signal, StateField | DerivedSignal]:
         """Returns where the signals of the base stand."""
         return dict(self._columns())
 
@@ -75,13 +75,13 @@ class FreeRoot:
             if signal in base:
                 fields[place.field][:, place.columns] = base[signal]
 
-    def _columns(self) -> dict[Signal, Place]:
+    def _columns(self) -> dict[Signal, StateField]:
         q, v = self.position, self.velocity
         return {
-            "base_position": Place("qpos", slice(q, q + 3)),
-            "base_orientation": Place("qpos", slice(q + 3, q + 7)),
-            "base_linear_velocity": Place("qvel", slice(v, v + 3)),
-            "base_angular_velocity": Place("qvel", slice(v + 3, v + 6)),
+            "base_position": StateField("qpos", slice(q, q + 3)),
+            "base_orientation": StateField("qpos", slice(q + 3, q + 7)),
+            "base_linear_velocity": StateField("qvel", slice(v, v + 3)),
+            "base_angular_velocity": StateField("qvel", slice(v + 3, v + 6)),
         }
 
 
@@ -123,13 +123,13 @@ class SlidingRoot:
     axis: FloatArray
     anchor: FloatArray
 
-    def places(self) -> dict[Signal, Place | Derived]:
+    def signal_fields(self) -> dict[Signal, StateField | DerivedSignal]:
         """Returns how the signals of the base follow from the state."""
         return {
-            "base_position": Derived(self._position),
-            "base_orientation": Derived(self._orientation),
-            "base_linear_velocity": Derived(self._linear_velocity),
-            "base_angular_velocity": Derived(self._angular_velocity),
+            "base_position": DerivedSignal(self._position),
+            "base_orientation": DerivedSignal(self._orientation),
+            "base_linear_velocity": DerivedSignal(self._linear_velocity),
+            "base_angular_velocity": DerivedSignal(self._angular_velocity),
         }
 
     def write(self, qpos: FloatArray, qvel: FloatArray, base: Mapping[Signal, FloatArray]) -> None:

@@ -25,7 +25,7 @@ _GAINS = (int(mujoco.mjtGain.mjGAIN_FIXED), int(mujoco.mjtGain.mjGAIN_AFFINE))
 _BIASES = (int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_AFFINE))
 
 
-def check_carried(model: mujoco.MjModel, root: int) -> None:
+def check_model(model: mujoco.MjModel, root: int) -> None:
     """Checks that a robot of this model can be logged, damaged and predicted from its logs.
 
     Args:

@@ -21,7 +21,7 @@ from selfmodel.robot.custom_numerics import (
     hidden_neurons,
 )
 from selfmodel.robot.floating_base import find_root
-from selfmodel.robot.model_checks import check_carried
+from selfmodel.robot.model_checks import check_model
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ class Robot:
         if not model.opt.timestep > 0:
             raise ValueError(f"the physics time step must be above 0 s, got {model.opt.timestep}")
         root = find_root(model, driven_joints(model))
-        check_carried(model, root)
+        check_model(model, root)
         object.__setattr__(self, "model", model)
         object.__setattr__(self, "anatomy", read_anatomy(model, root, hidden_neurons(model)))
         object.__setattr__(self, "root", str(model.body(root).name))

@@ -11,7 +11,7 @@ from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.noise import SensorNoise
 
 
-class Senses:
+class SensorReader:
     """Turns the state of many robots into readings: touch 0 or 1, angles from -1 to 1.
 
     Angles are read from the joint positions themselves: after a step, MuJoCo's sensors are one

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray, columns
-from selfmodel.robot.floating_base import Bind, Derived, Place, root_of
+from selfmodel.robot.floating_base import Bind, DerivedSignal, StateField, root_of
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Signal
 
@@ -14,11 +14,13 @@ Writer = Callable[[Mapping[Signal, FloatArray]], None]
 """Puts signals of the state, ``(n, width)`` each, into it; what is not given stays."""
 
 
-def places(robot: Robot, *models: mujoco.MjModel) -> dict[Signal, Place | Derived]:
+def signal_fields(
+    robot: Robot, *models: mujoco.MjModel
+) -> dict[Signal, StateField | DerivedSignal]:
     """Returns where each signal stands that is part of the physics' state.
 
     The commands are the controls; what the sensors read is not among them, because a controller
-    receives it only through ``Senses``.
+    receives it only through ``SensorReader``.
 
     Args:
         robot: The robot, whose parts the signals tell of.
@@ -29,9 +31,9 @@ def places(robot: Robot, *models: mujoco.MjModel) -> dict[Signal, Place | Derive
     model = models[0]
     motors = columns([int(model.actuator(name).id) for name in robot.anatomy.motors])
     return {
-        "commands": Place("ctrl", motors),
+        "commands": StateField("ctrl", motors),
         **_joints(robot, model),
-        **root_of(models, robot.root).places(),
+        **root_of(models, robot.root).signal_fields(),
     }
 
 
@@ -67,17 +69,17 @@ def fields_of(data: mujoco.MjData) -> Bind:
     return bind
 
 
-def present(place: Place | Derived, data: mujoco.MjData) -> FloatArray:
+def present(place: StateField | DerivedSignal, data: mujoco.MjData) -> FloatArray:
     """Returns a copy of the present value of a signal of a single robot, ``(width,)``."""
     return np.array(place.reader(fields_of(data))()[0])
 
 
-def _joints(robot: Robot, model: mujoco.MjModel) -> dict[Signal, Place]:
+def _joints(robot: Robot, model: mujoco.MjModel) -> dict[Signal, StateField]:
     hinges = [model.joint(name) for name in robot.anatomy.hinges]
     hinge_q = columns([int(hinge.qposadr[0]) for hinge in hinges])
     hinge_v = columns([int(hinge.dofadr[0]) for hinge in hinges])
     return {
-        "joint_positions": Place("qpos", hinge_q),
-        "joint_velocities": Place("qvel", hinge_v),
-        "joint_efforts": Place("qfrc_actuator", hinge_v),
+        "joint_positions": StateField("qpos", hinge_q),
+        "joint_velocities": StateField("qvel", hinge_v),
+        "joint_efforts": StateField("qfrc_actuator", hinge_v),
     }

@@ -11,7 +11,7 @@ from selfmodel.arrays import BoolArray, IndexArray
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.floating_base import Reader
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state_access import places
+from selfmodel.robot.state_access import signal_fields
 from selfmodel.trials.behaviour import Signal
 
 
@@ -29,7 +29,7 @@ def live_signals(
 
     What the controllers receive and give is not part of MuJoCo's state, and is left out.
     """
-    state = places(robot, *(embodiment.model for embodiment in embodiments))
+    state = signal_fields(robot, *(embodiment.model for embodiment in embodiments))
     return {
         signal: state[signal].reader(batch.bind)
         for signal in record
@@ -37,7 +37,7 @@ def live_signals(
     }
 
 
-class Alive:
+class LiveBatch:
     """Steps the simulations of a batch that MuJoCo has not raised in, and knows which broke down.
 
     One that MuJoCo warns about is reset by it and goes on, worthless but harmless: rows of a batch
@@ -74,7 +74,7 @@ class Alive:
 
 
 @contextmanager
-def counted_not_printed() -> Iterator[None]:
+def silence_mujoco_warnings() -> Iterator[None]:
     """Keeps MuJoCo's warnings off the terminal and out of a file: each is counted by its run."""
     before, quiet = mujoco.MjLogConfig.get(), mujoco.MjLogConfig.get()
     quiet.logto_console = quiet.logto_file = False

@@ -13,7 +13,7 @@ from selfmodel.arrays import FloatArray
 Key = TypeVar("Key", bound=Hashable)
 
 
-class Memo(Generic[Key]):
+class Cache(Generic[Key]):
     """Remembers a row of numbers for every key it was ever asked for."""
 
     def __init__(self) -> None:
@@ -32,11 +32,11 @@ class Memo(Generic[Key]):
         row: FloatArray = self._known[key]
         return row
 
-    def learn(self, other: "Memo[Key]", keys: Iterable[Key]) -> None:
+    def update_from(self, other: "Cache[Key]", keys: Iterable[Key]) -> None:
         """Takes the rows of those keys that another knows."""
         self._known.update((key, other[key]) for key in keys if key in other)
 
-    def values(
+    def get_or_compute(
         self, keys: Sequence[Key], compute: Callable[[list[Key]], FloatArray]
     ) -> list[FloatArray]:
         """Returns the row of each key.

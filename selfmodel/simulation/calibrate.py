@@ -25,8 +25,8 @@ from selfmodel.robot.parameters import (
     with_parameters,
 )
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.calibration_segments import Stretches, cut
-from selfmodel.simulation.outcome import Tally
+from selfmodel.simulation.calibration_segments import CalibrationSegments, cut_segments
+from selfmodel.simulation.outcome import SimulationStats
 from selfmodel.simulation.prediction import predict
 from selfmodel.simulation.requests import Segments
 from selfmodel.trials.behaviour import Behaviour, Signal
@@ -113,7 +113,7 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
     """
     if not trials:
         raise InputError("expected at least one trial of the intact robot, got none")
-    data = [cut(trial) for trial in trials]
+    data = [cut_segments(trial) for trial in trials]
     start = nominal(robot)
     before = _error(robot, start, data, threads)
     deviations = np.full(len(start.factors), PRIOR)
@@ -121,7 +121,7 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
         return Calibration(robot, start, deviations, before, before)
     zero = np.zeros((len(start.factors), 1))
 
-    def residuals_at(delay: int, of: Sequence[Stretches]) -> Residual:
+    def residuals_at(delay: int, of: Sequence[CalibrationSegments]) -> Residual:
         return partial(_residuals, robot, of, delay, threads)
 
     delay = min(DELAYS, key=lambda steps: float(np.sum(residuals_at(steps, data)(zero) ** 2)))
@@ -164,7 +164,7 @@ def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> flo
     Raises:
         InputError: A trial was not observed well enough.
     """
-    return _error(robot, nominal(robot), [cut(trial) for trial in trials], threads)
+    return _error(robot, nominal(robot), [cut_segments(trial) for trial in trials], threads)
 
 
 Residual = Callable[[FloatArray], FloatArray]
@@ -179,7 +179,11 @@ def _slopes(residual: Residual, x: FloatArray) -> FloatArray:
 
 
 def _residuals(
-    robot: Robot, data: Sequence[Stretches], delay: int, threads: int, logarithms: FloatArray
+    robot: Robot,
+    data: Sequence[CalibrationSegments],
+    delay: int,
+    threads: int,
+    logarithms: FloatArray,
 ) -> FloatArray:
     """See ``Residual``; the prior's are among them."""
     logarithms = np.reshape(logarithms, (len(logarithms), -1))
@@ -189,17 +193,19 @@ def _residuals(
     return np.concatenate([_damped(errors), weight * logarithms])
 
 
-def _error(robot: Robot, parameters: Parameters, data: Sequence[Stretches], threads: int) -> float:
+def _error(
+    robot: Robot, parameters: Parameters, data: Sequence[CalibrationSegments], threads: int
+) -> float:
     return float(np.sqrt(np.mean(_errors(robot, [parameters], data, threads) ** 2)))
 
 
 def _placed(
-    robot: Robot, found: Parameters, data: Sequence[Stretches], threads: int
-) -> list[Stretches]:
+    robot: Robot, found: Parameters, data: Sequence[CalibrationSegments], threads: int
+) -> list[CalibrationSegments]:
     """The same stretches, each beginning by itself: with the base where a model has it by then."""
     predicted = _predictor(robot, [found], threads)
 
-    def placed(stretches: Stretches) -> Stretches:
+    def placed(stretches: CalibrationSegments) -> CalibrationSegments:
         segments = stretches.segments
         if "base_position" in segments.states:
             return stretches
@@ -211,7 +217,7 @@ def _placed(
 
 
 def _errors(
-    robot: Robot, models: Sequence[Parameters], data: Sequence[Stretches], threads: int
+    robot: Robot, models: Sequence[Parameters], data: Sequence[CalibrationSegments], threads: int
 ) -> FloatArray:
     """The errors of the predictions in units of ``SCALES``, ``(errors, models)``."""
     predicted = _predictor(robot, models, threads)
@@ -237,7 +243,9 @@ def _predictor(
     ]
 
     def predicted(segments: Segments) -> Behaviour:
-        outcome = predict(robot, embodiments, segments, threads=threads, tally=Tally(), delay=delay)
+        outcome = predict(
+            robot, embodiments, segments, threads=threads, stats=SimulationStats(), delay=delay
+        )
         return outcome.behaviour
 
     return predicted

@@ -22,7 +22,7 @@ SEEN = 0.25
 
 
 @dataclass(frozen=True, eq=False)
-class Stretches:
+class CalibrationSegments:
     """A trial cut into stretches.
 
     Attributes:
@@ -38,7 +38,7 @@ class Stretches:
     judged: BoolArray
 
 
-def cut(trial: Trial) -> Stretches:
+def cut_segments(trial: Trial) -> CalibrationSegments:
     """Returns stretches of a trial in which the state and the commands are known.
 
     They are spread over the trial, and all of each is known. Where the base's position and linear
@@ -51,14 +51,14 @@ def cut(trial: Trial) -> Stretches:
     """
     if trial.behaviour.steps <= LEAD + HORIZON:
         raise _useless(trial, f"the trial has {trial.behaviour.steps}")
-    found = _spread(trial.behaviour) or _chained(trial.behaviour)
+    found = _spread(trial.behaviour) or _sequential(trial.behaviour)
     if found is None:
         never = _never_known(trial.behaviour)
         raise _useless(trial, f"the log never has {never}" if never else "the log has none of use")
     return found
 
 
-def _spread(behaviour: Behaviour) -> Stretches | None:
+def _spread(behaviour: Behaviour) -> CalibrationSegments | None:
     """Stretches of the whole state, each by itself; None where there are too few."""
     last = behaviour.steps - 1 - HORIZON
     begins = np.unique(np.linspace(LEAD, last, SEGMENTS).round().astype(np.intp))
@@ -67,10 +67,10 @@ def _spread(behaviour: Behaviour) -> Stretches | None:
     whole = _all_known(on_board & _known(states), begins)
     if not whole.any() or whole.sum() < SEEN * _all_known(on_board, begins).sum():
         return None
-    return _stretches(behaviour, states, begins[whole])
+    return _calibration_segments(behaviour, states, begins[whole])
 
 
-def _chained(behaviour: Behaviour) -> Stretches | None:
+def _sequential(behaviour: Behaviour) -> CalibrationSegments | None:
     """Stretches of what is on board, one after another; None where too little can be judged.
 
     What can be simulated is, for the sake of what goes on from it: all that begins in a known state
@@ -81,7 +81,7 @@ def _chained(behaviour: Behaviour) -> Stretches | None:
     states = estimated_states(behaviour, ONBOARD)
     commanded = np.asarray(np.isfinite(behaviour["commands"]).all(axis=1))
     starts = begins[_known(states)[begins] & _all_known(commanded, begins)]
-    found = _stretches(behaviour, states, starts)
+    found = _calibration_segments(behaviour, states, starts)
     return found if found.judged.sum() >= HORIZON else None
 
 
@@ -100,15 +100,15 @@ def _all_known(known: BoolArray, begins: IndexArray) -> BoolArray:
     return np.array([known[max(k - LEAD, 0) : k + HORIZON + 1].all() for k in begins.tolist()])
 
 
-def _stretches(
+def _calibration_segments(
     behaviour: Behaviour, states: Mapping[Signal, FloatArray], starts: IndexArray
-) -> Stretches:
+) -> CalibrationSegments:
     commands = behaviour["commands"]
     padded = np.concatenate([np.zeros((LEAD, commands.shape[1])), commands])
     before = starts[:, np.newaxis] + np.arange(-LEAD, HORIZON)
     after = starts[:, np.newaxis] + np.arange(1, HORIZON + 1)
     steady = np.logical_and.accumulate(_steady(behaviour)[np.maximum(before, 0)], axis=1)
-    return Stretches(
+    return CalibrationSegments(
         Segments(
             states={signal: values[starts] for signal, values in states.items()},
             commands=padded[before + LEAD],

@@ -9,7 +9,7 @@ from selfmodel.trials.behaviour import Behaviour
 
 
 @dataclass
-class Tally:
+class SimulationStats:
     """What a simulator has done so far.
 
     Attributes:
@@ -26,7 +26,7 @@ class Tally:
 
 
 @dataclass(frozen=True, eq=False)
-class Simulated:
+class SimulationResult:
     """The outcome of a batch of runs.
 
     Attributes:
@@ -37,13 +37,13 @@ class Simulated:
     behaviour: Behaviour
     diverged: BoolArray
 
-    def grouped(self, *shape: int) -> "Simulated":
+    def grouped(self, *shape: int) -> "SimulationResult":
         """Returns the same with the runs ``(n,)`` as an array of that shape, row by row."""
         flat = self.behaviour
         signals = {
             signal: values.reshape(*shape, *values.shape[1:])
             for signal, values in flat.signals.items()
         }
-        return Simulated(
+        return SimulationResult(
             Behaviour(flat.names, flat.time, signals), np.asarray(self.diverged.reshape(shape))
         )

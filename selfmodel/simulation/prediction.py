@@ -11,11 +11,11 @@ from selfmodel.errors import InputError
 from selfmodel.robot.custom_numerics import MAX_CONTROL_DELAY
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.sensing import Senses
+from selfmodel.robot.sensing import SensorReader
 from selfmodel.robot.state_access import writer
 from selfmodel.simulation.activations import starting_activations
-from selfmodel.simulation.batch import Alive, counted_not_printed, live_signals, new_batch
-from selfmodel.simulation.outcome import Simulated, Tally
+from selfmodel.simulation.batch import LiveBatch, live_signals, new_batch, silence_mujoco_warnings
+from selfmodel.simulation.outcome import SimulationResult, SimulationStats
 from selfmodel.simulation.requests import Segments
 from selfmodel.trials.behaviour import Behaviour
 
@@ -27,9 +27,9 @@ def predict(
     *,
     moves_as: Sequence[int] | None = None,
     threads: int,
-    tally: Tally,
+    stats: SimulationStats,
     delay: int | None = None,
-) -> Simulated:
+) -> SimulationResult:
     """Predicts segments of a trial with each of some models of a robot.
 
     Where the segments say the whole state, all of them are simulated side by side. Where they do
@@ -48,7 +48,7 @@ def predict(
             same commands, though its sensors may tell another story: only that one is simulated.
             Without it, all are.
         threads: Threads that MuJoCo steps on, the caller's included.
-        tally: Is told what was simulated.
+        stats: Is told what was simulated.
         delay: Control steps from a command to its effect; that of the robot if none is given.
 
     Returns:
@@ -77,7 +77,7 @@ def predict(
     batch = new_batch(robot.model, bodies, threads)
     qpos, sensordata = batch.bind("qpos"), batch.bind("sensordata")
     # Noise of its own for each segment: of a few numbers nobody sees how much there is.
-    senses = Senses(robot.model, robot.anatomy, embodiments, together)
+    senses = SensorReader(robot.model, robot.anatomy, embodiments, together)
     readings = np.empty((n * together, len(robot.anatomy.sensors)))
     # Where in the batch each row of the result is found.
     place = (source_of[:, np.newaxis] * together + np.arange(together)).ravel()
@@ -91,14 +91,14 @@ def predict(
     start = _Start(robot, batch, moving, segments)
     activations = starting_activations(robot, segments, late)
     batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE)
-    alive = Alive(batch)
+    alive = LiveBatch(batch)
     first = segments.lead - late
-    with counted_not_printed():
+    with silence_mujoco_warnings():
         for stage in stages:
             start.write(activations, stage)
             clock = perf_counter()
             alive.forward()
-            tally.physics_seconds += perf_counter() - clock
+            stats.physics_seconds += perf_counter() - clock
             for k in range(horizon + 1):
                 if "sensors" in kept:
                     senses.read(sensordata[place], qpos[place], readings)
@@ -109,13 +109,13 @@ def predict(
                     start.command(segments.commands[stage, first + k])
                     clock = perf_counter()
                     alive.step(robot.substeps)
-                    tally.physics_seconds += perf_counter() - clock
+                    stats.physics_seconds += perf_counter() - clock
     diverged: BoolArray = np.any(alive.diverged()[place].reshape(n, together), axis=1)
-    tally.runs += n
-    tally.steps += len(moving) * count * horizon
-    tally.diverged += int(diverged.sum())
+    stats.runs += n
+    stats.steps += len(moving) * count * horizon
+    stats.diverged += int(diverged.sum())
     time = np.arange(horizon + 1, dtype=np.float64) * robot.control_timestep
-    return Simulated(Behaviour(robot.anatomy.names, time, kept), diverged)
+    return SimulationResult(Behaviour(robot.anatomy.names, time, kept), diverged)
 
 
 def _repeated(embodiments: Sequence[Embodiment], times: int) -> list[Embodiment]:
@@ -143,7 +143,7 @@ class _Start:
         self._still = [
             (number, *still)
             for number, one in enumerate(embodiments)
-            for still in (*one.held, *(resting[name] for name in one.loose & resting.keys()))
+            for still in (*one.welded, *(resting[name] for name in one.detached & resting.keys()))
         ]
 
     def write(self, activations: FloatArray, stage: IndexArray) -> None:

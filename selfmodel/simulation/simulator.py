@@ -14,10 +14,10 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.physical.reality_gap import perturbed_models
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.sensing import Senses
-from selfmodel.simulation.batch import Alive, counted_not_printed, live_signals, new_batch
+from selfmodel.robot.sensing import SensorReader
+from selfmodel.simulation.batch import LiveBatch, live_signals, new_batch, silence_mujoco_warnings
 from selfmodel.simulation.ground_contacts import felt_points
-from selfmodel.simulation.outcome import Simulated, Tally
+from selfmodel.simulation.outcome import SimulationResult, SimulationStats
 from selfmodel.simulation.prediction import predict
 from selfmodel.simulation.requests import Ensemble, Segments
 from selfmodel.trials.behaviour import Behaviour, Signal
@@ -44,13 +44,13 @@ class Simulator:
     Args:
         robot: The robot with nothing wrong.
         threads: Threads that MuJoCo steps on, the caller's included.
-        tally: Is told what was simulated; a new one if none is given.
+        stats: Is told what was simulated; a new one if none is given.
     """
 
-    def __init__(self, robot: Robot, threads: int, tally: Tally | None = None) -> None:
+    def __init__(self, robot: Robot, threads: int, stats: SimulationStats | None = None) -> None:
         self.robot = robot
         self.threads = threads
-        self.tally = Tally() if tally is None else tally
+        self.stats = SimulationStats() if stats is None else stats
         room = REMEMBERED_BYTES // int(robot.model.nbuffer)
         self._embodiment = lru_cache(max(1, min(REMEMBERED_EMBODIMENTS, room)))(
             partial(build, robot)
@@ -58,7 +58,7 @@ class Simulator:
         self._felt = lru_cache(REMEMBERED_TRIALS)(partial(felt_points, robot))
         self._members = lru_cache(REMEMBERED_SHAPES)(partial(perturbed_models, robot))
 
-    def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> Simulated:
+    def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> SimulationResult:
         """Simulates each run for ``steps`` control steps from its start.
 
         Args:
@@ -74,7 +74,7 @@ class Simulator:
         hypotheses: Sequence[Hypothesis],
         segments: Segments,
         observed: Behaviour | None = None,
-    ) -> Simulated:
+    ) -> SimulationResult:
         """Predicts segments of a trial under each hypothesis; see ``prediction.predict``.
 
         Args:
@@ -92,7 +92,7 @@ class Simulator:
             ]
         first: dict[Hypothesis, int] = {}
         moves_as = [
-            first.setdefault(hypothesis.motion, i) for i, hypothesis in enumerate(hypotheses)
+            first.setdefault(hypothesis.dynamics_part, i) for i, hypothesis in enumerate(hypotheses)
         ]
         return predict(
             self.robot,
@@ -100,7 +100,7 @@ class Simulator:
             segments,
             moves_as=moves_as,
             threads=self.threads,
-            tally=self.tally,
+            stats=self.stats,
         )
 
     def _on_felt_ground(
@@ -120,7 +120,7 @@ class Simulator:
         driver: Driver,
         steps: int,
         ensemble: Ensemble,
-    ) -> Simulated:
+    ) -> SimulationResult:
         """Simulates each hypothesis with each of some self-models that differ a little.
 
         Args:
@@ -135,11 +135,11 @@ class Simulator:
         embodiments = [
             apply_faults(model, self.robot.anatomy, hypothesis)
             for hypothesis in hypotheses
-            for model in self._members(hypothesis.shape, ensemble.members, ensemble.level)
+            for model in self._members(hypothesis.spec_part, ensemble.members, ensemble.level)
         ]
         flat = self._run(embodiments, [driver] * len(embodiments), steps, ensemble.record)
         outcome = flat.grouped(len(hypotheses), ensemble.members)
-        return Simulated(outcome.behaviour, np.asarray(outcome.diverged.any(axis=1)))
+        return SimulationResult(outcome.behaviour, np.asarray(outcome.diverged.any(axis=1)))
 
     def _run(
         self,
@@ -147,10 +147,10 @@ class Simulator:
         drivers: Sequence[Driver],
         steps: int,
         record: Sequence[Signal],
-    ) -> Simulated:
+    ) -> SimulationResult:
         robot, n = self.robot, len(embodiments)
         batch = new_batch(robot.model, embodiments, self.threads)
-        senses = Senses(robot.model, robot.anatomy, embodiments)
+        senses = SensorReader(robot.model, robot.anatomy, embodiments)
         brains = drive(
             drivers,
             np.array([embodiment.neurons for embodiment in embodiments]),
@@ -166,8 +166,8 @@ class Simulator:
         }
         # After every field is bound: one that is bound later stays zero until the next step.
         batch.reset()
-        alive = Alive(batch)
-        with counted_not_printed():
+        alive = LiveBatch(batch)
+        with silence_mujoco_warnings():
             for k in range(steps):
                 senses.read(sensordata, qpos, brains.readings)
                 brains.step(motors.inlet)
@@ -177,16 +177,16 @@ class Simulator:
                 if k + 1 < steps:
                     start = perf_counter()
                     alive.step(robot.substeps)
-                    self.tally.physics_seconds += perf_counter() - start
+                    self.stats.physics_seconds += perf_counter() - start
         diverged = alive.diverged()
-        self.tally.runs += n
-        self.tally.steps += n * steps
-        self.tally.diverged += int(diverged.sum())
+        self.stats.runs += n
+        self.stats.steps += n * steps
+        self.stats.diverged += int(diverged.sum())
         signals = {
             signal: np.ascontiguousarray(rows.swapaxes(0, 1)) for signal, rows in kept.items()
         }
         time = np.arange(steps, dtype=np.float64) * robot.control_timestep
-        return Simulated(Behaviour(robot.anatomy.names, time, signals), diverged)
+        return SimulationResult(Behaviour(robot.anatomy.names, time, signals), diverged)
 
 
 class _DelayLine:

@@ -64,7 +64,7 @@ class Names:
 
 
 @dataclass(frozen=True)
-class Moment:
+class StepTiming:
     """When a control step of a robot with a clock of its own really happened.
 
     Attributes:
@@ -93,7 +93,7 @@ class Sample:
 
     time: float
     values: Mapping[Signal, FloatArray]
-    moment: Moment | None = None
+    moment: StepTiming | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +194,7 @@ def collect(names: Names, samples: Iterable[Sample]) -> Behaviour:
     )
 
 
-def late_steps(moments: Sequence[Moment | None]) -> BoolArray | None:
+def late_steps(moments: Sequence[StepTiming | None]) -> BoolArray | None:
     """Returns which steps were late, ``(steps,)``; None for a robot without a clock of its own."""
     known = [moment for moment in moments if moment is not None]
     return np.array([moment.late for moment in known]) if known else None

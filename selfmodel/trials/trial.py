@@ -21,7 +21,7 @@ def stage_of(name: str) -> Stage | None:
 
 
 @dataclass(frozen=True)
-class Plan:
+class TrialPlan:
     """What is known of a trial before it starts.
 
     Attributes:
@@ -51,7 +51,7 @@ class Trial:
         path: The log it was read from.
     """
 
-    plan: Plan
+    plan: TrialPlan
     robot: str
     behaviour: Behaviour
     path: str

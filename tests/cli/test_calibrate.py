@@ -15,7 +15,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import Sample, Signal
-from selfmodel.trials.trial import Plan, Stage
+from selfmodel.trials.trial import Stage, TrialPlan
 from tests.conftest import random_motion
 from tests.helpers.command import selfmodel
 
@@ -46,7 +46,7 @@ def write(
         for sample in SimulatedRobot(robot, gap=gap).run(driver, STEPS)
     )
     return write_trial(
-        path, robot, Plan(path.stem, stage, driver, STEPS, 0), samples, settings=SETTINGS
+        path, robot, TrialPlan(path.stem, stage, driver, STEPS, 0), samples, settings=SETTINGS
     )
 
 

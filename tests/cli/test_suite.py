@@ -207,7 +207,7 @@ def test_what_cannot_be_run_is_refused_before_anything_is(
     check(study)
 
     with pytest.raises(InputError, match=reason):
-        run_study(replace(study, **changed), workers=1, watch=lambda _: None)
+        run_study(replace(study, **changed), workers=1, on_event=lambda _: None)
     assert not (tmp_path / "out").exists()
 
 
@@ -247,10 +247,12 @@ def test_a_gait_that_was_lost_is_told_of_and_not_passed_over(
     monkeypatch.syspath_prepend(str(ROOT))  # the grid's processes find the function there
     study = replace(STUDY, bodies=["quadruped"], cases=[2], folder=tmp_path)
     assert recovery_jobs(study) == []
-    run_grid(tmp_path / "gaits", gait_jobs(study), evolve_nothing, workers=1, watch=lambda _: None)
+    run_grid(
+        tmp_path / "gaits", gait_jobs(study), evolve_nothing, workers=1, on_event=lambda _: None
+    )
 
     with pytest.raises(InputError, match=r"quadruped-seed000\.npz is missing"):
-        run_study(study, workers=1, watch=lambda _: None)
+        run_study(study, workers=1, on_event=lambda _: None)
 
 
 def evolve_nothing(_job: Job, _part: str, _run: Path) -> None:

@@ -18,7 +18,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import SIGNALS, Behaviour
-from selfmodel.trials.trial import Plan, Trial
+from selfmodel.trials.trial import Trial, TrialPlan
 from tests.conftest import random_controllers
 
 Both = tuple[Trial, Behaviour]
@@ -40,7 +40,7 @@ def logged_and_simulated(robot: Robot) -> Both:
     observed = Behaviour(
         simulated.names, simulated.time, {signal: simulated[signal][0] for signal in SIGNALS}
     )
-    plan = Plan("00-after", "after", controller, 300, 0)
+    plan = TrialPlan("00-after", "after", controller, 300, 0)
     return Trial(plan, robot.name, observed, "nowhere.mcap"), simulated
 
 

@@ -9,7 +9,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from selfmodel.controllers.command_range import TARGET_RANGE
-from selfmodel.controllers.cpg import FASTEST, FEEDBACK, SLOWEST, Cpg, Oscillators, Rhythms, grown
+from selfmodel.controllers.cpg import (
+    FASTEST,
+    FEEDBACK,
+    SLOWEST,
+    Cpg,
+    Oscillators,
+    Rhythms,
+    amplitude_rise,
+)
 from selfmodel.controllers.driver import drive
 from selfmodel.controllers.network import draw_weights
 from selfmodel.errors import InputError
@@ -79,7 +87,7 @@ def test_amplitudes_grow_as_their_differential_equation_says():
     a, step = 20.0, 1e-4
     r, speed = 0.0, 0.0
     for k in range(5000):
-        assert grown(k * step) == pytest.approx(r, abs=2e-3)
+        assert amplitude_rise(k * step) == pytest.approx(r, abs=2e-3)
         r, speed = r + step * speed, speed + step * a * (a / 4 * (1 - r) - speed)
 
 

@@ -10,7 +10,7 @@ import pytest
 from selfmodel.comparators import FORWARD_DISPLACEMENT, SEGMENT_PREDICTION, SENSOR_SERIES
 from selfmodel.controllers.driver import Driver
 from selfmodel.diagnosis.comparator import Comparator
-from selfmodel.diagnosis.diagnose import Diagnose
+from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.evidence import Evidence
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
@@ -19,11 +19,11 @@ from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.outcome import Simulated
+from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
 from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.trials.behaviour import Behaviour, Signal
-from selfmodel.trials.trial import Plan, Trial
+from selfmodel.trials.trial import Trial, TrialPlan
 from tests.conftest import exploding, random_controllers
 from tests.helpers.memory import MemoryJournal
 
@@ -41,7 +41,7 @@ class CountingSimulator(Simulator):
         super().__init__(robot, threads=1)
         self.times: Counter = Counter()
 
-    def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> Simulated:
+    def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> SimulationResult:
         """Simulates as ever."""
         self.times.update(runs)
         return super().run(runs, steps, record)
@@ -51,14 +51,14 @@ class CountingSimulator(Simulator):
         hypotheses: Sequence[Hypothesis],
         segments: Segments,
         observed: Behaviour | None = None,
-    ) -> Simulated:
+    ) -> SimulationResult:
         """Predicts as ever."""
         self.times.update((one, segments.commands.tobytes()) for one in hypotheses)
         return super().predict(hypotheses, segments, observed)
 
     def run_ensemble(
         self, hypotheses: Sequence[Hypothesis], driver: Driver, steps: int, ensemble: Ensemble
-    ) -> Simulated:
+    ) -> SimulationResult:
         """Simulates as ever."""
         self.times.update((one, driver) for one in hypotheses)
         return super().run_ensemble(hypotheses, driver, steps, ensemble)
@@ -95,7 +95,7 @@ def trials(quadruped: Robot) -> list[Trial]:
     """Two trials, each with a controller of its own."""
     damaged = SimulatedRobot(quadruped, parse("break:front_left_knee", quadruped.anatomy))
     return [
-        MemoryJournal(quadruped).record(damaged, Plan(f"{k}", "after", controller, STEPS, 0))
+        MemoryJournal(quadruped).record(damaged, TrialPlan(f"{k}", "after", controller, STEPS, 0))
         for k, controller in enumerate(random_controllers(quadruped, 3)[1:])
     ]
 
@@ -165,16 +165,16 @@ def test_a_diagnosis_simulates_nothing_twice_and_ranks_nothing_that_is_not_consi
     after, before = (
         MemoryJournal(quadruped).record(
             SimulatedRobot(quadruped, parse(truth, quadruped.anatomy)),
-            Plan(stage, stage, gait, SMALL.steps, 0),
+            TrialPlan(stage, stage, gait, SMALL.steps, 0),
         )
         for truth, stage in (("friction=0.3", "after"), ("intact", "before"))
     )
     simulator = CountingSimulator(quadruped)
-    search = Diagnose(simulator, SEGMENT_PREDICTION, SMALL, PAPER_KINDS, intact=[before])
+    search = DiagnosticSearch(simulator, SEGMENT_PREDICTION, SMALL, PAPER_KINDS, intact=[before])
     found = search([after], [], np.random.default_rng(0), lambda _: None)
 
-    assert found.outside is not None
-    assert found.outside.kind == "friction"
+    assert found.unsearched is not None
+    assert found.unsearched.kind == "friction"
     assert set(simulator.times.values()) == {1}
     simulated = {hypothesis for hypothesis, _ in simulator.times}
     considered = {
@@ -222,7 +222,7 @@ def test_a_hypothesis_that_diverges_is_infinitely_far_and_harms_no_other(
     evidence = Evidence(simulator, comparator)
     losses = evidence.losses([bad, INTACT], trials)
 
-    assert simulator.tally.diverged == len(trials)
+    assert simulator.stats.diverged == len(trials)
     assert np.all(np.isinf(losses[0]))
     assert np.array_equal(losses[1:], alone)
     assert evidence.distances([bad], trials) == np.inf
@@ -231,8 +231,8 @@ def test_a_hypothesis_that_diverges_is_infinitely_far_and_harms_no_other(
 def test_only_a_comparator_that_judges_in_pieces_can_be_asked_for_a_test(quadruped: Robot):
     simulator = Simulator(quadruped, 1)
 
-    assert Evidence(simulator, SEGMENT_PREDICTION).in_pieces
-    assert not Evidence(simulator, FORWARD_DISPLACEMENT).in_pieces
+    assert Evidence(simulator, SEGMENT_PREDICTION).is_piecewise
+    assert not Evidence(simulator, FORWARD_DISPLACEMENT).is_piecewise
 
 
 @pytest.mark.parametrize(

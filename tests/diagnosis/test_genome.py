@@ -9,7 +9,7 @@ from hypothesis.extra.numpy import arrays
 from selfmodel.diagnosis.genome import VALUES, decode, encode
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, canonical
-from selfmodel.faults.kind import Kind
+from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import ALL_KINDS, PAPER_KINDS
 from selfmodel.tasks import ROBOTS
@@ -31,7 +31,7 @@ def test_a_hypothesis_encodes_to_a_genome_that_decodes_to_it(name: str, data: st
 @pytest.mark.parametrize("name", ANATOMIES)
 @given(genome=arrays(float, GENES * VALUES, elements=st.floats(0, 1, exclude_max=True)))
 def test_any_genome_decodes_to_a_hypothesis_with_notation_and_a_genome(
-    name: str, kinds: tuple[Kind, ...], genome: np.ndarray
+    name: str, kinds: tuple[FaultKind, ...], genome: np.ndarray
 ):
     hypothesis = decode(genome, ANATOMIES[name], kinds)
 
@@ -81,7 +81,7 @@ def test_a_gene_is_active_from_one_half_on(active: float, faults: int):
 @pytest.mark.parametrize("name", ANATOMIES)
 def test_every_part_of_every_kind_can_be_reached(name: str):
     anatomy = ANATOMIES[name]
-    expected = {f"{kind.word}:{part}" for kind in PAPER_KINDS for part in kind.parts(anatomy)}
+    expected = {f"{kind.keyword}:{part}" for kind in PAPER_KINDS for part in kind.parts(anatomy)}
     kind_and_part = (np.arange(200) + 0.5) / 200
     reached = {
         str(decode(np.array([1.0, kind, part, 0.0]), anatomy))

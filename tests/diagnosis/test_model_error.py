@@ -8,10 +8,10 @@ import pytest
 
 from selfmodel.comparators import SEGMENT_PREDICTION
 from selfmodel.controllers.network import Controller
-from selfmodel.diagnosis.diagnose import Diagnose
+from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
-from selfmodel.diagnosis.loss_functions import Looks, Losses
-from selfmodel.diagnosis.model_error import mends, mends_in_part
+from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
+from selfmodel.diagnosis.model_error import any_fault_is_model_error, is_model_error
 from selfmodel.experiments.reality import draw_reality
 from selfmodel.faults import FRICTION
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
@@ -20,7 +20,7 @@ from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.trial import Plan, Stage, Trial
+from selfmodel.trials.trial import Stage, Trial, TrialPlan
 from tests.conftest import random_controllers
 from tests.helpers.memory import MemoryJournal
 
@@ -41,13 +41,13 @@ def test_a_fault_that_alone_would_have_helped_before_mends(quadruped: Robot):
     both, knee = (parse(text, anatomy) for text in (f"{KNEE}+{SLIPPERY}", KNEE))
     slippery = parse(SLIPPERY, anatomy)
     after = of(quadruped, {str(both): 0.5, KNEE: 0.7, SLIPPERY: 0.8})
-    looks = Looks(after, after, of(quadruped, {SLIPPERY: 0.8, KNEE: 2.0}))
+    looks = LossFunctions(after, after, of(quadruped, {SLIPPERY: 0.8, KNEE: 2.0}))
 
-    assert mends(both, knee, looks, anatomy)
-    assert not mends(both, slippery, looks, anatomy)
-    assert mends_in_part(both, looks, anatomy)
-    assert not mends_in_part(knee, looks, anatomy)
-    assert not mends_in_part(INTACT, looks, anatomy)
+    assert is_model_error(both, knee, looks, anatomy)
+    assert not is_model_error(both, slippery, looks, anatomy)
+    assert any_fault_is_model_error(both, looks, anatomy)
+    assert not any_fault_is_model_error(knee, looks, anatomy)
+    assert not any_fault_is_model_error(INTACT, looks, anatomy)
 
 
 def never(_: Sequence[Hypothesis]) -> np.ndarray:
@@ -57,26 +57,26 @@ def never(_: Sequence[Hypothesis]) -> np.ndarray:
 def test_where_nothing_from_before_can_be_compared_nothing_mends(quadruped: Robot):
     knee = parse(KNEE, quadruped.anatomy)
 
-    assert not mends(knee, INTACT, Looks(never, never, None), quadruped.anatomy)
+    assert not is_model_error(knee, INTACT, LossFunctions(never, never, None), quadruped.anatomy)
 
 
 def test_of_what_would_have_done_harm_nothing_else_is_asked(quadruped: Robot):
-    looks = Looks(never, never, of(quadruped, {KNEE: 2.0}))
+    looks = LossFunctions(never, never, of(quadruped, {KNEE: 2.0}))
 
-    assert not mends(parse(KNEE, quadruped.anatomy), INTACT, looks, quadruped.anatomy)
+    assert not is_model_error(parse(KNEE, quadruped.anatomy), INTACT, looks, quadruped.anatomy)
 
 
 def trial(robot: Robot, truth: str, gait: Controller, stage: Stage, number: int) -> Trial:
     """A trial across a small gap, on ground that is slippery before the failure and after."""
     reality = draw_reality(robot, 3, 0.02, structure=False)
     hidden = parse("+".join({truth, SLIPPERY} - {"intact"}), robot.anatomy)
-    plan = Plan(f"{number:02d}-{stage}", stage, gait, SMALL.steps, 0)
+    plan = TrialPlan(f"{number:02d}-{stage}", stage, gait, SMALL.steps, 0)
     return MemoryJournal(robot).record(reality.robot(robot, hidden, stream=number), plan)
 
 
 def diagnosed(robot: Robot, truth: str, *, looks_back: bool) -> Diagnosis:
     gait = random_controllers(robot, 5)[2]
-    search = Diagnose(
+    search = DiagnosticSearch(
         Simulator(robot, 1),
         SEGMENT_PREDICTION,
         SMALL,
@@ -96,4 +96,4 @@ def test_ground_that_always_was_slippery_is_no_change_nor_part_of_a_rival(
 
     assert "friction" in str(alone.best)
     assert str(found.best) == truth
-    assert not any("friction" in str(rival) for rival in found.rivals)
+    assert not any("friction" in str(rival) for rival in found.indistinguishable)

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from selfmodel.diagnosis.loss_functions import Looks, Losses
+from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
 from selfmodel.diagnosis.refine import refined
 from selfmodel.diagnosis.significance import is_better
 from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
@@ -78,7 +78,7 @@ def find(
     most: int = MOST,
     before: Losses | None = None,
 ) -> Hypothesis:
-    return refined(known, faults, most, Looks(losses, losses, before), ANATOMY)
+    return refined(known, faults, most, LossFunctions(losses, losses, before), ANATOMY)
 
 
 @pytest.mark.parametrize(
@@ -339,10 +339,10 @@ def test_the_screen_says_what_is_looked_at_and_the_losses_what_is_found():
     def screen(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
         return of(hypotheses)[:, ::3] + 1.0
 
-    assert refined([], FAULTS, MOST, Looks(losses, screen, None), ANATOMY) == truth
+    assert refined([], FAULTS, MOST, LossFunctions(losses, screen, None), ANATOMY) == truth
     few = len(looked_at)
     looked_at.clear()
-    assert refined([], FAULTS, MOST, Looks(losses, losses, None), ANATOMY) == truth
+    assert refined([], FAULTS, MOST, LossFunctions(losses, losses, None), ANATOMY) == truth
     assert few < len(looked_at) / 2
 
 
@@ -354,14 +354,14 @@ def test_a_screen_that_prefers_what_is_wrong_does_not_decide():
     losses = counted({"intact": 1.5, one: 1.0, right: 0.1}, otherwise=2.0)
     screen = counted({"intact": 1.5, one: 1.0, right: 0.5, wrong: 0.1}, otherwise=2.0)
 
-    assert refined([], FAULTS, MOST, Looks(losses, screen, None), ANATOMY) == said(right)
+    assert refined([], FAULTS, MOST, LossFunctions(losses, screen, None), ANATOMY) == said(right)
 
 
 def test_a_fault_that_would_have_helped_as_much_before_only_mends_the_model():
-    truth, mends = said("break:back_left_knee"), said("jam:front_left_knee")
-    both = canonical((*truth.faults, *mends.faults), ANATOMY)
+    truth, is_model_error = said("break:back_left_knee"), said("jam:front_left_knee")
+    both = canonical((*truth.faults, *is_model_error.faults), ANATOMY)
     after = additive(both)
 
-    assert find(after, before=additive(truth)) == mends
+    assert find(after, before=additive(truth)) == is_model_error
     assert find(after, before=additive(INTACT)) == both
-    assert find(after, before=additive(mends)) == truth
+    assert find(after, before=additive(is_model_error)) == truth

@@ -7,13 +7,13 @@ import pytest
 
 from selfmodel.arrays import FloatArray
 from selfmodel.comparators import COMPARATORS
-from selfmodel.diagnosis.diagnose import Diagnose
+from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour, collect
-from selfmodel.trials.trial import Plan, Trial
+from selfmodel.trials.trial import Trial, TrialPlan
 from tests.conftest import random_controllers
 from tests.helpers.gaits import changed
 
@@ -22,7 +22,7 @@ SMALL = dataclasses.replace(Settings().scaled(4), generations=1)
 
 @pytest.fixture
 def trial(quadruped: Robot) -> Trial:
-    plan = Plan("00-after", "after", random_controllers(quadruped, 1)[0], 300, 0)
+    plan = TrialPlan("00-after", "after", random_controllers(quadruped, 1)[0], 300, 0)
     samples = SimulatedRobot(quadruped).run(plan.controller, plan.steps)
     run = collect(quadruped.anatomy.names, samples)
     return Trial(plan, quadruped.name, run, "nowhere.mcap")
@@ -46,7 +46,7 @@ def test_a_comparator_of_whole_trials_screens_by_their_openings(
             steps["evidence" if simulated.steps == 300 else "screen"].add(simulated.steps)
             return comparator.losses(simulated, trial)
 
-    Diagnose(Simulator(quadruped, 1), Watched(), SMALL)(
+    DiagnosticSearch(Simulator(quadruped, 1), Watched(), SMALL)(
         [trial], [], np.random.default_rng(0), lambda _: None
     )
 
@@ -64,7 +64,7 @@ def test_where_the_opening_tells_nothing_the_whole_trial_is_the_screen(
         if signal != "commands"
     }
     trial = dataclasses.replace(trial, behaviour=changed(run, **hidden))
-    search = Diagnose(Simulator(quadruped, 1), COMPARATORS["sensor-series"], SMALL)
+    search = DiagnosticSearch(Simulator(quadruped, 1), COMPARATORS["sensor-series"], SMALL)
 
     search.check([trial])
     found = search([trial], [], np.random.default_rng(0), lambda _: None)

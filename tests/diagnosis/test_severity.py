@@ -5,17 +5,17 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pytest
 
-from selfmodel.diagnosis.loss_functions import Looks, Losses
+from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
 from selfmodel.diagnosis.refine import refined
 from selfmodel.diagnosis.severity import (
     COARSE,
     coarse_candidates,
-    with_fitted_degrees,
-    with_mean_degrees,
+    with_fitted_severities,
+    with_mean_severities,
 )
 from selfmodel.faults import FRICTION, WIND
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
-from selfmodel.faults.kind import WORLD, Fault
+from selfmodel.faults.kind import ENVIRONMENT, Fault
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import KINDS, PAPER_KINDS
 from tests.diagnosis.test_refine import ANATOMY, FAULTS, PIECES, find
@@ -35,7 +35,7 @@ def bowl(truth: Mapping[str, float], floor: float = 0.01) -> Losses:
     def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
         rows = []
         for hypothesis in hypotheses:
-            said_ = {f"{f.kind.name} {f.part}": f.degree for f in hypothesis.faults}
+            said_ = {f"{f.kind.name} {f.part}": f.severity for f in hypothesis.faults}
             off = sum(
                 (said_.get(term, 1.0) - truth.get(term, 1.0)) ** 2 for term in {*said_, *truth}
             )
@@ -51,14 +51,14 @@ BOTH = {"motor front_left_knee": 0.37, "friction ": 0.62}
 
 def test_degrees_are_found_between_those_that_are_proposed():
     found = find(bowl(BOTH, floor=1e-4), faults=DEGREES, most=2)
-    degrees = {f"{fault.kind.name} {fault.part}": fault.degree for fault in found.faults}
+    severities = {f"{fault.kind.name} {fault.part}": fault.severity for fault in found.faults}
 
-    assert degrees == pytest.approx(BOTH, abs=0.02)
-    assert not set(degrees.values()) & {fault.degree for fault in DEGREES}
+    assert severities == pytest.approx(BOTH, abs=0.02)
+    assert not set(severities.values()) & {fault.severity for fault in DEGREES}
 
 
 def test_every_part_is_proposed_at_few_degrees_of_the_whole_range():
-    proposed = {fault.degree for fault in DEGREES if fault.part == "front_left_knee"}
+    proposed = {fault.severity for fault in DEGREES if fault.part == "front_left_knee"}
     levels = WEAK_MOTOR.levels(ANATOMY, "front_left_knee")
 
     assert len(proposed) <= COARSE
@@ -68,8 +68,10 @@ def test_every_part_is_proposed_at_few_degrees_of_the_whole_range():
 
 def test_a_fit_of_degrees_never_makes_it_worse_and_a_degree_that_is_nothing_goes():
     losses = bowl({"friction ": 0.62})
-    useless = Hypothesis((Fault(FRICTION, WORLD, 0.9), Fault(WEAK_MOTOR, "back_left_knee", 0.9)))
-    fitted = with_fitted_degrees(useless, losses, ANATOMY)
+    useless = Hypothesis(
+        (Fault(FRICTION, ENVIRONMENT, 0.9), Fault(WEAK_MOTOR, "back_left_knee", 0.9))
+    )
+    fitted = with_fitted_severities(useless, losses, ANATOMY)
 
     assert losses([fitted]).sum() < losses([useless]).sum()
     assert find(losses, useless, faults=DEGREES) == find(losses, faults=DEGREES)
@@ -88,12 +90,12 @@ def rugged(truth: float, noise: float, lucky: float) -> Losses:
     def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
         rows = []
         for hypothesis in hypotheses:
-            degree = hypothesis.faults[0].degree if hypothesis.faults else 1.5
-            rng = np.random.default_rng(round(degree * 1e4))
+            severity = hypothesis.faults[0].severity if hypothesis.faults else 1.5
+            rng = np.random.default_rng(round(severity * 1e4))
             ripple = rng.normal(size=PIECES)
             ripple -= ripple.mean()
-            luck = 1.0 if degree == lucky else 0.0
-            rows.append(5 + (degree - truth) ** 2 - luck * LUCK + noise * ripple)
+            luck = 1.0 if severity == lucky else 0.0
+            rows.append(5 + (severity - truth) ** 2 - luck * LUCK + noise * ripple)
         return np.array(rows)
 
     return losses
@@ -102,19 +104,19 @@ def rugged(truth: float, noise: float, lucky: float) -> Losses:
 LUCK = 0.03
 
 
-def friction(degree: float) -> Hypothesis:
-    return Hypothesis((Fault(FRICTION, WORLD, degree),))
+def friction(severity: float) -> Hypothesis:
+    return Hypothesis((Fault(FRICTION, ENVIRONMENT, severity),))
 
 
 def degree_of(hypothesis: Hypothesis) -> float:
     (fault,) = hypothesis.faults
-    return fault.degree
+    return fault.severity
 
 
 def test_a_lucky_degree_does_not_win_where_its_neighbours_cannot_be_told_from_it():
     losses = rugged(truth=0.4, noise=0.3, lucky=0.32)
-    fitted = with_fitted_degrees(friction(0.6), losses, ANATOMY)
-    mean = with_mean_degrees(fitted, losses, ANATOMY)
+    fitted = with_fitted_severities(friction(0.6), losses, ANATOMY)
+    mean = with_mean_severities(fitted, losses, ANATOMY)
 
     assert degree_of(fitted) == 0.32
     assert degree_of(mean) == pytest.approx(0.4, abs=0.04)
@@ -123,7 +125,7 @@ def test_a_lucky_degree_does_not_win_where_its_neighbours_cannot_be_told_from_it
 def test_a_degree_that_is_told_from_its_neighbours_stays():
     losses = rugged(truth=0.4, noise=1e-6, lucky=0.4)
 
-    assert with_mean_degrees(friction(0.4), losses, ANATOMY) == friction(0.4)
+    assert with_mean_severities(friction(0.4), losses, ANATOMY) == friction(0.4)
 
 
 def valleys(*bottoms: float, noise: float, pieces: int = PIECES) -> Losses:
@@ -132,9 +134,9 @@ def valleys(*bottoms: float, noise: float, pieces: int = PIECES) -> Losses:
     def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
         rows = []
         for hypothesis in hypotheses:
-            degree = degree_of(hypothesis)
-            ripple = np.random.default_rng(round(degree * 1e4)).normal(size=pieces)
-            depth = min(abs(degree - bottom) for bottom in bottoms)
+            severity = degree_of(hypothesis)
+            ripple = np.random.default_rng(round(severity * 1e4)).normal(size=pieces)
+            depth = min(abs(severity - bottom) for bottom in bottoms)
             rows.append(2 + depth + noise * (ripple - ripple.mean()))
         return np.array(rows)
 
@@ -142,7 +144,7 @@ def valleys(*bottoms: float, noise: float, pieces: int = PIECES) -> Losses:
 
 
 def test_a_mean_is_not_taken_across_what_predicts_worse():
-    mean = with_mean_degrees(friction(0.2), valleys(0.2, 1.2, noise=0.2), ANATOMY)
+    mean = with_mean_severities(friction(0.2), valleys(0.2, 1.2, noise=0.2), ANATOMY)
 
     assert degree_of(mean) == pytest.approx(0.2, abs=0.05)
 
@@ -150,24 +152,24 @@ def test_a_mean_is_not_taken_across_what_predicts_worse():
 def test_without_pieces_to_compare_the_best_degree_stays():
     losses = valleys(0.4, noise=0.0, pieces=1)
 
-    assert with_mean_degrees(friction(0.4), losses, ANATOMY) == friction(0.4)
+    assert with_mean_severities(friction(0.4), losses, ANATOMY) == friction(0.4)
 
 
 def test_where_nothing_can_be_told_the_mean_is_that_of_all_degrees():
     means = [
         degree_of(
-            with_mean_degrees(friction(start), lambda asked: np.ones((len(asked), 9)), ANATOMY)
+            with_mean_severities(friction(start), lambda asked: np.ones((len(asked), 9)), ANATOMY)
         )
         for start in (0.2, 0.5, 0.9)
     ]
-    levels = FRICTION.levels(ANATOMY, WORLD)
+    levels = FRICTION.levels(ANATOMY, ENVIRONMENT)
 
     assert means == pytest.approx([(levels[0] + levels[-1]) / 2] * 3, abs=1e-3)
 
 
 def test_classes_of_what_reshapes_the_model_have_no_mean():
-    rough = Hypothesis((Fault(KINDS["roughness"], WORLD, 0.02),))
-    flat = with_mean_degrees(rough, lambda asked: np.ones((len(asked), PIECES)), ANATOMY)
+    rough = Hypothesis((Fault(KINDS["roughness"], ENVIRONMENT, 0.02),))
+    flat = with_mean_severities(rough, lambda asked: np.ones((len(asked), PIECES)), ANATOMY)
 
     assert flat == rough
 
@@ -182,7 +184,7 @@ def test_a_degree_that_is_not_needed_becomes_the_fault_without_one():
         known = {dead: 0.1 * ripple, faint: 0.1 * ripple[::-1] - 0.0003}
         return np.array([known.get(one, 1 + ripple) for one in hypotheses])
 
-    assert refined([faint], gains, 1, Looks(losses, losses, None), ANATOMY) == dead
+    assert refined([faint], gains, 1, LossFunctions(losses, losses, None), ANATOMY) == dead
 
 
 def test_a_mean_that_no_longer_needs_the_fault_leaves_the_best_degree_as_it_is():
@@ -197,7 +199,7 @@ def test_a_mean_that_no_longer_needs_the_fault_leaves_the_best_degree_as_it_is()
 
     winds = coarse_candidates((WIND,), ANATOMY)
     wind = parse("wind=8", ANATOMY)
-    mean = with_mean_degrees(wind, losses, ANATOMY)
+    mean = with_mean_severities(wind, losses, ANATOMY)
 
     assert mean not in (wind, INTACT)
-    assert refined([wind], winds, 1, Looks(losses, losses, None), ANATOMY) == wind
+    assert refined([wind], winds, 1, LossFunctions(losses, losses, None), ANATOMY) == wind

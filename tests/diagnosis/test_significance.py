@@ -12,10 +12,10 @@ from selfmodel.diagnosis.significance import (
     RATIO,
     WORSE,
     Z,
-    has_become_better,
+    exceeds_healthy_loss,
+    gain_exceeds_healthy_gain,
+    gain_is_model_error,
     is_better,
-    is_worse_than_ever,
-    only_mends,
     paired_z,
 )
 
@@ -68,17 +68,17 @@ def test_three_times_the_loss_counts_whatever_the_errors(times: float, told: boo
 
     assert paired_z(other, one) == pytest.approx(1)
     assert is_better(one, other) == told
-    assert is_worse_than_ever(other, one) == told
+    assert exceeds_healthy_loss(other, one) == told
 
 
 def test_the_rounding_of_arithmetic_is_no_reason():
     perfect, rounded = np.zeros(2), np.array([0.0, 1.9 * NEGLIGIBLE])
 
     assert not is_better(perfect, rounded)
-    assert not is_worse_than_ever(rounded, perfect)
+    assert not exceeds_healthy_loss(rounded, perfect)
     assert is_better(perfect, 2 * rounded)
-    assert is_worse_than_ever(np.full(50, 1.01 * NEGLIGIBLE), np.zeros(50))
-    assert not is_worse_than_ever(np.full(50, 0.99 * NEGLIGIBLE), np.zeros(50))
+    assert exceeds_healthy_loss(np.full(50, 1.01 * NEGLIGIBLE), np.zeros(50))
+    assert not exceeds_healthy_loss(np.full(50, 0.99 * NEGLIGIBLE), np.zeros(50))
 
 
 def test_of_a_single_piece_nothing_but_the_ratio_can_tell():
@@ -87,15 +87,15 @@ def test_of_a_single_piece_nothing_but_the_ratio_can_tell():
     assert paired_z(twice, small) == 0
     assert not is_better(small, twice)
     assert is_better(small, four_times)
-    assert not is_worse_than_ever(twice, small)
-    assert is_worse_than_ever(four_times, small)
+    assert not exceeds_healthy_loss(twice, small)
+    assert exceeds_healthy_loss(four_times, small)
 
 
 def test_losses_of_one_trial_and_one_piece_of_another_are_told_by_the_ratio():
     usual = np.full(50, 1.0)
 
-    assert not is_worse_than_ever(np.array([2.9]), usual)
-    assert is_worse_than_ever(np.array([3.1]), usual)
+    assert not exceeds_healthy_loss(np.array([2.9]), usual)
+    assert exceeds_healthy_loss(np.array([3.1]), usual)
 
 
 def test_whatever_predicts_at_all_is_better_than_what_diverged():
@@ -109,10 +109,10 @@ def test_whatever_predicts_at_all_is_better_than_what_diverged():
 def test_a_hypothesis_that_diverged_in_one_trial_is_worse_than_ever():
     mixed = np.array([0.0, 0.0, np.inf])
 
-    assert is_worse_than_ever(mixed, np.ones(3))
-    assert is_worse_than_ever(DIVERGED, np.ones(3))
-    assert not is_worse_than_ever(np.ones(3), DIVERGED)
-    assert not is_worse_than_ever(DIVERGED, DIVERGED)
+    assert exceeds_healthy_loss(mixed, np.ones(3))
+    assert exceeds_healthy_loss(DIVERGED, np.ones(3))
+    assert not exceeds_healthy_loss(np.ones(3), DIVERGED)
+    assert not exceeds_healthy_loss(DIVERGED, DIVERGED)
     assert is_better(np.full(3, 1e9), mixed)
 
 
@@ -122,9 +122,9 @@ def test_losses_of_other_trials_are_compared_as_welch_did():
     z = stats.ttest_ind(losses, usual, equal_var=False).statistic
     lift = (WORSE - z) * (losses.mean() - usual.mean()) / z
 
-    assert not is_worse_than_ever(losses + 0.99 * lift, usual)
-    assert is_worse_than_ever(losses + 1.01 * lift, usual)
-    assert not is_worse_than_ever(losses - 5, usual)
+    assert not exceeds_healthy_loss(losses + 0.99 * lift, usual)
+    assert exceeds_healthy_loss(losses + 1.01 * lift, usual)
+    assert not exceeds_healthy_loss(losses - 5, usual)
 
 
 @given(arrays(float, (2, 6), elements=LOSSES))
@@ -133,7 +133,7 @@ def test_of_two_at_most_one_is_better(pair: np.ndarray):
 
     assert not (is_better(one, other) and is_better(other, one))
     assert not is_better(one, one)
-    assert not is_worse_than_ever(one, one)
+    assert not exceeds_healthy_loss(one, one)
 
 
 @given(arrays(float, (2, 6), elements=LOSSES), st.permutations(range(6)))
@@ -149,8 +149,8 @@ def test_what_became_better_did_so_by_five_standard_errors(errors: float, told: 
     one, before = np.full(100, 10.0), np.full(100, 10.0)
     other = one + of_mean_and_error(errors * 0.1, 0.1)
 
-    assert has_become_better(one, other, before, before) == told
-    assert not has_become_better(other, one, before, before)
+    assert gain_exceeds_healthy_gain(one, other, before, before) == told
+    assert not gain_exceeds_healthy_gain(other, one, before, before)
 
 
 def at_the_edge(errors: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -169,32 +169,32 @@ def test_what_was_better_before_has_to_be_better_by_more_since():
     one, earlier, gain = at_the_edge(WORSE)
 
     assert paired_z(one + gain, one) > WORSE
-    assert not has_become_better(one, one + gain - 0.002, BEFORE, BEFORE + earlier)
-    assert has_become_better(one, one + gain + 0.002, BEFORE, BEFORE + earlier)
+    assert not gain_exceeds_healthy_gain(one, one + gain - 0.002, BEFORE, BEFORE + earlier)
+    assert gain_exceeds_healthy_gain(one, one + gain + 0.002, BEFORE, BEFORE + earlier)
 
 
 def test_what_made_it_worse_before_has_to_help_all_the_same():
     one, before = np.full(100, 10.0), np.full(100, 10.0)
     hardly = one + of_mean_and_error(0.2, 0.1)
 
-    assert not has_become_better(one, hardly, before, before - 1)
+    assert not gain_exceeds_healthy_gain(one, hardly, before, before - 1)
 
 
 def test_what_diverged_or_has_a_single_piece_has_not_become_better():
     one, other = np.zeros(5), np.linspace(1.0, 1.1, 5)
 
-    assert has_become_better(one, other, one, one)
-    assert not has_become_better(one, DIVERGED, one, one)
-    assert not has_become_better(one, other, one, DIVERGED)
-    assert not has_become_better(one[:1], other[:1], one, one)
-    assert not has_become_better(one, other * NEGLIGIBLE / 2, one, one)
+    assert gain_exceeds_healthy_gain(one, other, one, one)
+    assert not gain_exceeds_healthy_gain(one, DIVERGED, one, one)
+    assert not gain_exceeds_healthy_gain(one, other, one, DIVERGED)
+    assert not gain_exceeds_healthy_gain(one[:1], other[:1], one, one)
+    assert not gain_exceeds_healthy_gain(one, other * NEGLIGIBLE / 2, one, one)
 
 
 def test_what_helped_before_only_mends_unless_it_helps_significantly_more_since():
     one, earlier, gain = at_the_edge(Z)
 
-    assert only_mends(one, one + gain - 0.002, BEFORE, BEFORE + earlier)
-    assert not only_mends(one, one + gain + 0.002, BEFORE, BEFORE + earlier)
+    assert gain_is_model_error(one, one + gain - 0.002, BEFORE, BEFORE + earlier)
+    assert not gain_is_model_error(one, one + gain + 0.002, BEFORE, BEFORE + earlier)
 
 
 @pytest.mark.parametrize("harm", [0.0, NEGLIGIBLE / 2, 1.0])
@@ -202,8 +202,8 @@ def test_what_did_not_help_before_does_not_mend_however_little_it_helps_since(ha
     one, before = np.full(100, 10.0), np.full(100, 10.0)
     hardly = one + of_mean_and_error(0.2, 0.1)
 
-    assert not only_mends(one, hardly, before, before - harm)
-    assert only_mends(one, hardly, before, before + 2 * NEGLIGIBLE)
+    assert not gain_is_model_error(one, hardly, before, before - harm)
+    assert gain_is_model_error(one, hardly, before, before + 2 * NEGLIGIBLE)
 
 
 @pytest.mark.parametrize(("error", "told"), [(0.19, True), (0.21, False)])
@@ -211,13 +211,15 @@ def test_trials_that_would_not_have_shown_the_harm_say_nothing(error: float, tol
     # As much harm as it helps would have been 0.6 below what it helps: Z errors of 0.2.
     one, before = np.full(100, 10.0), np.full(100, 10.0)
 
-    assert only_mends(one, one + 0.3, before, before + of_mean_and_error(0.01, error)) == told
+    assert (
+        gain_is_model_error(one, one + 0.3, before, before + of_mean_and_error(0.01, error)) == told
+    )
 
 
 def test_of_what_diverged_or_has_a_single_piece_nobody_knows_whether_it_mends():
     one, other = np.zeros(5), np.linspace(1.0, 1.1, 5)
 
-    assert only_mends(one, other, one, other)
-    assert not only_mends(one, DIVERGED, one, other)
-    assert not only_mends(one, other, one, DIVERGED)
-    assert not only_mends(one, other, one[:1], other[:1])
+    assert gain_is_model_error(one, other, one, other)
+    assert not gain_is_model_error(one, DIVERGED, one, other)
+    assert not gain_is_model_error(one, other, one, DIVERGED)
+    assert not gain_is_model_error(one, other, one[:1], other[:1])

@@ -7,8 +7,8 @@ import pytest
 
 from selfmodel.cli.output.ranking import as_values, in_words, sureness
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
-from selfmodel.diagnosis.loss_functions import Looks, Losses
-from selfmodel.diagnosis.undetectable import unseen
+from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
+from selfmodel.diagnosis.undetectable import undetectable_faults
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import ALL_KINDS, PAPER_KINDS
@@ -34,7 +34,9 @@ TOUCH, KNEE = "sensor:front_left_touch", "break:front_left_knee"
 
 def test_what_makes_no_difference_is_unseen_and_what_makes_one_is_not(quadruped: Robot):
     losses = of(quadruped, {"intact": 1.0, TOUCH: 1.0, KNEE: 0.5}, otherwise=2.0)
-    found = unseen(INTACT, PAPER_KINDS, quadruped.anatomy, Looks(losses, losses, None))
+    found = undetectable_faults(
+        INTACT, PAPER_KINDS, quadruped.anatomy, LossFunctions(losses, losses, None)
+    )
 
     assert [str(one) for one in found] == [TOUCH]
 
@@ -42,13 +44,23 @@ def test_what_makes_no_difference_is_unseen_and_what_makes_one_is_not(quadruped:
 def test_what_diverges_is_ruled_out(quadruped: Robot):
     losses = of(quadruped, {"intact": 1.0}, otherwise=np.inf)
 
-    assert unseen(INTACT, PAPER_KINDS, quadruped.anatomy, Looks(losses, losses, None)) == []
+    assert (
+        undetectable_faults(
+            INTACT, PAPER_KINDS, quadruped.anatomy, LossFunctions(losses, losses, None)
+        )
+        == []
+    )
 
 
 def test_beside_what_diverges_nothing_is_unseen(quadruped: Robot):
     losses = of(quadruped, {}, otherwise=np.inf)
 
-    assert unseen(INTACT, PAPER_KINDS, quadruped.anatomy, Looks(losses, losses, None)) == []
+    assert (
+        undetectable_faults(
+            INTACT, PAPER_KINDS, quadruped.anatomy, LossFunctions(losses, losses, None)
+        )
+        == []
+    )
 
 
 def test_the_closest_comes_first_and_each_says_one_fault_more(quadruped: Robot):
@@ -60,7 +72,9 @@ def test_the_closest_comes_first_and_each_says_one_fault_more(quadruped: Robot):
         f"{KNEE}+jam:back_left_knee": 1 - 1e-7,
     }
     losses = of(quadruped, means, otherwise=2.0)
-    found = unseen(best, PAPER_KINDS, quadruped.anatomy, Looks(losses, losses, None))
+    found = undetectable_faults(
+        best, PAPER_KINDS, quadruped.anatomy, LossFunctions(losses, losses, None)
+    )
 
     assert [str(one) for one in found] == [
         "break:front_left_knee+jam:back_left_knee",
@@ -76,13 +90,20 @@ def test_only_what_the_screen_cannot_tell_is_looked_at_closely(quadruped: Robot)
         asked.update(hypotheses)
         return of(quadruped, {"intact": 1.0}, otherwise=2.0)(hypotheses)
 
-    assert unseen(INTACT, PAPER_KINDS, quadruped.anatomy, Looks(losses, screen, None)) == []
+    assert (
+        undetectable_faults(
+            INTACT, PAPER_KINDS, quadruped.anatomy, LossFunctions(losses, screen, None)
+        )
+        == []
+    )
     assert {str(one) for one in asked} == {"intact", TOUCH}
 
 
 def test_faults_of_degree_are_left_out(quadruped: Robot):
     same = of(quadruped, {}, otherwise=1.0)
-    found = unseen(INTACT, ALL_KINDS, quadruped.anatomy, Looks(same, same, None))
+    found = undetectable_faults(
+        INTACT, ALL_KINDS, quadruped.anatomy, LossFunctions(same, same, None)
+    )
 
     assert {fault.kind for one in found for fault in one.faults} == set(PAPER_KINDS)
 
@@ -98,7 +119,7 @@ def test_a_report_names_what_is_unseen(quadruped: Robot, best: str, besides: lis
         for one in besides
     ]
     diagnosis = Diagnosis(
-        (Candidate(known, 0.1),), 1, 0.2, (), "explained", "by eye", unseen=tuple(more)
+        (Candidate(known, 0.1),), 1, 0.2, (), "explained", "by eye", undetectable=tuple(more)
     )
     found = {"diagnosis": as_values(diagnosis.ranked), **sureness(diagnosis)}
 

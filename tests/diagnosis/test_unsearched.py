@@ -9,11 +9,11 @@ import pytest
 from selfmodel.cli.output.ranking import as_values, in_words, sureness
 from selfmodel.comparators import SEGMENT_PREDICTION, SENSOR_SERIES
 from selfmodel.controllers.network import Controller
-from selfmodel.diagnosis.diagnose import Diagnose
-from selfmodel.diagnosis.diagnosis import Diagnosis, Outside
-from selfmodel.diagnosis.loss_functions import Looks
+from selfmodel.diagnosis.diagnose import DiagnosticSearch
+from selfmodel.diagnosis.diagnosis import Diagnosis, UnsearchedFault
+from selfmodel.diagnosis.loss_functions import LossFunctions
 from selfmodel.diagnosis.significance import NEGLIGIBLE
-from selfmodel.diagnosis.unsearched import better_outside
+from selfmodel.diagnosis.unsearched import best_unsearched_fault
 from selfmodel.experiments.reality import draw_reality
 from selfmodel.faults import ROUGHNESS
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
@@ -22,7 +22,7 @@ from selfmodel.faults.registry import ALL_KINDS, PAPER_KINDS
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.trial import Plan, Stage, Trial
+from selfmodel.trials.trial import Stage, Trial, TrialPlan
 from tests.conftest import random_controllers
 from tests.helpers.memory import MemoryJournal
 
@@ -41,16 +41,18 @@ def of(robot: Robot, means: Mapping[str, float]) -> Callable[[Sequence[Hypothesi
 
 def test_what_explains_more_is_returned(quadruped: Robot):
     after = of(quadruped, {"wind=12": 0.8, "crosswind=12": 0.9})
-    found = better_outside(
-        INTACT, PAPER_KINDS, quadruped.anatomy, Looks(after, after, of(quadruped, {}))
+    found = best_unsearched_fault(
+        INTACT, PAPER_KINDS, quadruped.anatomy, LossFunctions(after, after, of(quadruped, {}))
     )
 
-    assert found == Outside(parse("wind=12", quadruped.anatomy), "wind")
+    assert found == UnsearchedFault(parse("wind=12", quadruped.anatomy), "wind")
 
 
 def test_what_helped_before_as_well_mends_the_model_and_is_no_change(quadruped: Robot):
     after, before = (of(quadruped, {"wind=12": mean}) for mean in (0.8, 0.79))
-    found = better_outside(INTACT, PAPER_KINDS, quadruped.anatomy, Looks(after, after, before))
+    found = best_unsearched_fault(
+        INTACT, PAPER_KINDS, quadruped.anatomy, LossFunctions(after, after, before)
+    )
 
     assert found is None
 
@@ -60,16 +62,18 @@ def never(_: Sequence[Hypothesis]) -> np.ndarray:
 
 
 def test_where_nothing_from_before_can_be_compared_nothing_is_simulated(quadruped: Robot):
-    looks = Looks(never, never, None)
+    looks = LossFunctions(never, never, None)
 
-    assert better_outside(INTACT, PAPER_KINDS, quadruped.anatomy, looks) is None
+    assert best_unsearched_fault(INTACT, PAPER_KINDS, quadruped.anatomy, looks) is None
 
 
 def test_where_nothing_is_left_to_explain_nothing_is_simulated(quadruped: Robot):
     def perfect(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
         return np.full((len(hypotheses), PIECES), NEGLIGIBLE)
 
-    found = better_outside(INTACT, PAPER_KINDS, quadruped.anatomy, Looks(perfect, never, never))
+    found = best_unsearched_fault(
+        INTACT, PAPER_KINDS, quadruped.anatomy, LossFunctions(perfect, never, never)
+    )
 
     assert found is None
 
@@ -78,9 +82,9 @@ def test_a_best_hypothesis_that_diverges_is_not_compared(quadruped: Robot):
     def diverged(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
         return np.full((len(hypotheses), PIECES), np.inf)
 
-    losses = Looks(diverged, diverged, of(quadruped, {}))
+    losses = LossFunctions(diverged, diverged, of(quadruped, {}))
 
-    assert better_outside(INTACT, PAPER_KINDS, quadruped.anatomy, losses) is None
+    assert best_unsearched_fault(INTACT, PAPER_KINDS, quadruped.anatomy, losses) is None
 
 
 def test_only_what_was_not_considered_is_asked_about_and_nothing_that_reshapes(quadruped: Robot):
@@ -92,7 +96,9 @@ def test_only_what_was_not_considered_is_asked_about_and_nothing_that_reshapes(q
 
     best = parse("sensor:back_left_angle", quadruped.anatomy)
     flat = of(quadruped, {})
-    found = better_outside(best, PAPER_KINDS, quadruped.anatomy, Looks(flat, screen, flat))
+    found = best_unsearched_fault(
+        best, PAPER_KINDS, quadruped.anatomy, LossFunctions(flat, screen, flat)
+    )
     kinds = {fault.kind for one in asked - {best} for fault in one.faults}
 
     assert found is None
@@ -106,19 +112,22 @@ def test_only_what_was_not_considered_is_asked_about_and_nothing_that_reshapes(q
 def test_with_all_kinds_considered_nothing_is_outside(quadruped: Robot):
     flat = of(quadruped, {})
 
-    assert better_outside(INTACT, ALL_KINDS, quadruped.anatomy, Looks(flat, flat, flat)) is None
+    assert (
+        best_unsearched_fault(INTACT, ALL_KINDS, quadruped.anatomy, LossFunctions(flat, flat, flat))
+        is None
+    )
 
 
 def trial(robot: Robot, truth: str, gait: Controller, stage: Stage, number: int) -> Trial:
     """A trial across a small gap."""
     reality = draw_reality(robot, 3, 0.03, structure=False)
     physical = reality.robot(robot, parse(truth, robot.anatomy), stream=number)
-    plan = Plan(f"{number:02d}-{stage}", stage, gait, SMALL.steps, 0)
+    plan = TrialPlan(f"{number:02d}-{stage}", stage, gait, SMALL.steps, 0)
     return MemoryJournal(robot).record(physical, plan)
 
 
 def diagnosed(robot: Robot, truth: str, gait: Controller) -> Diagnosis:
-    search = Diagnose(
+    search = DiagnosticSearch(
         Simulator(robot, 1),
         SEGMENT_PREDICTION,
         SMALL,
@@ -138,16 +147,18 @@ def test_a_weak_failure_of_another_kind_is_unexplained_and_named_across_a_gap(
     found = diagnosed(quadruped, truth, random_controllers(quadruped, 5)[2])
 
     assert (found.verdict == "unexplained") == (kind is not None)
-    assert (found.outside.kind if found.outside else None) == kind
+    assert (found.unsearched.kind if found.unsearched else None) == kind
     told = in_words({"diagnosis": as_values(found.ranked), **sureness(found)})
-    assert told.startswith(f"Unexplained: {found.outside.hypothesis}" if found.outside else "Expl")
+    assert told.startswith(
+        f"Unexplained: {found.unsearched.hypothesis}" if found.unsearched else "Expl"
+    )
     assert (f"add {kind} to --kinds" in told) == (kind is not None)
     assert all(fault.kind in PAPER_KINDS for one in found.ranked for fault in one.hypothesis.faults)
 
 
 def test_comparators_of_whole_trials_ask_for_nothing_outside(quadruped: Robot):
     gait = random_controllers(quadruped, 5)[2]
-    search = Diagnose(
+    search = DiagnosticSearch(
         Simulator(quadruped, 1),
         SENSOR_SERIES,
         dataclasses.replace(SMALL, steps=300),
@@ -160,4 +171,4 @@ def test_comparators_of_whole_trials_ask_for_nothing_outside(quadruped: Robot):
         lambda _: None,
     )
 
-    assert found.outside is None
+    assert found.unsearched is None

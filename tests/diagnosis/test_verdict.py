@@ -13,12 +13,12 @@ import pytest
 from selfmodel.comparators import FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
 from selfmodel.controllers.network import Controller
 from selfmodel.diagnosis.comparator import Comparator
-from selfmodel.diagnosis.diagnose import EQUAL, Diagnose
+from selfmodel.diagnosis.diagnose import EQUAL, DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.diagnosis.significance import TEST
 from selfmodel.faults import BROKEN, FRICTION, JAMMED
 from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
-from selfmodel.faults.kind import Kind
+from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import KINDS, PAPER_KINDS
 from selfmodel.physical.simulated_robot import SimulatedRobot
@@ -28,7 +28,7 @@ from selfmodel.simulation.requests import ClosedLoop
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import Behaviour, forward_displacement
-from selfmodel.trials.trial import Plan, Stage, Trial
+from selfmodel.trials.trial import Stage, Trial, TrialPlan
 from tests.conftest import random_controllers
 from tests.helpers.memory import MemoryJournal
 
@@ -41,7 +41,7 @@ GAIT = 4
 def trial(robot: Robot, truth: str, controller: Controller, stage: Stage = "after") -> Trial:
     """A trial of a robot with something wrong."""
     physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
-    plan = Plan(f"{stage}-{truth}-{hash(controller)}", stage, controller, SMALL.steps, 0)
+    plan = TrialPlan(f"{stage}-{truth}-{hash(controller)}", stage, controller, SMALL.steps, 0)
     return MemoryJournal(robot).record(physical, plan)
 
 
@@ -51,10 +51,10 @@ def diagnosed(
     intact: Sequence[Trial] = (),
     *,
     comparator: Comparator = SEGMENT_PREDICTION,
-    kinds: Sequence[Kind] = PAPER_KINDS,
+    kinds: Sequence[FaultKind] = PAPER_KINDS,
     seeds: Sequence[Hypothesis] = (),
 ) -> Diagnosis:
-    search = Diagnose(Simulator(robot, 1), comparator, SMALL, kinds, intact=intact)
+    search = DiagnosticSearch(Simulator(robot, 1), comparator, SMALL, kinds, intact=intact)
     return search(trials, seeds, np.random.default_rng(0), lambda _: None)
 
 
@@ -83,7 +83,7 @@ def test_a_fault_without_a_degree_is_explained_though_its_degree_is_considered(
     found = diagnosed(quadruped, [trial(quadruped, truth, gait)], before, kinds=chosen)
 
     assert str(found.best) == truth
-    assert (found.verdict, found.rivals) == ("explained", ())
+    assert (found.verdict, found.indistinguishable) == ("explained", ())
 
 
 class HardOfHearing:
@@ -121,7 +121,7 @@ def test_faults_that_differ_by_a_degree_are_no_rivals(
     assert str(found.best) == truth
     assert any("=gain" in str(one.hypothesis) for one in found.ranked[1:3])
     assert found.ranked[1].distance == found.ranked[0].distance
-    assert found.rivals == ()
+    assert found.indistinguishable == ()
 
 
 @pytest.mark.parametrize("case", [1, 2, 3, 6, 9])
@@ -132,7 +132,7 @@ def test_a_failure_of_table_one_is_found_and_explained(
 
     assert str(found.best) == CASES[case]
     assert found.verdict == "explained"
-    assert found.rivals == ()
+    assert found.indistinguishable == ()
     assert found.test == TEST
     assert found.ranked[0].distance < 1e-9
     assert (found.intact_distance > 1e-4) == (case != 9)
@@ -153,7 +153,7 @@ def test_a_hidden_neuron_is_unexplained(quadruped: Robot, gait: Controller, befo
     ],
 )
 def test_what_is_of_no_kind_that_is_considered_is_not_explained(
-    quadruped: Robot, gait: Controller, before: list[Trial], truth: str, kinds: list[Kind]
+    quadruped: Robot, gait: Controller, before: list[Trial], truth: str, kinds: list[FaultKind]
 ):
     found = diagnosed(quadruped, [trial(quadruped, truth, gait)], before, kinds=kinds)
 
@@ -221,10 +221,10 @@ def test_hypotheses_that_no_trial_tells_apart_are_rivals(
 
     assert found.verdict == "ambiguous"
     assert found.test == test
-    assert {one, other} <= {found.best, *found.rivals}
-    assert found.best not in found.rivals
-    assert len(found.rivals) <= SMALL.kept
-    assert {distances.get(rival, 0.0) for rival in found.rivals} == {0.0}
+    assert {one, other} <= {found.best, *found.indistinguishable}
+    assert found.best not in found.indistinguishable
+    assert len(found.indistinguishable) <= SMALL.kept
+    assert {distances.get(rival, 0.0) for rival in found.indistinguishable} == {0.0}
     assert found.intact_distance > 0
 
 
@@ -247,7 +247,7 @@ def test_fewer_faults_win_and_what_only_says_more_is_no_rival(quadruped: Robot, 
     assert [candidate.hypothesis for candidate in found.ranked[:2]] == [truth, more]
     assert [candidate.distance for candidate in found.ranked[:2]] == [0, 0]
     assert found.verdict == "explained"
-    assert found.rivals == ()
+    assert found.indistinguishable == ()
 
 
 def test_a_fault_that_the_trial_does_not_need_is_not_diagnosed(quadruped: Robot, gait: Controller):
@@ -260,7 +260,7 @@ def test_a_fault_that_the_trial_does_not_need_is_not_diagnosed(quadruped: Robot,
 
 def test_intact_is_always_judged_whatever_the_search_looked_at(quadruped: Robot, gait: Controller):
     one = trial(quadruped, "break:front_left_shoulder", gait)
-    search = Diagnose(Simulator(quadruped, 1), FORWARD_DISPLACEMENT, SMALL)
+    search = DiagnosticSearch(Simulator(quadruped, 1), FORWARD_DISPLACEMENT, SMALL)
     found = search([one], [], np.random.default_rng(3), lambda _: None)
     (expected,) = search.evidence.distances([INTACT], [one])
 

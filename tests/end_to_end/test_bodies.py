@@ -33,7 +33,7 @@ from selfmodel.tasks import suite_bodies, walking
 from selfmodel.trials.behaviour import SIGNALS, Behaviour, collect
 from selfmodel.trials.rotation import rotation_between
 from selfmodel.trials.state_estimation import BASE, STATE
-from selfmodel.trials.trial import Plan, Trial
+from selfmodel.trials.trial import Trial, TrialPlan
 from tests.conftest import lacking
 from tests.helpers.bodies import BODIES, swinging, swung
 from tests.logs.conftest import plan_of
@@ -129,7 +129,10 @@ def test_each_segment_of_a_trial_is_predicted_from_its_first_state(body: Robot):
 def test_a_trial_speaks_for_what_is_true_of_the_body(body: Robot):
     intact, *others = damages(body)
     trial = Trial(
-        Plan("trial", "before", swung(body, STEPS), STEPS, 0), body.name, happened(body, intact), ""
+        TrialPlan("trial", "before", swung(body, STEPS), STEPS, 0),
+        body.name,
+        happened(body, intact),
+        "",
     )
     evidence = Evidence(Simulator(body, 1), SEGMENT_PREDICTION)
     losses = evidence.losses([intact, *others], [trial]).mean(axis=1)

@@ -89,8 +89,8 @@ def wait_for_a_result(folder: Path) -> None:
 
 def test_a_grid_does_every_part_once_and_not_again(tmp_path: Path):
     events: list = []
-    first = run_grid(tmp_path, jobs(3, ("a", "b")), work, workers=2, watch=events.append)
-    again = run_grid(tmp_path, jobs(3, ("a", "b")), work, workers=2, watch=events.append)
+    first = run_grid(tmp_path, jobs(3, ("a", "b")), work, workers=2, on_event=events.append)
+    again = run_grid(tmp_path, jobs(3, ("a", "b")), work, workers=2, on_event=events.append)
 
     assert (first, again) == ((), ())
     assert calls(tmp_path) == {f"run-{seed:02d}": ["a", "b"] for seed in range(3)}
@@ -101,7 +101,9 @@ def test_a_grid_does_every_part_once_and_not_again(tmp_path: Path):
 
 def test_the_results_do_not_depend_on_the_number_of_workers(tmp_path: Path):
     for workers in (1, 2):
-        run_grid(tmp_path / str(workers), jobs(4, ("a", "b")), work, workers=workers, watch=silent)
+        run_grid(
+            tmp_path / str(workers), jobs(4, ("a", "b")), work, workers=workers, on_event=silent
+        )
 
     one, two = ([*finished(tmp_path / folder)] for folder in ("1", "2"))
 
@@ -110,8 +112,8 @@ def test_the_results_do_not_depend_on_the_number_of_workers(tmp_path: Path):
 
 
 def test_a_run_is_extended_by_a_part_and_keeps_the_others(tmp_path: Path):
-    run_grid(tmp_path, jobs(2, ("a",)), work, workers=1, watch=silent)
-    run_grid(tmp_path, jobs(2, ("a", "package.module:b/c")), work, workers=1, watch=silent)
+    run_grid(tmp_path, jobs(2, ("a",)), work, workers=1, on_event=silent)
+    run_grid(tmp_path, jobs(2, ("a", "package.module:b/c")), work, workers=1, on_event=silent)
 
     assert calls(tmp_path)["run-01"] == ["a", "package.module:b/c"]
     assert {each.part for each in finished(tmp_path)} == {"a", "package.module:b/c"}
@@ -127,7 +129,7 @@ def test_a_run_is_extended_by_a_part_and_keeps_the_others(tmp_path: Path):
 )
 def test_a_failure_is_kept_and_stops_no_other(tmp_path: Path, fails: str, sentence: str):
     bad = Job("bad", {"factor": 1, "fails": fails}, 0, ("a", "b"))
-    failed = run_grid(tmp_path, [bad, *jobs(2)], work, workers=1, watch=silent)
+    failed = run_grid(tmp_path, [bad, *jobs(2)], work, workers=1, on_event=silent)
 
     assert [(each.key, each.part, each.error) for each in failed] == [
         ("bad", "a", sentence),
@@ -139,26 +141,26 @@ def test_a_failure_is_kept_and_stops_no_other(tmp_path: Path, fails: str, senten
 
 
 def test_what_failed_is_tried_again(tmp_path: Path):
-    assert run_grid(tmp_path, jobs(1, fails="foreseen"), work, workers=1, watch=silent)
+    assert run_grid(tmp_path, jobs(1, fails="foreseen"), work, workers=1, on_event=silent)
     (tmp_path / "run-00" / "mended").touch()
 
-    assert run_grid(tmp_path, jobs(1, fails="foreseen"), work, workers=1, watch=silent) == ()
+    assert run_grid(tmp_path, jobs(1, fails="foreseen"), work, workers=1, on_event=silent) == ()
 
 
 def test_a_run_whose_results_were_deleted_is_made_again(tmp_path: Path):
-    run_grid(tmp_path, jobs(2), work, workers=1, watch=silent)
+    run_grid(tmp_path, jobs(2), work, workers=1, on_event=silent)
     shutil.rmtree(tmp_path / "run-01" / "parts")
 
-    assert run_grid(tmp_path, jobs(2), work, workers=1, watch=silent) == ()
+    assert run_grid(tmp_path, jobs(2), work, workers=1, on_event=silent) == ()
     assert calls(tmp_path) == {"run-00": ["result"], "run-01": ["result", "result"]}
 
 
 def test_a_run_made_of_something_else_is_refused_before_anything_is_done(tmp_path: Path):
-    run_grid(tmp_path, jobs(1), work, workers=1, watch=silent)
+    run_grid(tmp_path, jobs(1), work, workers=1, on_event=silent)
     other = [Job("new", {"factor": 1}, 0), Job("run-00", {"factor": 11}, 0)]
 
     with pytest.raises(InputError, match=r"run-00 .*parameters.factor is 10 there, asked is 11"):
-        run_grid(tmp_path, other, work, workers=1, watch=silent)
+        run_grid(tmp_path, other, work, workers=1, on_event=silent)
     assert not (tmp_path / "new").exists()
 
 
@@ -170,7 +172,7 @@ def test_a_grid_that_was_killed_goes_on_where_it_was(tmp_path: Path):
     done = {each.key for each in finished(tmp_path / "runs")}
     assert 0 < len(done) < 6
 
-    run_grid(tmp_path / "runs", jobs(6, seconds=0.3), work, workers=2, watch=silent)
+    run_grid(tmp_path / "runs", jobs(6, seconds=0.3), work, workers=2, on_event=silent)
 
     assert [each.seed for each in finished(tmp_path / "runs")] == list(range(6))
     assert all(calls(tmp_path / "runs")[key] == ["result"] for key in done)
@@ -189,7 +191,7 @@ def test_an_interrupt_ends_every_process_at_once_and_quietly(tmp_path: Path):
 
 
 def test_a_worker_never_sees_an_interrupt_not_even_while_it_starts(tmp_path: Path):
-    run_grid(tmp_path, jobs(2), work, workers=2, watch=silent)
+    run_grid(tmp_path, jobs(2), work, workers=2, on_event=silent)
 
     assert all(each.result["deaf"] for each in finished(tmp_path))
     assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())

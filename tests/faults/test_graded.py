@@ -13,7 +13,7 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.faults.terrain import BUMP, CELL, FLAT, HALF_EXTENT, unit_heights
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.sensing import Senses
+from selfmodel.robot.sensing import SensorReader
 from selfmodel.simulation.simulator import Simulator
 from tests.conftest import random_controllers, random_motion
 from tests.faults.test_build import assert_same_paths, follow
@@ -260,7 +260,7 @@ def test_a_world_without_level_ground_cannot_become_rough():
 def test_readings_have_the_gain_and_then_the_bias(quadruped: Robot):
     def first(text: str) -> np.ndarray:
         embodiment = build(quadruped, parse(text, quadruped.anatomy))
-        senses = Senses(quadruped.model, quadruped.anatomy, [embodiment])
+        senses = SensorReader(quadruped.model, quadruped.anatomy, [embodiment])
         qpos = quadruped.model.qpos0 + 0.1
         readings = np.empty((1, 8))
         senses.read(np.full((1, 8), 5.0), qpos[np.newaxis], readings)
@@ -298,7 +298,7 @@ def test_noise_has_its_deviation_and_is_the_same_whatever_else_is_wrong(quadrupe
 def test_another_seed_is_another_noise(quadruped: Robot):
     text = "sensor:front_left_angle=noise0.2"
     embodiments = [build(quadruped, parse(text, quadruped.anatomy), seed) for seed in (0, 0, 1)]
-    senses = Senses(quadruped.model, quadruped.anatomy, embodiments)
+    senses = SensorReader(quadruped.model, quadruped.anatomy, embodiments)
     readings = np.empty((3, 8))
     senses.read(np.zeros((3, 8)), np.tile(quadruped.model.qpos0, (3, 1)), readings)
 

@@ -15,7 +15,7 @@ from selfmodel.errors import InputError
 from selfmodel.experiments import plugins as resolve
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.faults.kind import Fault, Kind, between, grid
+from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import ALL_KINDS, KINDS, PAPER_KINDS, known
 from selfmodel.robot.anatomy import Anatomy
@@ -38,7 +38,7 @@ PAYLOAD = example("payload").PAYLOAD
 
 
 @pytest.mark.parametrize("kind", [*KINDS.values(), PAYLOAD], ids=lambda kind: kind.name)
-def test_a_kind_keeps_its_contract(kind: Kind, robot: Robot):
+def test_a_kind_keeps_its_contract(kind: FaultKind, robot: Robot):
     check_kind(kind, robot)
 
 
@@ -48,7 +48,7 @@ def test_the_registry_knows_each_kind_by_its_name():
     assert set(KINDS.values()) - set(ALL_KINDS) == {KINDS["neuron"]}
 
 
-@pytest.mark.parametrize("name", [kind.name for kind in ALL_KINDS if kind.degrees])
+@pytest.mark.parametrize("name", [kind.name for kind in ALL_KINDS if kind.severity_bounds])
 def test_a_kind_of_degree_proposes_a_few_levels(name: str, robot: Robot):
     kind = KINDS[name]
 
@@ -98,8 +98,12 @@ def heavier_each_time(_embodiment: Embodiment, _anatomy: Anatomy, _fault: Fault)
 
 heavier_each_time.times = 0
 
-GRADED = Kind(
-    name="odd", word="odd", strike=PAYLOAD.strike, degrees=between(0, 2), levels=grid(1.0)
+GRADED = FaultKind(
+    name="odd",
+    keyword="odd",
+    apply=PAYLOAD.apply,
+    severity_bounds=uniform_bounds(0, 2),
+    levels=uniform_levels(1.0),
 )
 
 
@@ -107,16 +111,16 @@ GRADED = Kind(
     ("change", "said"),
     [
         ({"name": "two words"}, "needs a name without spaces"),
-        ({"word": "a:b"}, "needs a word without spaces"),
+        ({"keyword": "a:b"}, "needs a word without spaces"),
         ({"parts": lambda _anatomy: ()}, "nothing can be proposed"),
-        ({"levels": grid()}, "nothing can be proposed"),
-        ({"levels": grid(3.0)}, "not between 0 and 2"),
-        ({"degrees": None}, "the kind no degrees"),
+        ({"levels": uniform_levels()}, "nothing can be proposed"),
+        ({"levels": uniform_levels(3.0)}, "not between 0 and 2"),
+        ({"severity_bounds": None}, "the kind no degrees"),
         ({"special": {1.0: None}}, "alone it means intact"),
-        ({"word": "friction"}, "is read back as friction=1.0"),
+        ({"keyword": "friction"}, "is read back as friction=1.0"),
         ({"absorbs": lambda _fault, _other, _anatomy: True}, "absorbs itself"),
-        ({"strike": nothing}, "changes nothing about a robot"),
-        ({"strike": heavier_each_time}, "does not make the same robot every time"),
+        ({"apply": nothing}, "changes nothing about a robot"),
+        ({"apply": heavier_each_time}, "does not make the same robot every time"),
         ({"feel": lambda _own, _fault, points: points.fill(0)}, "changes the points"),
     ],
 )
@@ -134,7 +138,7 @@ def test_the_contract_kit_sees_a_kind_that_edits_the_robot_itself():
         robot.model.body_mass[1] = 5.0
 
     with pytest.raises(ValueError, match=r"does not make the same robot|changes the robot itself"):
-        check_kind(dataclasses.replace(GRADED, strike=wrong), robot)
+        check_kind(dataclasses.replace(GRADED, apply=wrong), robot)
 
 
 def test_kinds_are_chosen_by_name(monkeypatch: pytest.MonkeyPatch):
@@ -155,7 +159,7 @@ def test_kinds_are_chosen_by_name(monkeypatch: pytest.MonkeyPatch):
         ("break,", "unknown kind ''"),
         ("neuron", "unknown kind 'neuron'"),
         ("nowhere:KIND", "cannot find the kind 'nowhere:KIND'"),
-        ("selfmodel.faults:Kind", "is no kind: expected a selfmodel.faults.Kind"),
+        ("selfmodel.faults:FaultKind", "is no kind: expected a selfmodel.faults.FaultKind"),
         ("tests.faults.test_kinds:SECOND_WIND", "are called 'second-wind', or 'wind' in notation"),
         ("tests.faults.test_kinds:OTHER_JAM", "are called 'jam', or 'cling' in notation"),
     ],
@@ -165,8 +169,8 @@ def test_a_name_of_no_kind_says_what_was_meant(names: str, said: str):
         resolve.kinds(names)
 
 
-SECOND_WIND = dataclasses.replace(GRADED, name="second-wind", word="wind")
-OTHER_JAM = dataclasses.replace(GRADED, name="jam", word="cling")
+SECOND_WIND = dataclasses.replace(GRADED, name="second-wind", keyword="wind")
+OTHER_JAM = dataclasses.replace(GRADED, name="jam", keyword="cling")
 
 
 def test_notation_names_a_third_party_s_kind_where_it_is_considered(quadruped: Robot):

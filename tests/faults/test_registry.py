@@ -6,20 +6,20 @@ from pathlib import Path
 import pytest
 
 from selfmodel.comparators import SEGMENT_PREDICTION
-from selfmodel.diagnosis.diagnose import Diagnose
+from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.kind_contract import check_kind
 from selfmodel.errors import InputError
-from selfmodel.faults.kind import Fault, Kind, between, grid
+from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
 from selfmodel.faults.notation import parse
-from selfmodel.faults.registry import ALL_KINDS, KINDS, PAPER_KINDS, considered, known
+from selfmodel.faults.registry import ALL_KINDS, KINDS, PAPER_KINDS, applicable_kinds, known
 from selfmodel.physical.simulated_robot import SimulatedRobot
-from selfmodel.recovery.explain import explain
+from selfmodel.recovery.explain import diagnose_trials
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.trial import Plan
+from selfmodel.trials.trial import TrialPlan
 from tests.conftest import random_controllers
 from tests.helpers.command import selfmodel
 from tests.helpers.memory import MemoryJournal
@@ -40,49 +40,49 @@ BARE = """\
 
 
 def test_what_strikes_a_robot_stays_in_its_order_and_brings_its_other_names(robot: Robot):
-    assert considered(PAPER_KINDS, robot.anatomy) == PAPER_KINDS
-    assert considered(ALL_KINDS, robot.anatomy) == ALL_KINDS
-    assert considered(ANGLES, robot.anatomy) == (*ANGLES, KINDS["jam"])
+    assert applicable_kinds(PAPER_KINDS, robot.anatomy) == PAPER_KINDS
+    assert applicable_kinds(ALL_KINDS, robot.anatomy) == ALL_KINDS
+    assert applicable_kinds(ANGLES, robot.anatomy) == (*ANGLES, KINDS["jam"])
     gains = (KINDS["sensor-gain"], KINDS["motor"])
-    assert considered(gains, robot.anatomy) == (*gains, KINDS["sensor"])
+    assert applicable_kinds(gains, robot.anatomy) == (*gains, KINDS["sensor"])
 
 
 def test_a_kind_that_cannot_strike_a_robot_is_passed_over_and_alone_refused():
     anatomy = Robot("bare", BARE, 0.02).anatomy
 
-    assert considered(PAPER_KINDS, anatomy) == (KINDS["break"], KINDS["jam"])
+    assert applicable_kinds(PAPER_KINDS, anatomy) == (KINDS["break"], KINDS["jam"])
     with pytest.raises(InputError, match="no part that sensor, sensor-gain can strike"):
-        considered((KINDS["sensor"], KINDS["sensor-gain"]), anatomy)
+        applicable_kinds((KINDS["sensor"], KINDS["sensor-gain"]), anatomy)
 
 
 def test_a_kind_that_no_diagnosis_may_propose_is_refused(robot: Robot):
     with pytest.raises(InputError, match="no diagnosis may propose neuron: leave it out"):
-        considered((KINDS["break"], KINDS["neuron"]), robot.anatomy)
+        applicable_kinds((KINDS["break"], KINDS["neuron"]), robot.anatomy)
 
 
 def test_kinds_that_a_fault_is_of_at_some_degree_can_be_named(quadruped: Robot):
     """What a diagnosis says is read back from its log."""
-    sticky = Kind(name="sticky", word="sticky", strike=strike)
-    stick = Kind(
+    sticky = FaultKind(name="sticky", keyword="sticky", apply=apply)
+    stick = FaultKind(
         name="stick",
-        word="stick",
-        strike=strike,
-        degrees=between(0, 2),
-        levels=grid(1.0, 2.0),
+        keyword="stick",
+        apply=apply,
+        severity_bounds=uniform_bounds(0, 2),
+        levels=uniform_levels(1.0, 2.0),
         special={0.0: sticky, 0.5: None},
     )
 
     check_kind(stick, quadruped)
-    assert considered((stick,), quadruped.anatomy) == (stick, sticky)
+    assert applicable_kinds((stick,), quadruped.anatomy) == (stick, sticky)
     assert str(parse("stick=0", quadruped.anatomy, known((stick,)))) == "sticky"
     for wrong in (KINDS["neuron"], KINDS["slope"]):
         with pytest.raises(ValueError, match=f"stick is {wrong.name} at some degree"):
             check_kind(dataclasses.replace(stick, special={0.0: wrong}), quadruped)
 
 
-def strike(embodiment: Embodiment, _anatomy: Anatomy, fault: Fault) -> None:
+def apply(embodiment: Embodiment, _anatomy: Anatomy, fault: Fault) -> None:
     """More friction in every joint."""
-    embodiment.model.dof_frictionloss[6:] += 0.1 + fault.degree
+    embodiment.model.dof_frictionloss[6:] += 0.1 + fault.severity
 
 
 def test_a_recovery_of_a_robot_with_nothing_to_strike_is_refused_before_any_trial(tmp_path: Path):
@@ -105,9 +105,9 @@ def test_a_joint_that_turns_out_to_be_jammed_at_0_is_found_among_angles_trial_af
     hidden = parse("jam:front_left_shoulder", quadruped.anatomy)
     journal, physical = MemoryJournal(quadruped), SimulatedRobot(quadruped, hidden)
     trials = [
-        journal.record(physical, Plan(f"{number:02d}-after", "after", gait, SMALL.steps, 0))
+        journal.record(physical, TrialPlan(f"{number:02d}-after", "after", gait, SMALL.steps, 0))
         for number, gait in enumerate(random_controllers(quadruped, 4)[1:])
     ]
-    search = Diagnose(Simulator(quadruped, 1), SEGMENT_PREDICTION, SMALL, ANGLES)
+    search = DiagnosticSearch(Simulator(quadruped, 1), SEGMENT_PREDICTION, SMALL, ANGLES)
 
-    assert explain(trials, search, 0, lambda _: None).best == hidden
+    assert diagnose_trials(trials, search, 0, lambda _: None).best == hidden

@@ -10,7 +10,7 @@ from selfmodel.physical.environment_robot import EnvironmentRobot
 from selfmodel.settings import Settings
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import SIGNALS, Behaviour, collect
-from selfmodel.trials.trial import Plan
+from selfmodel.trials.trial import TrialPlan
 from tests.conftest import random_controllers
 
 STEPS = 30
@@ -95,7 +95,7 @@ def logged(bench: Bench, folder: Path, steps: int = STEPS, **options: object) ->
     return write_trial(
         folder / "trial.mcap",
         QUADRUPED,
-        Plan("trial", "single", CONTROLLER, steps, 0),
+        TrialPlan("trial", "single", CONTROLLER, steps, 0),
         physical.run(CONTROLLER, steps),
         timed=True,
         settings=Settings(),

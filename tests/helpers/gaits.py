@@ -4,7 +4,7 @@ import numpy as np
 
 from selfmodel.controllers.playback import Playback
 from selfmodel.trials.behaviour import SIGNALS, Behaviour, Names, Signal
-from selfmodel.trials.trial import Plan, Trial
+from selfmodel.trials.trial import Trial, TrialPlan
 
 LEGS = 4
 NAMES = Names(
@@ -55,4 +55,6 @@ def changed(run: Behaviour, **signals: np.ndarray) -> Behaviour:
 def logged(run: Behaviour) -> Trial:
     """The trial whose log shows that run."""
     driver = Playback(run.names.motors, np.zeros((run.steps, len(run.names.motors))))
-    return Trial(Plan("made-up", "after", driver, run.steps, 0), "made-up", run, "made-up.mcap")
+    return Trial(
+        TrialPlan("made-up", "after", driver, run.steps, 0), "made-up", run, "made-up.mcap"
+    )

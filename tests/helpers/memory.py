@@ -5,7 +5,7 @@ from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery.database import Database
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import collect
-from selfmodel.trials.trial import Plan, Trial
+from selfmodel.trials.trial import Trial, TrialPlan
 
 
 class MemoryJournal:
@@ -15,7 +15,7 @@ class MemoryJournal:
         self._robot = robot
         self._database = Database()
 
-    def record(self, physical: PhysicalRobot, plan: Plan) -> Trial:
+    def record(self, physical: PhysicalRobot, plan: TrialPlan) -> Trial:
         """Runs a trial and keeps it."""
         samples = physical.run(plan.controller, plan.steps)
         behaviour = collect(self._robot.anatomy.names, samples)

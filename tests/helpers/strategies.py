@@ -3,7 +3,7 @@
 from hypothesis import strategies as st
 
 from selfmodel.faults.hypothesis import Hypothesis, canonical
-from selfmodel.faults.kind import Fault, Kind
+from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.faults.registry import KINDS, PAPER_KINDS
 from selfmodel.robot.anatomy import Anatomy
 
@@ -22,13 +22,13 @@ def hypotheses(
     return sets.map(lambda chosen: canonical(chosen, anatomy))
 
 
-def _fault(kind: Kind, anatomy: Anatomy) -> st.SearchStrategy[Fault]:
+def _fault(kind: FaultKind, anatomy: Anatomy) -> st.SearchStrategy[Fault]:
     parts = st.sampled_from(kind.parts(anatomy))
-    if kind.degrees is None:
+    if kind.severity_bounds is None:
         return parts.map(lambda part: Fault(kind, part))
-    degrees = kind.degrees
+    severities = kind.severity_bounds
     return parts.flatmap(
-        lambda part: st.floats(*degrees(anatomy, part)).map(
-            lambda degree: Fault(kind, part, degree + 0.0)
+        lambda part: st.floats(*severities(anatomy, part)).map(
+            lambda severity: Fault(kind, part, severity + 0.0)
         )
     )

@@ -11,8 +11,8 @@ from selfmodel.controllers.network import Controller, draw_weights
 from selfmodel.logs.writer import write_trial
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trials.behaviour import SIGNALS, Moment, Sample
-from selfmodel.trials.trial import Plan
+from selfmodel.trials.behaviour import SIGNALS, Sample, StepTiming
+from selfmodel.trials.trial import TrialPlan
 
 MJCF = """
 <mujoco model="biped">
@@ -66,29 +66,29 @@ def biped() -> Robot:
 
 
 @pytest.fixture(scope="session")
-def plan(biped: Robot) -> Plan:
+def plan(biped: Robot) -> TrialPlan:
     """A trial of the biped that is long enough for some flushes."""
     return plan_of(biped, STEPS)
 
 
 @pytest.fixture
-def log(biped: Robot, plan: Plan, tmp_path: Path) -> Path:
+def log(biped: Robot, plan: TrialPlan, tmp_path: Path) -> Path:
     """A finished log of a made-up trial."""
     path = tmp_path / "trial.mcap"
     samples = made_up(biped, STEPS)
     return write_trial(path, biped, plan, samples, settings=Settings(), hidden="intact")
 
 
-def plan_of(robot: Robot, steps: int, name: str = "00-before") -> Plan:
+def plan_of(robot: Robot, steps: int, name: str = "00-before") -> TrialPlan:
     """Returns a plan with a random controller."""
     genome = draw_weights(np.random.default_rng(1), (robot.network.weights,))
-    return Plan(name, "before", Controller(robot.network, genome), steps, seed=7)
+    return TrialPlan(name, "before", Controller(robot.network, genome), steps, seed=7)
 
 
 def timed(samples: Iterable[Sample]) -> Iterator[Sample]:
     """Yields the samples with made-up moments: some late, some missing."""
     for k, sample in enumerate(samples):
-        yield replace(sample, moment=Moment(1.01 * sample.time, k % 7 == 3, k % 11 == 5))
+        yield replace(sample, moment=StepTiming(1.01 * sample.time, k % 7 == 3, k % 11 == 5))
 
 
 def made_up(robot: Robot, steps: int, seed: int = 0) -> Iterator[Sample]:

@@ -56,5 +56,5 @@ def _run(call: Callable[[], object], sender: Connection) -> None:
     except LogError as failure:
         error = str(failure)
     seconds = time.perf_counter() - start
-    grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
-    sender.send(Outcome(error, seconds, grown / 1000))
+    amplitude_rise = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+    sender.send(Outcome(error, seconds, amplitude_rise / 1000))

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from selfmodel.controllers.network import Controller
-from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, Outside
+from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, UnsearchedFault
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, canonical
-from selfmodel.faults.kind import WORLD, Fault, Kind
+from selfmodel.faults.kind import ENVIRONMENT, Fault, FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import known
 from selfmodel.logs import CorruptError, LogError, SchemaMismatchError, read_truth
@@ -18,7 +18,7 @@ from selfmodel.logs.journal import FolderJournal, open_journal, read_database
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Sample
-from selfmodel.trials.trial import Plan
+from selfmodel.trials.trial import TrialPlan
 from tests.logs.conftest import made_up, plan_of
 
 HEAD = '[{"trials": 1, "ranked": [{"hypothesis": "intact", "distance": 1}], "intact_distance": 1, '
@@ -50,7 +50,7 @@ def diagnosis(robot: Robot) -> Diagnosis:
         ranked,
         trials=3,
         intact_distance=0.1 + 0.2,
-        rivals=(worse, parse("jam:left_hip", robot.anatomy)),
+        indistinguishable=(worse, parse("jam:left_hip", robot.anatomy)),
         verdict="ambiguous",
         test="by eye",
     )
@@ -66,10 +66,10 @@ def test_a_journal_reads_what_it_recorded(journal: FolderJournal, biped: Robot):
         ranked=first.ranked[1:],
         trials=4,
         intact_distance=math.inf,
-        rivals=(),
+        indistinguishable=(),
         verdict="unexplained",
-        outside=Outside(parse("wind=12", biped.anatomy), "wind"),
-        unseen=(parse("break:left_hip+jam:right_hip", biped.anatomy),),
+        unsearched=UnsearchedFault(parse("wind=12", biped.anatomy), "wind"),
+        undetectable=(parse("break:left_hip+jam:right_hip", biped.anatomy),),
     )
     journal.note(first)
     journal.note(second)
@@ -98,7 +98,7 @@ def test_the_hundredth_trial_comes_after_the_ninety_ninth(journal: FolderJournal
 
 def test_a_stage_without_a_truth_is_logged_without(journal: FolderJournal, biped: Robot):
     plan = plan_of(biped, 3)
-    other = Plan("01-after", "after", plan.controller, plan.steps, plan.seed)
+    other = TrialPlan("01-after", "after", plan.controller, plan.steps, plan.seed)
     assert read_truth(journal.record(MadeUpRobot(biped), other).path) is None
 
 
@@ -191,10 +191,10 @@ def test_diagnoses_are_json_without_surprises(journal: FolderJournal, biped: Rob
 
 
 def test_rivals_of_a_third_party_s_kind_are_read_back(biped: Robot, tmp_path: Path):
-    load = Kind(name="load", word="load", strike=lambda *_: None)
-    loaded = canonical([Fault(load, WORLD)], biped.anatomy)
+    load = FaultKind(name="load", keyword="load", apply=lambda *_: None)
+    loaded = canonical([Fault(load, ENVIRONMENT)], biped.anatomy)
     journal = open_journal(tmp_path / "run", biped, Settings(), {}, kinds=known([load]))
-    told = dataclasses.replace(diagnosis(biped), rivals=(loaded,))
+    told = dataclasses.replace(diagnosis(biped), indistinguishable=(loaded,))
     journal.note(told)
 
     assert journal.read().diagnoses == (told,)

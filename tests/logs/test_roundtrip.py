@@ -15,7 +15,7 @@ from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import SIGNALS, Behaviour, Sample, collect
-from selfmodel.trials.trial import Plan
+from selfmodel.trials.trial import TrialPlan
 from tests.logs.conftest import STEPS, made_up, plan_of
 
 ANYTHING = st.floats(allow_nan=True, allow_infinity=True, width=64)
@@ -70,7 +70,7 @@ def test_times_come_back_to_the_bit(biped: Robot, tmp_path: Path, timestep: floa
     assert behaviour.time.tolist() == [sample.time for sample in samples]
 
 
-def test_a_log_says_what_was_planned_and_with_what(log: Path, biped: Robot, plan: Plan):
+def test_a_log_says_what_was_planned_and_with_what(log: Path, biped: Robot, plan: TrialPlan):
     read = read_log(log)
     assert read.trial.plan == plan
     assert read.trial.robot == "biped"
@@ -84,7 +84,9 @@ def test_a_log_says_what_was_planned_and_with_what(log: Path, biped: Robot, plan
     assert read.trial.path == str(log)
 
 
-def test_the_same_trial_gives_the_same_bytes(log: Path, biped: Robot, plan: Plan, tmp_path: Path):
+def test_the_same_trial_gives_the_same_bytes(
+    log: Path, biped: Robot, plan: TrialPlan, tmp_path: Path
+):
     again = tmp_path / "again.mcap"
     samples = made_up(biped, STEPS)
     write_trial(again, biped, plan, samples, settings=Settings(), hidden="intact")
@@ -92,7 +94,7 @@ def test_the_same_trial_gives_the_same_bytes(log: Path, biped: Robot, plan: Plan
 
 
 def test_the_truth_is_read_only_by_who_asks_for_it(
-    log: Path, biped: Robot, plan: Plan, tmp_path: Path
+    log: Path, biped: Robot, plan: TrialPlan, tmp_path: Path
 ):
     paths = {None: tmp_path / "none" / "trial.mcap", "neuron:0": tmp_path / "other" / "trial.mcap"}
     logs = {"intact": read_log(log)}

@@ -9,7 +9,7 @@ from selfmodel.physical.debris import drop_debris
 from selfmodel.physical.reality_gap import DEBRIS, draw_gap
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state_access import places
+from selfmodel.robot.state_access import signal_fields
 from selfmodel.tasks import ROBOTS
 from tests.conftest import random_controllers
 
@@ -88,7 +88,7 @@ def test_debris_stands_behind_all_that_is_the_robots(name: str):
     text = "+".join(f"break:{joint}" for joint in joints)
     model = broken(robot, text)._embodiment.model
 
-    assert places(robot, model) == places(robot)
+    assert signal_fields(robot, model) == signal_fields(robot)
     assert (model.nu, model.nsensor) == (robot.model.nu, robot.model.nsensor)
     for b in range(robot.model.nbody):
         assert model.body(b).name == robot.model.body(b).name

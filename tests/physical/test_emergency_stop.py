@@ -18,7 +18,7 @@ from selfmodel.physical.safety_limits import Limit, joint_limits, tilt_limit
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Sample, Signal
-from selfmodel.trials.trial import Plan
+from selfmodel.trials.trial import TrialPlan
 from tests.helpers.bench import (
     CONTROLLER,
     NAMES,
@@ -154,7 +154,7 @@ def test_a_writer_that_fails_stops_the_robot_before_it_closes_the_log(tmp_path: 
             for k, sample in enumerate(real):
                 yield dataclasses.replace(sample, time=-1.0) if k == 9 else sample
 
-    plan = Plan("trial", "single", CONTROLLER, STEPS, 0)
+    plan = TrialPlan("trial", "single", CONTROLLER, STEPS, 0)
     with pytest.raises(InputError, match="step 9 of 30 is due"):
         write_trial(
             tmp_path / "trial.mcap", QUADRUPED, plan, samples(), timed=True, settings=Settings()

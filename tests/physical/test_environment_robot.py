@@ -18,7 +18,7 @@ from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log
 from selfmodel.logs.journal import open_journal
 from selfmodel.physical.environment_robot import EnvironmentRobot
-from selfmodel.physical.interface import PhysicalRobot, Timed
+from selfmodel.physical.interface import PhysicalRobot, TimedRobot
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.physical.step_timing import Stopwatch
 from selfmodel.recovery.recover import Recovery, recover
@@ -28,7 +28,7 @@ from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import load
 from selfmodel.tasks.walking import motion_capture
 from selfmodel.trials.behaviour import SIGNALS, collect
-from selfmodel.trials.trial import Plan
+from selfmodel.trials.trial import TrialPlan
 from tests.conftest import random_controllers
 from tests.helpers.bench import (
     CONTROLLER,
@@ -72,8 +72,8 @@ def test_what_an_environment_does_not_observe_is_marked():
 
 
 def test_only_a_robot_with_a_clock_of_its_own_is_timed():
-    assert isinstance(bench_robot(Bench()), Timed)
-    assert not isinstance(SimulatedRobot(QUADRUPED), Timed)
+    assert isinstance(bench_robot(Bench()), TimedRobot)
+    assert not isinstance(SimulatedRobot(QUADRUPED), TimedRobot)
 
 
 def test_times_are_those_aimed_at_and_marks_tell_when_steps_were():
@@ -222,11 +222,11 @@ def test_an_infinite_time_is_none_and_leaves_a_log_that_can_be_read(tmp_path: Pa
 def test_a_step_is_late_exactly_where_its_time_is_off_by_more_than_the_tolerance(
     took: list[float],
 ):
-    watch, now = Stopwatch(1.0, 0.25), 7.0
-    assert not watch.look(now, {}).late
+    on_event, now = Stopwatch(1.0, 0.25), 7.0
+    assert not on_event.look(now, {}).late
     for each in took:
         before, now = now, now + each
-        moment = watch.look(now, {})
+        moment = on_event.look(now, {})
         if abs(abs(now - before - 1) - 0.25) > 1e-9:
             assert moment.late == (abs(now - before - 1) > 0.25)
         assert moment.elapsed == now - 7.0
@@ -235,7 +235,9 @@ def test_a_step_is_late_exactly_where_its_time_is_off_by_more_than_the_tolerance
 def test_a_recovery_s_journal_keeps_the_clock_of_a_robot_that_has_one(tmp_path: Path):
     journal = open_journal(tmp_path / "run", QUADRUPED, Settings(), {})
     bench = Bench({5: 2 * TIMESTEP, 8: None})
-    trial = journal.record(bench_robot(bench), Plan("00-before", "before", CONTROLLER, STEPS, 0))
+    trial = journal.record(
+        bench_robot(bench), TrialPlan("00-before", "before", CONTROLLER, STEPS, 0)
+    )
     timing = read_log(trial.path).timing
 
     assert timing is not None
@@ -260,7 +262,7 @@ def test_a_recovery_is_the_same_through_environments(tmp_path: Path):
             journal=open_journal(tmp_path / folder, QUADRUPED, settings, {}),
             settings=settings,
             seed=0,
-            watch=lambda _event: None,
+            on_event=lambda _event: None,
         )
 
     envs = [load("quadruped", "walk", {"hypothesis": text}) for text in ("intact", truth)]

@@ -13,14 +13,14 @@ from selfmodel.faults.build import build
 from selfmodel.faults.notation import parse
 from selfmodel.logs import LogError, read_gap, read_log, read_truth
 from selfmodel.logs.writer import write_trial
-from selfmodel.physical.measurement_noise import FULL_SCALE, NoisyInstruments
+from selfmodel.physical.measurement_noise import FULL_SCALE, NoisyMeasurement
 from selfmodel.physical.reality_gap import Gap, draw_gap
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import SIGNALS, Behaviour, collect
-from selfmodel.trials.trial import Plan
+from selfmodel.trials.trial import TrialPlan
 from tests.conftest import random_controllers, random_motion
 from tests.helpers.command import SMALL, selfmodel
 
@@ -86,7 +86,7 @@ def test_a_command_reaches_the_motors_so_many_steps_later(quadruped: Robot, dela
 
 def test_readings_have_the_noise_of_the_level(quadruped: Robot):
     level, steps = 0.1, 4000
-    noise = NoisyInstruments(
+    noise = NoisyMeasurement(
         level,
         quadruped.anatomy,
         build(quadruped, parse("intact", quadruped.anatomy)),
@@ -95,7 +95,7 @@ def test_readings_have_the_noise_of_the_level(quadruped: Robot):
     rows = np.tile([1.0, 0, 1, 0, 0.3, -0.3, 0, 0], (steps, 1))
     clean = rows.copy()
     for row in rows:
-        noise.receive(row)
+        noise.corrupt_readings(row)
     error = rows - clean
 
     assert set(np.unique(rows[:, :4])) == {0.0, 1.0}
@@ -106,7 +106,7 @@ def test_readings_have_the_noise_of_the_level(quadruped: Robot):
 
 def test_logged_signals_have_noise_of_their_full_scale(quadruped: Robot):
     level, draws = 0.1, 4000
-    noise = NoisyInstruments(
+    noise = NoisyMeasurement(
         level,
         quadruped.anatomy,
         build(quadruped, parse("intact", quadruped.anatomy)),
@@ -117,7 +117,7 @@ def test_logged_signals_have_noise_of_their_full_scale(quadruped: Robot):
         clean = np.zeros(quadruped.anatomy.names.width(signal))
         if signal == "base_orientation":
             clean = Rotation.from_euler("xyz", [0.3, -0.2, 1.0]).as_quat(scalar_first=True)
-        rows = np.array([noise.observe(signal, clean) for _ in range(draws)])
+        rows = np.array([noise.measure(signal, clean) for _ in range(draws)])
         if signal in ("sensors", "commands"):
             np.testing.assert_array_equal(rows, np.tile(clean, (draws, 1)))
             continue
@@ -184,7 +184,7 @@ def test_a_dead_sensor_reads_exactly_0_and_any_other_has_noise(
 def test_the_log_hides_the_gap_where_only_scoring_looks(quadruped: Robot, tmp_path: Path):
     gap = drawn(quadruped, 0.1)
     (controller,) = random_controllers(quadruped, 1)
-    plan = Plan("trial", "single", controller, STEPS, 0)
+    plan = TrialPlan("trial", "single", controller, STEPS, 0)
     samples = list(SimulatedRobot(quadruped, gap=gap).run(controller, STEPS))
     texts = {
         "told": json.dumps(gap.as_values()),

@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from selfmodel.faults.build import build
 from selfmodel.faults.notation import parse
-from selfmodel.physical.initial_pose import ANGLES, TILT, jitter_start
+from selfmodel.physical.initial_pose import ANGLES, TILT, randomize_initial_pose
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state_access import places
+from selfmodel.robot.state_access import signal_fields
 from selfmodel.tasks import ROBOTS
 
 QUADRUPED = ROBOTS["quadruped"].robot()
@@ -22,14 +22,14 @@ def started(
 ) -> tuple[mujoco.MjModel, mujoco.MjData]:
     model = build(robot, parse(text, robot.anatomy)).model
     data = mujoco.MjData(model)
-    jitter_start(robot, model, data, level, np.random.default_rng(seed))
+    randomize_initial_pose(robot, model, data, level, np.random.default_rng(seed))
     mujoco.mj_forward(model, data)
     return model, data
 
 
 def test_starts_spread_around_the_reference_pose(robot: Robot):
     level, draws = 0.1, 300
-    where = places(robot)
+    where = signal_fields(robot)
     angles, turns, places_ = [], [], []
     for seed in range(draws):
         _, data = started(robot, level, seed)

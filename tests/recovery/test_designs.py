@@ -10,9 +10,9 @@ from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated_robot import SimulatedRobot
-from selfmodel.recovery.next_trial import candidates, telling_apart
+from selfmodel.recovery.next_trial import candidates, discriminating_controller
 from selfmodel.recovery.recover import Recovery, recover
-from selfmodel.recovery.repair import Repair
+from selfmodel.recovery.repair import RepairSearch
 from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
@@ -32,7 +32,7 @@ def evolved(robot: Robot, kind: str, next_trial: str = "repair") -> Recovery:
             return situation.repaired()
         known = situation.known
         rest = (situation.simulator, situation.settings, situation.rng)
-        return telling_apart(known.diagnoses[-1], known.controllers, *rest)
+        return discriminating_controller(known.diagnoses[-1], known.controllers, *rest)
 
     return recover(
         healthy=SimulatedRobot(robot),
@@ -42,7 +42,7 @@ def evolved(robot: Robot, kind: str, next_trial: str = "repair") -> Recovery:
         journal=MemoryJournal(robot),
         settings=FEW,
         seed=0,
-        watch=lambda _event: None,
+        on_event=lambda _event: None,
         design=getattr(robot, kind),
         calibrate=lambda _trials: SimpleNamespace(robot=fitted, summary=None),
         next_trial=choose,
@@ -80,7 +80,7 @@ def test_a_search_for_one_kind_does_not_start_from_controllers_of_the_other(quad
     seeds = [*random_controllers(quadruped, 2), *random_oscillators(quadruped, 2)]
     for kind in ("network", "cpg"):
         design = getattr(quadruped, kind)
-        search = Repair(Simulator(quadruped, 1), FEW, design)
+        search = RepairSearch(Simulator(quadruped, 1), FEW, design)
         found = search(INTACT, seeds, np.random.default_rng(0), lambda _generation: None)
         assert found.design == design
 

@@ -18,12 +18,12 @@ from selfmodel.recovery.disagreement import (
     EARLY,
     LOWEST,
     SCALES,
-    Dispute,
+    Disagreement,
     disagreements,
     first_falls,
 )
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.outcome import Simulated
+from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.trials.behaviour import Behaviour, Names, Signal
 from tests.conftest import random_controllers
@@ -65,7 +65,7 @@ class Oracle:
         ]
         self._fates = dict(zip(self.controllers, fates, strict=True))
 
-    def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> Simulated:
+    def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> SimulationResult:
         """Predicts what the fates say; only the second hypothesis is not uneventful."""
         known = dict(enumerate(self.controllers))
         shapes = {signal: (len(runs), steps, NAMES.width(signal)) for signal in record}
@@ -87,14 +87,14 @@ class Oracle:
                 diverged[row] = True
                 signals["joint_positions"][row, -1] = np.nan
         time = np.arange(steps) * 0.01
-        return Simulated(Behaviour(NAMES, time, signals), diverged)
+        return SimulationResult(Behaviour(NAMES, time, signals), diverged)
 
 
 def chosen(quadruped: Robot, fates: Sequence[Fate], steps: int = 400) -> int:
     """Which of the controllers with these fates is chosen."""
     oracle = Oracle(fates)
     hypotheses = [INTACT, parse("break:front_left_knee", quadruped.anatomy)]
-    one = Dispute(hypotheses, oracle, steps).most_telling(oracle.controllers)
+    one = Disagreement(hypotheses, oracle, steps).most_discriminative(oracle.controllers)
     return oracle.controllers.index(one)
 
 
@@ -111,7 +111,7 @@ def test_the_controller_that_makes_two_hypotheses_differ_is_chosen(quadruped: Ro
     motors = ("back_left_knee", "back_right_knee", "front_left_knee", "front_right_knee")
     pool = [moving(quadruped, motor) for motor in motors]
 
-    one = Dispute(hypotheses, Simulator(quadruped, 2), 120).most_telling(pool)
+    one = Disagreement(hypotheses, Simulator(quadruped, 2), 120).most_discriminative(pool)
     assert one == moving(quadruped, "front_left_knee")
 
 
@@ -125,7 +125,10 @@ def test_a_dead_sensor_is_asked_for_where_it_would_read_most(quadruped: Robot):
     touches = runs.behaviour["sensors"][..., touch].mean(axis=1)
 
     assert len(set(touches)) > 4
-    assert Dispute(hypotheses, simulator, EARLY).most_telling(pool) == pool[int(np.argmax(touches))]
+    assert (
+        Disagreement(hypotheses, simulator, EARLY).most_discriminative(pool)
+        == pool[int(np.argmax(touches))]
+    )
 
 
 def test_what_differs_most_is_chosen_and_of_equals_the_first(quadruped: Robot):

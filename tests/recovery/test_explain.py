@@ -8,7 +8,7 @@ import pytest
 
 from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
 from selfmodel.controllers.playback import Playback
-from selfmodel.diagnosis.diagnose import Diagnose
+from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.errors import InputError
 from selfmodel.faults.notation import parse
@@ -16,12 +16,12 @@ from selfmodel.logs import read_log
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.recovery.events import Event, SearchBegins
-from selfmodel.recovery.explain import explain
+from selfmodel.recovery.explain import diagnose_trials
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
-from selfmodel.trials.trial import Plan, Trial
+from selfmodel.trials.trial import Trial, TrialPlan
 from tests.conftest import random_controllers
 from tests.helpers.gaits import changed, gait, logged
 
@@ -32,7 +32,7 @@ def trials(robot: Robot, folder: Path, truth: str, count: int) -> list[Trial]:
     """Logged trials of a robot with something wrong, each with another controller."""
     found = []
     for number, controller in enumerate(random_controllers(robot, count, seed=2)):
-        plan = Plan(f"trial-{number}", "single", controller, SMALL.steps, 0)
+        plan = TrialPlan(f"trial-{number}", "single", controller, SMALL.steps, 0)
         samples = SimulatedRobot(robot, parse(truth, robot.anatomy)).run(controller, SMALL.steps)
         path = write_trial(folder / f"{number}.mcap", robot, plan, samples, settings=SMALL)
         found.append(read_log(path).trial)
@@ -44,17 +44,17 @@ def test_each_trial_is_added_in_turn_and_each_diagnosis_seeds_the_next(
 ):
     three = trials(quadruped, tmp_path, "break:back_left_shoulder", 3)
     events: list[Event] = []
-    search = Diagnose(Simulator(quadruped, 2), FORWARD_DISPLACEMENT, SMALL)
-    last = explain(three, search, 4, events.append)
+    search = DiagnosticSearch(Simulator(quadruped, 2), FORWARD_DISPLACEMENT, SMALL)
+    last = diagnose_trials(three, search, 4, events.append)
     begins = [event for event in events if isinstance(event, SearchBegins)]
     made = [event for event in events if isinstance(event, Diagnosis)]
 
     assert [event.kind for event in begins] == ["diagnostic"] * 3
     assert [diagnosis.trials for diagnosis in made] == [1, 2, 3]
     assert made[-1] == last
-    fewer = explain(
+    fewer = diagnose_trials(
         three[:2],
-        Diagnose(Simulator(quadruped, 1), FORWARD_DISPLACEMENT, SMALL),
+        DiagnosticSearch(Simulator(quadruped, 1), FORWARD_DISPLACEMENT, SMALL),
         4,
         lambda _: None,
     )
@@ -62,17 +62,17 @@ def test_each_trial_is_added_in_turn_and_each_diagnosis_seeds_the_next(
 
 
 def test_there_must_be_a_trial_to_explain(quadruped: Robot):
-    search = Diagnose(Simulator(quadruped, 1), FORWARD_DISPLACEMENT, SMALL)
+    search = DiagnosticSearch(Simulator(quadruped, 1), FORWARD_DISPLACEMENT, SMALL)
     with pytest.raises(InputError, match="at least one trial to explain, got none"):
-        explain([], search, 0, lambda _: None)
+        diagnose_trials([], search, 0, lambda _: None)
 
 
 def test_trials_that_cannot_be_judged_are_named_before_any_search(quadruped: Robot, tmp_path: Path):
     three = trials(quadruped, tmp_path, "intact", 3)
     blind = [three[0], *(unobserved(trial) for trial in three[1:])]
-    search = Diagnose(Simulator(quadruped, 1), FORWARD_DISPLACEMENT, SMALL)
+    search = DiagnosticSearch(Simulator(quadruped, 1), FORWARD_DISPLACEMENT, SMALL)
     with pytest.raises(InputError, match=r"1\.mcap: .* needs .*; .*2\.mcap: .* needs "):
-        explain(blind, search, 0, lambda _: pytest.fail("a search began"))
+        diagnose_trials(blind, search, 0, lambda _: pytest.fail("a search began"))
 
 
 def unobserved(trial: Trial) -> Trial:
@@ -89,7 +89,7 @@ def test_a_trial_that_other_software_drove_is_explained_by_its_commands(
     commands = trial.behaviour["commands"]
     plan = dataclasses.replace(trial.plan, controller=Playback(quadruped.anatomy.motors, commands))
     played = dataclasses.replace(trial, plan=plan)
-    search = Diagnose(Simulator(quadruped, 2), FORWARD_DISPLACEMENT, SMALL)
+    search = DiagnosticSearch(Simulator(quadruped, 2), FORWARD_DISPLACEMENT, SMALL)
     hypotheses = [parse(text, quadruped.anatomy) for text in ("break:back_left_shoulder", "intact")]
     distances = search.evidence.distances(hypotheses, [played])
 
@@ -111,7 +111,7 @@ def test_what_only_the_screen_cannot_judge_is_said_before_any_search(quadruped: 
     seen[starts[[1, 2, 4, 5]]] = True
     angles = np.where(seen[:, np.newaxis], run["joint_positions"], np.nan)
     trial = logged(changed(run, joint_positions=angles))
-    search = Diagnose(Simulator(quadruped, 1), SEGMENT_PREDICTION, SMALL)
+    search = DiagnosticSearch(Simulator(quadruped, 1), SEGMENT_PREDICTION, SMALL)
     search.evidence.check([trial])
 
     with pytest.raises(InputError, match="needs joint_positions at 4 or more of 26 moments"):

@@ -14,7 +14,7 @@ from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, Verdict
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.recovery.database import Database
-from selfmodel.recovery.disagreement import EARLY, Dispute
+from selfmodel.recovery.disagreement import EARLY, Disagreement
 from selfmodel.recovery.events import Event, Question
 from selfmodel.recovery.next_trial import (
     GENERATIONS,
@@ -22,28 +22,28 @@ from selfmodel.recovery.next_trial import (
     by_disagreement,
     by_repair,
     candidates,
-    in_the_running,
-    telling_apart,
+    candidates_to_separate,
+    discriminating_controller,
 )
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.outcome import Simulated
+from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.trials.behaviour import Behaviour, Signal
-from selfmodel.trials.trial import Plan, Trial
+from selfmodel.trials.trial import Trial, TrialPlan
 from tests.conftest import random_controllers
 
 SMALL = dataclasses.replace(Settings().scaled(12), steps=150)
 
 
-def diagnosis(*texts: str, robot: Robot, rivals: int = 0, verdict: Verdict) -> Diagnosis:
+def diagnosis(*texts: str, robot: Robot, indistinguishable: int = 0, verdict: Verdict) -> Diagnosis:
     """A diagnosis with these hypotheses, best first; the first few after the best are rivals."""
     found = [parse(text, robot.anatomy) for text in texts]
     return Diagnosis(
         ranked=tuple(Candidate(one, float(rank)) for rank, one in enumerate(found)),
         trials=1,
         intact_distance=9.0,
-        rivals=tuple(found[1 : 1 + rivals]),
+        indistinguishable=tuple(found[1 : 1 + indistinguishable]),
         verdict=verdict,
         test="by decree",
     )
@@ -53,9 +53,11 @@ def test_the_rivals_are_in_the_running_and_without_any_those_that_follow(quadrup
     texts = [f"break:{joint.name}" for joint in quadruped.anatomy.joints]
     known = [parse(text, quadruped.anatomy) for text in texts]
 
-    def running(rivals: int) -> tuple[Hypothesis, ...]:
-        return in_the_running(
-            diagnosis(*texts, robot=quadruped, rivals=rivals, verdict="ambiguous")
+    def running(indistinguishable: int) -> tuple[Hypothesis, ...]:
+        return candidates_to_separate(
+            diagnosis(
+                *texts, robot=quadruped, indistinguishable=indistinguishable, verdict="ambiguous"
+            )
         )
 
     assert running(1) == tuple(known[:2])
@@ -64,29 +66,45 @@ def test_the_rivals_are_in_the_running_and_without_any_those_that_follow(quadrup
 
 def test_what_may_be_wrong_besides_is_in_the_running_after_the_rivals(quadruped: Robot):
     texts = ("intact", "break:front_left_knee", "jam:front_left_knee")
-    found = diagnosis(*texts, robot=quadruped, rivals=1, verdict="ambiguous")
+    found = diagnosis(*texts, robot=quadruped, indistinguishable=1, verdict="ambiguous")
     touch = parse("sensor:front_left_touch", quadruped.anatomy)
     best, rival, _ = (one.hypothesis for one in found.ranked)
 
-    assert in_the_running(dataclasses.replace(found, unseen=(touch,))) == (best, rival, touch)
-    assert in_the_running(dataclasses.replace(found, rivals=(), unseen=(touch,))) == (best, touch)
+    assert candidates_to_separate(dataclasses.replace(found, undetectable=(touch,))) == (
+        best,
+        rival,
+        touch,
+    )
+    assert candidates_to_separate(
+        dataclasses.replace(found, indistinguishable=(), undetectable=(touch,))
+    ) == (best, touch)
 
 
 def test_what_explains_too_little_is_held_against_what_follows_it_first(quadruped: Robot):
     found = diagnosis(
-        "intact", "break:front_left_knee", robot=quadruped, rivals=0, verdict="unexplained"
+        "intact",
+        "break:front_left_knee",
+        robot=quadruped,
+        indistinguishable=0,
+        verdict="unexplained",
     )
     touch = parse("sensor:front_left_touch", quadruped.anatomy)
     best, follower = (one.hypothesis for one in found.ranked)
 
-    assert in_the_running(dataclasses.replace(found, unseen=(touch,))) == (best, follower, touch)
+    assert candidates_to_separate(dataclasses.replace(found, undetectable=(touch,))) == (
+        best,
+        follower,
+        touch,
+    )
 
 
 def test_a_hypothesis_that_diverges_is_not_in_the_running(quadruped: Robot):
     found = diagnosis("intact", "break:front_left_knee", robot=quadruped, verdict="explained")
     apart = dataclasses.replace(found.ranked[1], distance=float("inf"))
 
-    assert in_the_running(dataclasses.replace(found, ranked=(found.ranked[0], apart))) == (INTACT,)
+    assert candidates_to_separate(dataclasses.replace(found, ranked=(found.ranked[0], apart))) == (
+        INTACT,
+    )
 
 
 @settings(deadline=None)
@@ -121,10 +139,10 @@ def test_what_is_asked_is_bred_to_ask_more(quadruped: Robot):
     simulator, known = Simulator(quadruped, 2), random_controllers(quadruped, 2)
     touch = parse("sensor:front_left_touch", quadruped.anatomy)
     found = diagnosis("intact", robot=quadruped, verdict="explained")
-    found = dataclasses.replace(found, unseen=(touch,))
+    found = dataclasses.replace(found, undetectable=(touch,))
     first = candidates(known, SMALL, np.random.default_rng(1))
-    best = Dispute([INTACT, touch], simulator, SMALL.steps).most_telling(first)
-    bred = telling_apart(found, known, simulator, SMALL, np.random.default_rng(1))
+    best = Disagreement([INTACT, touch], simulator, SMALL.steps).most_discriminative(first)
+    bred = discriminating_controller(found, known, simulator, SMALL, np.random.default_rng(1))
 
     column = [sensor.name for sensor in quadruped.anatomy.sensors].index("front_left_touch")
     runs = simulator.run([(INTACT, one) for one in (best, bred)], EARLY, ("sensors",))
@@ -140,7 +158,7 @@ class CountingSimulator(Simulator):
         super().__init__(robot, threads=2)
         self.times: Counter = Counter()
 
-    def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> Simulated:
+    def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> SimulationResult:
         """Simulates as ever."""
         self.times.update((run, steps) for run in runs if not isinstance(run[1], Playback))
         return super().run(runs, steps, record)
@@ -149,7 +167,7 @@ class CountingSimulator(Simulator):
 def test_what_is_bred_of_is_not_looked_at_again(quadruped: Robot):
     simulator = CountingSimulator(quadruped)
     found = diagnosis("intact", "jam:front_left_knee", robot=quadruped, verdict="ambiguous")
-    telling_apart(
+    discriminating_controller(
         found, random_controllers(quadruped, 2), simulator, SMALL, np.random.default_rng(1)
     )
 
@@ -161,12 +179,14 @@ def test_the_same_stream_chooses_the_same_at_any_number_of_threads(quadruped: Ro
     found = diagnosis(
         *("jam:front_left_knee", "jam:front_left_shoulder"),
         robot=quadruped,
-        rivals=1,
+        indistinguishable=1,
         verdict="ambiguous",
     )
     tried = random_controllers(quadruped, 2)
     one, other = (
-        telling_apart(found, tried, Simulator(quadruped, n), SMALL, np.random.default_rng(3))
+        discriminating_controller(
+            found, tried, Simulator(quadruped, n), SMALL, np.random.default_rng(3)
+        )
         for n in (1, 2)
     )
 
@@ -193,10 +213,10 @@ def test_hypotheses_are_told_apart_until_one_explains_all_or_asking_is_in_vain(
     gait, compensating = random_controllers(quadruped, 2)
     besides = [parse(f"jam:{joint.name}", quadruped.anatomy) for joint in quadruped.anatomy.joints]
     told = diagnosis("jam:front_left_knee", "intact", robot=quadruped, verdict=verdict)
-    diagnoses = [dataclasses.replace(told, unseen=tuple(besides[:count])) for count in unseen]
+    diagnoses = [dataclasses.replace(told, undetectable=tuple(besides[:count])) for count in unseen]
     found = diagnoses[-1]
     empty = Behaviour(quadruped.anatomy.names, np.zeros(1), {})
-    tried = Trial(Plan("01-after", "after", gait, 1, 0), "quadruped", empty, "01-after")
+    tried = Trial(TrialPlan("01-after", "after", gait, 1, 0), "quadruped", empty, "01-after")
     events: list[Event] = []
     situation = Situation(
         known=Database((tried,), tuple(diagnoses)),
@@ -205,9 +225,9 @@ def test_hypotheses_are_told_apart_until_one_explains_all_or_asking_is_in_vain(
         settings=SMALL,
         rng=np.random.default_rng(0),
         repaired=lambda: compensating,
-        watch=events.append,
+        on_event=events.append,
     )
 
     assert by_repair(situation) == compensating
     assert (by_disagreement(situation) != compensating) == asks
-    assert events == ([Question(in_the_running(found))] if asks else [])
+    assert events == ([Question(candidates_to_separate(found))] if asks else [])

@@ -22,11 +22,11 @@ from selfmodel.logs.journal import open_journal
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.recovery.database import Journal
 from selfmodel.recovery.events import Event, SearchBegins
-from selfmodel.recovery.next_trial import NextTrial, Situation, by_repair, telling_apart
+from selfmodel.recovery.next_trial import NextTrial, Situation, by_repair, discriminating_controller
 from selfmodel.recovery.recover import Recovery, recover
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.outcome import Simulated
+from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.trials.behaviour import Sample, Signal
 from selfmodel.trials.trial import Trial
@@ -44,7 +44,7 @@ class CountingSimulator(Simulator):
         self.seen: Counter = Counter()
         self.on_run: Callable[[Sequence[Run]], object] = lambda _runs: None
 
-    def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> Simulated:
+    def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> SimulationResult:
         """Simulates as ever."""
         self.seen.update((*run, steps) for run in runs)
         self.on_run(runs)
@@ -90,7 +90,7 @@ def recovery(
         journal=MemoryJournal(robot),
         settings=dataclasses.replace(SMALL, trials=trials),
         seed=seed,
-        watch=events.append,
+        on_event=events.append,
         gait=gait,
         next_trial=next_trial,
     )
@@ -178,7 +178,7 @@ def test_the_truth_changes_a_diagnosis_only_through_what_the_robot_did(quadruped
             journal=MemoryJournal(quadruped),
             settings=dataclasses.replace(SMALL, trials=1),
             seed=1,
-            watch=events.append,
+            on_event=events.append,
         )
         diagnoses.append([event for event in events if isinstance(event, Diagnosis)])
 
@@ -282,7 +282,7 @@ def test_a_journal_of_files_shows_the_algorithm_no_more_than_its_three_methods(
                 journal=SealedJournal(journal),
                 settings=dataclasses.replace(SMALL, trials=1),
                 seed=1,
-                watch=lambda _: None,
+                on_event=lambda _: None,
             )
         )
 
@@ -316,7 +316,7 @@ def test_trials_that_tell_apart_differ_from_the_one_before_and_are_the_same_at_a
 ):
     def ask(situation: Situation) -> Controller:
         diagnosis = situation.known.diagnoses[-1]
-        return telling_apart(
+        return discriminating_controller(
             diagnosis,
             situation.known.controllers,
             situation.simulator,

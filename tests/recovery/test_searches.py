@@ -8,19 +8,19 @@ import pytest
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.controllers.network import Controller
-from selfmodel.diagnosis.diagnose import Diagnose
+from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.errors import InputError
 from selfmodel.experiments.scoring import is_correct
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated_robot import SimulatedRobot
-from selfmodel.recovery.repair import Repair
+from selfmodel.recovery.repair import RepairSearch
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.requests import ClosedLoop
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour, forward_displacement
-from selfmodel.trials.trial import Plan, Trial
+from selfmodel.trials.trial import Trial, TrialPlan
 from tests.conftest import exploding, random_controllers
 from tests.helpers.memory import MemoryJournal
 
@@ -30,13 +30,13 @@ SMALL = dataclasses.replace(Settings().scaled(20), generations=5, steps=200)
 def logged(robot: Robot, truth: str, controller: Controller, steps: int = 300) -> Trial:
     """A trial of a damaged robot."""
     physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
-    return MemoryJournal(robot).record(physical, Plan(truth, "after", controller, steps, 0))
+    return MemoryJournal(robot).record(physical, TrialPlan(truth, "after", controller, steps, 0))
 
 
 @pytest.mark.parametrize("truth", ["break:front_left_knee", "jam:back_right_shoulder", "intact"])
 def test_the_truth_is_at_distance_zero_and_ranks_first(quadruped: Robot, truth: str):
     trials = [logged(quadruped, truth, c) for c in random_controllers(quadruped, 2)]
-    diagnose = Diagnose(Simulator(quadruped, 2), FORWARD_DISPLACEMENT, Settings())
+    diagnose = DiagnosticSearch(Simulator(quadruped, 2), FORWARD_DISPLACEMENT, Settings())
     seeds = [parse(truth, quadruped.anatomy), parse("jam:front_right_knee", quadruped.anatomy)]
     diagnosis = diagnose(trials, seeds, np.random.default_rng(0), lambda _: None)
 
@@ -52,15 +52,15 @@ def test_a_diverging_hypothesis_is_infinitely_far_and_a_diverging_gait_is_worst(
     bad = exploding(simulator, "jam:front_left_knee")
     (controller,) = random_controllers(quadruped, 1)
     trial = logged(quadruped, "break:front_left_knee", controller)
-    diagnose = Diagnose(simulator, FORWARD_DISPLACEMENT, SMALL)
+    diagnose = DiagnosticSearch(simulator, FORWARD_DISPLACEMENT, SMALL)
 
     distances = diagnose.evidence.distances([bad, INTACT], [trial])
     assert distances[0] == np.inf
     assert np.isfinite(distances[1])
-    ways = Repair(simulator, SMALL)._simulate([(bad, controller), (INTACT, controller)])
+    ways = RepairSearch(simulator, SMALL)._simulate([(bad, controller), (INTACT, controller)])
     assert ways[0] == -np.inf
     assert np.isfinite(ways[1])
-    assert simulator.tally.diverged == 2
+    assert simulator.stats.diverged == 2
 
 
 def test_a_diagnosis_is_correct_if_it_cannot_be_told_from_the_truth(quadruped: Robot):
@@ -79,7 +79,9 @@ def test_a_repair_starts_from_the_controllers_it_is_given(quadruped: Robot):
     settings = dataclasses.replace(SMALL, generations=1)
     seeds = random_controllers(quadruped, 20, seed=3)
     simulator = Simulator(quadruped, 2)
-    best = Repair(simulator, settings)(INTACT, seeds, np.random.default_rng(0), lambda _: None)
+    best = RepairSearch(simulator, settings)(
+        INTACT, seeds, np.random.default_rng(0), lambda _: None
+    )
     runs = [(INTACT, seed) for seed in seeds]
     behaviour = simulator.run(runs, settings.steps, ["base_position"]).behaviour
 
@@ -93,7 +95,7 @@ def test_the_distance_to_several_trials_is_the_sum_of_the_distances(quadruped: R
     ]
     trials = [dataclasses.replace(t, path=str(i)) for i, t in enumerate(trials)]
     hypotheses = [INTACT, parse("jam:back_left_knee", quadruped.anatomy)]
-    diagnose = Diagnose(Simulator(quadruped, 2), FORWARD_DISPLACEMENT, SMALL)
+    diagnose = DiagnosticSearch(Simulator(quadruped, 2), FORWARD_DISPLACEMENT, SMALL)
     alone = [diagnose.evidence.distances(hypotheses, [trial]) for trial in trials]
 
     assert np.all(np.array(alone) > 0)
@@ -124,7 +126,7 @@ def test_of_hypotheses_that_explain_as_well_the_one_with_fewer_faults_ranks_firs
 ):
     (controller,) = random_controllers(quadruped, 1)
     trial = logged(quadruped, "break:front_left_knee", controller)
-    diagnose = Diagnose(Simulator(quadruped, 2), Indifferent(), SMALL)
+    diagnose = DiagnosticSearch(Simulator(quadruped, 2), Indifferent(), SMALL)
     ranked = diagnose([trial], [], np.random.default_rng(0), lambda _: None).ranked
     faults = [len(candidate.hypothesis) for candidate in ranked]
 
@@ -146,7 +148,7 @@ def test_a_comparator_that_breaks_its_contract_is_named(
 ):
     (controller,) = random_controllers(quadruped, 1)
     trial = logged(quadruped, "intact", controller)
-    diagnose = Diagnose(Simulator(quadruped, 2), Indifferent(distances), SMALL)
+    diagnose = DiagnosticSearch(Simulator(quadruped, 2), Indifferent(distances), SMALL)
     both = [INTACT, parse("jam:back_left_knee", quadruped.anatomy)]
 
     with pytest.raises(InputError, match=f"the comparator 'indifferent' {said}"):

@@ -145,9 +145,9 @@ def test_every_level_of_every_kind_is_within_the_bounds_of_its_part():
         anatomy = make().anatomy
         for kind in KINDS.values():
             for fault in kind.candidates(anatomy):
-                if kind.degrees is not None:
-                    low, high = kind.degrees(anatomy, fault.part)
-                    assert low <= fault.degree <= high
+                if kind.severity_bounds is not None:
+                    low, high = kind.severity_bounds(anatomy, fault.part)
+                    assert low <= fault.severity <= high
 
 
 @pytest.mark.parametrize(

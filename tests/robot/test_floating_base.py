@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from selfmodel.robot.floating_base import SlidingRoot, root_of
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state_access import fields_of, places, present, writer
+from selfmodel.robot.state_access import fields_of, present, signal_fields, writer
 
 MJCF = """
 <mujoco>
@@ -68,7 +68,7 @@ SLIDERS = {"seed": st.integers(0, 2**32), "slides": st.integers(1, 3), "turns": 
 def test_it_is_told_where_the_physics_has_it(seed: int, slides: int, turns: bool):  # noqa: FBT001
     robot = made(seed, slides, turns=turns)
     data = anywhere(robot, seed)
-    told = {signal: present(places(robot)[signal], data) for signal in BASE}
+    told = {signal: present(signal_fields(robot)[signal], data) for signal in BASE}
     body = data.body("torso")
     velocity = np.empty(6)
     of_body = mujoco.mjtObj.mjOBJ_XBODY
@@ -86,14 +86,14 @@ def test_it_is_told_where_the_physics_has_it(seed: int, slides: int, turns: bool
 def test_what_is_told_puts_it_back(seed: int, slides: int, turns: bool):  # noqa: FBT001
     robot = made(seed, slides, turns=turns)
     data, again = anywhere(robot, seed), mujoco.MjData(robot.model)
-    told = {signal: present(places(robot)[signal], data)[np.newaxis] for signal in BASE}
+    told = {signal: present(signal_fields(robot)[signal], data)[np.newaxis] for signal in BASE}
     writer(robot, fields_of(again))(told)
 
     for signal in ("base_position", "base_linear_velocity", "base_angular_velocity"):
         np.testing.assert_allclose(
-            present(places(robot)[signal], again), told[signal][0], atol=1e-9, err_msg=signal
+            present(signal_fields(robot)[signal], again), told[signal][0], atol=1e-9, err_msg=signal
         )
-    turns_of = [present(places(robot)["base_orientation"], one) for one in (data, again)]
+    turns_of = [present(signal_fields(robot)["base_orientation"], one) for one in (data, again)]
     assert abs(turns_of[0] @ turns_of[1]) == pytest.approx(1, abs=1e-12)
     assert again.qpos[-1] == again.qvel[-1] == 0  # the hip was not told of
 
@@ -102,14 +102,16 @@ def test_what_is_told_puts_it_back(seed: int, slides: int, turns: bool):  # noqa
 def test_where_it_is_stays_when_only_its_turn_is_told(seed: int):
     robot = made(seed, 3, turns=True)
     data, other = anywhere(robot, seed), anywhere(robot, seed + 5)
-    where = [places(robot)[signal] for signal in ("base_position", "base_linear_velocity")]
+    where = [signal_fields(robot)[signal] for signal in ("base_position", "base_linear_velocity")]
     before = [present(place, data) for place in where]
-    imu = {s: present(places(robot)[s], other)[np.newaxis] for s in (BASE[1], BASE[3])}
+    imu = {s: present(signal_fields(robot)[s], other)[np.newaxis] for s in (BASE[1], BASE[3])}
     writer(robot, fields_of(data))(imu)
 
     for place, was in zip(where, before, strict=True):
         np.testing.assert_allclose(present(place, data), was, atol=1e-9)
-    np.testing.assert_allclose(present(places(robot)[BASE[3]], data), imu[BASE[3]][0], atol=1e-9)
+    np.testing.assert_allclose(
+        present(signal_fields(robot)[BASE[3]], data), imu[BASE[3]][0], atol=1e-9
+    )
 
 
 def test_a_way_that_it_cannot_go_is_left_out():
@@ -123,7 +125,7 @@ def test_a_way_that_it_cannot_go_is_left_out():
     }
     writer(robot, fields_of(data))(told)
 
-    np.testing.assert_allclose(present(places(robot)["base_position"], data), [3, 0, 1])
+    np.testing.assert_allclose(present(signal_fields(robot)["base_position"], data), [3, 0, 1])
     assert data.qpos[1] == pytest.approx(0.4, abs=0.01)
 
 
@@ -134,7 +136,7 @@ def test_a_row_has_the_same_bits_in_any_batch(rows: int):
     state = {"qpos": rng.normal(size=(17, robot.model.nq))}
     state["qvel"] = rng.normal(size=(17, robot.model.nv))
     for signal in BASE:
-        place = places(robot)[signal]
+        place = signal_fields(robot)[signal]
         whole = place.reader(state.__getitem__)()
         part = place.reader({name: rows_[17 - rows :] for name, rows_ in state.items()}.__getitem__)
         np.testing.assert_array_equal(part(), whole[17 - rows :])
@@ -144,6 +146,6 @@ def test_a_free_root_is_read_in_place(quadruped: Robot):
     data = mujoco.MjData(quadruped.model)
     for signal in BASE:
         assert np.shares_memory(
-            places(quadruped)[signal].reader(fields_of(data))(),
+            signal_fields(quadruped)[signal].reader(fields_of(data))(),
             data.qvel if "velocity" in signal else data.qpos,
         )

@@ -16,7 +16,7 @@ from selfmodel.simulation.calibrate import BOUND, PRIOR, Calibration, calibrate,
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import SIGNALS, Signal, collect
 from selfmodel.trials.state_estimation import BASE
-from selfmodel.trials.trial import Plan, Trial
+from selfmodel.trials.trial import Trial, TrialPlan
 from tests.conftest import lacking, random_motion
 
 STEPS = 400
@@ -28,7 +28,9 @@ def trial(robot: Robot, physical: SimulatedRobot, seed: int, steps: int = STEPS)
     """A trial in which every joint moves."""
     driver = played_back(robot.anatomy.motors, random_motion(robot, steps, seed))
     behaviour = collect(robot.anatomy.names, physical.run(driver, steps))
-    return Trial(Plan("made-up", "before", driver, steps, 0), robot.name, behaviour, f"{seed}.mcap")
+    return Trial(
+        TrialPlan("made-up", "before", driver, steps, 0), robot.name, behaviour, f"{seed}.mcap"
+    )
 
 
 def trials(robot: Robot, count: int = 2) -> list[Trial]:

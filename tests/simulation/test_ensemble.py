@@ -7,7 +7,7 @@ import pytest
 
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
-from selfmodel.faults.kind import Kind
+from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import ALL_KINDS
 from selfmodel.robot.noise import SensorNoise
@@ -21,7 +21,9 @@ STEPS = 40
 
 
 @pytest.mark.parametrize("kind", ALL_KINDS, ids=lambda kind: kind.name)
-def test_members_without_a_gap_do_what_the_hypothesis_does_to_the_bit(robot: Robot, kind: Kind):
+def test_members_without_a_gap_do_what_the_hypothesis_does_to_the_bit(
+    robot: Robot, kind: FaultKind
+):
     hypotheses = [INTACT, Hypothesis(kind.candidates(robot.anatomy)[-1:])]
     (controller,) = random_controllers(robot, 1)
     simulator = Simulator(robot, 1)

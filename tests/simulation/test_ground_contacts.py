@@ -18,7 +18,7 @@ from selfmodel.simulation.ground_contacts import felt_points
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import suite_bodies
 from selfmodel.trials.behaviour import Behaviour, collect
-from selfmodel.trials.trial import Plan, Trial
+from selfmodel.trials.trial import Trial, TrialPlan
 
 STEPS = 1500
 MARGIN = 0.01
@@ -75,7 +75,7 @@ def test_the_right_roughness_predicts_best_though_its_bumps_are_unknown(
     def both(text: str) -> str:
         return "+".join(filter(None, (slope, text.removeprefix("intact")))) or "intact"
 
-    plan = Plan("00-after", "after", walk, STEPS, 0)
+    plan = TrialPlan("00-after", "after", walk, STEPS, 0)
     behaviour = observed(quadruped, both(truth), walk)
     trial = Trial(plan, quadruped.name, behaviour, "nowhere.mcap")
     said = ["intact", "roughness=0.01", "roughness=0.02", "roughness=0.04"]
@@ -135,7 +135,7 @@ def test_a_robot_on_its_back_or_far_away_feels_nothing_and_is_diagnosed_all_the_
     in_the_air["base_position"][:, 2] += 20
     on_its_back = {signal: values.copy() for signal, values in whole.signals.items()}
     on_its_back["sensors"][:, :4] = 0
-    plan = Plan("00-after", "after", walk, STEPS, 0)
+    plan = TrialPlan("00-after", "after", walk, STEPS, 0)
     for number, signals in enumerate((in_the_air, on_its_back)):
         behaviour = dataclasses.replace(whole, signals=signals)
         trial = Trial(plan, quadruped.name, behaviour, f"{number}.mcap")

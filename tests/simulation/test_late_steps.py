@@ -24,7 +24,7 @@ from selfmodel.tasks import ROBOTS, load
 from selfmodel.tasks.walking import motion_capture
 from selfmodel.trials.behaviour import SIGNALS, Behaviour, collect
 from selfmodel.trials.state_estimation import estimated_states
-from selfmodel.trials.trial import Plan, Trial
+from selfmodel.trials.trial import Trial, TrialPlan
 from tests.conftest import random_motion
 
 QUADRUPED = ROBOTS["quadruped"].robot()
@@ -74,7 +74,7 @@ def trial() -> Trial:
     physical = EnvironmentRobot(Stuttering(env), QUADRUPED, observe=motion_capture(env))
     driver = played_back(NAMES.motors, random_motion(QUADRUPED, STEPS))
     behaviour = collect(NAMES, physical.run(driver, STEPS))
-    return Trial(Plan("00", "after", driver, STEPS, 0), "quadruped", behaviour, "nowhere.mcap")
+    return Trial(TrialPlan("00", "after", driver, STEPS, 0), "quadruped", behaviour, "nowhere.mcap")
 
 
 def without_marks(trial: Trial) -> Trial:
@@ -110,7 +110,7 @@ def test_a_log_with_late_and_lost_steps_fits_the_robot_as_it_was_and_no_fault(tm
     env = load("quadruped", "walk")
     physical = EnvironmentRobot(Stuttering(env, {90}), QUADRUPED, observe=motion_capture(env))
     driver = played_back(NAMES.motors, random_motion(QUADRUPED, STEPS))
-    plan = Plan("00", "after", driver, STEPS, 0)
+    plan = TrialPlan("00", "after", driver, STEPS, 0)
     path = tmp_path / "trial.mcap"
     write_trial(path, QUADRUPED, plan, physical.run(driver, STEPS), timed=True, settings=Settings())
     log = read_log(path)

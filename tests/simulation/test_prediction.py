@@ -18,7 +18,7 @@ from selfmodel.physical.reality_gap import draw_gap
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.outcome import Tally
+from selfmodel.simulation.outcome import SimulationStats
 from selfmodel.simulation.prediction import predict
 from selfmodel.simulation.requests import Segments
 from selfmodel.simulation.simulator import Simulator
@@ -159,7 +159,9 @@ def test_a_delay_is_the_same_in_a_run_a_prediction_and_a_physical_robot(
 
     def predicted(robot: Robot, steps: int | None) -> Behaviour:
         built = [build(robot, INTACT)]
-        return predict(robot, built, segments, threads=1, tally=Tally(), delay=steps).behaviour
+        return predict(
+            robot, built, segments, threads=1, stats=SimulationStats(), delay=steps
+        ).behaviour
 
     for signal in SIGNALS:
         assert exact[signal].tobytes() == run[signal].tobytes(), signal
@@ -178,7 +180,14 @@ def test_segments_that_do_not_say_what_is_still_on_its_way_are_refused(quadruped
     with pytest.raises(InputError, match=said):
         Simulator(late(quadruped, 2), 1).predict([INTACT], segments)
     with pytest.raises(InputError, match=said):
-        predict(quadruped, [build(quadruped, INTACT)], segments, threads=1, tally=Tally(), delay=2)
+        predict(
+            quadruped,
+            [build(quadruped, INTACT)],
+            segments,
+            threads=1,
+            stats=SimulationStats(),
+            delay=2,
+        )
 
 
 def test_without_the_base_a_segment_goes_on_where_the_one_before_it_ended(robot: Robot):
@@ -230,7 +239,7 @@ def test_a_prediction_that_diverges_is_flagged_counted_and_alone(quadruped: Robo
     outcome = simulator.predict([bad, INTACT], segments)
 
     assert outcome.diverged.tolist() == [True, False]
-    assert (simulator.tally.runs, simulator.tally.diverged) == (2, 1)
-    assert simulator.tally.steps == 2 * 3 * HORIZON
+    assert (simulator.stats.runs, simulator.stats.diverged) == (2, 1)
+    assert simulator.stats.steps == 2 * 3 * HORIZON
     for signal in RECORD:
         assert outcome.behaviour[signal][1].tobytes() == expected[signal][0].tobytes()

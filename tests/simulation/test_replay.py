@@ -19,7 +19,7 @@ from selfmodel.simulation.replay import replay
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import SIGNALS, Behaviour
-from selfmodel.trials.trial import Plan, Trial
+from selfmodel.trials.trial import Trial, TrialPlan
 from tests.conftest import random_controllers, random_oscillators
 
 STEPS = 1000
@@ -27,7 +27,7 @@ STEPS = 1000
 
 def logged(folder: Path, robot: Robot, truth: str, driver: Driver) -> Path:
     """Logs a trial of a robot with something wrong."""
-    plan = Plan("trial", "single", driver, STEPS, 0)
+    plan = TrialPlan("trial", "single", driver, STEPS, 0)
     samples = SimulatedRobot(robot, parse(truth, robot.anatomy)).run(driver, STEPS)
     path = folder / "trial.mcap"
     return write_trial(path, robot, plan, samples, settings=Settings())

@@ -8,7 +8,7 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.sensing import Senses
+from selfmodel.robot.sensing import SensorReader
 from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.trials.behaviour import SIGNALS, collect
 from tests.conftest import exploding, random_controllers
@@ -101,7 +101,7 @@ def test_readings_are_what_the_paper_says(quadruped: Robot):
 
 
 def test_touch_is_felt_from_the_smallest_force_on(quadruped: Robot):
-    senses = Senses(quadruped.model, quadruped.anatomy, [build(quadruped, INTACT)])
+    senses = SensorReader(quadruped.model, quadruped.anatomy, [build(quadruped, INTACT)])
     forces = np.array([[0.0, 1e-9, 1.0, 1e4, 0.0, 0.0, 0.0, 0.0]])
     readings = np.empty((1, 8))
     senses.read(forces, quadruped.model.qpos0[np.newaxis], readings)
@@ -118,7 +118,7 @@ def test_a_diverging_simulation_is_flagged_counted_and_alone(robot: Robot):
     outcome = simulator.run(mixed, STEPS, SIGNALS)
 
     assert outcome.diverged.tolist() == [False, False, True, False, False, False, False]
-    assert simulator.tally.diverged == 1
+    assert simulator.stats.diverged == 1
     for signal in SIGNALS:
         others = np.delete(outcome.behaviour[signal], 2, axis=0)
         assert np.array_equal(others, expected[signal]), signal
@@ -129,5 +129,5 @@ def test_the_tally_counts_runs_and_steps(quadruped: Robot):
     simulator.run(some_runs(quadruped, 3), 10, ["sensors"])
     simulator.run(some_runs(quadruped, 2), 7, ["sensors"])
 
-    assert (simulator.tally.runs, simulator.tally.steps, simulator.tally.diverged) == (5, 44, 0)
-    assert simulator.tally.physics_seconds > 0
+    assert (simulator.stats.runs, simulator.stats.steps, simulator.stats.diverged) == (5, 44, 0)
+    assert simulator.stats.physics_seconds > 0

@@ -7,9 +7,9 @@ from dm_control import suite
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
-from selfmodel.physical.interface import Timed
+from selfmodel.physical.interface import TimedRobot
 from selfmodel.physical.simulated_robot import SimulatedRobot
-from selfmodel.recovery.repair import Repair
+from selfmodel.recovery.repair import RepairSearch
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS, entry, load, suite_bodies
@@ -61,7 +61,7 @@ def test_the_environment_of_a_damaged_body_is_its_simulation_to_the_bit(name: st
         for signal in SIGNALS:
             assert got[signal].tobytes() == expected[signal].tobytes(), signal
 
-    assert isinstance(physical, Timed)
+    assert isinstance(physical, TimedRobot)
     assert got.late is not None
     assert not got.late.any()
     batch = {signal: got[signal][np.newaxis] for signal in score.record}
@@ -88,8 +88,8 @@ def test_a_repair_for_the_return_finds_another_controller_than_one_for_the_way()
     assert score is not None
     settings = Settings(steps=STEPS, generations=2).scaled(8)
     simulator = Simulator(robot, 1)
-    stands = Repair(simulator, settings, score=score)
-    goes = Repair(simulator, settings)
+    stands = RepairSearch(simulator, settings, score=score)
+    goes = RepairSearch(simulator, settings)
     found = [
         repair(INTACT, (), np.random.default_rng(0), lambda _: None) for repair in (stands, goes)
     ]

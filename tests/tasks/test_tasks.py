@@ -20,7 +20,7 @@ from dm_env import specs
 from selfmodel import tasks
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.faults.kind import Fault, Kind, between, grid
+from selfmodel.faults.kind import Fault, FaultKind, between, grid
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import KINDS
 from selfmodel.robot.anatomy import Anatomy
@@ -104,10 +104,10 @@ def test_every_time_step_is_finite_and_in_its_specs(domain: str, task: str, hypo
 
 def test_a_robot_may_have_a_fault_of_a_kind_of_ones_own():
     def lighter(embodiment: Embodiment, _anatomy: Anatomy, fault: Fault) -> None:
-        embodiment.model.body_mass[1] *= fault.degree
+        embodiment.model.body_mass[1] *= fault.severity
 
-    kind = Kind(
-        name="lighter", word="lighter", strike=lighter, degrees=between(0.1, 0.9), levels=grid(0.5)
+    kind = FaultKind(
+        name="lighter", word="lighter", apply=lighter, degrees=between(0.1, 0.9), levels=grid(0.5)
     )
     robot = ROBOTS["quadruped"].robot()
     made = parse("lighter=0.5", robot.anatomy, (*KINDS.values(), kind))

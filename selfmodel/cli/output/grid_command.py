@@ -18,13 +18,13 @@ def run_shown(run: Callable[[Watch], Sequence[PartEnds]], out: Path) -> Sequence
         run: Runs it, and tells what it is given of every event.
         out: Its folder.
     """
-    with grid_display() as watch:
+    with grid_display() as on_event:
         try:
-            return run(watch)
+            return run(on_event)
         except KeyboardInterrupt:
             typer.echo(
-                f"interrupted: {watch.done} of {watch.total} are done and kept in {out}; the same "
-                f"command goes on with the rest",
+                f"interrupted: {on_event.done} of {on_event.total} are done and kept in {out}; the "
+                f"same command goes on with the rest",
                 err=True,
             )
             raise typer.Exit(130) from None

@@ -26,10 +26,10 @@ def sureness(diagnosis: Diagnosis) -> dict[str, Any]:
     intact = diagnosis.intact_distance
     return {
         "verdict": diagnosis.verdict,
-        "rivals": [str(rival) for rival in diagnosis.rivals],
-        "unseen": [_besides(one, diagnosis.best) for one in diagnosis.unseen],
+        "rivals": [str(rival) for rival in diagnosis.indistinguishable],
+        "unseen": [_besides(one, diagnosis.best) for one in diagnosis.undetectable],
         "test": diagnosis.test,
-        "outside": diagnosis.outside.as_object() if diagnosis.outside else None,
+        "outside": diagnosis.unsearched.as_object() if diagnosis.unsearched else None,
         "intact_distance": intact if math.isfinite(intact) else None,
     }
 
@@ -55,8 +55,8 @@ def _verdict(found: Mapping[str, Any]) -> str:
             alone = "" if found["unseen"] else ", and nothing else as well"
             return f"Explained: {best} predicts the trials{alone}."
         case "ambiguous":
-            rivals = ", ".join(found["rivals"])
-            return f"Ambiguous: the trials cannot tell {best} from {rivals} ({found['test']})."
+            others = ", ".join(found["rivals"])
+            return f"Ambiguous: the trials cannot tell {best} from {others} ({found['test']})."
     if found["outside"] is not None:
         better, kind = found["outside"]["hypothesis"], found["outside"]["kind"]
         return (

@@ -52,7 +52,7 @@ def _reality(found: dict[str, Any]) -> str:
 
 def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
     """Returns the outcome as plain values, as ``recover --json`` prints it."""
-    recovery, tally = outcome.recovery, outcome.tally
+    recovery, stats = outcome.recovery, outcome.stats
     return {
         "robot": experiment.robot.name,
         "case": experiment.case,
@@ -89,8 +89,8 @@ def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
             "repair": recovery.repair_evaluations,
             "diagnostic": recovery.diagnostic_evaluations,
             "distinct_hypotheses": recovery.distinct_hypotheses,
-            "simulated_steps": tally.steps,
-            "diverged": tally.diverged,
+            "simulated_steps": stats.steps,
+            "diverged": stats.diverged,
         },
         "seconds": outcome.seconds,
     }

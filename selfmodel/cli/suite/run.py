@@ -93,7 +93,7 @@ def run(
         comparator=comparator,
     )
     failed = grid_command.run_shown(
-        lambda watch: run_study(study, workers=resolve.threads(workers), watch=watch), out
+        lambda on_event: run_study(study, workers=resolve.threads(workers), on_event=on_event), out
     )
     results = write_results(out)
     if as_json:

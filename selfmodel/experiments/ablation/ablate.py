@@ -16,7 +16,7 @@ def ablate(
     ablation: Ablation,
     *,
     workers: int,
-    watch: Callable[[GridBegins | PartEnds], None],
+    on_event: Callable[[GridBegins | PartEnds], None],
     only: tuple[int, int] = (1, 1),
 ) -> tuple[PartEnds, ...]:
     """Runs what has not been run yet, and returns what failed.
@@ -24,7 +24,7 @@ def ablate(
     Args:
         ablation: What to run.
         workers: Processes at a time, each with one thread of physics.
-        watch: Is told what happens, of the gaits' grid and then of the runs'.
+        on_event: Is told what happens, of the gaits' grid and then of the runs'.
         only: ``(i, n)``: of every n runs the i-th, from 1, for a cluster of n machines.
 
     Raises:
@@ -32,7 +32,7 @@ def ablate(
     """
     check(ablation)
     chosen = cells(ablation, only)
-    no_gait = bank.fill(ablation, chosen, workers, watch)
+    no_gait = bank.fill(ablation, chosen, workers, on_event)
     gaits = bank.folder(ablation)
     jobs = [
         job(ablation, cell, digests)
@@ -40,7 +40,7 @@ def ablate(
         if (digests := bank.digests(gaits, cell, ablation.settings)) is not None
     ]
     failed = run_grid(
-        ablation.folder / "runs", jobs, partial(_rows, gaits), workers=workers, watch=watch
+        ablation.folder / "runs", jobs, partial(_rows, gaits), workers=workers, on_event=on_event
     )
     return no_gait + failed
 

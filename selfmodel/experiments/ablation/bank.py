@@ -16,7 +16,7 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.logs.atomic import put
 from selfmodel.logs.controllers import controller_bytes
 from selfmodel.recovery.random_streams import repair_stream
-from selfmodel.recovery.repair import Repair
+from selfmodel.recovery.repair import RepairSearch
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 
@@ -28,7 +28,7 @@ def fill(
     ablation: Ablation,
     cells: Sequence[Cell],
     workers: int,
-    watch: Callable[[GridBegins | PartEnds], None],
+    on_event: Callable[[GridBegins | PartEnds], None],
 ) -> tuple[PartEnds, ...]:
     """Evolves the gaits that the runs need and the bank lacks; returns what failed.
 
@@ -56,7 +56,7 @@ def fill(
         )
         for robot, number in needed
     ]
-    return run_grid(folder(ablation), jobs, evolve_gait, workers=workers, watch=watch)
+    return run_grid(folder(ablation), jobs, evolve_gait, workers=workers, on_event=on_event)
 
 
 def folder(ablation: Ablation) -> Path:
@@ -84,7 +84,7 @@ def digests(bank: Path, cell: Cell, settings: Settings) -> list[str] | None:
 def evolve_gait(job: Job, _part: str, run: Path) -> Any:  # noqa: ANN401  # JSON
     """Evolves a gait as a recovery with that seed begins, and puts it into the bank."""
     robot = resolve.robot_entry(job.parameters["robot"]).robot()
-    repair = Repair(Simulator(robot, threads=1), Settings(**job.parameters["settings"]))
+    repair = RepairSearch(Simulator(robot, threads=1), Settings(**job.parameters["settings"]))
     found = repair(INTACT, (), repair_stream(job.seed, 0), lambda _generation: None)
     put(_path(run.parent, job.parameters["robot"], job.seed), controller_bytes(found))
     return {"evaluations": repair.evaluations}

@@ -7,7 +7,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 from selfmodel.controllers.driver import Evolved
-from selfmodel.diagnosis.diagnose import Diagnose
+from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.experiments import plugins as resolve
 from selfmodel.experiments.ablation import bank
@@ -24,7 +24,7 @@ from selfmodel.experiments.experiment import Experiment, run
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import known
 from selfmodel.recovery.events import Event
-from selfmodel.recovery.explain import explain
+from selfmodel.recovery.explain import diagnose_trials
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Trial
@@ -87,7 +87,7 @@ def diagnosed(
     Raises:
         InputError: The comparator cannot judge the trials.
     """
-    search = Diagnose(
+    search = DiagnosticSearch(
         Simulator(robot, threads=1),
         setting.comparator,
         setting.spec.settings,
@@ -97,7 +97,7 @@ def diagnosed(
     rows: list[Row] = []
     clock = Clock()
 
-    def watch(event: Event) -> None:
+    def on_event(event: Event) -> None:
         clock(event)
         if isinstance(event, Diagnosis):
             rows.append(
@@ -108,7 +108,7 @@ def diagnosed(
                 )
             )
 
-    explain(trials, search, setting.spec.cell.seed, watch, after={1, len(trials)})
+    diagnose_trials(trials, search, setting.spec.cell.seed, on_event, after={1, len(trials)})
     return rows
 
 
@@ -131,7 +131,7 @@ def _in_a_recovery(setting: Setting) -> list[Row]:
     trials: list[Trial] = []
     clock = Clock()
 
-    def watch(event: Event) -> None:
+    def on_event(event: Event) -> None:
         clock(event)
         if isinstance(event, Trial):
             trials.append(event)
@@ -162,7 +162,7 @@ def _in_a_recovery(setting: Setting) -> list[Row]:
         kinds=resolve.kinds(setting.spec.kinds),
         next_trial=setting.spec.next_trial,
     )
-    outcome = run(experiment, watch)
+    outcome = run(experiment, on_event)
     rows[-1] = dataclasses.replace(
         rows[-1], distinct_hypotheses=outcome.recovery.distinct_hypotheses
     )

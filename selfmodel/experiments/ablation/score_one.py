@@ -68,7 +68,7 @@ def row_of(setting: Setting, diagnosis: Diagnosis, trials: Sequence[Trial], cloc
         distance=_finite(best.distance),
         intact_distance=_finite(diagnosis.intact_distance),
         verdict=diagnosis.verdict,
-        rivals=len(diagnosis.rivals),
+        rivals=len(diagnosis.indistinguishable),
         evaluations=clock.evaluations,
         distinct_hypotheses=None,
         seconds=clock.seconds,

@@ -15,7 +15,7 @@ from selfmodel.logs.reader import read_log
 from selfmodel.logs.writer import write_trial
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibrate import calibrate
-from selfmodel.trials.trial import Plan, Stage, Trial
+from selfmodel.trials.trial import Stage, Trial, TrialPlan
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,7 @@ def calibrated_robot(setting: Setting, intact: Sequence[Trial]) -> Robot:
 def _trial(setting: Setting, number: int, stage: Stage, gait: Evolved) -> Trial:
     """The trial as its log says it; run if there is no log yet."""
     steps, seed = setting.spec.settings.steps, setting.spec.cell.seed
-    plan = Plan(f"{number:02d}-{stage}", stage, gait, steps, seed)
+    plan = TrialPlan(f"{number:02d}-{stage}", stage, gait, steps, seed)
     path = setting.folder / "trials" / f"{plan.name}.mcap"
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -20,7 +20,7 @@ from selfmodel.logs.controllers import controller_bytes
 from selfmodel.recovery.events import Event
 from selfmodel.recovery.fitness import Score
 from selfmodel.recovery.random_streams import repair_stream
-from selfmodel.recovery.repair import Repair
+from selfmodel.recovery.repair import RepairSearch
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
@@ -29,24 +29,24 @@ from selfmodel.trials.trial import Trial
 
 
 def run_study(
-    study: Study, *, workers: int, watch: Callable[[GridBegins | PartEnds], None]
+    study: Study, *, workers: int, on_event: Callable[[GridBegins | PartEnds], None]
 ) -> tuple[PartEnds, ...]:
     """Runs what has not been run yet, and returns what failed.
 
     Args:
         study: What to run.
         workers: Processes at a time, each with one thread of physics.
-        watch: Is told what happens, of the gaits' grid and then of the recoveries'.
+        on_event: Is told what happens, of the gaits' grid and then of the recoveries'.
 
     Raises:
         InputError: Something about it is wrong, or its folder holds another.
     """
     check(study)
     no_gait = run_grid(
-        study.folder / "gaits", gait_jobs(study), _evolve, workers=workers, watch=watch
+        study.folder / "gaits", gait_jobs(study), _evolve, workers=workers, on_event=on_event
     )
     jobs = recovery_jobs(study)
-    failed = run_grid(study.folder / "runs", jobs, _recover, workers=workers, watch=watch)
+    failed = run_grid(study.folder / "runs", jobs, _recover, workers=workers, on_event=on_event)
     return no_gait + failed
 
 
@@ -55,7 +55,7 @@ def _evolve(job: Job, _part: str, run: Path) -> Any:  # noqa: ANN401  # JSON
     said = job.parameters
     entry = resolve.robot_entry(said["body"])
     robot = entry.robot()
-    repair = Repair(
+    repair = RepairSearch(
         Simulator(robot, threads=1),
         Settings(**said["settings"]),
         resolve.design(said["controller"], robot),
@@ -106,7 +106,7 @@ def _recover(job: Job, _part: str, run: Path) -> Any:  # noqa: ANN401  # JSON
         before=_worth(experiment.score, robot, INTACT, before),
         after=after,
         recovered=max(recoveries),
-        diverged=outcome.tally.diverged,
+        diverged=outcome.stats.diverged,
         seconds=outcome.seconds,
     )
     return as_objects([row])

@@ -22,7 +22,7 @@ from selfmodel.robot.mjcf.refusals import refuse_unusable
 from selfmodel.robot.mjcf.sensors import add_sensors
 from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.robot.mjcf.untrusted import LARGEST, checked_model
-from selfmodel.robot.mjcf.visuals import drop_looks
+from selfmodel.robot.mjcf.visuals import drop_visuals
 
 CONTROL_TIMESTEP = 0.01
 """Seconds between two commands that are wanted where nothing else is said."""
@@ -94,7 +94,7 @@ def _adapted(name: str, document: Document, settings: MjcfSettings) -> Adapted:
         if body.attrib.pop("mocap", "false") == "true":
             document.notes.append(f"the mocap body {body.get('name')} stands still")
     model = compiled(document.text, document.assets)
-    if drop_looks(document, model):
+    if drop_visuals(document, model):
         model = compiled(document.text, document.assets)
     refuse_unusable(model)
     timestep = _control_timestep(float(model.opt.timestep), settings.control_timestep)

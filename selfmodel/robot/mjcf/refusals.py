@@ -7,7 +7,7 @@ from selfmodel.errors import InputError
 from selfmodel.robot.anatomy_reader import driven_joints
 from selfmodel.robot.floating_base import find_root, joints_of
 from selfmodel.robot.mjcf.mujoco_errors import told_by_mujoco
-from selfmodel.robot.model_checks import check_carried
+from selfmodel.robot.model_checks import check_model
 from selfmodel.robot.transmission import motor_joints
 
 _PROBE_SECONDS = 0.2
@@ -39,7 +39,7 @@ def refuse_unusable(model: mujoco.MjModel) -> None:
         )
     try:
         root = find_root(model, driven)
-        check_carried(model, root)
+        check_model(model, root)
     except ValueError as error:
         raise InputError(str(error)) from error
     _refuse_driven_root(model, root)

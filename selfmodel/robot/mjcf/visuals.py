@@ -15,7 +15,7 @@ _PIXELS = 64
 """Width and height of a pattern that MuJoCo makes: each hypothesis has a copy of the model."""
 
 
-def drop_looks(document: Document, model: mujoco.MjModel) -> bool:
+def drop_visuals(document: Document, model: mujoco.MjModel) -> bool:
     """Takes out skins; and meshes and pictures that nothing can touch, if the files are too large.
 
     Patterns that MuJoCo makes become small, so that a model takes kilobytes and not megabytes. The

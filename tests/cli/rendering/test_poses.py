@@ -9,7 +9,7 @@ from hypothesis.extra import numpy as arrays
 from selfmodel.cli.rendering.poses import POSE, Poses, poses_of
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state_access import places
+from selfmodel.robot.state_access import signal_fields
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import Behaviour, Signal
@@ -27,7 +27,7 @@ def moved(robot: Robot) -> Behaviour:
 def told(robot: Robot, poses: Poses, signal: Signal) -> np.ndarray:
     """A signal of the state that the poses make up."""
     state = {"qpos": poses.qpos, "qvel": np.zeros((len(poses.qpos), robot.model.nv))}
-    return places(robot)[signal].reader(state.__getitem__)()
+    return signal_fields(robot)[signal].reader(state.__getitem__)()
 
 
 MOVED = moved(ROBOTS["quadruped"].robot())

@@ -29,7 +29,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import SIGNALS, Behaviour
-from selfmodel.trials.trial import Plan
+from selfmodel.trials.trial import TrialPlan
 from tests.conftest import random_controllers
 from tests.helpers.command import selfmodel
 from tests.helpers.opengl import WORKS, draws
@@ -45,7 +45,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory, quadruped: Robot) -> Path:
     """A folder with a short log of a damaged quadruped."""
     folder = tmp_path_factory.mktemp("render")
     (controller,) = random_controllers(quadruped, 1, seed=3)
-    plan = Plan("trial", "single", controller, STEPS, 0)
+    plan = TrialPlan("trial", "single", controller, STEPS, 0)
     samples = SimulatedRobot(quadruped, parse(DAMAGE, quadruped.anatomy)).run(controller, STEPS)
     write_trial(folder / "a.mcap", quadruped, plan, samples, settings=Settings())
     return folder

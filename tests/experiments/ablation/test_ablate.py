@@ -64,7 +64,7 @@ def small(folder: Path, **changes: object) -> Ablation:
 
 
 def run(ablation: Ablation, workers: int = 1, **more: object) -> tuple[PartEnds, ...]:
-    return ablate(ablation, workers=workers, watch=lambda _event: None, **more)
+    return ablate(ablation, workers=workers, on_event=lambda _event: None, **more)
 
 
 def timeless(rows: Sequence[Row]) -> list[Row]:
@@ -115,7 +115,7 @@ def test_one_more_comparator_diagnoses_from_the_same_logs_and_nothing_is_done_ag
     events: list[GridBegins | PartEnds] = []
     same = "their_comparators:SAME"
     both = small(extended, bank=done / "bank", comparators=[PAPERS, same])
-    ablate(both, workers=1, watch=events.append)
+    ablate(both, workers=1, on_event=events.append)
 
     assert events[0] == GridBegins(total=4, finished=2)
     assert [event.part for event in events[1:]] == [same, same]

@@ -51,7 +51,7 @@ def test_a_robot_of_ones_own_is_ablated_by_the_name_of_its_file(
     Path("mine.xml").write_text(quadruped.mjcf, encoding="utf-8")
     ablation = small(tmp_path / "out", robots=["./mine.xml"])
 
-    assert ablate(ablation, workers=1, watch=lambda _event: None) == ()
+    assert ablate(ablation, workers=1, on_event=lambda _event: None) == ()
     assert {row.robot for row in collect(ablation.folder)} == {"./mine.xml"}
     assert {
         path.name for path in write_results(ablation.folder).files if path.suffix == ".png"

@@ -16,8 +16,8 @@ from selfmodel.controllers.driver import Evolved, drive
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.sensing import Senses
-from selfmodel.robot.state_access import places
+from selfmodel.robot.sensing import SensorReader
+from selfmodel.robot.state_access import signal_fields
 from tests.logs.rosbag.bags import T0, Item, joint_state, odometry, wrench, write_bag
 
 JOINT_PERIOD, JITTER, JOINT_LATENCY = 0.005, 0.0004, 0.002
@@ -68,9 +68,9 @@ def _driven(robot: Robot, hidden: Hypothesis, controller: Evolved, steps: int) -
     embodiment = build(robot, hidden)
     model, data = embodiment.model, mujoco.MjData(embodiment.model)
     mujoco.mj_forward(model, data)
-    senses = Senses(model, robot.anatomy, [embodiment])
+    senses = SensorReader(model, robot.anatomy, [embodiment])
     brain = drive([controller], embodiment.neurons[np.newaxis], len(robot.anatomy.sensors))
-    where = places(robot)
+    where = signal_fields(robot)
     states: list[dict[str, FloatArray]] = []
 
     def look() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from selfmodel.comparators import COMPARATORS, DEFAULT
 from selfmodel.controllers.network import Controller
-from selfmodel.diagnosis.diagnose import Diagnose
+from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log, save_controller
@@ -99,7 +99,7 @@ def test_the_right_fault_is_found_in_an_imported_trial(
     assert facts["valid"]["joint_positions"] == facts["valid"]["base_position"] == 1
     assert facts["topics"]["/odom"]["latency"] == pytest.approx(0.015)
     trial = read_log(log).trial
-    diagnose = Diagnose(
+    diagnose = DiagnosticSearch(
         Simulator(quadruped, threads=2),
         COMPARATORS[DEFAULT],
         Settings(generations=12).scaled(50),

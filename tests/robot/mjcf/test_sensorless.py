@@ -14,7 +14,7 @@ from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import collect
-from selfmodel.trials.trial import Plan
+from selfmodel.trials.trial import TrialPlan
 from tests.robot.mjcf.awkward import mjcf
 
 
@@ -37,7 +37,7 @@ def test_a_trial_of_a_robot_without_any_sensor_is_logged_and_read(tmp_path: Path
     path = write_trial(
         tmp_path / "trial.mcap",
         robot,
-        Plan("trial", "single", driver, 20, 0),
+        TrialPlan("trial", "single", driver, 20, 0),
         SimulatedRobot(robot).run(driver, 20),
         settings=Settings(),
     )
