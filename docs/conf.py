@@ -1,18 +1,16 @@
 """Sphinx configuration; ``make docs`` builds the site."""
 
-import importlib
 import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent / "_ext"))
 
-from rooms import ROOMS
-from selfmodel import __version__
+import selfmodel
 
 project = "selfmodel"
 author = "the selfmodel developers"
 copyright = author  # noqa: A001  # Sphinx reads this name
-version = release = __version__
+version = release = selfmodel.__version__
 
 extensions = [
     "myst_parser",
@@ -21,6 +19,7 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx_copybutton",
     "command_line",
+    "room",
 ]
 exclude_patterns = ["_build"]
 myst_enable_extensions = ["deflist", "dollarmath", "fieldlist"]
@@ -47,8 +46,6 @@ python_maximum_signature_line_length = 88
 add_module_names = False
 toc_object_entries_show_parents = "hide"
 
-# A room exports its names lazily; autodoc lists the names that are in a module already.
-for room in ROOMS:
-    module = importlib.import_module(room)
-    for name in getattr(module, "__all__", ()):
-        setattr(module, name, getattr(module, name))
+# selfmodel exports its names lazily; autodoc lists the names that are in a module already.
+for name in getattr(selfmodel, "__all__", ()):
+    setattr(selfmodel, name, getattr(selfmodel, name))
