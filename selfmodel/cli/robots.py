@@ -26,7 +26,7 @@ def robots(
     """List the robots, or the parts and failure cases of one."""
     # The robots bring MuJoCo, which takes longer to import than the help takes to print.
     from selfmodel.cli.output.robot_parts import parts, print_parts  # noqa: PLC0415
-    from selfmodel.experiments.plugins import is_model, notes_on, robot_entry  # noqa: PLC0415
+    from selfmodel.experiments.robots import is_model, notes_on, robot_entry  # noqa: PLC0415
     from selfmodel.tasks import ROBOTS  # noqa: PLC0415
 
     if robot is None:

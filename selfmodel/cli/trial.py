@@ -55,8 +55,9 @@ def trial(
     # Whatever brings MuJoCo waits until the command runs.
     import numpy as np  # noqa: PLC0415
 
+    from selfmodel.cli import inputs  # noqa: PLC0415
     from selfmodel.controllers.network import draw_weights  # noqa: PLC0415
-    from selfmodel.experiments import plugins as resolve  # noqa: PLC0415
+    from selfmodel.experiments import plugins, robots, trial_logs  # noqa: PLC0415
     from selfmodel.experiments.reality import draw_reality  # noqa: PLC0415
     from selfmodel.faults.notation import parse  # noqa: PLC0415
     from selfmodel.faults.registry import known  # noqa: PLC0415
@@ -66,25 +67,25 @@ def trial(
     from selfmodel.trials.trial import TrialPlan  # noqa: PLC0415
 
     kind = "network" if controller is None else str(controller)
-    made = resolve.with_neurons(
-        resolve.robot_entry(robot, model_settings or ()).robot(),
+    made = robots.with_neurons(
+        robots.robot_entry(robot, model_settings or ()).robot(),
         neurons,
         "cpg" if kind == "cpg" else "network",
     )
     check_log_name(out)
     hidden = parse(
-        "intact" if damage is None else damage, made.anatomy, known(resolve.kinds(kinds))
+        "intact" if damage is None else damage, made.anatomy, known(plugins.kinds(kinds))
     )
     reality = draw_reality(made, seed, gap, structure=structure)
     driver: Evolved
-    if kind in resolve.DESIGNS:
-        design = resolve.design(kind, made)
+    if kind in plugins.DESIGNS:
+        design = plugins.design(kind, made)
         driver = design.controller(draw_weights(np.random.default_rng(seed), (design.weights,)))
     else:
-        driver = resolve.controller(Path(kind), made)
-    resolve.check_neurons(hidden, driver)
+        driver = trial_logs.controller(Path(kind), made)
+    plugins.check_neurons(hidden, driver)
     settings = Settings()
-    plan = TrialPlan("trial", resolve.stage(stage), driver, settings.steps, seed)
+    plan = TrialPlan("trial", inputs.stage(stage), driver, settings.steps, seed)
     samples = reality.robot(made, hidden).run(driver, settings.steps)
     try:
         write_trial(

@@ -9,7 +9,7 @@ import pytest
 from selfmodel.controllers.driver import Driver
 from selfmodel.controllers.playback import played_back
 from selfmodel.errors import InputError
-from selfmodel.experiments import plugins as resolve
+from selfmodel.experiments import robots
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
 from selfmodel.faults.notation import parse
@@ -133,7 +133,7 @@ def test_the_joints_of_a_lost_limb_rest_where_noise_hides_them(
 
 def test_a_lost_limb_rests_wherever_it_starts():
     # The hopper's knee starts beyond its limit, which would push it all through the trial.
-    robot = resolve.robot_entry("suite-hopper-hop").robot()
+    robot = robots.robot_entry("suite-hopper-hop").robot()
     broken = parse("break:knee", robot.anatomy)
     run, starts = trial(robot, broken), range(0, STEPS - HORIZON, 15)
     outcome = Simulator(robot, 1).predict([broken], cut(run, starts))

@@ -34,7 +34,7 @@ def list_bodies(*, as_json: Json = False) -> None:
 
 
 def _facts(domain: str) -> dict[str, Any]:
-    from selfmodel.experiments.plugins import robot_entry  # noqa: PLC0415
+    from selfmodel.experiments.robots import robot_entry  # noqa: PLC0415
     from selfmodel.experiments.suite.bodies import DOMAINS, bodies  # noqa: PLC0415
 
     entry = robot_entry(bodies([domain], None)[0])
