@@ -15,10 +15,10 @@ version = release = selfmodel.__version__
 extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
-    "sphinx.ext.mathjax",
     "sphinx.ext.napoleon",
     "sphinx_copybutton",
     "command_line",
+    "mathml",
     "room",
 ]
 exclude_patterns = ["_build"]
@@ -27,13 +27,15 @@ myst_heading_anchors = 4  # a link to a heading is the one that GitHub makes
 
 html_theme = "furo"
 html_title = "selfmodel"
+html_theme_options = {"top_of_page_buttons": []}
+html_math_renderer = "mathml"
 html_static_path = ["_static"]
 html_css_files = ["tables.css"]
 html_show_sphinx = False
 html_show_copyright = False
 copybutton_exclude = ".linenos, .gp, .go"
 
-autodoc_default_options = {"members": True, "show-inheritance": False}
+autodoc_default_options = {"members": True}
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_preserve_defaults = True

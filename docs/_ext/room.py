@@ -37,6 +37,8 @@ def _lines(package: ModuleType) -> Iterator[str]:
         if names:
             yield from (f"## `{module.__name__}`", "", "```{eval-rst}")
             yield from (f".. automodule:: {module.__name__}", f"   :members: {', '.join(names)}")
+            if module is not package and module.__name__.rpartition(".")[2] in public:
+                yield "   :no-index:"  # the package has a function with the name of its module
             yield from ("```", "")
 
 
