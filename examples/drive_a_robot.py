@@ -14,7 +14,7 @@ import dm_env
 import numpy as np
 
 from selfmodel.controllers.network import Controller, draw_weights
-from selfmodel.errors import InputError, TrialError, in_words
+from selfmodel.errors import InputError, TrialError, describe
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.environment_robot import EnvironmentRobot
 from selfmodel.physical.safety_limits import joint_limits, tilt_limit
@@ -107,10 +107,10 @@ def main(host: str, port: int, path: Path) -> None:
     try:
         write_trial(path, robot, plan, samples, timed=True, settings=Settings())
     except InputError as error:
-        sys.exit(in_words(error))
+        sys.exit(describe(error))
     except TrialError as error:
         kept = f"what was observed until then is in {path}" if path.exists() else "there is no log"
-        sys.exit(f"{in_words(error)}; {kept}")
+        sys.exit(f"{describe(error)}; {kept}")
     print(f"{plan.steps} steps: {path}")
 
 

@@ -19,7 +19,7 @@ from selfmodel.physical.step_timing import TIME, Stopwatch
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import SIGNALS, Names, Sample, Signal
 
-GenerationCallback = Callable[[Any], Mapping[str, Any] | None]
+Observe = Callable[[Any], Mapping[str, Any] | None]
 """Turns an observation into our signals, each ``(width,)``, and perhaps ``time``; what it leaves
 out, and what is NaN, was not observed. None: nothing was."""
 
@@ -90,7 +90,7 @@ class EnvironmentRobot:
         env: dm_env.Environment,
         robot: Robot,
         *,
-        observe: GenerationCallback = by_name,
+        observe: Observe = by_name,
         stop: Callable[[], object] | None = None,
         safe: FloatArray | None = None,
         limits: Sequence[Limit] = (),
