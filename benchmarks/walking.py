@@ -30,7 +30,7 @@ class Walk:
 
     @property
     def is_walking(self) -> bool:
-        """Whether the torso stays between the ground and twice its height, without deep contacts."""
+        """Whether the torso stays between the ground and twice its height, contacts shallow."""
         return self.lowest > 0 and self.highest < 2 and self.deepest <= 0.01
 
 
