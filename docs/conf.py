@@ -1,9 +1,12 @@
 """Sphinx configuration; ``make docs`` builds the site."""
 
+import os
 import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent / "_ext"))
+
+os.environ.setdefault("MUJOCO_GL", "disable")  # dm_control searches for a display on import
 
 import selfmodel
 
