@@ -16,6 +16,12 @@ PAGES = sorted(ROOT.glob("docs/**/*.md"))
 DATA = ("text", "toml", "xml")
 """Languages of output and of files."""
 
+SEARCH = re.compile(
+    r"selfmodel (recover|diagnose|calibrate|ablate|suite run|render|trial .*--structure)"
+    r"|\b(recover|diagnose|evolve_controller)\("
+)
+"""Commands and calls that run an evolutionary algorithm, a calibration or that draw for seconds."""
+
 
 @dataclass(frozen=True)
 class Block:
@@ -98,9 +104,18 @@ def test_comments_belong_to_blocks():
         assert len(comments) == sum(bool(block.comment) for block in blocks(page)), name_of(page)
 
 
-@pytest.mark.parametrize(
-    "page", [page for page in PAGES if any(map(is_run, blocks(page)))], ids=name_of
-)
+def runnable() -> list[object]:
+    """The pages with code to run, those with a search marked."""
+    pages = [page for page in PAGES if any(map(is_run, blocks(page)))]
+    searches = {
+        page: SEARCH.search("".join(block.text for block in blocks(page) if is_run(block)))
+        for page in pages
+    }
+    marks = {page: [pytest.mark.search] if searches[page] else [] for page in pages}
+    return [pytest.param(page, marks=marks[page], id=name_of(page)) for page in pages]
+
+
+@pytest.mark.parametrize("page", runnable())
 def test_code_of_a_page_runs_in_order(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
