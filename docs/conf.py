@@ -1,12 +1,17 @@
 """Sphinx configuration; ``make docs`` builds the site."""
 
 import os
+import re
 import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent / "_ext"))
 
 os.environ.setdefault("MUJOCO_GL", "disable")  # dm_control searches for a display on import
+
+from docutils import nodes
+from sphinx import addnodes
+from sphinx.application import Sphinx
 
 import selfmodel
 
@@ -54,3 +59,43 @@ toc_object_entries_show_parents = "hide"
 # selfmodel exports its names lazily; autodoc lists the names that are in a module already.
 for name in getattr(selfmodel, "__all__", ()):
     setattr(selfmodel, name, getattr(selfmodel, name))
+
+LONGEST_VALUE = 80  # characters
+
+
+def plain_attribute(
+    _app: Sphinx, what: str, _name: str, _obj: object, _options: object, lines: list[str]
+) -> None:
+    """Keeps napoleon from reading ``Noun: the rest`` of an attribute's docstring as a type."""
+    if what in {"attribute", "data", "property"}:
+        lines[:0] = ["..", ""]  # an empty comment, which has no colon
+
+
+def readable_defaults(
+    _app: Sphinx,
+    _what: str,
+    _name: str,
+    _obj: object,
+    _options: object,
+    signature: str | None,
+    returns: str | None,
+) -> tuple[str | None, str | None]:
+    """Replaces the ``repr`` of a function in a dataclass's signature by its name."""
+    if signature is not None:
+        signature = re.sub(r"<function (\w+)[^>]*>", r"\1", signature)
+        signature = re.sub(r"= <[^>]*>+", "= ...", signature)
+    return signature, returns
+
+
+def without_long_values(_app: Sphinx, document: nodes.document) -> None:
+    """Removes the value of a constant that is longer than a line."""
+    for node in list(document.findall(addnodes.desc_annotation)):
+        if node.astext().startswith(" = ") and len(node.astext()) > LONGEST_VALUE:
+            node.parent.remove(node)
+
+
+def setup(app: Sphinx) -> None:
+    """Connects the corrections, the first before napoleon's own at 500."""
+    app.connect("autodoc-process-docstring", plain_attribute, priority=400)
+    app.connect("autodoc-process-signature", readable_defaults)
+    app.connect("doctree-read", without_long_values)
