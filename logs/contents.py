@@ -9,6 +9,7 @@ from typing import TypeVar
 from mcap.exceptions import EndOfFile, InvalidMagic
 from mcap.records import Attachment, Channel, Header, McapRecord, Message, Metadata, Schema
 
+from selfmodel.files import check_regular, read_file
 from selfmodel.logs.budget import ExcessError
 from selfmodel.logs.errors import (
     ANOTHER,
@@ -20,7 +21,6 @@ from selfmodel.logs.errors import (
     UnsupportedError,
     salvage_it,
 )
-from selfmodel.logs.files import check_regular, read_bounded
 from selfmodel.logs.framing import (
     FAILURES,
     MAGIC,
@@ -111,7 +111,7 @@ def read_bytes(path: Path) -> bytes:
         raise UnsupportedError(
             path, f"expected at most {FILE_LIMIT} bytes, got more", advice=ANOTHER
         )
-    return read_bounded(path, "a log file", FILE_LIMIT)
+    return read_file(path, "a log file", FILE_LIMIT)
 
 
 def _put(items: dict[str, _Item], name: str, item: _Item) -> None:

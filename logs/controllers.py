@@ -24,8 +24,8 @@ from selfmodel.controllers.cpg import Cpg
 from selfmodel.controllers.driver import Design, Evolved
 from selfmodel.controllers.network import Network
 from selfmodel.errors import InputError
+from selfmodel.files import read_file
 from selfmodel.logs.errors import LogWriteError
-from selfmodel.logs.files import read_bounded
 
 LARGEST = 2**20
 """Bytes that a controller may have: the paper's have under 3,000."""
@@ -74,7 +74,7 @@ def load_controller(path: Path) -> Evolved:
     Raises:
         InputError: There is none; the message names the file.
     """
-    return parse_controller(read_bounded(path, "a controller file", LARGEST), str(path))
+    return parse_controller(read_file(path, "a controller file", LARGEST), str(path))
 
 
 def controller_bytes(controller: Evolved) -> bytes:

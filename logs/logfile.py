@@ -7,8 +7,8 @@ from pathlib import Path
 from mcap.writer import CompressionType, Writer
 
 import selfmodel
-from selfmodel.logs.atomic import part_of, sync
-from selfmodel.logs.files import create_part, explained, publish
+from selfmodel.logs.atomic import partial_path, sync
+from selfmodel.logs.files import as_write_error, create_partial, publish
 from selfmodel.logs.records import MEDIA_TYPES, with_digest
 from selfmodel.logs.schemas import schema_text
 
@@ -31,7 +31,7 @@ class LogFile:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._file = create_part(path)
+        self._file = create_partial(path)
         self._schemas: dict[str, int] = {}
         self._mcap = Writer(
             self._file,
@@ -40,18 +40,18 @@ class LogFile:
             # Without it nothing protects attachments and metadata.
             enable_data_crcs=True,
         )
-        with explained(part_of(path)):
+        with as_write_error(partial_path(path)):
             self._mcap.start(profile="ros2", library=f"selfmodel/{selfmodel.__version__}")
 
     def metadata(self, name: str, texts: Mapping[str, str]) -> None:
         """Writes a record of names and texts, with its digest."""
-        with explained(part_of(self.path)):
+        with as_write_error(partial_path(self.path)):
             self._mcap.add_metadata(name, with_digest(name, texts))
 
     def attach(self, name: str, data: bytes) -> None:
         """Writes a file within the file."""
         media_type = MEDIA_TYPES.get(name, "application/octet-stream")
-        with explained(part_of(self.path)):
+        with as_write_error(partial_path(self.path)):
             # Times of 0: the same trial gives the same bytes, whenever it is run.
             self._mcap.add_attachment(0, 0, name, media_type, data)
 
@@ -64,18 +64,18 @@ class LogFile:
         return self._mcap.register_channel(topic, "cdr", schema)
 
     def message(self, channel: int, nanoseconds: int, payload: bytes, sequence: int) -> None:
-        """Writes a message. A full chunk goes to the disk, so this is to be ``explained``."""
+        """Writes a message; wrap calls in ``as_write_error``: a full chunk is written to disk."""
         self._mcap.add_message(channel, nanoseconds, payload, nanoseconds, sequence)
 
     def flush(self) -> None:
         """Hands everything to the operating system, where a kill cannot reach it."""
-        with explained(part_of(self.path)):
+        with as_write_error(partial_path(self.path)):
             self._mcap.flush()
 
     def sync(self) -> None:
         """Waits until the disk has everything."""
         self.flush()
-        with explained(part_of(self.path)):
+        with as_write_error(partial_path(self.path)):
             sync(self._file)
 
     def finish(self) -> None:
@@ -84,14 +84,14 @@ class LogFile:
         Raises:
             InputError: A file of that name has come to exist meanwhile; the part stays.
         """
-        with explained(part_of(self.path)):
+        with as_write_error(partial_path(self.path)):
             self._mcap.finish()
             publish(self._file, self.path)
 
     def abandon(self) -> None:
         """Closes the file and takes it away: what it holds is also elsewhere."""
         self.close()
-        part_of(self.path).unlink(missing_ok=True)
+        partial_path(self.path).unlink(missing_ok=True)
 
     def close(self) -> None:
         """Closes the file as it is; harmless when it is closed."""

@@ -139,6 +139,25 @@ class Imported:
     mapping: str
 
 
+@dataclass(frozen=True)
+class TrialHeader:
+    """Content of a log's preamble beside the robot and the plan.
+
+    Attributes:
+        settings: The paper's numbers, for the record.
+        timed: Whether the samples have a step timing; see ``physical.interface.TimedRobot``.
+        hidden: Faults of a simulated physical robot, in notation; for ``read_truth`` only.
+        gap: Reality gap of a simulated physical robot, as JSON; for ``read_gap`` only.
+        imported: Origin of an imported trial.
+    """
+
+    settings: Settings
+    timed: bool = False
+    hidden: str | None = None
+    gap: str | None = None
+    imported: Imported | None = None
+
+
 def trial_record(texts: Mapping[str, str]) -> TrialRecord:
     """Returns the record that stands in a log.
 

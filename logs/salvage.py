@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from selfmodel.errors import InputError
-from selfmodel.logs.atomic import part_of
+from selfmodel.logs.atomic import partial_path
 from selfmodel.logs.budget import RECORD_LIMIT, UNPACKED_LIMIT
 from selfmodel.logs.contents import Contents, Messages
 from selfmodel.logs.errors import CorruptError, LogError, SchemaMismatchError
-from selfmodel.logs.files import explained, refuse_existing
+from selfmodel.logs.files import as_write_error, refuse_existing
 from selfmodel.logs.logfile import LogFile
 from selfmodel.logs.reader import interpret, read_controller, read_log, read_record
 from selfmodel.logs.records import (
@@ -227,6 +227,6 @@ def _write_messages(log: LogFile, every: dict[str, Messages]) -> None:
             for payload, (time, _) in zip(messages.payloads, messages.times, strict=True)
         ]
     rows.sort(key=lambda row: row[:2])
-    with explained(part_of(log.path)):
+    with as_write_error(partial_path(log.path)):
         for time, channel, payload in rows:
             log.message(channel, time, payload, 0)

@@ -20,8 +20,8 @@ from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.neuron import SILENT_NEURON
 from selfmodel.faults.registry import ALL_KINDS, KINDS
 from selfmodel.faults.table_one import cases_of
+from selfmodel.files import read_file
 from selfmodel.logs import LogError, TrialLog, load_controller, read_log
-from selfmodel.logs.files import read_bounded
 from selfmodel.logs.robots import described_difference, the_robot_of
 from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.next_trial import NextTrial, by_disagreement, by_repair
@@ -385,7 +385,7 @@ def robot(name: str, control_timestep: float) -> Robot:
     path = Path(name)
     if not is_model(name):
         return robot_entry(name).robot()
-    data = read_bounded(path, "an MJCF file", LARGEST_MODEL)
+    data = read_file(path, "an MJCF file", LARGEST_MODEL)
     try:
         return Robot(path.stem, data.decode(), control_timestep)
     except (ValueError, KeyError) as error:

@@ -26,6 +26,7 @@ from selfmodel.errors import InputError
 from selfmodel.logs import LogError, TrialLog, read_log
 from selfmodel.logs.budget import Budget
 from selfmodel.logs.framing import Frame, frames, parse, unpack
+from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.salvage import salvage
 from selfmodel.logs.scan import scan
 from selfmodel.logs.writer import write_trial
@@ -261,9 +262,7 @@ def main() -> None:
                     robot,
                     plan_of(robot, STEPS),
                     samples,
-                    timed=clock,
-                    settings=Settings(),
-                    hidden="intact",
+                    TrialHeader(Settings(), timed=clock, hidden="intact"),
                 )
             )
         ]

@@ -15,6 +15,7 @@ from selfmodel.logs import read_log
 from selfmodel.logs.cdr import names_of
 from selfmodel.logs.contents import read_contents
 from selfmodel.logs.frames import body_names
+from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.schemas import schema_text
 from selfmodel.logs.topics import Topic, description, topics, transforms
 from selfmodel.logs.writer import write_trial
@@ -181,7 +182,7 @@ def test_viewers_are_told_where_each_body_is_and_how_the_base_moves(
 ):
     plan = plan_of(biped, 80)
     samples = list(SimulatedRobot(biped).run(plan.controller, 80))
-    path = write_trial(tmp_path / "b.mcap", biped, plan, samples, settings=Settings())
+    path = write_trial(tmp_path / "b.mcap", biped, plan, samples, TrialHeader(Settings()))
     topics_read = read_contents(path).topics
     data = mujoco.MjData(biped.model)
     for step in (5, 40, 75):

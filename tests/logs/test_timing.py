@@ -12,7 +12,7 @@ from mcap.opcode import Opcode
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError, SchemaMismatchError, UnsupportedError, logfile, read_log
 from selfmodel.logs.contents import read_contents
-from selfmodel.logs.records import LONGEST_TEXT, RESULT, TRIAL
+from selfmodel.logs.records import LONGEST_TEXT, RESULT, TRIAL, TrialHeader
 from selfmodel.logs.salvage import salvage
 from selfmodel.logs.topics import TIMING
 from selfmodel.logs.writer import write_trial
@@ -26,7 +26,7 @@ from tests.logs.test_salvage import spoiled
 
 def write(path: Path, robot: Robot, samples: Iterator[Sample], **options: object) -> Path:
     plan = plan_of(robot, STEPS)
-    return write_trial(path, robot, plan, samples, settings=Settings(), **options)
+    return write_trial(path, robot, plan, samples, TrialHeader(Settings(), **options))
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from selfmodel.experiments.suite.plan import Study, check, gait_jobs, gait_path,
 from selfmodel.experiments.suite.rows import Row, as_objects
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
-from selfmodel.logs.atomic import put
+from selfmodel.logs.atomic import write_atomic
 from selfmodel.logs.controllers import controller_bytes
 from selfmodel.recovery.events import Event
 from selfmodel.recovery.fitness import Score
@@ -62,7 +62,7 @@ def _evolve(job: Job, _part: str, run: Path) -> Any:  # noqa: ANN401  # JSON
         score=resolve.score(said["score"], said["body"], entry),
     )
     found = repair(INTACT, (), repair_stream(job.seed, 0), _ignore)
-    put(run.parent / f"{job.key}.npz", controller_bytes(found))
+    write_atomic(run.parent / f"{job.key}.npz", controller_bytes(found))
     return {"evaluations": repair.evaluations}
 
 
