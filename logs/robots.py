@@ -43,7 +43,7 @@ def robot_of(log: TrialLog) -> Robot:
         )
     names = log.trial.behaviour.names
     if (robot.anatomy.names, robot.root) != (names, log.root):
-        what = described_difference(robot.anatomy.names, names)
+        what = describe_difference(robot.anatomy.names, names)
         raise SchemaMismatchError(
             path,
             f"its model is of another robot than its messages: {what}; the base is {robot.root!r} "
@@ -75,7 +75,7 @@ def _silent() -> Iterator[None]:
         mujoco.set_mju_user_warning(before)
 
 
-def described_difference(names: Names, logged: Names) -> str:
+def describe_difference(names: Names, logged: Names) -> str:
     """Returns in what a robot differs from that of a log, in words."""
     told = []
     for what in ("sensors", "motors", "hinges"):
@@ -89,7 +89,7 @@ def described_difference(names: Names, logged: Names) -> str:
     return "; ".join(told) or "their parts are called alike"
 
 
-def the_robot_of(logs: Sequence[TrialLog]) -> Robot:
+def common_robot(logs: Sequence[TrialLog]) -> Robot:
     """Returns the robot that all logs are of.
 
     Raises:

@@ -6,7 +6,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray, frozen
 from selfmodel.controllers.driver import Evolved
-from selfmodel.logs.cdr import names_of
+from selfmodel.logs.cdr import decode_names
 from selfmodel.logs.contents import Contents, Messages
 from selfmodel.logs.errors import CorruptError, SchemaMismatchError
 from selfmodel.logs.records import TrialRecord
@@ -78,7 +78,7 @@ def _messages(path: Path, contents: Contents, topic: str) -> Messages:
 
 def _names(path: Path, contents: Contents, topic: str) -> tuple[str, ...]:
     try:
-        return names_of(_messages(path, contents, topic).payloads[0])
+        return decode_names(_messages(path, contents, topic).payloads[0])
     except ValueError as error:
         raise SchemaMismatchError(path, f"on {topic}: {error}", good=contents.good) from error
 

@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.logs.frames import body_names
+from selfmodel.logs.kinematics import body_names
 from selfmodel.robot.robot import Robot
 
 _JOINTS = {

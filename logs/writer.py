@@ -11,7 +11,7 @@ from selfmodel.controllers.driver import Driver
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError, in_words
 from selfmodel.logs.atomic import partial_path
-from selfmodel.logs.encoder import Encoder, empty_rows, parts_of
+from selfmodel.logs.encoder import Encoder, empty_rows, sample_rows
 from selfmodel.logs.errors import IncompleteError, salvage_it
 from selfmodel.logs.files import as_write_error
 from selfmodel.logs.logfile import LogFile
@@ -128,7 +128,7 @@ class TrialWriter:
                 f"the sample of step {self.steps} has {has} moment, and timed is {given}: a trial "
                 f"is timed if its robot has a clock of its own"
             )
-        told = parts_of(sample)
+        told = sample_rows(sample)
         for part, rows in self._rows.items():
             row = told.get(part)
             if row is None or row.shape != rows.shape[1:]:

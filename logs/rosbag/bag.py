@@ -15,12 +15,12 @@ from ruamel.yaml.error import YAMLError
 
 from selfmodel.errors import InputError
 from selfmodel.files import check_regular, read_file
+from selfmodel.logs.decompress import ZSTD_MAGIC, BombError, unzstd, unzstd_file
 from selfmodel.logs.errors import CorruptError, NotMcapError
 from selfmodel.logs.framing import MAGIC
 from selfmodel.logs.rosbag.stored import Announced, Stored
 from selfmodel.logs.rosbag.stored_mcap import read_mcap
 from selfmodel.logs.rosbag.stored_sqlite import SQLITE_MAGIC, read_sqlite
-from selfmodel.logs.unpack import ZSTD_MAGIC, BombError, unzstd, unzstd_file
 
 METADATA = "metadata.yaml"
 EXPECTED = "give a bag's folder, or its .mcap or .db3"

@@ -22,7 +22,7 @@ from selfmodel.faults.registry import ALL_KINDS, KINDS
 from selfmodel.faults.table_one import cases_of
 from selfmodel.files import read_file
 from selfmodel.logs import LogError, TrialLog, load_controller, read_log
-from selfmodel.logs.robots import described_difference, the_robot_of
+from selfmodel.logs.robots import common_robot, describe_difference
 from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.next_trial import NextTrial, by_disagreement, by_repair
 from selfmodel.robot.mjcf.adaptation import adapt
@@ -334,7 +334,7 @@ def robot_of_logs(found: Sequence[TrialLog], override: str | None) -> Robot:
             not have their sensors, motors and hinges.
     """
     try:
-        own = the_robot_of(found)
+        own = common_robot(found)
     except LogError as error:
         raise InputError(str(error)) from error
     if override is None:
@@ -343,7 +343,7 @@ def robot_of_logs(found: Sequence[TrialLog], override: str | None) -> Robot:
     if chosen.anatomy.names != own.anatomy.names:
         raise InputError(
             f"{override} is another robot than that of {found[0].trial.path}: "
-            f"{described_difference(chosen.anatomy.names, own.anatomy.names)}"
+            f"{describe_difference(chosen.anatomy.names, own.anatomy.names)}"
         )
     return chosen
 

@@ -16,7 +16,7 @@ from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log
-from selfmodel.logs.frames import Kinematics, body_names
+from selfmodel.logs.kinematics import Kinematics, body_names
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.robots import robot_of
 from selfmodel.logs.writer import write_trial

@@ -19,9 +19,9 @@ from selfmodel.logs import (
     read_log,
 )
 from selfmodel.logs import reader as reader_module
+from selfmodel.logs.checksums import verified_records
 from selfmodel.logs.contents import Contents, read_contents
 from selfmodel.logs.records import HIDDEN, RESULT, TRIAL, with_digest, without_digest
-from selfmodel.logs.scan import scan
 
 CASES = Path(__file__).parents[3] / "shared" / "samples" / "mcap-conformance"
 Change = Callable[[McapRecord], McapRecord | None]
@@ -58,7 +58,7 @@ def test_a_file_that_is_not_there_is_said_so(tmp_path: Path):
 
 def rewritten(path: Path, change: Change) -> None:
     """Writes a sound file of what ``change`` makes of each record, None for nothing."""
-    records = list(scan(path.read_bytes()))
+    records = list(verified_records(path.read_bytes()))
     output = io.BytesIO()
     writer = Writer(output, enable_data_crcs=True)
     writer.start("ros2")

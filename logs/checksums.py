@@ -34,7 +34,7 @@ from selfmodel.logs.framing import (
 )
 
 
-def scan(data: bytes) -> Iterator[McapRecord]:
+def verified_records(data: bytes) -> Iterator[McapRecord]:
     """Yields each record of a file, the ones within chunks in their place, checking all.
 
     A caller knows that the file is sound when the iteration ends without an exception.
