@@ -41,7 +41,7 @@ class Info:
         attachments: Sizes of the attachments by name, bytes.
         records: Names of the metadata records.
         observed: Fraction of observed numbers by signal, in [0, 1].
-        driver: Description of the controller, or of what replaced it.
+        driver: Description of the controller, or of its replacement by recorded commands.
         source: Origin of an imported or salvaged trial; empty for other trials.
     """
 

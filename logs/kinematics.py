@@ -63,7 +63,7 @@ class Kinematics:
             poses[k, :, :3] = data.xpos
             poses[k, :, 3:] = data.xquat
         parents = self._model.body_parentid[1:]
-        with np.errstate(over="ignore", invalid="ignore"):  # NaN where the base was not observed
+        with np.errstate(over="ignore", invalid="ignore"):  # unobserved or extreme values
             relative = _relative(poses[:, parents], poses[:, 1:])[..., _POSITION_XYZW]
         return to_micrometres(relative).reshape(len(position), 7 * len(parents))
 
@@ -74,7 +74,7 @@ def to_micrometres(values: FloatArray) -> FloatArray:
     Rounding is for derived numbers, which are only displayed: constant values compress to almost
     nothing.
     """
-    with np.errstate(over="ignore"):  # NaN where the base was not observed
+    with np.errstate(over="ignore"):  # unobserved or extreme values
         rounded: FloatArray = np.rint(values * 2.0**20) / 2.0**20
     return rounded + 0.0  # 0 is 0, never -0
 

@@ -27,7 +27,7 @@ def run_trial(
 
     Raises:
         InputError: The file exists, or the plan does not fit the robot.
-        LogError: The robot stopped early, or the file does not contain what was written.
+        LogError: The robot stopped early, or the log failed its verification.
         LogWriteError: The disk is full, or failed.
     """
     timed = isinstance(physical, TimedRobot)
@@ -60,7 +60,7 @@ class TrialRunner:
 
         Raises:
             InputError: The plan's name is no file name, or the name of an existing log.
-            LogError: The robot stopped early, or the file does not contain what was written.
+            LogError: The robot stopped early, or the log failed its verification.
             LogWriteError: The disk is full, or failed.
         """
         path = self.folder / f"{checked_name(plan.name)}.mcap"

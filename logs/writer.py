@@ -1,4 +1,4 @@
-"""Writes a trial into its log while it runs, so that whatever happens, what happened is kept."""
+"""Writer of a trial's log, while the trial runs."""
 
 import itertools
 from collections.abc import Iterable
@@ -23,7 +23,7 @@ from selfmodel.trials.behaviour import Names, Sample
 from selfmodel.trials.trial import TrialPlan
 
 FLUSH_STEPS = 50
-"""How many steps a kill can cost at most. It makes the file 1 % larger than never flushing."""
+"""Steps between two flushes, the most that a kill can lose. The file is 1 % larger than without."""
 
 
 def write_trial(
@@ -99,21 +99,22 @@ class TrialWriter:
     def __enter__(self) -> Self:
         self._log = LogFile(self.path)
         with ExitStack() as undo:
-            undo.callback(self._log.close)  # `__exit__` is not called where this is interrupted
+            undo.callback(self._log.close)  # an interrupted `__enter__` has no `__exit__`
             write_preamble(self._log, self._robot, self._plan, self._header)
             self._channels = [
                 self._log.channel(topic.name, topic.type) for topic in self._encoder.topics
             ]
-            self._log.sync()  # before the robot moves, the disk has all that steps are read by
+            self._log.sync()  # the disk has the preamble before the robot moves
             undo.pop_all()
         self._sound = True
         return self
 
     def add(self, sample: Sample) -> None:
-        """Takes the next step's sample.
+        """Adds the sample of the next step.
 
         Raises:
-            InputError: It is one too many, not of its time, or its rows do not fit the robot.
+            InputError: The trial has all its steps, the time is not that of the next step, or the
+                rows do not fit the robot.
             LogWriteError: The disk is full, or failed.
         """
         time = self.steps * self._robot.control_timestep
@@ -128,9 +129,9 @@ class TrialWriter:
                 f"the sample of step {self.steps} has {has} moment, and timed is {given}: a trial "
                 f"is timed if its robot has a clock of its own"
             )
-        told = sample_rows(sample)
+        sampled = sample_rows(sample)
         for part, rows in self._rows.items():
-            row = told.get(part)
+            row = sampled.get(part)
             if row is None or row.shape != rows.shape[1:]:
                 raise InputError(
                     f"the sample of step {self.steps} must have {part} of shape "
@@ -141,7 +142,7 @@ class TrialWriter:
         if self.steps == 0:
             self._start = self._end
         self.steps += 1
-        # The first step goes out at once: with it, what follows can always be salvaged.
+        # The first step is flushed at once: salvage needs one complete step.
         if self.steps == 1 or self.steps - self._written == FLUSH_STEPS:
             self._flush()
 
@@ -152,7 +153,7 @@ class TrialWriter:
         traceback: TracebackType | None,
     ) -> None:
         try:
-            # Not where writing itself was interrupted: half a record would be written on.
+            # Not after an interrupted write, which may have left an incomplete record.
             if self._sound:
                 self._flush()
             if error is None and self.steps == self._plan.steps:
@@ -165,7 +166,7 @@ class TrialWriter:
         except (OSError, InputError) as failure:
             if error is None:
                 raise
-            error.add_note(str(failure))  # what ended the trial comes first
+            error.add_note(str(failure))  # the first error is the cause
         finally:
             self._log.close()
         if error is None and self.steps < self._plan.steps:
@@ -177,7 +178,7 @@ class TrialWriter:
             )
 
     def _flush(self) -> None:
-        """Writes the steps that wait, and hands them to the operating system."""
+        """Writes the buffered steps, and flushes them to the operating system."""
         count = self.steps - self._written
         if not count:
             return
@@ -198,7 +199,7 @@ class TrialWriter:
 
 def _in_words(error: BaseException) -> str:
     text = " ".join(f"{type(error).__name__}: {in_words(error)}".split()).removesuffix(":")
-    # A file's name that is no text comes with surrogates, which a log cannot hold.
+    # A file name that is not UTF-8 contains surrogates, which a log cannot contain.
     return text.encode("utf-8", "backslashreplace").decode()
 
 

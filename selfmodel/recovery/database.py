@@ -12,7 +12,7 @@ from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.trials.trial import Trial, TrialPlan
 
 RunTrial = Callable[[PhysicalRobot, TrialPlan], Trial]
-"""Runs a physical trial and returns it, as read back from its log where there is one."""
+"""Runs a physical trial and returns it; with a log, as read back from the log."""
 
 
 @dataclass(frozen=True, eq=False)

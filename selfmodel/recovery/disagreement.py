@@ -140,7 +140,7 @@ def disagreements(behaviour: Behaviour) -> FloatArray:
             each.
 
     Returns:
-        ``(controllers,)``; 0 for a single hypothesis, NaN where a simulation diverged.
+        ``(controllers,)``; 0 for a single hypothesis, NaN if a simulation diverged.
     """
     controllers, hypotheses = behaviour["sensors"].shape[:2]
     pairs = list(combinations(range(hypotheses), 2))

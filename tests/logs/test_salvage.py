@@ -186,7 +186,7 @@ def test_the_original_is_left_alone_and_the_truth_goes_along_unseen(log: Path, s
 
 
 def test_a_sound_log_is_not_salvaged(log: Path, saved: Path):
-    with pytest.raises(InputError, match="is sound, and the trial in it is finished: there"):
+    with pytest.raises(InputError, match="is valid, and the trial in it is finished: there"):
         salvage(log, saved)
     spoiled(log, Opcode.CHUNK, 2)
     salvage(log, saved)
