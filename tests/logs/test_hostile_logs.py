@@ -132,8 +132,8 @@ def message(data: bytes = b"") -> bytes:
         (TRIAL, {"stage": "../../etc/passwd"}, "stage must be one of"),
         (RESULT, {"steps": "9" * 5000}, "its record selfmodel.result is wrong"),
         (RESULT, {"steps": "-1"}, "after -1 of 120 steps"),
-        (RESULT, {"displacement": "nan"}, "says nan m of displacement"),
-        (RESULT, {"displacement": "1e999"}, "says inf m of displacement"),
+        (RESULT, {"displacement": "nan"}, "displacement is nan m in its result"),
+        (RESULT, {"displacement": "1e999"}, "displacement is inf m in its result"),
     ],
 )
 def test_what_a_record_may_not_say_is_refused(
