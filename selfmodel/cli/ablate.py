@@ -74,11 +74,11 @@ def ablate(
     from selfmodel.cli import lists  # noqa: PLC0415
     from selfmodel.cli.output import grid_command  # noqa: PLC0415
     from selfmodel.comparators import COMPARATORS  # noqa: PLC0415
-    from selfmodel.experiments import plugins as resolve  # noqa: PLC0415
     from selfmodel.experiments.ablation import Ablation, write_results  # noqa: PLC0415
     from selfmodel.experiments.ablation import ablate as run  # noqa: PLC0415
     from selfmodel.experiments.ablation.results import as_object  # noqa: PLC0415
     from selfmodel.settings import Settings  # noqa: PLC0415
+    from selfmodel.simulation.threads import thread_count  # noqa: PLC0415
     from selfmodel.tasks import ROBOTS  # noqa: PLC0415
 
     cases = cases.strip()
@@ -99,9 +99,7 @@ def ablate(
     )
     part = lists.share("--only", only)
     failed = grid_command.run_shown(
-        lambda on_event: run(
-            ablation, workers=resolve.threads(workers), on_event=on_event, only=part
-        ),
+        lambda on_event: run(ablation, workers=thread_count(workers), on_event=on_event, only=part),
         out,
     )
     results = write_results(out)

@@ -33,19 +33,20 @@ def calibrate(
     model. What is written is a model for --robot of diagnose and replay.
     """
     # Whatever brings MuJoCo waits until the command runs.
-    from selfmodel.experiments import plugins as resolve  # noqa: PLC0415
+    from selfmodel.experiments import trial_logs  # noqa: PLC0415
     from selfmodel.logs.files import as_write_error, create_partial, publish, refuse_existing  # noqa: PLC0415
     from selfmodel.robot.parameters import factor_names  # noqa: PLC0415
     from selfmodel.simulation.calibrate import calibrate as fit_to  # noqa: PLC0415
+    from selfmodel.simulation.threads import thread_count  # noqa: PLC0415
 
     start = perf_counter()
     if out.suffix.lower() != ".xml":
         raise InputError(f"--out needs a name that ends in .xml, got {str(out)!r}")
     refuse_existing(out)
-    logs = resolve.logs(files)
-    before = resolve.robot_of_logs(logs, robot)
+    logs = trial_logs.logs(files)
+    before = trial_logs.robot_of_logs(logs, robot)
     _refuse_assets(before, robot or str(files[0]))
-    fit = fit_to(before, [log.trial for log in logs], resolve.threads(threads))
+    fit = fit_to(before, [log.trial for log in logs], thread_count(threads))
     with create_partial(out) as file, as_write_error(out):
         file.write(fit.robot.mjcf.encode())
         publish(file, out)

@@ -51,22 +51,23 @@ def diagnose(
         confidence_to_dict,
         ranking_to_list,
     )
-    from selfmodel.experiments import plugins as resolve  # noqa: PLC0415
+    from selfmodel.experiments import plugins, trial_logs  # noqa: PLC0415
     from selfmodel.experiments.fitting import calibration_values, fitted  # noqa: PLC0415
     from selfmodel.recovery.explain import diagnose_trials  # noqa: PLC0415
     from selfmodel.simulation.simulator import Simulator  # noqa: PLC0415
+    from selfmodel.simulation.threads import thread_count  # noqa: PLC0415
 
     start = perf_counter()
-    judge = resolve.comparator(comparator)
-    considered = resolve.kinds(kinds)
-    logs = resolve.logs(files)
-    model = resolve.robot_of_logs(logs, robot)
+    judge = plugins.comparator(comparator)
+    considered = plugins.kinds(kinds)
+    logs = trial_logs.logs(files)
+    model = trial_logs.robot_of_logs(logs, robot)
     used = _since_the_failure(logs)
     first = used[0]
     chosen = first.trial.plan.seed if seed is None else seed
     intact = [log.trial for log in logs if log not in used]
-    fit = fitted(model, intact, resolve.threads(threads)) if calibrate and intact else None
-    simulator = Simulator(fit.robot if fit else model, resolve.threads(threads))
+    fit = fitted(model, intact, thread_count(threads)) if calibrate and intact else None
+    simulator = Simulator(fit.robot if fit else model, thread_count(threads))
     search = DiagnosticSearch(simulator, judge, first.settings, considered, intact=intact)
     for note in _notes(used):
         typer.echo(f"note: {note}", err=True)

@@ -60,36 +60,40 @@ def recover(
 ) -> None:
     """Recover a robot from a failure: diagnose it from logged trials, evolve a controller."""
     # Whatever brings MuJoCo waits until the command runs.
+    from selfmodel.cli import inputs  # noqa: PLC0415
     from selfmodel.cli.output.display import display  # noqa: PLC0415
     from selfmodel.cli.output.report import as_object, print_report  # noqa: PLC0415
-    from selfmodel.experiments import plugins as resolve  # noqa: PLC0415
+    from selfmodel.controllers.controller import check_silent_neurons  # noqa: PLC0415
+    from selfmodel.experiments import plugins, robots  # noqa: PLC0415
     from selfmodel.experiments.experiment import Experiment, run  # noqa: PLC0415
+    from selfmodel.faults.neuron import silent_neurons  # noqa: PLC0415
     from selfmodel.faults.notation import parse  # noqa: PLC0415
     from selfmodel.faults.registry import known  # noqa: PLC0415
     from selfmodel.logs.files import replace_file  # noqa: PLC0415
     from selfmodel.settings import Settings  # noqa: PLC0415
+    from selfmodel.simulation.threads import thread_count  # noqa: PLC0415
 
-    entry = resolve.robot_entry(robot, model_settings or ())
-    considered = resolve.kinds(kinds)
-    damaged = resolve.case_notation(entry, case, damage)
-    made = resolve.with_neurons(entry.robot(), neurons, controller)
-    design = resolve.design(controller, made)
+    entry = robots.robot_entry(robot, model_settings or ())
+    considered = plugins.kinds(kinds)
+    damaged = inputs.case_notation(entry, case, damage)
+    made = entry.robot()
+    design = plugins.design(controller, made, neurons)
     truth = parse(damaged, made.anatomy, known(considered))
-    resolve.check_neurons(truth, design)
+    check_silent_neurons(design, silent_neurons(truth))
     experiment = Experiment(
         robot=made,
         case=case,
         truth=truth,
-        comparator=resolve.comparator(comparator),
+        comparator=plugins.comparator(comparator),
         kinds=considered,
         calibrated=calibrate,
         settings=Settings(trials=trials, generations=generations).scaled(population),
         seed=seed,
-        threads=resolve.threads(threads),
+        threads=thread_count(threads),
         folder=out or _new_folder(made.name),
         gap=gap,
         structure=structure,
-        next_trial=resolve.next_trial(next_trial),
+        next_trial=plugins.next_trial(next_trial),
         design=design,
         physical=entry.physical,
     )

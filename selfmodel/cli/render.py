@@ -82,22 +82,23 @@ def render(
     gl = _choose_gl(out, stick=stick)
     # Whatever brings MuJoCo waits until it is known what draws.
     from selfmodel.cli.rendering.diagnosed import diagnosed  # noqa: PLC0415
-    from selfmodel.experiments import plugins as resolve  # noqa: PLC0415
+    from selfmodel.experiments import plugins, trial_logs  # noqa: PLC0415
     from selfmodel.faults.notation import parse  # noqa: PLC0415
     from selfmodel.faults.registry import known  # noqa: PLC0415
     from selfmodel.logs.errors import LogWriteError  # noqa: PLC0415
     from selfmodel.logs.files import replace_file  # noqa: PLC0415
+    from selfmodel.simulation.threads import thread_count  # noqa: PLC0415
 
     if diagnosis is not None:
         hypothesis = diagnosed(diagnosis)
-    (log,) = resolve.logs([file])
-    robot = resolve.robot_of_logs([log], model)
+    (log,) = trial_logs.logs([file])
+    robot = trial_logs.robot_of_logs([log], model)
     film, result = _filmed(
         log,
         robot,
-        parse(hypothesis or "intact", robot.anatomy, known(resolve.kinds(kinds))),
+        parse(hypothesis or "intact", robot.anatomy, known(plugins.kinds(kinds))),
         None if out.suffix.lower() in FILMS else pictures,
-        resolve.threads(threads),
+        thread_count(threads),
     )
     for note in result["notes"]:
         typer.echo(f"note: {note}", err=True)

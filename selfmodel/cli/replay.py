@@ -53,22 +53,23 @@ def replay(
     import mujoco  # noqa: PLC0415
 
     from selfmodel.cli.replay_figure import check_figure, draw  # noqa: PLC0415
-    from selfmodel.experiments import plugins as resolve  # noqa: PLC0415
+    from selfmodel.experiments import plugins, trial_logs  # noqa: PLC0415
     from selfmodel.faults.notation import parse  # noqa: PLC0415
     from selfmodel.faults.registry import known  # noqa: PLC0415
     from selfmodel.simulation.replay import replay as simulate  # noqa: PLC0415
     from selfmodel.simulation.simulator import Simulator  # noqa: PLC0415
+    from selfmodel.simulation.threads import thread_count  # noqa: PLC0415
     from selfmodel.trials.behaviour import SIGNALS  # noqa: PLC0415
 
     if out is not None:
         check_figure(out)
-    (log,) = resolve.logs([file])
-    robot = resolve.robot_of_logs([log], model)
-    assumed = parse(hypothesis, robot.anatomy, known(resolve.kinds(kinds)))
+    (log,) = trial_logs.logs([file])
+    robot = trial_logs.robot_of_logs([log], model)
+    assumed = parse(hypothesis, robot.anatomy, known(plugins.kinds(kinds)))
     logged = log.software.get("mujoco", "unknown")
     exact = logged == mujoco.__version__ and not log.imported
     tolerance = 0.0 if exact else TOLERANCE
-    simulator = Simulator(robot, resolve.threads(threads))
+    simulator = Simulator(robot, thread_count(threads))
     found = simulate(log.trial, assumed, simulator, tolerance)
     result = {
         "log": str(file),

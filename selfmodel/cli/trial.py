@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -19,9 +19,6 @@ from selfmodel.cli.options import (
     Structural,
     check_log_name,
 )
-
-if TYPE_CHECKING:
-    from selfmodel.controllers.driver import Evolved
 
 
 def trial(
@@ -55,36 +52,38 @@ def trial(
     # Whatever brings MuJoCo waits until the command runs.
     import numpy as np  # noqa: PLC0415
 
-    from selfmodel.controllers.network import draw_weights  # noqa: PLC0415
-    from selfmodel.experiments import plugins as resolve  # noqa: PLC0415
+    from selfmodel.cli import inputs  # noqa: PLC0415
+    from selfmodel.controllers.controller import (  # noqa: PLC0415
+        Controller,
+        check_silent_neurons,
+        draw_genomes,
+    )
+    from selfmodel.experiments import plugins, robots, trial_logs  # noqa: PLC0415
     from selfmodel.experiments.reality import draw_reality  # noqa: PLC0415
+    from selfmodel.faults.neuron import silent_neurons  # noqa: PLC0415
     from selfmodel.faults.notation import parse  # noqa: PLC0415
     from selfmodel.faults.registry import known  # noqa: PLC0415
     from selfmodel.logs.physical_trial import run_trial  # noqa: PLC0415
     from selfmodel.logs.records import TrialHeader  # noqa: PLC0415
+    from selfmodel.robot.designs import DESIGNS  # noqa: PLC0415
     from selfmodel.settings import Settings  # noqa: PLC0415
     from selfmodel.trials.trial import TrialPlan  # noqa: PLC0415
 
     kind = "network" if controller is None else str(controller)
-    made = resolve.with_neurons(
-        resolve.robot_entry(robot, model_settings or ()).robot(),
-        neurons,
-        "cpg" if kind == "cpg" else "network",
-    )
+    made = robots.robot_entry(robot, model_settings or ()).robot()
     check_log_name(out)
     hidden = parse(
-        "intact" if damage is None else damage, made.anatomy, known(resolve.kinds(kinds))
+        "intact" if damage is None else damage, made.anatomy, known(plugins.kinds(kinds))
     )
     reality = draw_reality(made, seed, gap, structure=structure)
-    driver: Evolved
-    if kind in resolve.DESIGNS:
-        design = resolve.design(kind, made)
-        driver = design.controller(draw_weights(np.random.default_rng(seed), (design.weights,)))
+    if kind in DESIGNS:
+        design = plugins.design(kind, made, neurons)
+        driver = Controller(design, draw_genomes(np.random.default_rng(seed), (design.weights,)))
     else:
-        driver = resolve.controller(Path(kind), made)
-    resolve.check_neurons(hidden, driver)
+        driver = trial_logs.controller(Path(kind), made, neurons)
+    check_silent_neurons(driver.design, silent_neurons(hidden))
     settings = Settings()
-    plan = TrialPlan("trial", resolve.stage(stage), driver, settings.steps, seed)
+    plan = TrialPlan("trial", inputs.stage(stage), driver, settings.steps, seed)
     header = TrialHeader(settings, hidden=str(hidden), gap=reality.text)
     try:
         logged = run_trial(reality.robot(made, hidden), plan, out, made, header)

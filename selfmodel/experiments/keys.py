@@ -5,12 +5,12 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from selfmodel.errors import InputError
-from selfmodel.experiments import plugins as resolve
+from selfmodel.experiments import robots
 
 
 def key_of(robot: str) -> str:
     """Returns what stands for a robot in names of files: its name, or that of its MJCF."""
-    name = Path(robot).stem if resolve.is_model(robot) else robot
+    name = Path(robot).stem if robots.is_model(robot) else robot
     return re.sub(r"[^\w.-]", "_", name, flags=re.ASCII).lstrip(".-") or "robot"
 
 

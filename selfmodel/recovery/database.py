@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from selfmodel.controllers.driver import Evolved
+from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.physical.interface import PhysicalRobot
@@ -30,10 +30,10 @@ class Database:
     diagnoses: tuple[Diagnosis, ...] = ()
 
     @property
-    def controllers(self) -> tuple[Evolved, ...]:
+    def controllers(self) -> tuple[Controller, ...]:
         """Distinct controllers that a physical robot has run, newest first."""
         drivers = dict.fromkeys(trial.plan.controller for trial in reversed(self.trials))
-        return tuple(driver for driver in drivers if isinstance(driver, Evolved))
+        return tuple(driver for driver in drivers if isinstance(driver, Controller))
 
     @property
     def evidence(self) -> tuple[Trial, ...]:

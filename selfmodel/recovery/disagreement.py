@@ -11,7 +11,8 @@ from types import MappingProxyType
 import numpy as np
 
 from selfmodel.arrays import FloatArray, IndexArray
-from selfmodel.controllers.driver import Driver, Evolved
+from selfmodel.controllers.command_source import CommandSource
+from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
@@ -65,9 +66,9 @@ class Disagreement:
     def __init__(self, hypotheses: Sequence[Hypothesis], simulator: Simulator, steps: int) -> None:
         self._hypotheses, self._simulator, self._steps = tuple(hypotheses), simulator, steps
         self._early = min(steps, EARLY_STEPS)
-        self._cache: Cache[Evolved] = Cache()
+        self._cache: Cache[Controller] = Cache()
 
-    def most_discriminative(self, candidates: Sequence[Evolved]) -> Evolved:
+    def most_discriminative(self, candidates: Sequence[Controller]) -> Controller:
         """Returns the controller whose trial is predicted to separate the hypotheses best.
 
         Controllers with which the robot falls under any hypothesis, or whose simulation diverges,
@@ -87,7 +88,7 @@ class Disagreement:
                 return candidates[i]
         return candidates[int(falls.argmax())]
 
-    def most_discriminative_first(self, candidates: Sequence[Evolved]) -> list[Evolved]:
+    def most_discriminative_first(self, candidates: Sequence[Controller]) -> list[Controller]:
         """Returns the controllers in order of decreasing disagreement.
 
         Controllers with which the robot falls in the first ``EARLY_STEPS`` are last, the earliest
@@ -95,13 +96,13 @@ class Disagreement:
         """
         return [candidates[i] for i in self._ordered(candidates)[1]]
 
-    def _ordered(self, candidates: Sequence[Evolved]) -> tuple[IndexArray, list[int]]:
+    def _ordered(self, candidates: Sequence[Controller]) -> tuple[IndexArray, list[int]]:
         """First fall per controller, and the controllers' indices by decreasing disagreement."""
         found = self._cache.get_or_compute(candidates, self._evaluate)
         falls, disagreement = np.array(found).T
         return falls.astype(np.intp), np.lexsort((-disagreement, -falls)).tolist()
 
-    def _evaluate(self, candidates: Sequence[Evolved]) -> FloatArray:
+    def _evaluate(self, candidates: Sequence[Controller]) -> FloatArray:
         """First fall and disagreement per controller, ``(controllers, 2)``."""
         early = self._predicted(candidates, self._early)
         falls = self._first_falls(early)
@@ -115,7 +116,7 @@ class Disagreement:
             disagreement[upright] = np.where(found.diverged.any(axis=1), -1.0, computed)
         return np.stack([falls, disagreement], axis=1)
 
-    def _predicted(self, drivers: Sequence[Driver], steps: int) -> SimulationResult:
+    def _predicted(self, drivers: Sequence[CommandSource], steps: int) -> SimulationResult:
         """Each driver's rollouts by hypothesis, ``(drivers, hypotheses, steps, width)``."""
         runs = [(hypothesis, driver) for driver in drivers for hypothesis in self._hypotheses]
         outcome = self._simulator.run(runs, steps, (*DIFFERENCE_SCALES, "commands"))

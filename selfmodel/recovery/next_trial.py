@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from selfmodel.controllers.driver import Evolved
-from selfmodel.controllers.network import draw_weights
+from selfmodel.controllers.controller import Controller, draw_genomes
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.evolution import reproduce
 from selfmodel.faults.hypothesis import Hypothesis
@@ -44,20 +43,20 @@ class Situation:
     simulator: Simulator
     settings: Settings
     rng: np.random.Generator
-    repaired: Callable[[], Evolved]
+    repaired: Callable[[], Controller]
     on_event: Callable[[Event], None]
 
 
-NextTrial = Callable[[Situation], Evolved]
+NextTrial = Callable[[Situation], Controller]
 """Chooses the controller of the next physical trial."""
 
 
-def by_repair(situation: Situation) -> Evolved:
+def by_repair(situation: Situation) -> Controller:
     """Returns a controller that compensates for the best hypothesis, as in the paper."""
     return situation.repaired()
 
 
-def by_disagreement(situation: Situation) -> Evolved:
+def by_disagreement(situation: Situation) -> Controller:
     """Returns the controller with the largest disagreement of hypotheses, or finally a repair.
 
     A repair is returned once the diagnosis is ``explained`` and either has no undetectable fault
@@ -81,11 +80,11 @@ def by_disagreement(situation: Situation) -> Evolved:
 
 def discriminating_controller(
     diagnosis: Diagnosis,
-    known: Sequence[Evolved],
+    known: Sequence[Controller],
     simulator: Simulator,
     settings: Settings,
     rng: np.random.Generator,
-) -> Evolved:
+) -> Controller:
     """Returns the controller with the largest disagreement of the hypotheses to separate.
 
     Args:
@@ -125,8 +124,8 @@ def candidates_to_separate(diagnosis: Diagnosis) -> tuple[Hypothesis, ...]:
 
 
 def candidates(
-    known: Sequence[Evolved], settings: Settings, rng: np.random.Generator
-) -> list[Evolved]:
+    known: Sequence[Controller], settings: Settings, rng: np.random.Generator
+) -> list[Controller]:
     """Returns the distinct controllers to choose from, those of earlier trials first.
 
     Args:
@@ -141,13 +140,13 @@ def candidates(
     distinct = dict.fromkeys([*same_design, *bred])
     found = [controller for controller in distinct if controller != newest]
     if not found:  # every child equals its parent, as without mutation
-        found = [newest.design.controller(draw_weights(rng, newest.genome.shape))]
+        found = [Controller(newest.design, draw_genomes(rng, newest.genome.shape))]
     return found
 
 
 def offspring(
-    parents: Sequence[Evolved], settings: Settings, rng: np.random.Generator
-) -> list[Evolved]:
+    parents: Sequence[Controller], settings: Settings, rng: np.random.Generator
+) -> list[Controller]:
     """Returns one population of children.
 
     Args:
@@ -157,6 +156,6 @@ def offspring(
     """
     genomes = np.array([parent.genome for parent in parents])
     bred = reproduce(
-        np.resize(genomes, (settings.population, genomes.shape[1])), draw_weights, settings, rng
+        np.resize(genomes, (settings.population, genomes.shape[1])), draw_genomes, settings, rng
     )
-    return [parents[0].design.controller(genome) for genome in bred]
+    return [Controller(parents[0].design, genome) for genome in bred]

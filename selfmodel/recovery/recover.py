@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from selfmodel.controllers.driver import Design, Evolved
+from selfmodel.controllers.controller import Controller, Design
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
@@ -19,6 +19,7 @@ from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.next_trial import NextTrial, Situation, by_repair
 from selfmodel.recovery.random_streams import choice_stream, diagnosis_stream, repair_stream
 from selfmodel.recovery.repair import RepairSearch
+from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibrate import Calibration
 from selfmodel.simulation.simulator import Simulator
@@ -75,7 +76,7 @@ def recover(
     settings: Settings,
     seed: int,
     on_event: Callable[[Event], None],
-    gait: Evolved | None = None,
+    gait: Controller | None = None,
     design: Design | None = None,
     kinds: Sequence[FaultKind] = PAPER_KINDS,
     calibrate: Callable[[Sequence[Trial]], Calibration] | None = None,
@@ -107,12 +108,12 @@ def recover(
         The trials, the last diagnosis and the number of evaluations.
     """
     # Not of the calibrated model, which is written with fewer digits.
-    design = simulator.robot.network if design is None else design
+    design = network_for(simulator.robot) if design is None else design
     repair = RepairSearch(simulator, settings, design, score=score)
     tried: list[Hypothesis] = []
     database = Database()
 
-    def evolve_controller(hypothesis: Hypothesis) -> Evolved:
+    def evolve_controller(hypothesis: Hypothesis) -> Controller:
         on_event(SearchBegins("repair", hypothesis))
         rng = repair_stream(seed, len(database.diagnoses))
         return repair(hypothesis, database.controllers, rng, on_event)
@@ -127,7 +128,7 @@ def recover(
         on_event(diagnosis)
         return diagnosis
 
-    def act(robot: PhysicalRobot, stage: Stage, best: Hypothesis, controller: Evolved) -> None:
+    def act(robot: PhysicalRobot, stage: Stage, best: Hypothesis, controller: Controller) -> None:
         nonlocal database
         plan = TrialPlan(f"{len(tried):02d}-{stage}", stage, controller, settings.steps, seed)
         tried.append(best)

@@ -12,7 +12,7 @@ import pytest
 from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.kind_contract import check_kind
 from selfmodel.errors import InputError
-from selfmodel.experiments import plugins as resolve
+from selfmodel.experiments import plugins, robots
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
@@ -132,7 +132,7 @@ def test_the_contract_kit_sees_each_way_to_break_it(change: dict, said: str, qua
 
 
 def test_the_contract_kit_sees_a_kind_that_edits_the_robot_itself():
-    robot = resolve.robot("quadruped", 0.01)
+    robot = robots.robot("quadruped", 0.01)
 
     def wrong(_embodiment: Embodiment, _anatomy: Anatomy, _fault: Fault) -> None:
         robot.model.body_mass[1] = 5.0
@@ -144,11 +144,11 @@ def test_the_contract_kit_sees_a_kind_that_edits_the_robot_itself():
 def test_kinds_are_chosen_by_name(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / "examples"))
 
-    assert resolve.kinds("break,jam,sensor") == PAPER_KINDS
-    assert resolve.kinds("all") == ALL_KINDS
-    assert resolve.kinds(" friction , break") == (KINDS["friction"], KINDS["break"])
-    assert resolve.kinds("jam,all") == (KINDS["jam"], *(k for k in ALL_KINDS if k.name != "jam"))
-    assert [kind.name for kind in resolve.kinds("jam,payload:PAYLOAD")] == ["jam", "payload"]
+    assert plugins.kinds("break,jam,sensor") == PAPER_KINDS
+    assert plugins.kinds("all") == ALL_KINDS
+    assert plugins.kinds(" friction , break") == (KINDS["friction"], KINDS["break"])
+    assert plugins.kinds("jam,all") == (KINDS["jam"], *(k for k in ALL_KINDS if k.name != "jam"))
+    assert [kind.name for kind in plugins.kinds("jam,payload:PAYLOAD")] == ["jam", "payload"]
 
 
 @pytest.mark.parametrize(
@@ -166,7 +166,7 @@ def test_kinds_are_chosen_by_name(monkeypatch: pytest.MonkeyPatch):
 )
 def test_a_name_of_no_kind_says_what_was_meant(names: str, said: str):
     with pytest.raises(InputError, match=said):
-        resolve.kinds(names)
+        plugins.kinds(names)
 
 
 SECOND_WIND = dataclasses.replace(GRADED, name="second-wind", keyword="wind")

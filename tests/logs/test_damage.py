@@ -170,7 +170,11 @@ def retyped(record: McapRecord) -> McapRecord:
             "120 messages on /joint_states for 119 steps",
         ),
         (metadata(RESULT, steps="119"), IncompleteError, "after 119 of 120 steps"),
-        (metadata(RESULT, displacement="1.5"), CorruptError, r"displacement is 1\.5 m in its result"),
+        (
+            metadata(RESULT, displacement="1.5"),
+            CorruptError,
+            r"displacement is 1\.5 m in its result",
+        ),
         (without(Attachment, "model.xml"), SchemaMismatchError, r"no attachment model\.xml"),
         (attachment("model.xml", b"0.6", b"0.7"), CorruptError, r"model\.xml is not the one"),
         (attachment("controller.npz", b"<f8", b"<f4"), CorruptError, r"controller\.npz is not"),

@@ -11,7 +11,7 @@ from selfmodel.cli.output.plain import plain
 from selfmodel.errors import InputError
 
 if TYPE_CHECKING:
-    from selfmodel.controllers.driver import Evolved
+    from selfmodel.controllers.controller import Controller
     from selfmodel.logs.rosbag.importer import Recording
     from selfmodel.logs.rosbag.mapping import BagMapping
     from selfmodel.robot.robot import Robot
@@ -65,12 +65,12 @@ def import_(
 
 def _suggestion(bag: Path, name: str) -> str:
     # Whatever brings MuJoCo or ROS's messages waits until the command runs.
-    from selfmodel.experiments import plugins as resolve  # noqa: PLC0415
+    from selfmodel.experiments import robots  # noqa: PLC0415
     from selfmodel.logs.rosbag.bag import open_bag  # noqa: PLC0415
     from selfmodel.logs.rosbag.suggest import suggest  # noqa: PLC0415
 
     own = not _is_model(name)
-    made = resolve.robot(name, TIMESTEP if own else _timestep(Path(name)))
+    made = robots.robot(name, TIMESTEP if own else _timestep(Path(name)))
     with open_bag(bag) as opened:
         return suggest(opened, made, name, with_timestep=not own)
 
@@ -111,7 +111,7 @@ def _import(bag: Path, out: Path, path: Path, *, as_json: bool) -> None:
 
 def _mapped_robot(mapping: "BagMapping", folder: Path) -> "Robot":
     """The robot that a mapping names: one that comes with selfmodel, or a file beside it."""
-    from selfmodel.experiments import plugins as resolve  # noqa: PLC0415
+    from selfmodel.experiments import robots  # noqa: PLC0415
 
     name, timestep = mapping.robot, mapping.control_timestep
     own = not _is_model(name)
@@ -124,18 +124,18 @@ def _mapped_robot(mapping: "BagMapping", folder: Path) -> "Robot":
             ("robot",), f"{name} does not say how often it is controlled: add control_timestep, s"
         )
     try:
-        return resolve.robot(name if own else str(folder / name), timestep or TIMESTEP)
+        return robots.robot(name if own else str(folder / name), timestep or TIMESTEP)
     except InputError as error:
         raise mapping.document.error(("robot",), str(error)) from error
 
 
-def _controller(mapping: "BagMapping", folder: Path, robot: "Robot") -> "Evolved | None":
-    from selfmodel.experiments import plugins as resolve  # noqa: PLC0415
+def _controller(mapping: "BagMapping", folder: Path, robot: "Robot") -> "Controller | None":
+    from selfmodel.experiments import trial_logs  # noqa: PLC0415
 
     if mapping.controller is None:
         return None
     try:
-        return resolve.controller(folder / mapping.controller, robot)
+        return trial_logs.controller(folder / mapping.controller, robot)
     except InputError as error:
         raise mapping.document.error(("controller",), str(error)) from error
 

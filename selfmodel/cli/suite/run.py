@@ -70,12 +70,12 @@ def run(
     # Whatever brings MuJoCo waits until the command runs.
     from selfmodel.cli import lists  # noqa: PLC0415
     from selfmodel.cli.output import grid_command  # noqa: PLC0415
-    from selfmodel.experiments import plugins as resolve  # noqa: PLC0415
     from selfmodel.experiments.suite.bodies import DOMAINS, bodies, tasks_of  # noqa: PLC0415
     from selfmodel.experiments.suite.plan import Study, known_cases  # noqa: PLC0415
     from selfmodel.experiments.suite.results import write_results  # noqa: PLC0415
     from selfmodel.experiments.suite.work import run_study  # noqa: PLC0415
     from selfmodel.settings import Settings  # noqa: PLC0415
+    from selfmodel.simulation.threads import thread_count  # noqa: PLC0415
 
     asked = lists.texts("--domains", domains, DOMAINS)
     wanted = None if tasks is None else lists.texts("--tasks", tasks, tasks_of(asked))
@@ -93,7 +93,7 @@ def run(
         comparator=comparator,
     )
     failed = grid_command.run_shown(
-        lambda on_event: run_study(study, workers=resolve.threads(workers), on_event=on_event), out
+        lambda on_event: run_study(study, workers=thread_count(workers), on_event=on_event), out
     )
     results = write_results(out)
     if as_json:

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from selfmodel import __version__
-from selfmodel.controllers.driver import Evolved
-from selfmodel.experiments import plugins as resolve
+from selfmodel.controllers.controller import Controller
+from selfmodel.experiments import robots, trial_logs
 from selfmodel.experiments.ablation.plan import Ablation, Cell, model_digest
 from selfmodel.experiments.grid import GridBegins, Job, PartEnds, run_grid
 from selfmodel.experiments.keys import key_of
@@ -64,13 +64,13 @@ def folder(ablation: Ablation) -> Path:
     return ablation.folder / "bank" if ablation.bank is None else ablation.bank
 
 
-def gait(bank: Path, robot: str, number: int) -> Evolved:
+def gait(bank: Path, robot: str, number: int) -> Controller:
     """Returns a gait of the bank.
 
     Raises:
         InputError: There is none, or it is for another robot.
     """
-    return resolve.controller(_path(bank, robot, number), resolve.robot_entry(robot).robot())
+    return trial_logs.controller(_path(bank, robot, number), robots.robot_entry(robot).robot())
 
 
 def digests(bank: Path, cell: Cell, settings: Settings) -> list[str] | None:
@@ -83,7 +83,7 @@ def digests(bank: Path, cell: Cell, settings: Settings) -> list[str] | None:
 
 def evolve_gait(job: Job, _part: str, run: Path) -> Any:  # noqa: ANN401  # JSON
     """Evolves a gait as a recovery with that seed begins, and puts it into the bank."""
-    robot = resolve.robot_entry(job.parameters["robot"]).robot()
+    robot = robots.robot_entry(job.parameters["robot"]).robot()
     repair = RepairSearch(Simulator(robot, threads=1), Settings(**job.parameters["settings"]))
     found = repair(INTACT, (), repair_stream(job.seed, 0), lambda _generation: None)
     write_atomic(_path(run.parent, job.parameters["robot"], job.seed), controller_bytes(found))

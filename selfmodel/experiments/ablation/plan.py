@@ -11,7 +11,7 @@ from urllib.parse import quote
 
 from selfmodel import __version__
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.experiments import plugins as resolve
+from selfmodel.experiments import plugins, robots
 from selfmodel.experiments.grid import Job, check_shared
 from selfmodel.experiments.keys import check_keys, key_of
 from selfmodel.faults.kind import FaultKind
@@ -195,7 +195,7 @@ def spec(of: Job) -> Spec:
 
 
 def _failures(ablation: Ablation, robot: str) -> list[tuple[int | None, str]]:
-    entry = resolve.robot_entry(robot)
+    entry = robots.robot_entry(robot)
     anatomy = entry.robot().anatomy
     numbers = entry.cases if ablation.cases is None else ablation.cases
     cases: list[tuple[int | None, str]] = [(case, entry.cases[case]) for case in numbers]
@@ -205,27 +205,27 @@ def _failures(ablation: Ablation, robot: str) -> list[tuple[int | None, str]]:
 
 def _named(ablation: Ablation) -> tuple[FaultKind, ...]:
     """What notation may name: also a third party's kinds, where they are considered."""
-    return known(resolve.kinds(ablation.kinds))
+    return known(plugins.kinds(ablation.kinds))
 
 
 def model_digest(robot: str) -> str:
     """Returns the digest of a robot's model, which its results depend on."""
-    return hashlib.sha256(resolve.robot_entry(robot).robot().mjcf.encode()).hexdigest()
+    return hashlib.sha256(robots.robot_entry(robot).robot().mjcf.encode()).hexdigest()
 
 
 def _check_names(ablation: Ablation) -> None:
     check_keys(ablation.robots)
     for robot in ablation.robots:
-        entry = resolve.robot_entry(robot)
+        entry = robots.robot_entry(robot)
         for case in ablation.cases or ():
             if case not in entry.cases:
                 raise unknown_name(f"case of {robot}", str(case), map(str, entry.cases))
         anatomy = entry.robot().anatomy
-        applicable_kinds(resolve.kinds(ablation.kinds), anatomy)
+        applicable_kinds(plugins.kinds(ablation.kinds), anatomy)
         for damage in ablation.damages:
             parse(damage, anatomy, _named(ablation))
     for comparator in ablation.comparators:
-        resolve.comparator(comparator)
+        plugins.comparator(comparator)
     if ablation.next_trial not in NEXT_TRIAL:
         raise unknown_name("way to choose the next trial", ablation.next_trial, NEXT_TRIAL)
 

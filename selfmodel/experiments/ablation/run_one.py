@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from urllib.parse import quote
 
-from selfmodel.controllers.driver import Evolved
+from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
-from selfmodel.experiments import plugins as resolve
+from selfmodel.experiments import plugins, robots
 from selfmodel.experiments.ablation import bank
 from selfmodel.experiments.ablation.plan import Spec
 from selfmodel.experiments.ablation.rows import Row
@@ -51,7 +51,7 @@ def run_one(spec: Spec, comparator: str, folder: Path, gaits: Path) -> list[Row]
 
 
 def setting_of(
-    spec: Spec, comparator: str, folder: Path, gaits: tuple[Evolved, ...] = ()
+    spec: Spec, comparator: str, folder: Path, gaits: tuple[Controller, ...] = ()
 ) -> Setting:
     """Returns the objects that a run's specification stands for.
 
@@ -61,13 +61,13 @@ def setting_of(
         folder: Where the run is kept.
         gaits: Its gaits, where trials are still to be run.
     """
-    robot = resolve.robot_entry(spec.cell.robot).robot()
+    robot = robots.robot_entry(spec.cell.robot).robot()
     return Setting(
         spec=spec,
-        comparator=resolve.comparator(comparator),
+        comparator=plugins.comparator(comparator),
         name=comparator,
         robot=robot,
-        truth=parse(spec.cell.truth, robot.anatomy, known(resolve.kinds(spec.kinds))),
+        truth=parse(spec.cell.truth, robot.anatomy, known(plugins.kinds(spec.kinds))),
         gaits=gaits,
         folder=folder,
     )
@@ -91,7 +91,7 @@ def diagnosed(
         Simulator(robot, threads=1),
         setting.comparator,
         setting.spec.settings,
-        resolve.kinds(setting.spec.kinds),
+        plugins.kinds(setting.spec.kinds),
         intact=intact,
     )
     rows: list[Row] = []
@@ -159,7 +159,7 @@ def _in_a_recovery(setting: Setting) -> list[Row]:
         gait=setting.gaits[0],
         gap=cell.gap,
         structure=setting.spec.structure,
-        kinds=resolve.kinds(setting.spec.kinds),
+        kinds=plugins.kinds(setting.spec.kinds),
         next_trial=setting.spec.next_trial,
     )
     outcome = run(experiment, on_event)

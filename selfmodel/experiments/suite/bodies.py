@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.experiments.plugins import is_model
+from selfmodel.experiments.robots import is_model
 from selfmodel.tasks import ROBOTS, suite_bodies
 
 DOMAINS: Mapping[str, tuple[str, ...]] = MappingProxyType(

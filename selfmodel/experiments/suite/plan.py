@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from selfmodel import __version__
-from selfmodel.controllers.network import Network
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.experiments import plugins as resolve
+from selfmodel.experiments import plugins, robots
 from selfmodel.experiments.grid import Job, check_shared, finished
 from selfmodel.experiments.keys import check_keys, key_of
-from selfmodel.faults.neuron import SILENT_NEURON
+from selfmodel.faults.neuron import silent_neurons
 from selfmodel.faults.notation import parse
 from selfmodel.settings import Settings
 from selfmodel.tasks import Entry
@@ -50,7 +49,7 @@ class Study:
 
 def known_cases(bodies: Sequence[str]) -> tuple[int, ...]:
     """Returns the numbers of the cases that at least one of some bodies has."""
-    return tuple(sorted({case for body in bodies for case in resolve.robot_entry(body).cases}))
+    return tuple(sorted({case for body in bodies for case in robots.robot_entry(body).cases}))
 
 
 def check(study: Study) -> None:
@@ -59,12 +58,12 @@ def check(study: Study) -> None:
     Raises:
         InputError: Something is, and which.
     """
-    resolve.comparator(study.comparator)
+    plugins.comparator(study.comparator)
     check_keys(study.bodies)
     for body in study.bodies:
-        entry = resolve.robot_entry(body)
-        resolve.design(study.controller, entry.robot())
-        resolve.score(study.score, body, entry)
+        entry = robots.robot_entry(body)
+        plugins.design(study.controller, entry.robot())
+        plugins.score(study.score, body, entry)
     known = known_cases(study.bodies)
     for case in study.cases:
         if case not in known:
@@ -111,7 +110,7 @@ def recovery_jobs(study: Study) -> list[Job]:
                 )
             continue
         body = gait.parameters["body"]
-        entry = resolve.robot_entry(body)
+        entry = robots.robot_entry(body)
         found += [
             Job(
                 key=f"{key_of(body)}-case{case:02d}-seed{gait.seed:03d}",
@@ -133,11 +132,10 @@ def recovery_jobs(study: Study) -> list[Job]:
 
 
 def _means_something(study: Study, entry: Entry, case: int) -> bool:
-    """Whether a failure is one as the study drives the robot: oscillators have no neurons."""
+    """Returns whether the study's controllers have the hidden neurons that a failure silences."""
     robot = entry.robot()
-    faults = parse(entry.cases[case], robot.anatomy).faults
-    drives = resolve.design(study.controller, robot)
-    return isinstance(drives, Network) or all(fault.kind is not SILENT_NEURON for fault in faults)
+    silent = silent_neurons(parse(entry.cases[case], robot.anatomy))
+    return max(silent, default=-1) < plugins.design(study.controller, robot).hidden
 
 
 def gait_path(folder: Path, key: str) -> Path:
@@ -146,7 +144,7 @@ def gait_path(folder: Path, key: str) -> Path:
 
 
 def _body(body: str) -> dict[str, Any]:
-    robot = resolve.robot_entry(body).robot()
+    robot = robots.robot_entry(body).robot()
     assets = hashlib.sha256()
     for name, content in sorted(robot.assets.items()):
         # Of one length each: what ends where is told apart.

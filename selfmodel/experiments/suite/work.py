@@ -7,13 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from selfmodel.experiments import plugins as resolve
+from selfmodel.controllers.controller import check_silent_neurons
+from selfmodel.experiments import plugins, robots, trial_logs
 from selfmodel.experiments.experiment import Experiment
 from selfmodel.experiments.experiment import run as run_experiment
 from selfmodel.experiments.grid import GridBegins, Job, PartEnds, run_grid
 from selfmodel.experiments.suite.plan import Study, check, gait_jobs, gait_path, recovery_jobs
 from selfmodel.experiments.suite.rows import Row, as_objects
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.neuron import silent_neurons
 from selfmodel.faults.notation import parse
 from selfmodel.logs.atomic import write_atomic
 from selfmodel.logs.controllers import controller_bytes
@@ -53,13 +55,13 @@ def run_study(
 def _evolve(job: Job, _part: str, run: Path) -> Any:  # noqa: ANN401  # JSON
     """Evolves a gait as a recovery with that seed begins, and keeps it."""
     said = job.parameters
-    entry = resolve.robot_entry(said["body"])
+    entry = robots.robot_entry(said["body"])
     robot = entry.robot()
     repair = RepairSearch(
         Simulator(robot, threads=1),
         Settings(**said["settings"]),
-        resolve.design(said["controller"], robot),
-        score=resolve.score(said["score"], said["body"], entry),
+        plugins.design(said["controller"], robot),
+        score=plugins.score(said["score"], said["body"], entry),
     )
     found = repair(INTACT, (), repair_stream(job.seed, 0), _ignore)
     write_atomic(run.parent / f"{job.key}.npz", controller_bytes(found))
@@ -69,25 +71,25 @@ def _evolve(job: Job, _part: str, run: Path) -> Any:  # noqa: ANN401  # JSON
 def _recover(job: Job, _part: str, run: Path) -> Any:  # noqa: ANN401  # JSON
     """Lets a body fail and recover, and returns its row."""
     said, shared = job.parameters, job.parameters["shared"]
-    entry = resolve.robot_entry(said["body"])
+    entry = robots.robot_entry(said["body"])
     robot = entry.robot()
     truth = parse(said["truth"], robot.anatomy)
-    design = resolve.design(shared["controller"], robot)
-    resolve.check_neurons(truth, design)
+    design = plugins.design(shared["controller"], robot)
+    check_silent_neurons(design, silent_neurons(truth))
     folder = run / "recovery"
     shutil.rmtree(folder, ignore_errors=True)  # what is left of a run that was killed
     experiment = Experiment(
         robot=robot,
         case=said["case"],
         truth=truth,
-        comparator=resolve.comparator(shared["comparator"]),
+        comparator=plugins.comparator(shared["comparator"]),
         settings=Settings(**shared["settings"]),
         seed=job.seed,
         threads=1,
         folder=folder,
-        gait=resolve.controller(gait_path(run.parents[1], said["gait"]), robot),
+        gait=trial_logs.controller(gait_path(run.parents[1], said["gait"]), robot),
         design=design,
-        score=resolve.score(shared["score"], said["body"], entry),
+        score=plugins.score(shared["score"], said["body"], entry),
         physical=entry.physical,
     )
     outcome = run_experiment(experiment, _ignore)
