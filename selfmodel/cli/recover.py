@@ -64,8 +64,7 @@ def recover(
     from selfmodel.cli.output.report import as_object, print_report  # noqa: PLC0415
     from selfmodel.experiments import plugins as resolve  # noqa: PLC0415
     from selfmodel.experiments.experiment import Experiment, run  # noqa: PLC0415
-    from selfmodel.faults.notation import parse  # noqa: PLC0415
-    from selfmodel.faults.registry import known  # noqa: PLC0415
+    from selfmodel.faults.hypothesis_space import HypothesisSpace  # noqa: PLC0415
     from selfmodel.logs.files import replace  # noqa: PLC0415
     from selfmodel.settings import Settings  # noqa: PLC0415
 
@@ -74,7 +73,7 @@ def recover(
     damaged = resolve.case_notation(entry, case, damage)
     made = resolve.with_neurons(entry.robot(), neurons, controller)
     design = resolve.design(controller, made)
-    truth = parse(damaged, made.anatomy, known(considered))
+    truth = HypothesisSpace(made.anatomy, considered).parse(damaged)
     resolve.check_neurons(truth, design)
     experiment = Experiment(
         robot=made,

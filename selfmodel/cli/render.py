@@ -83,8 +83,7 @@ def render(
     # Whatever brings MuJoCo waits until it is known what draws.
     from selfmodel.cli.rendering.diagnosed import diagnosed  # noqa: PLC0415
     from selfmodel.experiments import plugins as resolve  # noqa: PLC0415
-    from selfmodel.faults.notation import parse  # noqa: PLC0415
-    from selfmodel.faults.registry import known  # noqa: PLC0415
+    from selfmodel.faults.hypothesis_space import HypothesisSpace  # noqa: PLC0415
     from selfmodel.logs.errors import LogWriteError  # noqa: PLC0415
     from selfmodel.logs.files import replace  # noqa: PLC0415
 
@@ -95,7 +94,7 @@ def render(
     film, result = _filmed(
         log,
         robot,
-        parse(hypothesis or "intact", robot.anatomy, known(resolve.kinds(kinds))),
+        HypothesisSpace(robot.anatomy, resolve.kinds(kinds)).parse(hypothesis or "intact"),
         None if out.suffix.lower() in FILMS else pictures,
         resolve.threads(threads),
     )

@@ -58,8 +58,7 @@ def trial(
     from selfmodel.controllers.network import draw_weights  # noqa: PLC0415
     from selfmodel.experiments import plugins as resolve  # noqa: PLC0415
     from selfmodel.experiments.reality import draw_reality  # noqa: PLC0415
-    from selfmodel.faults.notation import parse  # noqa: PLC0415
-    from selfmodel.faults.registry import known  # noqa: PLC0415
+    from selfmodel.faults.hypothesis_space import HypothesisSpace  # noqa: PLC0415
     from selfmodel.logs import read_log  # noqa: PLC0415
     from selfmodel.logs.writer import write_trial  # noqa: PLC0415
     from selfmodel.settings import Settings  # noqa: PLC0415
@@ -72,8 +71,8 @@ def trial(
         "cpg" if kind == "cpg" else "network",
     )
     check_log_name(out)
-    hidden = parse(
-        "intact" if damage is None else damage, made.anatomy, known(resolve.kinds(kinds))
+    hidden = HypothesisSpace(made.anatomy, resolve.kinds(kinds)).parse(
+        "intact" if damage is None else damage
     )
     reality = draw_reality(made, seed, gap, structure=structure)
     driver: Evolved

@@ -14,7 +14,7 @@ from selfmodel.experiments.reality import draw_reality
 from selfmodel.experiments.scoring import is_correct
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import FaultKind
-from selfmodel.faults.registry import PAPER_KINDS, known
+from selfmodel.faults.registry import PAPER_KINDS, notation_kinds
 from selfmodel.logs.journal import open_journal
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery.events import Event
@@ -108,7 +108,7 @@ def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
             experiment.settings,
             hidden={"before": str(INTACT), "after": str(truth), "recovery": str(truth)},
             gap=reality.text,
-            kinds=known(experiment.kinds),
+            kinds=notation_kinds(experiment.kinds),
         ),
         settings=experiment.settings,
         seed=experiment.seed,

@@ -34,7 +34,7 @@ SLOPE = FaultKind(
     apply=_tilt,
     severity_bounds=uniform_bounds(-0.6, 0.6),
     levels=uniform_levels(-0.3, -0.25, -0.2, -0.15, -0.1, -0.05, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3),
-    special={0.0: None},
+    degenerates_to={0.0: None},
     unit="rad",
 )
 """The angle of the ground along forward, uphill positive. The ground and the robot's start pose are

@@ -94,6 +94,6 @@ JAMMED_AT_ANGLE = FaultKind(
     absorbs=_absorbs_motor,
     severity_bounds=_degrees,
     levels=_levels,
-    special={0.0: JAMMED},
+    degenerates_to={0.0: JAMMED},
     unit="rad",
 )

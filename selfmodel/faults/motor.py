@@ -26,6 +26,6 @@ WEAK_MOTOR = FaultKind(
     apply=_apply,
     severity_bounds=uniform_bounds(0.0, 1.0),
     levels=uniform_levels(0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9),
-    special={1.0: None},
+    degenerates_to={1.0: None},
     unit="of its torque",
 )

@@ -65,9 +65,9 @@ SENSOR_GAIN = FaultKind(
     affects_dynamics=False,
     severity_bounds=uniform_bounds(0.0, 2.0),
     levels=uniform_levels(0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.2, 1.4, 1.6, 1.8, 2.0),
-    special={1.0: None},
+    degenerates_to={1.0: None},
     # With a bias, a gain of 0 is a reading that is stuck.
-    alone={0.0: FAILED_SENSOR},
+    degenerates_alone_to={0.0: FAILED_SENSOR},
     unit="times",
 )
 
@@ -80,7 +80,7 @@ SENSOR_BIAS = FaultKind(
     affects_dynamics=False,
     severity_bounds=uniform_bounds(-1.0, 1.0),
     levels=uniform_levels(-0.9, -0.7, -0.5, -0.35, -0.2, -0.1, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9),
-    special={0.0: None},
+    degenerates_to={0.0: None},
     unit="of the reading's range",
 )
 
@@ -93,6 +93,6 @@ SENSOR_NOISE = FaultKind(
     affects_dynamics=False,
     severity_bounds=uniform_bounds(0.0, 1.0),
     levels=uniform_levels(0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8),
-    special={0.0: None},
+    degenerates_to={0.0: None},
     unit="of the reading's range",
 )

@@ -157,7 +157,7 @@ ROUGHNESS = FaultKind(
     feel=_feel,
     severity_bounds=uniform_bounds(0.0, 0.1),
     levels=uniform_levels(0.01, 0.02, 0.04),
-    special={0.0: None},
+    degenerates_to={0.0: None},
     unit="m",
 )
 """How far the ground rises above its mean height or falls below it, at most."""

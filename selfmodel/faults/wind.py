@@ -41,7 +41,7 @@ WIND = FaultKind(
     apply=_along,
     severity_bounds=_BOUNDS,
     levels=_LEVELS,
-    special={0.0: None},
+    degenerates_to={0.0: None},
     unit="m/s",
 )
 """Along forward: positive wind blows from behind, -5 is against the robot."""
@@ -52,7 +52,7 @@ CROSSWIND = FaultKind(
     apply=_across,
     severity_bounds=_BOUNDS,
     levels=_LEVELS,
-    special={0.0: None},
+    degenerates_to={0.0: None},
     unit="m/s",
 )
 """Along the world's y axis: positive wind blows from the right to the left."""
