@@ -7,7 +7,6 @@ from functools import lru_cache, partial
 from typing import Any
 
 from selfmodel.errors import unknown_name
-from selfmodel.faults.table_one import cases_of
 from selfmodel.robot.mjcf.adaptation import adapt_text
 from selfmodel.robot.mjcf.load import robot_from
 from selfmodel.robot.mjcf.settings import MjcfSettings
@@ -62,7 +61,6 @@ def entry(domain: str, task: str) -> Entry:
     """Returns the body of a task with its failures, its environment and its return."""
     return Entry(
         robot=partial(robot, domain, task),
-        cases=cases_of(robot(domain, task).anatomy),
         physical=partial(SuiteRobot, domain, task),
         episode_return=episode_return(domain, task),
     )

@@ -19,7 +19,6 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.neuron import SILENT_NEURON
 from selfmodel.faults.registry import ALL_KINDS, KINDS
-from selfmodel.faults.table_one import cases_of
 from selfmodel.logs import LogError, TrialLog, load_controller, read_log
 from selfmodel.logs.files import read_bounded
 from selfmodel.logs.robots import described_difference, the_robot_of
@@ -66,7 +65,7 @@ def robot_entry(name: str, settings: Iterable[str] = ()) -> Entry:
     given = tuple(settings)
     if is_model(name):
         made = load_mjcf(Path(name), _settings(name, given))
-        return Entry(robot=lambda: made, cases=cases_of(made.anatomy), suite={})
+        return Entry(robot=lambda: made)
     if given:
         raise InputError(f"--set {given[0]} is for a robot's MJCF: {name!r} has all that it needs")
     # Nothing is drawn here, and dm_control would look for what to draw with.
