@@ -253,7 +253,7 @@ def test_a_world_without_level_ground_cannot_become_rough():
     mjcf = """<mujoco><worldbody><body><freejoint/><geom size="0.1"/></body></worldbody></mujoco>"""
     robot = Robot("ball", mjcf, 0.002)
 
-    with pytest.raises(InputError, match="takes the place of a plane"):
+    with pytest.raises(InputError, match="replaces a ground plane"):
         built(robot, "roughness=0.02")
 
 
