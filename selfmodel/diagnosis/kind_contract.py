@@ -47,8 +47,8 @@ def check_kind(kind: FaultKind, robot: Robot) -> None:
             )
     _check_edits(kind, candidates, robot)
     _check_batch(kind, robot)
-    if kind.feel is not None:
-        _check_feel(kind, candidates, robot)
+    if kind.adapt_to_contacts is not None:
+        _check_contacts(kind, candidates, robot)
 
 
 def _check_severity(fault: Fault, robot: Robot) -> None:
@@ -107,15 +107,15 @@ def _check_batch(kind: FaultKind, robot: Robot) -> None:
             raise ValueError(f"a robot with {run[0]} moves differently in a batch and alone")
 
 
-def _check_feel(kind: FaultKind, candidates: tuple[Fault, ...], robot: Robot) -> None:
+def _check_contacts(kind: FaultKind, candidates: tuple[Fault, ...], robot: Robot) -> None:
     """Checks the hook with contact points on a step, and without contact points."""
     on_a_step = np.array([[x, 0.0, 0.02 * (x > 2)] for x in np.linspace(1.5, 3, 200)])
     for fault in candidates:
         for points in (on_a_step, np.empty((0, 3))):
             before, own = points.copy(), build(robot, Hypothesis((fault,)))
             size = mujoco.mj_sizeModel(own.model)
-            if kind.feel is not None:
-                kind.feel(own, fault, points)
+            if kind.adapt_to_contacts is not None:
+                kind.adapt_to_contacts(own, fault, points)
             if mujoco.mj_sizeModel(own.model) != size or not np.array_equal(points, before):
                 raise ValueError(f"{kind.name} changes the contact points, or a model's layout")
 

@@ -65,8 +65,8 @@ class FaultKind:
         edit_spec: Optional hook: edits the robot's specification before it is compiled, given the
             seed of the random parts, for changes that a compiled model does not allow. The sizes
             of MjData stay.
-        feel: Optional hook: adapts an embodiment to the contact points observed in a trial,
-            ``(n, 3)``, world frame, m, before segments of that trial are predicted.
+        adapt_to_contacts: Optional hook: adapts an embodiment to the contact points observed in a
+            trial, ``(n, 3)``, world frame, m, before segments of that trial are predicted.
         parts: Names of the parts that the kind applies to, in the order of a gene's third value;
             ``ENVIRONMENT`` alone for an environment.
         absorbs: Returns whether the first fault, of this kind, removes any effect of the second.
@@ -92,7 +92,7 @@ class FaultKind:
     edit_spec: Callable[["MjSpec", "Fault", int], None] | None = field(
         default=None, compare=False, repr=False
     )
-    feel: Callable[["Embodiment", "Fault", FloatArray], None] | None = field(
+    adapt_to_contacts: Callable[["Embodiment", "Fault", FloatArray], None] | None = field(
         default=None, compare=False, repr=False
     )
     parts: Callable[[Anatomy], tuple[str, ...]] = field(

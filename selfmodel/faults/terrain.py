@@ -19,24 +19,24 @@ if TYPE_CHECKING:
 HALF_EXTENT = (15.0, 8.0)
 """Half the extent of the field along x and y, m, centred on the initial position."""
 
-CELL = 0.1
+CELL_SIZE = 0.1
 """Grid spacing of the field, m."""
 
-BUMP = 3
+CELLS_PER_BUMP = 3
 """Cells between two random heights; the heights in between are interpolated."""
 
-TERRAIN = "selfmodel_terrain"
+TERRAIN_NAME = "selfmodel_terrain"
 """Name of the height field in a model."""
 
-FLAT, LEVEL_OFF = 0.8, 0.4
+FLAT_RADIUS, TRANSITION_WIDTH = 0.8, 0.4
 """Radius of the flat ground around the initial position, and width of the transition to the full
 roughness, m: no robot starts inside the terrain."""
 
-TOUCHES, PLACES = 3, 10
+MIN_CELL_CONTACTS, MIN_CELLS = 3, 10
 """Minimum contacts per cell for an estimate of its height, because touch sensors err, and minimum
 estimated cells for an estimate of the terrain."""
 
-DEVIATION = 2 / 3 / math.sqrt(3)
+UNIT_DEVIATION = 2 / 3 / math.sqrt(3)
 """Standard deviation of a terrain of roughness 1: that of the uniform distribution on [-1, 1],
 1 / sqrt(3), times sqrt(2/3) for bilinear interpolation along each of two axes."""
 
@@ -44,28 +44,31 @@ DEVIATION = 2 / 3 / math.sqrt(3)
 def unit_heights(seed: int) -> FloatArray:
     """Returns the heights of a terrain of roughness 1, ``(rows along y, columns along x)``.
 
-    Heights are drawn uniformly from [-1, 1] every ``BUMP`` cells, with bilinear interpolation.
+    Heights are drawn uniformly from [-1, 1] every ``CELLS_PER_BUMP`` cells; the heights in between
+    are interpolated bilinearly.
     """
-    columns, rows = (round(2 * half / CELL) + 1 for half in HALF_EXTENT)
-    drawn = np.random.default_rng(seed).uniform(-1, 1, (rows // BUMP + 2, columns // BUMP + 2))
+    columns, rows = (round(2 * half / CELL_SIZE) + 1 for half in HALF_EXTENT)
+    drawn = np.random.default_rng(seed).uniform(
+        -1, 1, (rows // CELLS_PER_BUMP + 2, columns // CELLS_PER_BUMP + 2)
+    )
     along_y = _interpolate(drawn, rows)
     heights = _interpolate(along_y.T, columns).T
     x = np.linspace(-HALF_EXTENT[0], HALF_EXTENT[0], columns)
     y = np.linspace(-HALF_EXTENT[1], HALF_EXTENT[1], rows)
     distance = np.sqrt(y[:, np.newaxis] ** 2 + x**2)
-    rough: FloatArray = heights * np.clip((distance - FLAT) / LEVEL_OFF, 0, 1)
+    rough: FloatArray = heights * np.clip((distance - FLAT_RADIUS) / TRANSITION_WIDTH, 0, 1)
     return rough
 
 
 def _interpolate(drawn: FloatArray, count: int) -> FloatArray:
     """``count`` rows, interpolated between the drawn rows."""
-    whole, part = np.divmod(np.arange(count), BUMP)
-    weight = (part / BUMP)[:, np.newaxis]
+    whole, part = np.divmod(np.arange(count), CELLS_PER_BUMP)
+    weight = (part / CELLS_PER_BUMP)[:, np.newaxis]
     rows: FloatArray = drawn[whole] * (1 - weight) + drawn[whole + 1] * weight
     return rows
 
 
-def _reshape(spec: "MjSpec", fault: Fault, seed: int) -> None:
+def _edit_spec(spec: "MjSpec", fault: Fault, seed: int) -> None:
     """Replaces every ground plane by the terrain."""
     import mujoco  # noqa: PLC0415  # faults/ imports without MuJoCo
 
@@ -75,7 +78,7 @@ def _reshape(spec: "MjSpec", fault: Fault, seed: int) -> None:
     heights = fault.severity * unit_heights(seed)
     low, high = float(heights.min()), float(heights.max())
     spec.add_hfield(
-        name=TERRAIN,
+        name=TERRAIN_NAME,
         nrow=heights.shape[0],
         ncol=heights.shape[1],
         # The last size is the thickness below the lowest point.
@@ -84,12 +87,12 @@ def _reshape(spec: "MjSpec", fault: Fault, seed: int) -> None:
     )
     for plane in planes:
         plane.type = mujoco.mjtGeom.mjGEOM_HFIELD
-        plane.hfieldname = TERRAIN
+        plane.hfieldname = TERRAIN_NAME
         # A plane is infinite wherever its centre is; the field is centred on the initial position.
         plane.pos = [0.0, 0.0, plane.pos[2] + low]
 
 
-def felt_heights(points: FloatArray) -> FloatArray:
+def estimated_heights(points: FloatArray) -> FloatArray:
     """Returns the terrain of roughness 1 estimated from contact points; see ``unit_heights``.
 
     The heights are scaled to the standard deviation of a terrain of roughness 1: the severity of
@@ -101,30 +104,34 @@ def felt_heights(points: FloatArray) -> FloatArray:
     """
     from scipy.ndimage import distance_transform_edt  # noqa: PLC0415  # slow to import
 
-    columns, rows = (round(2 * half / CELL) + 1 for half in HALF_EXTENT)
+    columns, rows = (round(2 * half / CELL_SIZE) + 1 for half in HALF_EXTENT)
     level = np.zeros((rows, columns))
-    cells = np.round((points[:, :2] + HALF_EXTENT) / CELL).astype(np.intp)
+    cells = np.round((points[:, :2] + HALF_EXTENT) / CELL_SIZE).astype(np.intp)
     inside = np.all((cells >= 0) & (cells < (columns, rows)), axis=1)
     if not inside.any():
         return level
-    places, of_place = np.unique(cells[inside], axis=0, return_inverse=True)
-    order = np.argsort(of_place, kind="stable")
-    touches = np.split(points[inside, 2][order], np.cumsum(np.bincount(of_place))[:-1])
-    often = np.array([len(heights) >= TOUCHES for heights in touches], dtype=bool)
-    felt = np.array([np.median(heights) for heights in touches if len(heights) >= TOUCHES])
-    column, row = places[often].T
-    distance = np.linalg.norm(places[often] * CELL - HALF_EXTENT, axis=1)
-    flat, rough = distance < FLAT, distance > FLAT + LEVEL_OFF
-    if rough.sum() < PLACES:
+    contact_cells, cell_index = np.unique(cells[inside], axis=0, return_inverse=True)
+    order = np.argsort(cell_index, kind="stable")
+    heights_by_cell = np.split(points[inside, 2][order], np.cumsum(np.bincount(cell_index))[:-1])
+    frequent = np.array(
+        [len(heights) >= MIN_CELL_CONTACTS for heights in heights_by_cell], dtype=bool
+    )
+    estimated = np.array(
+        [np.median(heights) for heights in heights_by_cell if len(heights) >= MIN_CELL_CONTACTS]
+    )
+    column, row = contact_cells[frequent].T
+    distance = np.linalg.norm(contact_cells[frequent] * CELL_SIZE - HALF_EXTENT, axis=1)
+    flat, rough = distance < FLAT_RADIUS, distance > FLAT_RADIUS + TRANSITION_WIDTH
+    if rough.sum() < MIN_CELLS:
         return level
-    above = felt - np.median(felt[flat] if flat.any() else felt)
+    above = estimated - np.median(estimated[flat] if flat.any() else estimated)
     deviation = math.sqrt(np.square(above[rough]).mean())
     if not deviation > 0:
         return level
-    known = np.zeros(level.shape, dtype=bool)
-    known[row, column] = True
-    level[row, column] = np.clip(above * DEVIATION / deviation, -1, 1)
-    nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
+    observed = np.zeros(level.shape, dtype=bool)
+    observed[row, column] = True
+    level[row, column] = np.clip(above * UNIT_DEVIATION / deviation, -1, 1)
+    nearest = distance_transform_edt(~observed, return_distances=False, return_indices=True)
     return np.asarray(level[tuple(nearest)])
 
 
@@ -133,14 +140,14 @@ def _adapt_to_contacts(embodiment: "Embodiment", fault: Fault, points: FloatArra
     import mujoco  # noqa: PLC0415  # faults/ imports without MuJoCo
 
     model = embodiment.model
-    field = model.hfield(TERRAIN)
+    field = model.hfield(TERRAIN_NAME)
     fields = model.geom_type == mujoco.mjtGeom.mjGEOM_HFIELD
     (geom, *_) = np.flatnonzero(fields & (model.geom_dataid == field.id))
     back = model.geom_quat[geom] * (1.0, -1.0, -1.0, -1.0)
     in_its_frame = rotated(points - model.geom_pos[geom], back)
     # The data is a fraction of the field's height above the lowest drawn height.
     lowest = fault.severity * float(unit_heights(embodiment.seed).min())
-    parts = (fault.severity * felt_heights(in_its_frame) - lowest) / field.size[2]
+    parts = (fault.severity * estimated_heights(in_its_frame) - lowest) / field.size[2]
     field.data[:] = np.clip(parts, 0, 1)
 
 
@@ -152,8 +159,8 @@ ROUGHNESS = FaultKind(
     name="roughness",
     keyword="roughness",
     apply=_apply,
-    edit_spec=_reshape,
-    feel=_adapt_to_contacts,
+    edit_spec=_edit_spec,
+    adapt_to_contacts=_adapt_to_contacts,
     severity_bounds=uniform_bounds(0.0, 0.1),
     levels=uniform_levels(0.01, 0.02, 0.04),
     degenerates_to={0.0: None},

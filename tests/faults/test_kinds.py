@@ -121,7 +121,10 @@ GRADED = FaultKind(
         ({"absorbs": lambda _fault, _other, _anatomy: True}, "absorbs itself"),
         ({"apply": nothing}, "changes nothing about a robot"),
         ({"apply": heavier_each_time}, "does not make the same robot every time"),
-        ({"feel": lambda _own, _fault, points: points.fill(0)}, "changes the contact points"),
+        (
+            {"adapt_to_contacts": lambda _own, _fault, points: points.fill(0)},
+            "changes the contact points",
+        ),
     ],
 )
 def test_the_contract_kit_sees_each_way_to_break_it(change: dict, said: str, quadruped: Robot):
