@@ -1,4 +1,4 @@
-"""The registry entry of one of the paper's robots, whose MJCF lies beside this file."""
+"""The registry entry of one of the paper's robots, with the MJCF file of the robot's name."""
 
 from functools import partial
 from pathlib import Path

@@ -35,7 +35,7 @@ from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import Fault
 
 STARTS = 3
-"""Single faults to start from, beside the known hypotheses."""
+"""Single faults to start from, in addition to the known hypotheses."""
 
 
 def refined(
@@ -46,7 +46,7 @@ def refined(
     The algorithm is in the docstring of the module.
 
     Args:
-        known: Hypotheses to start from, beside the best single faults and ``INTACT``.
+        known: Hypotheses to start from, in addition to the best single faults and ``INTACT``.
         space: The hypotheses about the robot; its coarse candidates are proposed.
         max_faults: Maximum number of faults of a hypothesis.
         losses: Loss functions of the trials.

@@ -104,3 +104,41 @@ def test_more_faults_than_genes_are_refused():
 
     with pytest.raises(InputError, match="1 genes has no room for the 2 faults"):
         SPACES["quadruped"].encode(both, 1)
+
+
+@pytest.mark.parametrize("kinds", [PAPER_KINDS, ALL_KINDS], ids=["paper", "all"])
+@given(data=st.data())
+def test_neighbours_are_canonical_and_differ_from_the_hypothesis_by_one_fault(
+    kinds: tuple[FaultKind, ...], data: st.DataObject
+):
+    space = HypothesisSpace(ANATOMIES["quadruped"], kinds)
+    hypothesis = space.canonical(data.draw(st.lists(st.sampled_from(space.coarse_candidates))))
+    own = set(hypothesis.faults)
+
+    for one in space.neighbours(hypothesis):
+        assert one != hypothesis
+        assert one == space.canonical(one.faults)
+    assert all(len(set(one.faults) - own) <= 1 for one in space.with_one_replaced(hypothesis))
+    less = space.with_one_less(hypothesis)
+    assert all(len(one) <= len(hypothesis) for one in less)
+    assert {space.canonical(own - {fault}) for fault in own} <= set(less)
+    more = space.with_one_more(hypothesis)
+    assert all(set(one.faults) - own for one in more)
+
+
+def test_a_severity_that_means_another_kind_or_nothing_changes_the_fault():
+    space = HypothesisSpace(ANATOMIES["quadruped"], ALL_KINDS)
+    weak = space.parse("motor:front_left_knee=0.5+sensor:back_left_angle=gain0.5")
+
+    assert str(space.with_severity(weak, 0, 0.25)).startswith("motor:front_left_knee=0.25+")
+    assert str(space.with_severity(weak, 0, 1.0)) == "sensor:back_left_angle=gain0.5"
+    assert str(space.with_severity(weak, 1, 0.0)).endswith("+sensor:back_left_angle")
+
+
+def test_a_gain_of_0_is_a_failed_sensor_but_with_a_bias_a_reading_that_is_stuck():
+    space = HypothesisSpace(ANATOMIES["quadruped"], ALL_KINDS)
+    stuck = space.parse("sensor:back_left_angle=gain0.0+sensor:back_left_angle=bias0.3")
+
+    assert len(stuck) == 2
+    assert space.parse(str(stuck)) == stuck
+    assert str(space.with_severity(stuck, 0, 0.0)) == "sensor:back_left_angle"
