@@ -25,7 +25,7 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Trial
 
-REFINED = 2
+REFINEMENT_STARTS = 2
 """Hypotheses from the EA that the refinement starts from, best first."""
 
 EQUAL_DISTANCES = "equal distances"
@@ -86,7 +86,7 @@ class DiagnosticSearch:
         found = self._evolved(trials, seeds, rng, on_generation)
         best, aside = found[0], self._looks_aside(trials)
         if self.evidence.is_piecewise:
-            best = self._refined(trials, found[:REFINED], aside)
+            best = self._refined(trials, found[:REFINEMENT_STARTS], aside)
         judged = list(self.evidence.judged(trials) | {best, INTACT})
         totals = dict(zip(judged, map(float, self.evidence.distances(judged, trials)), strict=True))
         others = [one for one in _ranked(totals) if one != best]
