@@ -66,9 +66,8 @@ def recover(
     from selfmodel.controllers.controller import check_silent_neurons  # noqa: PLC0415
     from selfmodel.experiments import plugins, robots  # noqa: PLC0415
     from selfmodel.experiments.experiment import Experiment, run  # noqa: PLC0415
+    from selfmodel.faults.hypothesis_space import HypothesisSpace  # noqa: PLC0415
     from selfmodel.faults.neuron import silent_neurons  # noqa: PLC0415
-    from selfmodel.faults.notation import parse  # noqa: PLC0415
-    from selfmodel.faults.registry import known  # noqa: PLC0415
     from selfmodel.logs.files import replace_file  # noqa: PLC0415
     from selfmodel.settings import Settings  # noqa: PLC0415
     from selfmodel.simulation.threads import thread_count  # noqa: PLC0415
@@ -78,7 +77,7 @@ def recover(
     damaged = inputs.case_notation(entry, case, damage)
     made = entry.robot()
     design = plugins.design(controller, made, neurons)
-    truth = parse(damaged, made.anatomy, known(considered))
+    truth = HypothesisSpace(made.anatomy, considered).parse(damaged)
     check_silent_neurons(design, silent_neurons(truth))
     experiment = Experiment(
         robot=made,

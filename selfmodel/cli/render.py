@@ -83,8 +83,7 @@ def render(
     # Whatever brings MuJoCo waits until it is known what draws.
     from selfmodel.cli.rendering.diagnosed import diagnosed  # noqa: PLC0415
     from selfmodel.experiments import plugins, trial_logs  # noqa: PLC0415
-    from selfmodel.faults.notation import parse  # noqa: PLC0415
-    from selfmodel.faults.registry import known  # noqa: PLC0415
+    from selfmodel.faults.hypothesis_space import HypothesisSpace  # noqa: PLC0415
     from selfmodel.logs.errors import LogWriteError  # noqa: PLC0415
     from selfmodel.logs.files import replace_file  # noqa: PLC0415
     from selfmodel.simulation.threads import thread_count  # noqa: PLC0415
@@ -96,7 +95,7 @@ def render(
     film, result = _filmed(
         log,
         robot,
-        parse(hypothesis or "intact", robot.anatomy, known(plugins.kinds(kinds))),
+        HypothesisSpace(robot.anatomy, plugins.kinds(kinds)).parse(hypothesis or "intact"),
         None if out.suffix.lower() in FILMS else pictures,
         thread_count(threads),
     )

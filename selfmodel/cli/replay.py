@@ -54,8 +54,7 @@ def replay(
 
     from selfmodel.cli.replay_figure import check_figure, draw  # noqa: PLC0415
     from selfmodel.experiments import plugins, trial_logs  # noqa: PLC0415
-    from selfmodel.faults.notation import parse  # noqa: PLC0415
-    from selfmodel.faults.registry import known  # noqa: PLC0415
+    from selfmodel.faults.hypothesis_space import HypothesisSpace  # noqa: PLC0415
     from selfmodel.simulation.replay import replay as simulate  # noqa: PLC0415
     from selfmodel.simulation.simulator import Simulator  # noqa: PLC0415
     from selfmodel.simulation.threads import thread_count  # noqa: PLC0415
@@ -65,7 +64,7 @@ def replay(
         check_figure(out)
     (log,) = trial_logs.logs([file])
     robot = trial_logs.robot_of_logs([log], model)
-    assumed = parse(hypothesis, robot.anatomy, known(plugins.kinds(kinds)))
+    assumed = HypothesisSpace(robot.anatomy, plugins.kinds(kinds)).parse(hypothesis)
     logged = log.software.get("mujoco", "unknown")
     exact = logged == mujoco.__version__ and not log.imported
     tolerance = 0.0 if exact else TOLERANCE

@@ -60,9 +60,8 @@ def trial(
     )
     from selfmodel.experiments import plugins, robots, trial_logs  # noqa: PLC0415
     from selfmodel.experiments.reality import draw_reality  # noqa: PLC0415
+    from selfmodel.faults.hypothesis_space import HypothesisSpace  # noqa: PLC0415
     from selfmodel.faults.neuron import silent_neurons  # noqa: PLC0415
-    from selfmodel.faults.notation import parse  # noqa: PLC0415
-    from selfmodel.faults.registry import known  # noqa: PLC0415
     from selfmodel.logs.physical_trial import run_trial  # noqa: PLC0415
     from selfmodel.logs.records import TrialHeader  # noqa: PLC0415
     from selfmodel.robot.designs import DESIGNS  # noqa: PLC0415
@@ -72,8 +71,8 @@ def trial(
     kind = "network" if controller is None else str(controller)
     made = robots.robot_entry(robot, model_settings or ()).robot()
     check_log_name(out)
-    hidden = parse(
-        "intact" if damage is None else damage, made.anatomy, known(plugins.kinds(kinds))
+    hidden = HypothesisSpace(made.anatomy, plugins.kinds(kinds)).parse(
+        "intact" if damage is None else damage
     )
     reality = draw_reality(made, seed, gap, structure=structure)
     if kind in DESIGNS:
