@@ -56,14 +56,14 @@ def selfmodel_process(*arguments: str, cwd: Path, **environment: str) -> Done:
 
 @contextmanager
 def _as_started_in(folder: Path, argv: list[str], environment: dict[str, str]) -> Iterator[None]:
-    """Sets what a new process would have, and restores it; modules of the folder are forgotten."""
+    """Sets what a new process would have, and restores it; modules in the folder are forgotten."""
     before = Path.cwd(), sys.argv, list(sys.path), dict(os.environ), set(sys.modules)
-    first, spawned_in = os.environ.get("PYTHONPATH"), multiprocessing.process.ORIGINAL_DIR
+    spawned_in = multiprocessing.process.ORIGINAL_DIR
     os.chdir(folder)
     os.environ.update(environment)
-    added = environment.get("PYTHONPATH", first or "").split(os.pathsep)
-    own = [str(Path(path).resolve()) for path in ("", *added) if path != (first or "")]
-    sys.argv, sys.path[:0] = argv, [str(folder), *own]
+    places = [folder, *map(Path, filter(None, environment.get("PYTHONPATH", "").split(os.pathsep)))]
+    places = [place.resolve() for place in places]
+    sys.argv, sys.path[:0] = argv, map(str, places)
     # Worker processes start in the folder in which their parent started.
     multiprocessing.process.ORIGINAL_DIR = str(folder)
     try:
@@ -75,6 +75,6 @@ def _as_started_in(folder: Path, argv: list[str], environment: dict[str, str]) -
         os.environ.update(before[3])
         multiprocessing.process.ORIGINAL_DIR = spawned_in
         for name in set(sys.modules) - before[4]:
-            path = getattr(sys.modules[name], "__file__", None) or ""
-            if any(path.startswith(f"{place}{os.sep}") for place in (str(folder), *own)):
+            file = getattr(sys.modules[name], "__file__", None)
+            if file is not None and Path(file).parent in places:
                 del sys.modules[name]
