@@ -8,7 +8,7 @@ import typer
 
 from selfmodel.cli.lazy import group
 from selfmodel.cli.output.plain import plain
-from selfmodel.errors import InputError, WorkError, in_words
+from selfmodel.errors import InputError, WorkError, describe
 
 COMMANDS = {
     "robots": ("selfmodel.cli.robots:robots", "List the robots, or the parts of one."),
@@ -60,10 +60,10 @@ def main() -> None:
         # The same usage line for `python -m selfmodel` as for the installed command.
         app(prog_name="selfmodel")
     except InputError as error:
-        _fail(in_words(error), 2)
+        _fail(describe(error), 2)
     except (OSError, WorkError) as error:
         # A full disk, a folder without write permission: the message contains the file's name.
-        _fail(in_words(error), 1)
+        _fail(describe(error), 1)
     except MemoryError as error:
         _fail(f"there is not enough memory ({error or 'for this'}): ask for less at once", 1)
     except KeyboardInterrupt:

@@ -136,7 +136,7 @@ Neurons = Annotated[
         max=100,
         metavar="N",
         help="Hidden neurons of the network.",
-        show_default="the robot's own: 3 for selfmodel's robots",
+        show_default="3",
         rich_help_panel=CONTROLLER,
     ),
 ]

@@ -32,8 +32,10 @@ from selfmodel.cli.options import (
 from selfmodel.cli.output.display import display
 from selfmodel.cli.output.report import as_object, print_report
 from selfmodel.comparators import DEFAULT
+from selfmodel.controllers.controller import check_silent_neurons
 from selfmodel.experiments import plugins, robots
 from selfmodel.experiments.experiment import Experiment, run
+from selfmodel.faults.neuron import silent_neurons
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import known
 from selfmodel.logs.files import replace
@@ -80,10 +82,10 @@ def recover(
     entry = robots.robot_entry(robot, model_settings or ())
     considered = plugins.kinds(kinds)
     damaged = inputs.case_notation(entry.cases, case, damage)
-    made = robots.with_neurons(entry.robot(), neurons, controller)
-    design = plugins.design(controller, made)
+    made = entry.robot()
+    design = plugins.design(controller, made, neurons)
     truth = parse(damaged, made.anatomy, known(considered))
-    plugins.check_neurons(truth, design)
+    check_silent_neurons(design, silent_neurons(truth))
     experiment = Experiment(
         robot=made,
         case=case,

@@ -11,6 +11,7 @@ from selfmodel.cli.output.plain import plain
 from selfmodel.cli.output.robot_parts import parts, print_parts
 from selfmodel.cli.output.tables import folding
 from selfmodel.experiments.robots import is_model, notes_on, robot_entry
+from selfmodel.robot.designs import network_for
 from selfmodel.tasks import ROBOTS, Entry
 
 
@@ -46,14 +47,15 @@ def robots(
 
 def _facts(entry: Entry) -> dict[str, Any]:
     made = entry.robot()
+    network = network_for(made)
     return {
         "robot": made.name,
         "joints": [joint.name for joint in made.anatomy.joints],
         "hinges": list(made.anatomy.hinges),
         "sensors": [sensor.name for sensor in made.anatomy.sensors],
         "motors": list(made.anatomy.motors),
-        "hidden_neurons": made.anatomy.neurons,
-        "weights": made.network.weights,
+        "hidden_neurons": network.hidden,
+        "weights": network.weights,
         "control_timestep": made.control_timestep,
         "tasks": list(entry.suite),
         "cases": {str(number): notation for number, notation in entry.cases.items()},

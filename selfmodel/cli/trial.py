@@ -2,7 +2,6 @@
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import typer
@@ -23,18 +22,17 @@ from selfmodel.cli.options import (
     Steps,
     Structural,
 )
-from selfmodel.controllers.network import draw_weights
+from selfmodel.controllers.controller import Controller, check_silent_neurons, draw_genomes
 from selfmodel.experiments import plugins, robots, trial_logs
 from selfmodel.experiments.reality import draw_reality
+from selfmodel.faults.neuron import silent_neurons
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import known
 from selfmodel.logs import read_log
 from selfmodel.logs.writer import write_trial
+from selfmodel.robot.designs import DESIGNS
 from selfmodel.settings import Settings
 from selfmodel.trials.trial import TrialPlan
-
-if TYPE_CHECKING:
-    from selfmodel.controllers.driver import Evolved
 
 
 def trial(
@@ -55,23 +53,18 @@ def trial(
 ) -> None:
     """Run one trial of the simulated physical robot and write its log."""
     kind = "network" if controller is None else str(controller)
-    made = robots.with_neurons(
-        robots.robot_entry(robot, model_settings or ()).robot(),
-        neurons,
-        "cpg" if kind == "cpg" else "network",
-    )
+    made = robots.robot_entry(robot, model_settings or ()).robot()
     inputs.check_log_name(out)
     hidden = parse(
         "intact" if damage is None else damage, made.anatomy, known(plugins.kinds(kinds))
     )
     reality = draw_reality(made, seed, gap, structure=structure)
-    driver: Evolved
-    if kind in plugins.DESIGNS:
-        design = plugins.design(kind, made)
-        driver = design.controller(draw_weights(np.random.default_rng(seed), (design.weights,)))
+    if kind in DESIGNS:
+        design = plugins.design(kind, made, neurons)
+        driver = Controller(design, draw_genomes(np.random.default_rng(seed), (design.weights,)))
     else:
-        driver = trial_logs.controller(Path(kind), made)
-    plugins.check_neurons(hidden, driver)
+        driver = trial_logs.controller(Path(kind), made, neurons)
+    check_silent_neurons(driver.design, silent_neurons(hidden))
     settings = Settings(steps=steps)
     plan = TrialPlan("trial", inputs.stage(stage), driver, settings.steps, seed)
     samples = reality.robot(made, hidden).run(driver, settings.steps)

@@ -11,7 +11,7 @@ from selfmodel.cli.inputs import check_log_name
 from selfmodel.cli.options import Json
 from selfmodel.cli.output.plain import counted, plain
 from selfmodel.cli.output.tables import show
-from selfmodel.controllers.driver import Evolved
+from selfmodel.controllers.controller import Controller
 from selfmodel.errors import InputError
 from selfmodel.experiments import robots, trial_logs
 from selfmodel.experiments.robots import is_model
@@ -114,7 +114,7 @@ def _mapped_robot(mapping: BagMapping, folder: Path) -> Robot:
         raise mapping.document.error(("robot",), str(error)) from error
 
 
-def _controller(mapping: BagMapping, folder: Path, robot: Robot) -> Evolved | None:
+def _controller(mapping: BagMapping, folder: Path, robot: Robot) -> Controller | None:
     if mapping.controller is None:
         return None
     try:

@@ -9,6 +9,7 @@ from selfmodel.cli.options import Json
 from selfmodel.cli.output.tables import show
 from selfmodel.experiments.robots import robot_entry
 from selfmodel.experiments.suite.bodies import DOMAINS, bodies
+from selfmodel.robot.designs import network_for
 
 
 def list_bodies(*, as_json: Json = False) -> None:
@@ -45,7 +46,7 @@ def _facts(domain: str) -> dict[str, Any]:
         "hinges": len(robot.anatomy.hinges),
         "sensors": len(robot.anatomy.sensors),
         "motors": len(robot.anatomy.motors),
-        "weights": robot.network.weights,
+        "weights": network_for(robot).weights,
         "physics_timestep": float(robot.model.opt.timestep),
         "substeps": robot.substeps,
         "control_timestep": robot.control_timestep,
