@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from selfmodel.cli.inputs import check_folder
 from selfmodel.cli.options import Json, LogFiles, SelfModel, Threads
 from selfmodel.cli.output.plain import counted, plain
 from selfmodel.cli.output.tables import show
@@ -40,6 +41,7 @@ def calibrate(
     start = perf_counter()
     if out.suffix.lower() != ".xml":
         raise InputError(f"--out needs a name that ends in .xml, got {str(out)!r}")
+    check_folder(out)
     refuse_existing(out)
     logs = trial_logs.logs(files)
     before = trial_logs.robot_of_logs(logs, robot)

@@ -111,6 +111,16 @@ def share(option: str, given: str) -> tuple[int, int]:
     return int(first), int(count)
 
 
+def check_folder(path: Path) -> None:
+    """Checks that the folder of a file to be written exists.
+
+    Raises:
+        InputError: The folder is missing.
+    """
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: there is no folder {path.parent}: make it, or choose another")
+
+
 def check_log_name(path: Path) -> None:
     """Checks the name of a log to be written.
 

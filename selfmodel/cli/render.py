@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
+from selfmodel.cli.inputs import check_folder
 from selfmodel.cli.options import Json, LogFile, NamedKinds, SelfModel, Threads
 from selfmodel.cli.output.plain import counted, plain
 from selfmodel.cli.rendering import gl, video
@@ -100,8 +101,7 @@ def _check_name(out: Path, *, stick: bool) -> None:
         raise InputError(
             f"--out needs a name that ends in {', '.join((*FILMS, *STRIPS))}, got {str(out)!r}"
         )
-    if not out.parent.is_dir():
-        raise InputError(f"{out}: there is no folder {out.parent}: make it, or choose another")
+    check_folder(out)
     if stick and kind in STRIPS:
         raise InputError(f"--stick is for films: a strip such as {out.name} has stick figures")
     refuse_existing(out)

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from selfmodel.cli.inputs import check_folder
 from selfmodel.errors import InputError, WorkError
 from selfmodel.logs.errors import LogWriteError
 from selfmodel.logs.files import refuse_existing, replace
@@ -31,8 +32,7 @@ def check_figure(path: Path) -> None:
     """
     if path.suffix.lower().removeprefix(".") not in FORMATS:
         raise InputError(f"--out needs a name that ends in .png, .svg or .pdf, got {str(path)!r}")
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: there is no folder {path.parent}: make it, or choose another")
+    check_folder(path)
     refuse_existing(path)
 
 

@@ -1,4 +1,4 @@
-"""Promises of the lists on the command line of an ablation."""
+"""Option values: lists with commas, shares of a study."""
 
 from pathlib import Path
 
