@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 
 import typer
-from rich.console import Console
+from rich.console import Console, JustifyMethod
 from rich.measure import Measurement
 from rich.table import Table
 
@@ -51,7 +51,7 @@ def folding(
     """
     table = Table(title=plain(title) if title else None)
     for place, name in enumerate(columns):
-        justify = "left" if texts is None or place < texts else "right"
+        justify: JustifyMethod = "left" if texts is None or place < texts else "right"
         table.add_column(name, overflow="fold", justify=justify)
     for row in rows:
         table.add_row(*map(plain, row))
