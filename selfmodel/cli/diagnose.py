@@ -24,10 +24,11 @@ from selfmodel.cli.options import (
 )
 from selfmodel.cli.output.display import display
 from selfmodel.cli.output.plain import counted, plain
-from selfmodel.cli.output.ranking import as_values, in_words, ranking_table, sureness
+from selfmodel.cli.output.ranking import in_words, ranking_table
 from selfmodel.comparators import DEFAULT
 from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
+from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
 from selfmodel.experiments import plugins, trial_logs
 from selfmodel.experiments.fitting import calibration_values, fitted
 from selfmodel.logs import TrialLog
@@ -41,7 +42,7 @@ def diagnose(
     files: LogFiles,
     *,
     robot: SelfModel = None,
-    comparator: ComparatorName = DEFAULT,
+    comparator: ComparatorName = DEFAULT.name,
     kinds: KindNames = DEFAULT_KINDS,
     calibrate: Calibrated = True,
     population: LoggedPopulation = None,
@@ -84,8 +85,8 @@ def diagnose(
         "played_back": [log.trial.path for log in used if _is_played_back(log)],
         "intact": [trial.path for trial in intact],
         "calibration": calibration_values(fit),
-        "diagnosis": as_values(diagnosis.ranked),
-        **sureness(diagnosis),
+        "diagnosis": ranking_to_list(diagnosis.ranked),
+        **confidence_to_dict(diagnosis),
         "evaluations": search.evaluations,
         "distinct_hypotheses": search.distinct_hypotheses,
         "seconds": perf_counter() - start,

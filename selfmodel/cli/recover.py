@@ -38,7 +38,7 @@ from selfmodel.experiments.experiment import Experiment, run
 from selfmodel.faults.neuron import silent_neurons
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import known
-from selfmodel.logs.files import replace
+from selfmodel.logs.files import replace_file
 from selfmodel.settings import Settings
 from selfmodel.simulation.threads import thread_count
 
@@ -49,7 +49,7 @@ def recover(
     case: Case = None,
     damage: Damage = None,
     model_settings: ModelSettings = None,
-    comparator: ComparatorName = DEFAULT,
+    comparator: ComparatorName = DEFAULT.name,
     calibrate: Calibrated = True,
     gap: GapLevel = 0.0,
     structure: Structural = False,
@@ -111,7 +111,7 @@ def recover(
         raise typer.Exit(130) from None
     result = as_object(experiment, outcome)
     try:
-        replace(experiment.folder / "result.json", f"{result}\n".encode())
+        replace_file(experiment.folder / "result.json", f"{result}\n".encode())
     finally:  # the result is printed even if the disk is full
         if as_json:
             typer.echo(result)

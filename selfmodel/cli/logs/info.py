@@ -13,7 +13,7 @@ from selfmodel.cli.output.plain import counted, plain
 from selfmodel.cli.output.tables import show
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError, TrialLog
-from selfmodel.logs.info import Info, hides_truth, read_info
+from selfmodel.logs.info import Info, has_truth, read_info
 from selfmodel.logs.salvage import salvageable_steps
 
 
@@ -86,7 +86,7 @@ def _as_object(path: Path, found: Info) -> dict[str, Any]:
         "records": list(found.records),
         "observed": {signal: round(share, 6) for signal, share in found.observed.items()},
         "clock": _clock(found.log),
-        "truth": "hidden" if hides_truth(found) else "unknown",
+        "truth": "hidden" if has_truth(found) else "unknown",
         "source": dict(found.source),
     }
 

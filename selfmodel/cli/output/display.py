@@ -14,7 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 from selfmodel.cli.output.plain import counted
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.evolution import Generation
-from selfmodel.recovery.events import Event, Question, SearchBegins
+from selfmodel.recovery.events import DiscriminatingTrial, Event, SearchBegins
 from selfmodel.simulation.calibrate import Calibration
 from selfmodel.trials.trial import Trial
 
@@ -61,7 +61,7 @@ class _Lines:
                     f"calibration: error {event.error_before:.3f} before, {event.error:.3f} after; "
                     f"delay {counted(event.parameters.delay, 'step')}"
                 )
-            case Question():
+            case DiscriminatingTrial():
                 apart = ", ".join(map(str, event.hypotheses))
                 self._say(f"the next trial discriminates between: {apart}")
             case Trial():

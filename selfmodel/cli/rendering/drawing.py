@@ -21,7 +21,7 @@ from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import known
 from selfmodel.logs import TrialLog
 from selfmodel.logs.errors import LogWriteError
-from selfmodel.logs.files import replace
+from selfmodel.logs.files import replace_file
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.replay import replay
 from selfmodel.simulation.simulator import Simulator
@@ -63,7 +63,7 @@ def draw_trial(
         typer.echo(f"note: {note}", err=True)
     data = _drawn(film, out.suffix.lower().removeprefix("."), pictures, sticks=sticks)
     try:
-        replace(out, data)
+        replace_file(out, data)
     except LogWriteError as error:
         raise WorkError(f"{out}: it could not be written: {error.reason}") from error
     return {
