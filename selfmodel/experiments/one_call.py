@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from selfmodel.comparators import SEGMENT_PREDICTION
+from selfmodel.comparators import DEFAULT
 from selfmodel.controllers.command_source import CommandSource
 from selfmodel.controllers.controller import Controller, Design
 from selfmodel.diagnosis.comparator import Comparator
@@ -33,8 +33,7 @@ from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation import calibrate as calibration
-from selfmodel.simulation import replay as replays
+from selfmodel.simulation import calibrate as calibration, replay as replays
 from selfmodel.simulation.calibrate import Calibration
 from selfmodel.simulation.replay import Replay
 from selfmodel.simulation.simulator import Simulator
@@ -201,7 +200,7 @@ def diagnose(
     *,
     healthy: Sequence[TrialSource] = (),
     robot: Robot | None = None,
-    comparator: str | Comparator = SEGMENT_PREDICTION,
+    comparator: str | Comparator = DEFAULT,
     kinds: Sequence[FaultKind] = PAPER_KINDS,
     settings: Settings | None = None,
     calibrate: bool = True,
@@ -253,7 +252,7 @@ def recover(
     robot: Robot,
     folder: str | Path,
     *,
-    comparator: str | Comparator = SEGMENT_PREDICTION,
+    comparator: str | Comparator = DEFAULT,
     kinds: Sequence[FaultKind] = PAPER_KINDS,
     settings: Settings | None = None,
     design: str | Design = "network",

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
 from selfmodel.diagnosis.refine import refined

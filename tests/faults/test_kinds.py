@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from selfmodel.controllers.playback import Playback
-from selfmodel.diagnosis.kind_contract import check_kind
+from selfmodel.diagnosis.kind_contract import check_fault_kind
 from selfmodel.errors import InputError
 from selfmodel.experiments import plugins, robots
 from selfmodel.faults.build import build
@@ -39,7 +39,7 @@ PAYLOAD = example("payload").PAYLOAD
 
 @pytest.mark.parametrize("kind", [*KINDS.values(), PAYLOAD], ids=lambda kind: kind.name)
 def test_a_kind_keeps_its_contract(kind: FaultKind, robot: Robot):
-    check_kind(kind, robot)
+    check_fault_kind(kind, robot)
 
 
 def test_the_registry_knows_each_kind_by_its_name():
@@ -128,10 +128,10 @@ GRADED = FaultKind(
     ],
 )
 def test_the_contract_kit_sees_each_way_to_break_it(change: dict, said: str, quadruped: Robot):
-    check_kind(GRADED, quadruped)
+    check_fault_kind(GRADED, quadruped)
 
     with pytest.raises((ValueError, InputError), match=said):
-        check_kind(dataclasses.replace(GRADED, **change), quadruped)
+        check_fault_kind(dataclasses.replace(GRADED, **change), quadruped)
 
 
 def test_the_contract_kit_sees_a_kind_that_edits_the_robot_itself():
@@ -141,7 +141,7 @@ def test_the_contract_kit_sees_a_kind_that_edits_the_robot_itself():
         robot.model.body_mass[1] = 5.0
 
     with pytest.raises(ValueError, match=r"does not make the same robot|changes the robot itself"):
-        check_kind(dataclasses.replace(GRADED, apply=wrong), robot)
+        check_fault_kind(dataclasses.replace(GRADED, apply=wrong), robot)
 
 
 def test_kinds_are_chosen_by_name(monkeypatch: pytest.MonkeyPatch):

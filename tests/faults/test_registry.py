@@ -7,7 +7,7 @@ import pytest
 
 from selfmodel.comparators import SEGMENT_PREDICTION
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
-from selfmodel.diagnosis.kind_contract import check_kind
+from selfmodel.diagnosis.kind_contract import check_fault_kind
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
@@ -77,12 +77,12 @@ def test_kinds_that_a_fault_is_of_at_some_degree_can_be_named(quadruped: Robot):
         degenerates_to={0.0: sticky, 0.5: None},
     )
 
-    check_kind(stick, quadruped)
+    check_fault_kind(stick, quadruped)
     assert HypothesisSpace.of((stick,), quadruped.anatomy).kinds == (stick, sticky)
     assert str(HypothesisSpace(quadruped.anatomy, (stick,)).parse("stick=0")) == "sticky"
     for wrong in (KINDS["neuron"], KINDS["slope"]):
         with pytest.raises(ValueError, match=f"stick degenerates to {wrong.name}"):
-            check_kind(dataclasses.replace(stick, degenerates_to={0.0: wrong}), quadruped)
+            check_fault_kind(dataclasses.replace(stick, degenerates_to={0.0: wrong}), quadruped)
 
 
 def apply(embodiment: Embodiment, _anatomy: Anatomy, fault: Fault) -> None:

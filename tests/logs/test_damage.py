@@ -17,8 +17,8 @@ from selfmodel.logs import (
     TruncatedError,
     UnsupportedError,
     read_log,
+    reader as reader_module,
 )
-from selfmodel.logs import reader as reader_module
 from selfmodel.logs.checksums import verified_records
 from selfmodel.logs.contents import Contents, read_contents
 from selfmodel.logs.records import HIDDEN, RESULT, TRIAL, with_digest, without_digest

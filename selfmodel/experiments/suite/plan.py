@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from selfmodel import __version__
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.experiments import plugins, robots
 from selfmodel.experiments.grid import Job, check_shared, finished
@@ -16,6 +15,7 @@ from selfmodel.faults.neuron import silent_neurons
 from selfmodel.faults.notation import parse
 from selfmodel.settings import Settings
 from selfmodel.tasks import Entry
+from selfmodel.version import __version__
 
 OF_DIAGNOSIS = ("trials", "genes", "kept")
 """Settings that no gait depends on."""

@@ -9,8 +9,7 @@ import numpy as np
 
 from selfmodel.controllers.controller import check_silent_neurons
 from selfmodel.experiments import plugins, robots, trial_logs
-from selfmodel.experiments.experiment import Experiment
-from selfmodel.experiments.experiment import run as run_experiment
+from selfmodel.experiments.experiment import Experiment, run as run_experiment
 from selfmodel.experiments.grid import GridBegins, Job, PartEnds, run_grid
 from selfmodel.experiments.suite.plan import Study, check, gait_jobs, gait_path, recovery_jobs
 from selfmodel.experiments.suite.rows import Row, as_objects
