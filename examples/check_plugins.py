@@ -16,11 +16,11 @@ from selfmodel.diagnosis.kind_contract import check_kind
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log
-from selfmodel.logs.robots import the_robot_of
+from selfmodel.logs.robots import common_robot
 from selfmodel.simulation.simulator import Simulator
 
 log = read_log(sys.argv[1])
-robot, trial = the_robot_of([log]), log.trial
+robot, trial = common_robot([log]), log.trial
 prepared = HEADING.prepare(trial)
 broken = parse("break:front_left_knee", robot.anatomy)
 

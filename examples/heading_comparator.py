@@ -33,7 +33,7 @@ class Heading:
             InputError: The base's orientation was not observed.
         """
         orientation = trial.behaviour["base_orientation"]
-        observed = np.isfinite(orientation).all(axis=-1)
+        observed = np.asarray(np.isfinite(orientation).all(axis=-1))
         if not observed.any():
             raise InputError(
                 f"{trial.path}: {self.name} needs base_orientation, and the log does not have it: "

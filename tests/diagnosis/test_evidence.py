@@ -27,7 +27,7 @@ from selfmodel.trials.behaviour import Behaviour, Signal
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.conftest import exploding, random_controllers
 from tests.helpers.comparators import Prepared, PreparedPieces
-from tests.helpers.memory import MemoryJournal
+from tests.helpers.memory import in_memory
 
 STEPS = 60
 SMALL = dataclasses.replace(Settings().scaled(12), generations=2, steps=600)
@@ -101,7 +101,7 @@ def trials(quadruped: Robot) -> list[Trial]:
     """Two trials, each with a controller of its own."""
     damaged = SimulatedRobot(quadruped, parse("break:front_left_knee", quadruped.anatomy))
     return [
-        MemoryJournal(quadruped).record(damaged, TrialPlan(f"{k}", "after", controller, STEPS, 0))
+        in_memory(quadruped)(damaged, TrialPlan(f"{k}", "after", controller, STEPS, 0))
         for k, controller in enumerate(random_controllers(quadruped, 3)[1:])
     ]
 
@@ -202,7 +202,7 @@ def test_a_diagnosis_simulates_nothing_twice_and_ranks_nothing_that_is_not_consi
 ):
     gait = random_controllers(quadruped, 6)[5]
     after, before = (
-        MemoryJournal(quadruped).record(
+        in_memory(quadruped)(
             SimulatedRobot(quadruped, parse(truth, quadruped.anatomy)),
             TrialPlan(stage, stage, gait, SMALL.steps, 0),
         )

@@ -13,7 +13,7 @@ import pytest
 from selfmodel.comparators import FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
 from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.comparator import Comparator
-from selfmodel.diagnosis.diagnose import EQUAL, DiagnosticSearch
+from selfmodel.diagnosis.diagnose import EQUAL_DISTANCES, DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.diagnosis.significance import TEST
 from selfmodel.faults import BROKEN, FRICTION, JAMMED
@@ -31,7 +31,7 @@ from selfmodel.trials.behaviour import Behaviour, forward_displacement
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
 from tests.conftest import random_controllers
 from tests.helpers.comparators import Prepared, PreparedPieces
-from tests.helpers.memory import MemoryJournal
+from tests.helpers.memory import in_memory
 
 SMALL = dataclasses.replace(Settings().scaled(12), generations=2, steps=300)
 CASES = ROBOTS["quadruped"].cases
@@ -43,7 +43,7 @@ def trial(robot: Robot, truth: str, controller: Controller, stage: Stage = "afte
     """A trial of a robot with something wrong."""
     physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
     plan = TrialPlan(f"{stage}-{truth}-{hash(controller)}", stage, controller, SMALL.steps, 0)
-    return MemoryJournal(robot).record(physical, plan)
+    return in_memory(robot)(physical, plan)
 
 
 def diagnosed(
@@ -199,7 +199,7 @@ class CoarseInPieces(Coarse):
         )
 
 
-@pytest.mark.parametrize(("make", "test"), [(Coarse, EQUAL), (CoarseInPieces, TEST)])
+@pytest.mark.parametrize(("make", "test"), [(Coarse, EQUAL_DISTANCES), (CoarseInPieces, TEST)])
 def test_hypotheses_that_no_trial_tells_apart_are_rivals(
     quadruped: Robot, gait: Controller, make: Callable[[float], Comparator], test: str
 ):

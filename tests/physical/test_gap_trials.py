@@ -12,6 +12,7 @@ from selfmodel.controllers.playback import played_back
 from selfmodel.faults.build import build
 from selfmodel.faults.notation import parse
 from selfmodel.logs import LogError, read_gap, read_log, read_truth
+from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.measurement_noise import NoisyMeasurement
 from selfmodel.physical.reality_gap import Gap, draw_gap
@@ -200,9 +201,7 @@ def test_the_log_hides_the_gap_where_only_scoring_looks(quadruped: Robot, tmp_pa
             quadruped,
             plan,
             samples,
-            settings=Settings(),
-            hidden="intact",
-            gap=text,
+            TrialHeader(Settings(), hidden="intact", gap=text),
         )
     assert read_gap(tmp_path / "told.mcap") == gap.as_values()
     assert read_gap(tmp_path / "other.mcap") == {}

@@ -24,7 +24,7 @@ from selfmodel.trials.behaviour import forward_displacement
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.conftest import exploding, random_controllers
 from tests.helpers.comparators import Prepared
-from tests.helpers.memory import MemoryJournal
+from tests.helpers.memory import in_memory
 
 SMALL = dataclasses.replace(Settings().scaled(20), generations=5, steps=200)
 
@@ -32,7 +32,7 @@ SMALL = dataclasses.replace(Settings().scaled(20), generations=5, steps=200)
 def logged(robot: Robot, truth: str, controller: Controller, steps: int = 300) -> Trial:
     """A trial of a damaged robot."""
     physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
-    return MemoryJournal(robot).record(physical, TrialPlan(truth, "after", controller, steps, 0))
+    return in_memory(robot)(physical, TrialPlan(truth, "after", controller, steps, 0))
 
 
 @pytest.mark.parametrize("truth", ["break:front_left_knee", "jam:back_right_shoulder", "intact"])

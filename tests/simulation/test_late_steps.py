@@ -14,6 +14,7 @@ from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log
+from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.robots import robot_of
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.environment_robot import EnvironmentRobot
@@ -112,7 +113,9 @@ def test_a_log_with_late_and_lost_steps_fits_the_robot_as_it_was_and_no_fault(tm
     driver = played_back(NAMES.motors, random_motion(QUADRUPED, STEPS))
     plan = TrialPlan("00", "after", driver, STEPS, 0)
     path = tmp_path / "trial.mcap"
-    write_trial(path, QUADRUPED, plan, physical.run(driver, STEPS), timed=True, settings=Settings())
+    write_trial(
+        path, QUADRUPED, plan, physical.run(driver, STEPS), TrialHeader(Settings(), timed=True)
+    )
     log = read_log(path)
     self_model = robot_of(log)
     texts = ("intact", "break:front_left_knee", "jam:back_right_shoulder")
