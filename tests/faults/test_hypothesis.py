@@ -1,4 +1,4 @@
-"""Promises of canonical form: equal hypotheses are equal robots, in the fewest words."""
+"""Tests of the canonical form: equal hypotheses have equal effects, with the fewest faults."""
 
 import pytest
 from hypothesis import given, strategies as st

@@ -1,4 +1,4 @@
-"""Promises of the notation: it reads back what it writes, and says which term is wrong."""
+"""Tests of the notation: round trips, and messages that contain the malformed term."""
 
 import pytest
 from hypothesis import given, strategies as st

@@ -1,4 +1,4 @@
-"""Promises of what a diagnosis considers: what can strike the robot, under whatever name."""
+"""Tests of the kinds of a search: those that apply to the robot, and those they degenerate to."""
 
 import dataclasses
 from pathlib import Path
@@ -41,7 +41,7 @@ BARE = """\
 </worldbody>
 <actuator><position name="hip" joint="hip" kp="50" ctrlrange="-1 1"/></actuator></mujoco>
 """
-"""A robot without a sensor."""
+"""A robot without sensors."""
 
 
 def test_what_strikes_a_robot_stays_in_its_order_and_brings_its_other_names(robot: Robot):
@@ -66,7 +66,7 @@ def test_a_kind_that_no_diagnosis_may_propose_is_refused(robot: Robot):
 
 
 def test_kinds_that_a_fault_is_of_at_some_degree_can_be_named(quadruped: Robot):
-    """What a diagnosis says is read back from its log."""
+    """Diagnoses in a journal are parsed with these kinds."""
     sticky = FaultKind(name="sticky", keyword="sticky", apply=apply)
     stick = FaultKind(
         name="stick",
@@ -86,7 +86,7 @@ def test_kinds_that_a_fault_is_of_at_some_degree_can_be_named(quadruped: Robot):
 
 
 def apply(embodiment: Embodiment, _anatomy: Anatomy, fault: Fault) -> None:
-    """More friction in every joint."""
+    """Adds friction to every joint."""
     embodiment.model.dof_frictionloss[6:] += 0.1 + fault.severity
 
 
