@@ -1,4 +1,4 @@
-"""The file of a mapping: read strictly, so that no entry is without effect."""
+"""Strict reader of mapping files: an entry without effect is an error."""
 
 from pathlib import Path
 from typing import Literal
@@ -22,14 +22,14 @@ from selfmodel.logs.rosbag.tables import Table, parse_document
 from selfmodel.trials.trial import STAGES
 
 LARGEST = 2**20
-"""Bytes that a mapping may have."""
+"""Maximum size of a mapping, bytes."""
 
 
 def read_mapping(path: Path) -> BagMapping:
     """Returns the mapping in a file.
 
     Raises:
-        InputError: It cannot be read, or is wrong; the sentence names the line.
+        InputError: The file cannot be read, or is invalid; the message names the line.
     """
     try:
         text = read_file(path, "a mapping", LARGEST).decode()
@@ -39,11 +39,11 @@ def read_mapping(path: Path) -> BagMapping:
 
 
 def parse_mapping(text: str, name: str) -> BagMapping:
-    """Returns the mapping that a text says; see ``read_mapping``.
+    """Returns the mapping in a text; see ``read_mapping``.
 
     Args:
-        text: TOML.
-        name: What errors call it.
+        text: Text, as TOML.
+        name: Name of the text in errors.
     """
     document, tables = parse_document(text, name)
     top = Table(document, (), tables)

@@ -1,6 +1,6 @@
-"""A mapping to start from, drawn from a bag and a robot.
+"""Suggestion of a mapping from a bag and a robot.
 
-What is uncertain is marked: ``CHECK`` is a guess that may be right, ``CHANGE`` must be filled in.
+Comments mark uncertain entries: ``CHECK`` marks a guess, ``CHANGE`` an entry to fill in.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,13 +17,13 @@ _COMMANDED = ("command", "cmd", "target", "desired", "setpoint", "goal", "refere
 
 
 def suggest(bag: Bag, robot: Robot, name: str, *, with_timestep: bool) -> str:
-    """Returns a mapping as TOML.
+    """Returns the suggestion of a mapping, as TOML.
 
     Args:
-        bag: The recording.
-        robot: Whose trial it is.
-        name: What the mapping is to call the robot: its name, or its MJCF file.
-        with_timestep: Whether the mapping must say the control time step.
+        bag: The bag.
+        robot: Robot of the recording.
+        name: Name of the robot in the mapping, or its MJCF file.
+        with_timestep: Whether the mapping must contain the control time step.
 
     Raises:
         LogError: A message of the bag is damaged.
@@ -63,7 +63,7 @@ def suggest(bag: Bag, robot: Robot, name: str, *, with_timestep: bool) -> str:
 
 
 def _able(bag: Bag, kind: RoleKind) -> list[Topic]:
-    """The topics that can play a role, those of its first type first."""
+    """Topics that can play a role, in the order of the role's types."""
     able = [
         topic
         for topic in bag.topics.values()
@@ -77,7 +77,7 @@ def _is_command(topic: Topic) -> bool:
 
 
 def _fit(series: Series, parts: Sequence[str]) -> int:
-    """How many parts of the robot a topic seems to tell of."""
+    """Number of parts of the robot with a matching name on a topic."""
     if series.topic.type == ARRAY:
         return len(parts) if len(series.columns) == len(parts) else 0
     return len(matched(parts, list(series.columns)))
@@ -94,14 +94,14 @@ def _angles(
     parts: Sequence[str],
     order: tuple[str, ...],
 ) -> Iterator[str]:
-    """The table of the joints or of the commands.
+    """Table of the joints or of the commands.
 
     Args:
-        table: Its name.
-        topics: Those that can play the role, the likeliest first.
-        series: What they say.
-        parts: The hinges or motors of the robot.
-        order: What the columns of a Float64MultiArray may be, in order.
+        table: Name of the table.
+        topics: Topics that can play the role, most likely first.
+        series: Messages by topic.
+        parts: Hinges or motors of the robot.
+        order: Likely names of the columns of a Float64MultiArray, in order.
     """
     yield f"[{table}]"
     yield _topic(topics)
@@ -177,7 +177,7 @@ def _touches(bag: Bag, sensors: Sequence[str]) -> Iterator[str]:
 
 
 def _quoted(text: str) -> str:
-    """A text as TOML has it: names in a bag may hold anything."""
+    """TOML string of a text; names in a bag may contain any character."""
     return f'"{"".join(map(_escaped, text))}"'
 
 
