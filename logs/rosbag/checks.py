@@ -106,8 +106,8 @@ def _check_columns_are_named(mapping: BagMapping, role: Role, kind: str) -> None
     if kind == ARRAY and not given:
         raise mapping.document.error(
             role.path,
-            f"{role.topic} has numbers without names ({ARRAY}): add {key} to [{role.name}], to "
-            f"say which is which",
+            f"{role.topic} has numbers without names ({ARRAY}): add {key} to "
+            f"[{role.name}], which names them",
         )
     if kind != ARRAY and given:
         raise mapping.document.error(

@@ -64,8 +64,8 @@ def clocked(series: Series, clock: str) -> Clocked:
     everything = np.ones(len(stamped), dtype=bool)
     apart = float(np.median(latency)) if len(latency) else 0.0
     if clock == "log":
-        told = latency if abs(apart) <= APART else latency[:0]
-        return Clocked(series.logged, everything, 0, told)
+        usable_latency = latency if abs(apart) <= APART else latency[:0]
+        return Clocked(series.logged, everything, 0, usable_latency)
     if abs(apart) > APART:
         raise ClocksApartError(
             f"the stamps on {series.topic.name} and the times at which it was recorded are "

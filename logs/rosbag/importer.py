@@ -150,7 +150,7 @@ def _clocks(mapping: BagMapping, series: Mapping[str, Series]) -> dict[str, Cloc
             found[role.topic] = clocked(series[role.topic], mapping.clock)
         except ClocksApartError as error:
             raise mapping.document.error(
-                (*role.path, "topic"), f'{error}: set clock = "log" to go by the log times alone'
+                (*role.path, "topic"), f'{error}: set clock = "log" to use the log times'
             ) from error
     return found
 
@@ -162,7 +162,7 @@ def _steps(mapping: BagMapping, tracks: Tracks, timestep: float) -> Steps:
         if not len(track.times):
             raise mapping.document.error(
                 (*role.path, "topic"),
-                f"{role.topic} says nothing that is a number about {part}: name another topic",
+                f"{role.topic} has no number for {part}: name another topic",
             )
     first = max(int(track.times[0]) for _, _, track in needed)
     # The last command is held, so the end of the commands does not end the trial.

@@ -74,14 +74,14 @@ def _gaps(behaviour: Behaviour, qualities: Mapping[str, Quality]) -> Iterator[st
         within = [gap for gap in found.gaps if gap.start < end and gap.start + gap.length > 0]
         if not within or found.roles == ("commands",):  # a command is held until the next
             continue
-        told = [f"{gap.length * 1e3:.0f} ms at {gap.start:.3f} s" for gap in within[:LISTED]]
+        listed = [f"{gap.length * 1e3:.0f} ms at {gap.start:.3f} s" for gap in within[:LISTED]]
         if len(within) > LISTED:
-            told.append(f"{len(within) - LISTED} more")
+            listed.append(f"{len(within) - LISTED} more")
         rows = sum(
             int(np.sum((behaviour.time > gap.start) & (behaviour.time < gap.start + gap.length)))
             for gap in within
         )
-        yield f"{topic}: silent for {', '.join(told)}; rows marked as not observed: {rows}"
+        yield f"{topic}: silent for {', '.join(listed)}; rows marked as not observed: {rows}"
 
 
 def _left_out(qualities: Mapping[str, Quality]) -> Iterator[str]:

@@ -80,8 +80,8 @@ def quality(series: Series, clock: Clocked, origin: int, roles: tuple[str, ...])
         origin: Start of the trial, ns.
         roles: Roles of the topic.
     """
-    told = clock.times[clock.usable]
-    times = np.unique(told)
+    usable = clock.times[clock.usable]
+    times = np.unique(usable)
     periods = np.diff(times) / 1e9
     usual = float(np.median(periods)) if len(periods) else None
     silent = periods > REACH * usual if usual is not None else np.zeros(0, dtype=bool)
@@ -99,7 +99,7 @@ def quality(series: Series, clock: Clocked, origin: int, roles: tuple[str, ...])
         latency_max=float(clock.latency.max()) if len(clock.latency) else None,
         fallbacks=clock.fallbacks,
         strays=int(np.sum(~clock.usable)),
-        repeated=len(told) - len(times),
-        reordered=int(np.sum(told < np.maximum.accumulate(told))) if len(told) else 0,
+        repeated=len(usable) - len(times),
+        reordered=int(np.sum(usable < np.maximum.accumulate(usable))) if len(usable) else 0,
         refused=dict(series.refused),
     )

@@ -89,8 +89,8 @@ def base_signals(tracks: Tracks, steps: Steps, *, from_start: bool) -> dict[Sign
     orientation = _wide(_at(tracks.base_orientation, steps, slerp), 4)
     velocity = _wide(_at(tracks.base_linear_velocity, steps, linear), 3)
     if from_start:
-        told = [(tracks.base_position, position), (tracks.base_orientation, orientation)]
-        if any(len(track.times) and np.isnan(rows[0]).any() for track, rows in told):
+        required = [(tracks.base_position, position), (tracks.base_orientation, orientation)]
+        if any(len(track.times) and np.isnan(rows[0]).any() for track, rows in required):
             raise ValueError("where the base is at the start of the trial is not known")
         if len(tracks.base_orientation.times):
             by = unyaw(orientation[0])

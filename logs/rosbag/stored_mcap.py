@@ -77,7 +77,7 @@ def _items(file: IO[bytes]) -> Iterator[Announced | Stored]:
         elif isinstance(record, Statistics):
             claimed = record.message_count
     if claimed is not None and claimed != count:
-        raise DamageError(f"its statistics say {claimed} messages, it holds {count}")
+        raise DamageError(f"its statistics have {claimed} messages, its records {count}")
     if file.read(1):
         raise DamageError("something follows its end")
 

@@ -45,9 +45,9 @@ def suggest(bag: Bag, robot: Robot, name: str, *, with_timestep: bool) -> str:
             f"# s; CHECK: how often the robot is commanded"
         )
     lines += [
-        '# controller = "gait.npz"  # what drove the robot, if it is known',
-        '# stage = "before"  # recorded while nothing was wrong with the robot',
-        'clock = "header"  # or "log", where the time stamps are of another clock',
+        '# controller = "gait.npz"  # controller of the robot, if known',
+        '# stage = "before"  # of the healthy robot',
+        'clock = "header"  # or "log", if the time stamps are of another clock',
         "# start = 0.0      # s after the first moment at which every role has data",
         "# duration = 10.0  # s",
         "",
@@ -111,7 +111,7 @@ def _angles(
         offered = _names(series, topics[:1])
         if topics[0].type == ARRAY:
             offered = _order(len(offered), order)
-            yield f"order = [{', '.join(map(_quoted, offered))}]  # CHECK: the bag does not say it"
+            yield f"order = [{', '.join(map(_quoted, offered))}]  # CHECK: the bag has no names"
     yield f"[{table}.names]  # each may also be {{ name = ..., sign = -1, offset = 0.1 }}"
     found = matched(parts, offered)
     for part in parts:
@@ -139,7 +139,7 @@ def _topic(topics: Sequence[Topic]) -> str:
 def _base(bag: Bag) -> Iterator[str]:
     topics = _able(bag, "base")
     if not topics:
-        yield "# No topic tells where the robot is: no displacement can be known."
+        yield "# No topic has the position of the base: the trial has no displacement."
         yield ""
         return
     yield "[base]"
@@ -147,7 +147,7 @@ def _base(bag: Bag) -> Iterator[str]:
     yield 'frame = "start"'
     yield 'unit = "m"'
     if topics[0].type != ODOMETRY:
-        yield "# It tells no velocities, and none are derived."
+        yield "# It has no velocities, and none are derived."
     yield ""
 
 
@@ -165,7 +165,7 @@ def _touches(bag: Bag, sensors: Sequence[str]) -> Iterator[str]:
     found = matched(sensors, list(topics))
     for sensor in sensors:
         if sensor not in found:
-            yield f"# No topic is like {sensor}: it counts as not observed."
+            yield f"# No topic is similar to {sensor}: it is not observed."
             continue
         topic = topics[found[sensor].name]
         unsure = "" if found[sensor].sure else "  # CHECK: not sure"
