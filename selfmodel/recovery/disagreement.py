@@ -4,9 +4,8 @@ The next test is the test on which models disagree most, as in Bongard, Zykov an
 *Resilient machines through continuous self-modeling* (Science 2006).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import combinations
-from types import MappingProxyType
 
 import numpy as np
 
@@ -19,27 +18,15 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.simulation.cache import Cache
 from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import Behaviour, Signal
+from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.rotation import directions
 from selfmodel.trials.signal_difference import difference
+from selfmodel.trials.signal_scales import DISAGREEMENT_SCALES
 
 EARLY_STEPS = 100
 """Control steps over which disagreement is computed. Later, contacts make any two predictions
 differ. In closed loop, two hypotheses differed 2.4 times as much as self-models that differ by 3 %
 in the first quarter of a second, and 1.7 times after three quarters; later steps added nothing."""
-
-DIFFERENCE_SCALES: Mapping[Signal, float] = MappingProxyType(
-    {
-        "sensors": 1.0,
-        "joint_positions": 0.3,
-        "base_position": 0.1,
-        "base_orientation": 0.3,
-        "base_linear_velocity": 0.3,
-        "base_angular_velocity": 1.0,
-    }
-)
-"""Difference between two predictions that counts as full disagreement, in each signal's unit.
-Larger differences count the same, so that a single extreme prediction does not decide."""
 
 FALLEN_HEIGHT = 0.5
 """Height below which a base has fallen, as a fraction of its standing height. A base that starts on
@@ -119,7 +106,7 @@ class Disagreement:
     def _predicted(self, drivers: Sequence[CommandSource], steps: int) -> SimulationResult:
         """Each driver's rollouts by hypothesis, ``(drivers, hypotheses, steps, width)``."""
         runs = [(hypothesis, driver) for driver in drivers for hypothesis in self._hypotheses]
-        outcome = self._simulator.run(runs, steps, (*DIFFERENCE_SCALES, "commands"))
+        outcome = self._simulator.run(runs, steps, (*DISAGREEMENT_SCALES, "commands"))
         return outcome.grouped(len(drivers), len(self._hypotheses))
 
     def _first_falls(self, simulated: SimulationResult) -> IndexArray:
@@ -133,11 +120,11 @@ class Disagreement:
 def disagreements(behaviour: Behaviour) -> FloatArray:
     """Returns the disagreement of the hypotheses on each controller, 0 to 1.
 
-    The disagreement is the mean difference of two predictions, relative to ``DIFFERENCE_SCALES``,
+    The disagreement is the mean difference of two predictions, relative to ``DISAGREEMENT_SCALES``,
     over all pairs of hypotheses, signals, columns and early steps.
 
     Args:
-        behaviour: Signals of ``DIFFERENCE_SCALES``, ``(controllers, hypotheses, steps, width)``
+        behaviour: Signals of ``DISAGREEMENT_SCALES``, ``(controllers, hypotheses, steps, width)``
             each.
 
     Returns:
@@ -146,12 +133,12 @@ def disagreements(behaviour: Behaviour) -> FloatArray:
     controllers, hypotheses = behaviour["sensors"].shape[:2]
     pairs = list(combinations(range(hypotheses), 2))
     total = np.zeros(controllers)
-    for name, scale in DIFFERENCE_SCALES.items():
+    for name, scale in DISAGREEMENT_SCALES.items():
         values = behaviour[name][:, :, :EARLY_STEPS]
         for first, second in pairs:
             differences = difference(name, values[:, first], values[:, second])
             total += np.minimum(np.abs(differences) / scale, 1).mean(axis=(1, 2))
-    return total / max(len(pairs), 1) / len(DIFFERENCE_SCALES)
+    return total / max(len(pairs), 1) / len(DISAGREEMENT_SCALES)
 
 
 def first_falls(behaviour: Behaviour, normals: FloatArray, standing_height: float) -> IndexArray:

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT
-from selfmodel.comparators.arithmetic import command_errors
+from selfmodel.comparators.command_errors import command_errors
 from selfmodel.controllers.command_source import make_batch
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback

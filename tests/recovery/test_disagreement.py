@@ -17,7 +17,6 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.recovery import disagreement
 from selfmodel.recovery.disagreement import (
-    DIFFERENCE_SCALES,
     EARLY_STEPS,
     FALLEN_HEIGHT,
     Disagreement,
@@ -29,6 +28,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.trials.behaviour import Behaviour, Names, Signal
+from selfmodel.trials.signal_scales import DISAGREEMENT_SCALES
 from tests.conftest import random_controllers
 
 NAMES = Names(sensors=("touch",), motors=("motor",), hinges=("hinge",))
@@ -219,7 +219,7 @@ def test_disagreement_is_a_part_of_one_and_knows_no_order_of_the_hypotheses(
     shape = (2, hypotheses, 7)
     signals = {
         signal: size * rng.normal(size=(*shape, NAMES.width(signal)))
-        for signal in DIFFERENCE_SCALES
+        for signal in DISAGREEMENT_SCALES
     }
     turned = Rotation.from_rotvec(size * rng.normal(size=(np.prod(shape), 3)))
     signals["base_orientation"] = turned.as_quat(scalar_first=True).reshape(*shape, 4)

@@ -101,7 +101,7 @@ def test_a_trial_that_other_software_drove_is_explained_by_its_commands(
 def test_a_comparator_says_what_a_trial_lacks(name: str, quadruped: Robot, tmp_path: Path):
     (trial,) = trials(quadruped, tmp_path, "intact", 1)
     with pytest.raises(InputError, match=r"0\.mcap: .* needs \w+"):
-        COMPARATORS[name].request(unobserved(trial))
+        COMPARATORS[name].prepare(unobserved(trial))
 
 
 def test_what_only_the_screen_cannot_judge_is_said_before_any_search(quadruped: Robot):
