@@ -149,7 +149,9 @@ def test_no_misprint_crashes(biped: Robot, bag: Path):
 
 
 def test_the_mapping_in_the_guide_is_one():
-    guide = (Path(__file__).parents[3] / "docs" / "real-robots.md").read_text(encoding="utf-8")
+    guide = (Path(__file__).parents[3] / "docs" / "how-to" / "import-a-recording.md").read_text(
+        encoding="utf-8"
+    )
     text = guide.partition("```toml\n")[2].partition("```")[0]
     mapping = parse_mapping(text, "guide")
     assert mapping.joints.links["front_left_knee"] == Link("FL_knee", -1, 0.1)
