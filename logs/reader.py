@@ -171,8 +171,8 @@ def read_gap(path: str | Path) -> dict[str, Any] | None:
     This is for scoring. Nothing that diagnoses may call it.
 
     Returns:
-        The numbers of a ``selfmodel.physical.reality_gap.Gap``, and under ``structure`` those of a
-        ``selfmodel.physical.structural_mismatch.Structure`` or None; None where no gap is told.
+        The attributes of a ``RealityGap`` (``selfmodel.physical.reality_gap``), with those of a
+        ``StructuralMismatch`` or None as ``structure``; None if the log has no gap.
 
     Raises:
         LogError: The file is damaged, or what it says is no gap.

@@ -17,7 +17,7 @@ from selfmodel.logs.files import explained
 from selfmodel.logs.logfile import LogFile
 from selfmodel.logs.preamble import write_preamble
 from selfmodel.logs.records import FINISHED, RESULT, STOPPED, Imported, Result, checked_name
-from selfmodel.physical.cleanup import Ending
+from selfmodel.physical.cleanup import Cleanup
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Names, Sample
@@ -73,7 +73,7 @@ def write_trial(
         imported=imported,
     )
     # Whatever ends a trial, the robot is stopped.
-    with writer, Ending(getattr(samples, "close", lambda: None)):
+    with writer, Cleanup(getattr(samples, "close", lambda: None)):
         for sample in itertools.islice(samples, plan.steps):
             writer.add(sample)
     return path

@@ -36,7 +36,7 @@ def calibrate(
     from selfmodel.experiments import trial_logs  # noqa: PLC0415
     from selfmodel.logs.files import create_part, explained, publish, refuse_existing  # noqa: PLC0415
     from selfmodel.robot.parameters import factor_names  # noqa: PLC0415
-    from selfmodel.simulation.calibrate import calibrate as fit_to  # noqa: PLC0415
+    from selfmodel.simulation.calibration import calibrate as fit_to  # noqa: PLC0415
     from selfmodel.simulation.threads import thread_count  # noqa: PLC0415
 
     start = perf_counter()

@@ -161,8 +161,8 @@ def _filmed(
 
     from selfmodel.cli.rendering.film import evenly, film_of  # noqa: PLC0415
     from selfmodel.cli.rendering.video import RATE  # noqa: PLC0415
-    from selfmodel.simulation.replay import replay  # noqa: PLC0415
     from selfmodel.simulation.simulator import Simulator  # noqa: PLC0415
+    from selfmodel.simulation.trial_replay import replay  # noqa: PLC0415
 
     logged = log.trial.behaviour
     found = replay(log.trial, assumed, Simulator(robot, threads))
@@ -182,14 +182,14 @@ def _filmed(
     held = int(film.shots[0].held.sum())
     if held:
         notes.append(f"{held} of {len(film.time)} pictures show what was seen last, and say so")
-    if found.broke_down:
+    if found.diverged:
         notes.append("the simulation broke down: with this hypothesis the model is unstable")
     return film, {
         "hypothesis": str(assumed),
         "steps": logged.steps,
         "missing": list(film.missing),
         "held": held,
-        "diverged": found.broke_down,
+        "diverged": found.diverged,
         "notes": notes,
     }
 

@@ -11,7 +11,7 @@ from selfmodel.cli.options import Json, NamedKinds, RobotOrModel, Threads
 
 if TYPE_CHECKING:
     from selfmodel.logs import TrialLog
-    from selfmodel.simulation.replay import Replay
+    from selfmodel.simulation.trial_replay import Replay
     from selfmodel.trials.behaviour import Signal
 
 TOLERANCE = 1e-6
@@ -56,9 +56,9 @@ def replay(
     from selfmodel.experiments import plugins, trial_logs  # noqa: PLC0415
     from selfmodel.faults.notation import parse  # noqa: PLC0415
     from selfmodel.faults.registry import known  # noqa: PLC0415
-    from selfmodel.simulation.replay import replay as simulate  # noqa: PLC0415
     from selfmodel.simulation.simulator import Simulator  # noqa: PLC0415
     from selfmodel.simulation.threads import thread_count  # noqa: PLC0415
+    from selfmodel.simulation.trial_replay import replay as simulate  # noqa: PLC0415
     from selfmodel.trials.behaviour import SIGNALS  # noqa: PLC0415
 
     if out is not None:
@@ -81,7 +81,7 @@ def replay(
         "first_divergence_step": found.first_divergence_step,
         "rms": {signal: _finite(found.rms(signal)) for signal in SIGNALS},
         "tolerance": tolerance,
-        "diverged": found.broke_down,
+        "diverged": found.diverged,
         "mujoco": {"logged": logged, "running": mujoco.__version__},
     }
     if out is not None:
@@ -116,7 +116,7 @@ def _print(result: dict[str, Any], log: "TrialLog", found: "Replay") -> None:
             f"The log was imported, and resampled: what differs by less than {TOLERANCE:g} counts "
             f"as the same."
         )
-    if found.broke_down:
+    if found.diverged:
         typer.echo("The simulation broke down: with this hypothesis the model is unstable.")
     if found.identical:
         typer.echo("identical: every number that was observed is the simulated one, to the bit.")

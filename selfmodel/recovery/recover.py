@@ -20,7 +20,7 @@ from selfmodel.recovery.next_trial import NextTrial, Situation, by_repair
 from selfmodel.recovery.random_streams import choice_stream, diagnosis_stream, repair_stream
 from selfmodel.recovery.repair import RepairSearch
 from selfmodel.settings import Settings
-from selfmodel.simulation.calibrate import Calibration
+from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
 

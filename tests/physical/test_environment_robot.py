@@ -135,7 +135,7 @@ def test_a_caller_that_stops_iterating_stops_the_robot():
 
 def test_a_robot_that_cannot_be_read_at_the_start_is_not_driven():
     bench = Bench({0: None})
-    with pytest.raises(TrialError, match=r"nothing was read of front_left_touch, .* at step 0"):
+    with pytest.raises(TrialError, match=r"no reading of front_left_touch, .* at step 0"):
         driven(bench)
     assert bench.done == ["stop", "reset", "stop"]
 
@@ -222,11 +222,11 @@ def test_an_infinite_time_is_none_and_leaves_a_log_that_can_be_read(tmp_path: Pa
 def test_a_step_is_late_exactly_where_its_time_is_off_by_more_than_the_tolerance(
     took: list[float],
 ):
-    on_event, now = Stopwatch(1.0, 0.25), 7.0
-    assert not on_event.look(now, {}).late
+    stopwatch, now = Stopwatch(1.0, 0.25), 7.0
+    assert not stopwatch.update(now, {}).late
     for each in took:
         before, now = now, now + each
-        moment = on_event.look(now, {})
+        moment = stopwatch.update(now, {})
         if abs(abs(now - before - 1) - 0.25) > 1e-9:
             assert moment.late == (abs(now - before - 1) > 0.25)
         assert moment.elapsed == now - 7.0

@@ -14,7 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.evolution import Generation
 from selfmodel.recovery.events import Event, Question, SearchBegins
-from selfmodel.simulation.calibrate import Calibration
+from selfmodel.simulation.calibration import Calibration
 from selfmodel.trials.trial import Trial
 
 

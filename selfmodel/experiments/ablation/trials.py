@@ -14,7 +14,7 @@ from selfmodel.logs.atomic import part_of, put
 from selfmodel.logs.reader import read_log
 from selfmodel.logs.writer import write_trial
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.calibrate import calibrate
+from selfmodel.simulation.calibration import calibrate
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
 
 

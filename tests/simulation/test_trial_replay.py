@@ -15,8 +15,8 @@ from selfmodel.logs.writer import write_trial
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot, with_neurons
 from selfmodel.settings import Settings
-from selfmodel.simulation.replay import replay
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.simulation.trial_replay import replay
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import SIGNALS, Behaviour
 from selfmodel.trials.trial import Trial, TrialPlan

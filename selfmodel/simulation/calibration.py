@@ -1,8 +1,8 @@
-"""Calibration of the self-model: its continuous parameters, fitted to trials of the intact robot.
+"""Calibration of the self-model: fits its continuous parameters to trials of the healthy robot.
 
-The parameters are found by a box-constrained least squares over short predictions from logged
-states (``mujoco.minimize``), with a prior that keeps what the trials do not show near nominal. The
-delay, which is a whole number, is tried out.
+The fit is a box-constrained nonlinear least squares over short predictions from logged states
+(``mujoco.minimize``), with a Gaussian prior for parameters that the trials do not determine. The
+control delay, an integer, is found by exhaustive search.
 """
 
 from collections.abc import Callable, Sequence
@@ -34,23 +34,23 @@ from selfmodel.trials.signal_difference import difference
 from selfmodel.trials.state_estimation import BASE
 from selfmodel.trials.trial import Trial
 
-PRIOR = 0.15
-"""How far a parameter may be expected from nominal, as a deviation of its logarithm."""
+PRIOR_DEVIATION = 0.15
+"""Standard deviation of the prior on the logarithm of each parameter's factor."""
 
-SHARE = 0.05
-"""The weight of the prior beside the data: all errors together count as 1 / SHARE**2 independent
-ones, however many there are, because those of neighbouring steps and columns say the same thing
-again and again."""
+PRIOR_WEIGHT = 0.05
+"""Weight of the prior relative to the data. All errors together count as 1 / PRIOR_WEIGHT**2
+independent errors, whatever their number: errors of neighbouring steps and columns are strongly
+correlated."""
 
-BOUND = 1.2
-"""How far the logarithm of a parameter may be from nominal: a factor of 0.3 to 3.3."""
+MAX_LOG_FACTOR = 1.2
+"""Bound on the absolute logarithm of a parameter's factor: factors of 0.3 to 3.3."""
 
-STEP = 0.1
-"""The finite difference of a logarithm. Contact makes a small one meaningless: a parameter moves
-when a foot comes down, and that shows as noise between near values."""
+DIFFERENCE_STEP = 0.1
+"""Step of the finite differences of a logarithm. Smaller steps are dominated by noise: a parameter
+changes the time at which a foot makes contact."""
 
-DELAYS = range(MAX_CONTROL_DELAY + 1)
-"""Control delays that are tried."""
+CANDIDATE_DELAYS = range(MAX_CONTROL_DELAY + 1)
+"""Control delays of the exhaustive search, control steps."""
 
 SCALES: dict[Signal, float] = {
     "joint_positions": 0.03,
@@ -63,22 +63,22 @@ SCALES: dict[Signal, float] = {
 """Errors beyond these count by their size, smaller ones by their square: an impact that is missed
 by a step is no statement about masses."""
 
-ITERATIONS = 3
+MAX_ITERATIONS = 3
 
-EXACT = 0.01
+EXACT_ERROR = 0.01
 """The root mean square error, in ``SCALES``, below which the model is taken to be the robot."""
 
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """A self-model fitted to trials.
+    """Result of a calibration.
 
     Attributes:
-        robot: The robot whose MJCF says the fitted parameters.
+        robot: The robot with the fitted parameters in its MJCF.
         parameters: The fitted parameters.
-        deviations: The standard deviation of each factor's logarithm, ``(factors,)`` in the order
-            of ``Parameters.factors``: that of the prior where the trials show nothing, less where
-            they show something.
+        deviations: Posterior standard deviation of each factor's logarithm, ``(factors,)`` in the
+            order of ``Parameters.factors``; ``PRIOR_DEVIATION`` for a factor without influence on
+            the trials.
         error_before: Root mean square error of the predictions with the nominal parameters, in
             units of ``SCALES``.
         error: The same with the fitted ones.
@@ -92,54 +92,57 @@ class Calibration:
 
 
 def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibration:
-    """Fits the continuous parameters of a robot to trials in which nothing was wrong with it.
+    """Fits the continuous parameters of a robot to trials of the healthy robot.
 
     The result does not depend on the number of threads. A model that predicts the trials exactly
-    is left as it is, to the bit.
+    is returned unchanged, to the bit.
 
-    A trial in which the base's position and linear velocity were hardly ever observed together is
-    taken to begin in the model's start pose, and the base is carried on from there. A step that
-    was late, a command that is not known, or a state that is not where a stretch begins (at every
-    tenth step) leaves it off for the rest of that trial.
+    If the base's position and linear velocity were rarely observed together in a trial, the trial
+    is assumed to begin in the model's initial pose, and the state of the base is predicted from
+    there on. After a late step, an unknown command, or an unknown state at the beginning of a
+    segment (every tenth step), the rest of such a trial is not used.
 
     Args:
         robot: The robot as its model describes it.
-        trials: At least one, each with the commands and the state; the base's position and linear
-            velocity may be NaN.
-        threads: Threads for the physics.
+        trials: At least one trial with commands and state; the base's position and linear velocity
+            may be NaN.
+        threads: Threads of MuJoCo's steps.
 
     Raises:
-        InputError: There are no trials, or one was not observed well enough.
+        InputError: There are no trials, or too little of a trial was observed.
     """
     if not trials:
-        raise InputError("expected at least one trial of the intact robot, got none")
+        raise InputError("expected at least one trial of the healthy robot, got none")
     data = [cut_segments(trial) for trial in trials]
     start = nominal(robot)
     before = _error(robot, start, data, threads)
-    deviations = np.full(len(start.factors), PRIOR)
-    if before < EXACT:
+    deviations = np.full(len(start.factors), PRIOR_DEVIATION)
+    if before < EXACT_ERROR:
         return Calibration(robot, start, deviations, before, before)
     zero = np.zeros((len(start.factors), 1))
 
     def residuals_at(delay: int, of: Sequence[CalibrationSegments]) -> Residual:
         return partial(_residuals, robot, of, delay, threads)
 
-    delay = min(DELAYS, key=lambda steps: float(np.sum(residuals_at(steps, data)(zero) ** 2)))
+    delay = min(
+        CANDIDATE_DELAYS, key=lambda steps: float(np.sum(residuals_at(steps, data)(zero) ** 2))
+    )
     residual = residuals_at(delay, data)
     fitted, _ = mujoco.minimize.least_squares(
         zero,
         residual,
-        bounds=[np.full_like(zero, -BOUND), np.full_like(zero, BOUND)],
+        bounds=[np.full_like(zero, -MAX_LOG_FACTOR), np.full_like(zero, MAX_LOG_FACTOR)],
         jacobian=lambda x, _residual: _slopes(residual, x),
-        max_iter=ITERATIONS,
+        max_iter=MAX_ITERATIONS,
         xtol=1e-3,
         verbose=mujoco.minimize.Verbosity.SILENT,
     )
     found = from_factors(np.exp(fitted.ravel()), delay)
-    # What a factor does to the whole of a long simulation is mostly chaos, and tells nothing of it.
-    slopes = _slopes(residuals_at(delay, _placed(robot, found, data, threads)), fitted)
-    count = len(slopes) - len(zero)  # of the errors: the rest is the prior, at its weight
-    spread = np.linalg.inv(slopes.T @ slopes) * count * SHARE**2
+    # Independent segments: long simulations are chaotic, so their derivatives are meaningless.
+    independent = _with_estimated_base(robot, found, data, threads)
+    slopes = _slopes(residuals_at(delay, independent), fitted)
+    count = len(slopes) - len(zero)  # number of errors; the other rows are the prior
+    spread = np.linalg.inv(slopes.T @ slopes) * count * PRIOR_WEIGHT**2
     return Calibration(
         robot=with_parameters(robot, found),
         parameters=found,
@@ -150,32 +153,32 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
 
 
 def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> float:
-    """Returns how badly a self-model predicts the motion in trials.
+    """Returns the prediction error of a self-model on trials.
 
     Args:
         robot: The self-model.
-        trials: As for ``calibrate``.
-        threads: Threads for the physics.
+        trials: The trials, as for ``calibrate``.
+        threads: Threads of MuJoCo's steps.
 
     Returns:
-        The root mean square error over all columns after all steps that are judged, in units of
+        The root mean square error over all columns after all judged steps, in units of
         ``SCALES``.
 
     Raises:
-        InputError: A trial was not observed well enough.
+        InputError: Too little of a trial was observed.
     """
     return _error(robot, nominal(robot), [cut_segments(trial) for trial in trials], threads)
 
 
 Residual = Callable[[FloatArray], FloatArray]
-"""From logarithms of factors, ``(factors, m)``, to residuals, ``(residuals, m)``."""
+"""Function from logarithms of factors, ``(factors, m)``, to residuals, ``(residuals, m)``."""
 
 
 def _slopes(residual: Residual, x: FloatArray) -> FloatArray:
-    """The derivative of the residuals, ``(residuals, factors)``."""
-    steps = STEP * np.eye(len(x))
+    """Returns the Jacobian of the residuals by central differences, ``(residuals, factors)``."""
+    steps = DIFFERENCE_STEP * np.eye(len(x))
     ahead, behind = residual(x + steps), residual(x - steps)
-    return np.asarray((ahead - behind) / (2 * STEP))
+    return np.asarray((ahead - behind) / (2 * DIFFERENCE_STEP))
 
 
 def _residuals(
@@ -185,11 +188,11 @@ def _residuals(
     threads: int,
     logarithms: FloatArray,
 ) -> FloatArray:
-    """See ``Residual``; the prior's are among them."""
+    """Returns the residuals of the data, then those of the prior; see ``Residual``."""
     logarithms = np.reshape(logarithms, (len(logarithms), -1))
     models = [from_factors(np.exp(row), delay) for row in logarithms.T]
     errors = _errors(robot, models, data, threads)
-    weight = np.sqrt(len(errors)) * SHARE / PRIOR
+    weight = np.sqrt(len(errors)) * PRIOR_WEIGHT / PRIOR_DEVIATION
     return np.concatenate([_damped(errors), weight * logarithms])
 
 
@@ -199,21 +202,21 @@ def _error(
     return float(np.sqrt(np.mean(_errors(robot, [parameters], data, threads) ** 2)))
 
 
-def _placed(
+def _with_estimated_base(
     robot: Robot, found: Parameters, data: Sequence[CalibrationSegments], threads: int
 ) -> list[CalibrationSegments]:
-    """The same stretches, each beginning by itself: with the base where a model has it by then."""
-    predicted = _predictor(robot, [found], threads)
+    """Returns independent segments; an unobserved base begins in its predicted state."""
+    predict_with = _predictor(robot, [found], threads)
 
-    def placed(stretches: CalibrationSegments) -> CalibrationSegments:
-        segments = stretches.segments
+    def independent(own: CalibrationSegments) -> CalibrationSegments:
+        segments = own.segments
         if "base_position" in segments.states:
-            return stretches
-        made = predicted(replace(segments, record=BASE))
-        states = {**segments.states, **{signal: made[signal][0, :, 0] for signal in BASE}}
-        return replace(stretches, segments=replace(segments, states=states))
+            return own
+        predicted = predict_with(replace(segments, record=BASE))
+        states = {**segments.states, **{signal: predicted[signal][0, :, 0] for signal in BASE}}
+        return replace(own, segments=replace(segments, states=states))
 
-    return [placed(stretches) for stretches in data]
+    return [independent(own) for own in data]
 
 
 def _errors(
@@ -235,7 +238,10 @@ def _errors(
 def _predictor(
     robot: Robot, models: Sequence[Parameters], threads: int
 ) -> Callable[[Segments], Behaviour]:
-    """Predicts with models that have one delay: ``(models, segments, horizon + 1, width)``."""
+    """Returns a function that predicts segments with models of equal delay.
+
+    The signals of its result are ``(models, segments, horizon + 1, width)``.
+    """
     delay = models[0].delay
     embodiments = [
         apply_faults(edited_model(robot, parameters), robot.anatomy, INTACT)
@@ -252,5 +258,5 @@ def _predictor(
 
 
 def _damped(errors: FloatArray) -> FloatArray:
-    """Residuals whose squares grow as errors do, once these exceed 1 (pseudo-Huber)."""
+    """Returns pseudo-Huber residuals: their squares grow linearly with errors above 1."""
     return np.asarray(np.sign(errors) * np.sqrt(2 * (np.sqrt(1 + errors**2) - 1)))
