@@ -1,7 +1,7 @@
-"""Where the time of one recovery goes, and how much memory it takes.
+"""Time shares and peak memory of one recovery.
 
-Run by itself (``python -m benchmarks.recovery``) it measures one recovery in this process and
-prints one JSON object; ``measure`` does that several times in processes of their own.
+``python -m benchmarks.recovery`` measures one recovery in this process and prints one JSON object;
+``measure`` repeats this in separate processes.
 """
 
 import json
@@ -16,7 +16,7 @@ from statistics import median
 from time import perf_counter
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT
-from selfmodel.controllers.driver import Driver
+from selfmodel.controllers.command_source import CommandSource
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.faults.notation import parse
 from selfmodel.logs.journal import open_journal
@@ -34,13 +34,13 @@ ROUNDS = 5
 
 
 class TimedRobot:
-    """A physical robot, and the seconds that its own simulation took."""
+    """A physical robot that measures the seconds of its simulation."""
 
     def __init__(self, robot: PhysicalRobot) -> None:
         self._robot = robot
         self.seconds = 0.0
 
-    def run(self, controller: Driver, steps: int) -> Iterator[Sample]:
+    def run(self, controller: CommandSource, steps: int) -> Iterator[Sample]:
         """Runs a controller."""
         samples = self._robot.run(controller, steps)
         while True:
@@ -53,7 +53,7 @@ class TimedRobot:
 
 
 class TimedJournal:
-    """A journal, and the seconds that writing and reading took, without those of the robots."""
+    """A journal that measures the seconds of writing and reading, without those of the robots."""
 
     def __init__(self, journal: Journal, robots: tuple[TimedRobot, ...]) -> None:
         self._journal = journal

@@ -1,7 +1,7 @@
-"""Every single fault, recorded as a robot's driver would, imported and diagnosed again.
+"""Diagnoses of every single fault, recorded as by a robot's driver, imported and diagnosed.
 
 Run with ``python -m benchmarks.round_trip``; it takes five minutes on two cores, and prints the
-table that ``docs/real-robots.md`` has.
+table of ``docs/results/import.md``.
 """
 
 import os
@@ -9,7 +9,7 @@ import tempfile
 from pathlib import Path
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT
-from selfmodel.controllers.driver import Evolved
+from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
 from selfmodel.faults.registry import PAPER_KINDS
@@ -48,14 +48,14 @@ def main() -> None:
 
 
 def single_faults(robot: Robot) -> list[Hypothesis]:
-    """Returns every hypothesis of one fault that the paper's diagnosis may propose."""
+    """Returns every hypothesis of one fault of the paper's kinds."""
     anatomy = robot.anatomy
     return [
         canonical([fault], anatomy) for kind in PAPER_KINDS for fault in kind.candidates(anatomy)
     ]
 
 
-def recorded(folder: Path, robot: Robot, truth: Hypothesis, gait: Evolved) -> list[TrialLog]:
+def recorded(folder: Path, robot: Robot, truth: Hypothesis, gait: Controller) -> list[TrialLog]:
     """Returns one trial as simulated, as imported, and as imported without its controller."""
     steps = SETTINGS.steps
     plan = TrialPlan("trial", "single", gait, steps, SEED)
@@ -72,7 +72,7 @@ def recorded(folder: Path, robot: Robot, truth: Hypothesis, gait: Evolved) -> li
 
 
 def judged(log: TrialLog, truth: Hypothesis) -> str:
-    """Returns what the diagnosis of a log says, and how far the truth is from it."""
+    """Returns the best hypothesis for a log, and the distance of the truth."""
     simulator = Simulator(robot_of(log), os.cpu_count() or 1)
     search = DiagnosticSearch(simulator, FORWARD_DISPLACEMENT, log.settings)
     best = diagnose_trials([log.trial], search, SEED, lambda _: None).best

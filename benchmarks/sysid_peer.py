@@ -1,8 +1,8 @@
-"""The same calibration as ``mujoco.sysid`` does it: same segments, parameters, bounds and scales.
+"""Calibration by ``mujoco.sysid``, with the same segments, parameters, bounds and scales.
 
-``mujoco.sysid`` knows no delay of the commands, so each delay is tried around it, as ``calibrate``
-does. Its solver, stopping rule and finite differences are its own defaults; it has no prior, and
-large errors count by their square.
+``mujoco.sysid`` has no command delay, so each delay is tried around it, as in ``calibrate``. Its
+solver, stopping rule and finite differences are its defaults; it has no prior, and large errors
+count squared.
 """
 
 import io
@@ -27,7 +27,7 @@ from selfmodel.trials.state_estimation import STATE, estimated_states
 from selfmodel.trials.trial import Trial
 
 Theirs = Any
-"""What mujoco.sysid makes or asks for."""
+"""Object or argument of mujoco.sysid, which has no types."""
 
 # Imported so, because it says that it is typed, and MuJoCo itself is not.
 sysid: Theirs = import_module("mujoco.sysid")
@@ -36,8 +36,8 @@ States = dict[Signal, FloatArray]
 
 
 def sysid_parameters(robot: Robot, trials: Sequence[Trial]) -> Parameters:
-    """Returns what ``mujoco.sysid`` makes of trials of the intact robot, on one thread."""
-    logging.set_verbosity(logging.ERROR)  # it misses the sensors, which are not compared
+    """Returns the fit of ``mujoco.sysid`` to trials of the healthy robot, on one thread."""
+    logging.set_verbosity(logging.ERROR)  # it warns of missing sensors, which are not compared
     names = factor_names(robot)
     parameters = sysid.ParameterDict(
         {name: sysid.Parameter(name, 0.0, -MAX_LOG_FACTOR, MAX_LOG_FACTOR) for name in names}
@@ -57,13 +57,13 @@ def sysid_parameters(robot: Robot, trials: Sequence[Trial]) -> Parameters:
         return float(np.sum(np.square(np.concatenate(residuals))))
 
     delay = min(CANDIDATE_DELAYS, key=cost)
-    progress = io.StringIO()  # it has no way to be silent
+    progress = io.StringIO()  # it has no option to be silent
     found, _ = sysid.optimize(parameters, residual_at(delay), verbose=False, output=progress)
     return from_factors(np.exp(found.as_vector()), delay)
 
 
 def _builder(robot: Robot) -> Theirs:
-    """Builds models from logarithms; it is asked for the same one once a segment."""
+    """Builds models from logarithms; called once per segment with the same ones."""
 
     @lru_cache(64)
     def build(row: tuple[float, ...]) -> mujoco.MjModel:
@@ -73,7 +73,7 @@ def _builder(robot: Robot) -> Theirs:
 
 
 def _sequences(robot: Robot, trials: Sequence[Trial], delay: int) -> Theirs:
-    """Every segment as a sequence of its own: from a logged state, under the delayed commands."""
+    """Returns every segment as a sequence: from a logged state, under the delayed commands."""
     states, controls, observed = [], [], []
     for trial in trials:
         estimated = estimated_states(trial.behaviour)
@@ -108,7 +108,7 @@ def _sequences(robot: Robot, trials: Sequence[Trial], delay: int) -> Theirs:
 
 
 def _vectors(robot: Robot, states: Theirs) -> FloatArray:
-    """The state as MuJoCo orders it, ``(steps, nq + nv)``."""
+    """Returns the state in MuJoCo's order, ``(steps, nq + nv)``."""
     model, steps = robot.model, len(states[STATE[0]])
     fields = {"qpos": np.zeros((steps, model.nq)), "qvel": np.zeros((steps, model.nv))}
     writer(robot, fields.__getitem__)(states)
@@ -116,7 +116,7 @@ def _vectors(robot: Robot, states: Theirs) -> FloatArray:
 
 
 class _Residual:
-    """The errors of a segment in units of ``SCALES``, as sysid asks for them."""
+    """Returns the errors of a segment in units of ``SCALES``."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot

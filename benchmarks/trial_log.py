@@ -1,4 +1,4 @@
-"""What it costs to log a trial and to read it back, beside the library's own writer and reader."""
+"""Cost of writing and reading a trial log, and of the MCAP library's own writer and reader."""
 
 import tempfile
 from collections.abc import Sequence
@@ -10,11 +10,12 @@ import numpy as np
 from mcap.reader import make_reader
 from mcap.writer import Writer
 
-from selfmodel.controllers.network import Controller, draw_weights
+from selfmodel.controllers.controller import Controller, draw_genomes
 from selfmodel.logs import read_log
 from selfmodel.logs.contents import read_contents
 from selfmodel.logs.writer import TrialWriter
 from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Sample
@@ -26,13 +27,13 @@ ROUNDS = 7
 def measure(robot: Robot) -> dict[str, float]:
     """Returns the medians for a trial of the paper's length, its samples made beforehand.
 
-    The library's writer gets the same messages, encoded already, and keeps its defaults: chunks of
-    1 MiB, nothing flushed, no checksum over the data. Its reader keeps its own: no checksum is
-    looked at, and no message decoded.
+    The library's writer receives the same encoded messages and has its defaults: chunks of 1 MiB,
+    no flush, no checksum of the data. Its reader has its defaults too: no checksum is compared,
+    and no message decoded.
     """
     settings = Settings()
-    genome = draw_weights(np.random.default_rng(0), (robot.network.weights,))
-    controller = Controller(robot.network, genome)
+    network = network_for(robot)
+    controller = Controller(network, draw_genomes(np.random.default_rng(0), (network.weights,)))
     samples = list(SimulatedRobot(robot).run(controller, settings.steps))
     plan = TrialPlan("trial", "single", controller, settings.steps, 0)
     duration = settings.steps * robot.control_timestep
@@ -66,7 +67,7 @@ def measure(robot: Robot) -> dict[str, float]:
 
 
 def _write(path: Path, robot: Robot, plan: TrialPlan, samples: Sequence[Sample]) -> list[float]:
-    """Writes a trial; returns for how many seconds each step waited for the log."""
+    """Writes a trial; returns the seconds that each step waited for the log."""
     delays = []
     with TrialWriter(path, robot, plan, settings=Settings()) as writer:
         for sample in samples:
@@ -77,7 +78,7 @@ def _write(path: Path, robot: Robot, plan: TrialPlan, samples: Sequence[Sample])
 
 
 def _with_the_library(path: Path, plain: Path) -> tuple[float, float, int]:
-    """Seconds to write and to read the messages of a log with the library alone, and bytes."""
+    """Returns seconds to write and to read a log's messages with the library alone, and bytes."""
     every = read_contents(path).topics
     start = perf_counter()
     with plain.open("wb") as file:

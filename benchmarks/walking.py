@@ -1,11 +1,12 @@
-"""Whether a controller walks: how far, how high the torso goes, how deep the feet sink."""
+"""Measures of a walk: displacement, torso height, contact depth."""
 
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
-from selfmodel.controllers.driver import Evolved, drive
+from selfmodel.controllers.command_source import make_batch
+from selfmodel.controllers.controller import Controller
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.robot.robot import Robot
@@ -14,10 +15,10 @@ from selfmodel.robot.sensing import SensorReader
 
 @dataclass(frozen=True)
 class Walk:
-    """What a run of an intact robot looked like, at every physics step.
+    """Measures of a run of the healthy robot, over every physics step.
 
     Attributes:
-        displacement: How far it travelled forward, m.
+        displacement: Forward displacement, m.
         lowest: Least height of the root body over its standing height.
         highest: Greatest height of the root body over its standing height.
         deepest: Deepest penetration of any contact, m.
@@ -30,17 +31,17 @@ class Walk:
 
     @property
     def is_walking(self) -> bool:
-        """Whether the torso stays between the ground and twice its height, and feet on top."""
+        """Whether the torso stays between the ground and twice its height, contacts shallow."""
         return self.lowest > 0 and self.highest < 2 and self.deepest <= 0.01
 
 
-def walk(robot: Robot, controller: Evolved, steps: int) -> Walk:
-    """Returns how a controller makes an intact robot walk."""
+def walk(robot: Robot, controller: Controller, steps: int) -> Walk:
+    """Returns the measures of a controller's walk on the healthy robot."""
     embodiment = build(robot, INTACT)
     model, data = embodiment.model, mujoco.MjData(embodiment.model)
     mujoco.mj_forward(model, data)
     senses = SensorReader(model, robot.anatomy, [embodiment])
-    brain = drive([controller], embodiment.neurons[np.newaxis], len(robot.anatomy.sensors))
+    brain = make_batch([controller], [embodiment.silent_neurons], len(robot.anatomy.sensors))
     start, heights, deepest = data.qpos[0], [data.qpos[2]], 0.0
     for step in range(steps):
         senses.read(data.sensordata[np.newaxis], data.qpos[np.newaxis], brain.readings)

@@ -7,7 +7,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from selfmodel.controllers.driver import Driver
+from selfmodel.controllers.command_source import CommandSource
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError, describe
 from selfmodel.logs.atomic import part_of
@@ -244,7 +244,7 @@ def _in_words(error: BaseException) -> str:
     return text.encode("utf-8", "backslashreplace").decode()
 
 
-def _check_ends(robot: str, names: Names, driver: Driver) -> None:
+def _check_ends(robot: str, names: Names, driver: CommandSource) -> None:
     if isinstance(driver, Playback):
         sensors, motors = names.sensors, driver.motors
     else:

@@ -1,7 +1,7 @@
 """Physical robot behind a ``dm_env.Environment``, such as real hardware."""
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from typing import Any
@@ -10,12 +10,13 @@ import dm_env
 import numpy as np
 
 from selfmodel.arrays import FloatArray, IndexArray
-from selfmodel.controllers.driver import Driver, drive
+from selfmodel.controllers.command_source import CommandSource, make_batch
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError, TrialError
 from selfmodel.physical.cleanup import Cleanup
 from selfmodel.physical.safety_limits import Limit
 from selfmodel.physical.step_timing import TIMESTAMP, Stopwatch
+from selfmodel.robot.actuator_ranges import command_ranges
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import SIGNALS, Names, Sample, Signal
 
@@ -76,8 +77,7 @@ class EnvironmentRobot:
         critical: Signals that must not be NaN in an observation that arrived.
         patience: Consecutive steps for which a required signal may be missing.
         tolerance: Largest deviation of a punctual step, as a fraction of the control time step.
-        neurons: 1 for each hidden neuron of the controller that works, 0 for a silent one,
-            ``(hidden,)``; all work if not given.
+        silent_neurons: Indices of the silent hidden neurons of the controller.
         clock: Monotonic clock, s. Timestamps of observations, as ``time``, take precedence.
 
     Raises:
@@ -97,7 +97,7 @@ class EnvironmentRobot:
         critical: Sequence[Signal] = (),
         patience: int = 5,
         tolerance: float = 0.25,
-        neurons: FloatArray | None = None,
+        silent_neurons: Iterable[int] = (),
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         motors = (len(robot.anatomy.motors),)
@@ -115,10 +115,10 @@ class EnvironmentRobot:
         self._halt = stop or partial(_step_to, env, targets)
         self._limits, self._critical = tuple(limits), tuple(critical)
         self._patience, self._tolerance = patience, tolerance
-        self._neurons = np.ones(robot.anatomy.neurons) if neurons is None else np.array(neurons)
+        self._silent_neurons = frozenset(silent_neurons)
         self.clock = clock
 
-    def run(self, controller: Driver, steps: int) -> Iterator[Sample]:
+    def run(self, controller: CommandSource, steps: int) -> Iterator[Sample]:
         """Runs a controller; see ``PhysicalRobot``.
 
         The caller must close the returned iterator, as ``write_trial`` does: closing it stops the
@@ -150,10 +150,10 @@ class EnvironmentRobot:
                 f"the safe command could not be sent: {_type_and_message(error)}"
             ) from error
 
-    def _steps(self, controller: Driver, steps: int) -> Iterator[Sample]:
+    def _steps(self, controller: CommandSource, steps: int) -> Iterator[Sample]:
         robot = self._robot
         names, timestep = robot.anatomy.names, robot.control_timestep
-        brain = drive([controller], self._neurons[np.newaxis], len(names.sensors))
+        brain = make_batch([controller], [self._silent_neurons], len(names.sensors))
         commands = np.zeros((1, len(names.motors)))
         needed = {signal for limit in self._limits for signal in limit.signals}
         if not isinstance(controller, Playback):
@@ -241,7 +241,7 @@ def _step_to(env: dm_env.Environment, targets: FloatArray) -> None:
 
 
 def _nearest_to_zero(robot: Robot) -> FloatArray:
-    centre, half = np.array(robot.network.ranges).T
+    centre, half = np.array(command_ranges(robot.model)).T
     return np.asarray(np.clip(0.0, centre - half, centre + half))
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from typing import Protocol, runtime_checkable
 
-from selfmodel.controllers.driver import Driver
+from selfmodel.controllers.command_source import CommandSource
 from selfmodel.trials.behaviour import Sample
 
 
@@ -13,7 +13,7 @@ class PhysicalRobot(Protocol):
     Diagnosis and recovery have access to a physical robot through this method only.
     """
 
-    def run(self, controller: Driver, steps: int) -> Iterator[Sample]:
+    def run(self, controller: CommandSource, steps: int) -> Iterator[Sample]:
         """Runs a controller from the initial pose and yields each sample during its control step.
 
         The robot stops when the caller stops iterating.

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from selfmodel.controllers.driver import Driver
+from selfmodel.controllers.command_source import CommandSource
 from selfmodel.trials.behaviour import Behaviour, forward_displacement
 
 Stage = Literal["before", "after", "recovery", "single"]
@@ -33,7 +33,7 @@ class TrialPlan:
 
     name: str
     stage: Stage
-    controller: Driver
+    controller: CommandSource
     steps: int
     seed: int
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
-from selfmodel.controllers.network import Controller
+from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnose import EQUAL, DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
@@ -22,6 +22,7 @@ from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import KINDS, PAPER_KINDS
 from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.requests import ClosedLoop
@@ -233,8 +234,8 @@ def deaf(robot: Robot, gait: Controller, sensor: str) -> Controller:
     number = robot.anatomy.names.sensors.index(sensor)
     genome = gait.genome.copy()
     inputs = len(robot.anatomy.sensors) + 1
-    genome[number : robot.network.hidden * inputs : inputs] = 0
-    return Controller(robot.network, genome)
+    genome[number : network_for(robot).hidden * inputs : inputs] = 0
+    return Controller(network_for(robot), genome)
 
 
 def test_fewer_faults_win_and_what_only_says_more_is_no_rival(quadruped: Robot, gait: Controller):

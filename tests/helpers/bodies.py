@@ -8,7 +8,7 @@ from functools import lru_cache, partial
 import mujoco
 import numpy as np
 
-from selfmodel.controllers.driver import Driver
+from selfmodel.controllers.command_source import CommandSource
 from selfmodel.controllers.playback import played_back
 from selfmodel.robot.robot import Robot
 
@@ -129,6 +129,6 @@ def swinging(robot: Robot, steps: int) -> np.ndarray:
     return (low + high) / 2 + (high - low) / 4 * wave
 
 
-def swung(robot: Robot, steps: int) -> Driver:
+def swung(robot: Robot, steps: int) -> CommandSource:
     """A driver that gives these commands."""
     return played_back(robot.anatomy.motors, swinging(robot, steps))

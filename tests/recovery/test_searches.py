@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT
-from selfmodel.controllers.network import Controller
+from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.errors import InputError
 from selfmodel.experiments.scoring import is_correct
@@ -15,6 +15,7 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.recovery.repair import RepairSearch
+from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.requests import ClosedLoop
@@ -65,7 +66,7 @@ def test_a_diverging_hypothesis_is_infinitely_far_and_a_diverging_gait_is_worst(
 
 def test_a_diagnosis_is_correct_if_it_cannot_be_told_from_the_truth(quadruped: Robot):
     simulator = Simulator(quadruped, 2)
-    deaf = Controller(quadruped.network, np.zeros(quadruped.network.weights))
+    deaf = Controller(network_for(quadruped), np.zeros(network_for(quadruped).weights))
     (awake,) = random_controllers(quadruped, 1)
     truth = parse("neuron:0", quadruped.anatomy)
 

@@ -1,4 +1,4 @@
-"""Promises of the check of a controller's arithmetic: exact, silent where nothing is known."""
+"""Tests of command errors: exact, and NaN where the controller's state is unknown."""
 
 import dataclasses
 
@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 
 from selfmodel.comparators.arithmetic import command_errors, command_spans
-from selfmodel.controllers.network import Controller
+from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import SIGNALS, Behaviour
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.conftest import random_controllers, random_oscillators
+from tests.conftest import random_controllers, random_cpgs
 from tests.helpers.memory import MemoryJournal
 
 STEPS = 60
@@ -32,7 +33,7 @@ def with_signals(one: Trial, **signals: np.ndarray) -> Trial:
 
 
 @pytest.mark.parametrize("truth", ["intact", "break:front_left_knee", "sensor:front_left_angle"])
-def test_a_controller_that_works_errs_by_exactly_nothing_whatever_else_is_wrong(
+def test_a_working_controller_has_errors_of_exactly_0_under_any_other_fault(
     robot: Robot, truth: str
 ):
     one = trial(robot, truth.replace("front_left_knee", robot.anatomy.joints[0].name))
@@ -40,20 +41,20 @@ def test_a_controller_that_works_errs_by_exactly_nothing_whatever_else_is_wrong(
     assert np.array_equal(command_errors(one), np.zeros((STEPS, len(robot.anatomy.motors))))
 
 
-def rhythmic(robot: Robot, truth: str) -> Trial:
-    """A trial that oscillators drive."""
-    (driver,) = random_oscillators(robot, 1)
+def of_a_cpg(robot: Robot, truth: str) -> Trial:
+    """A trial of a CPG."""
+    (driver,) = random_cpgs(robot, 1)
     physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
     return MemoryJournal(robot).record(physical, TrialPlan("t", "after", driver, STEPS, 0))
 
 
 @pytest.mark.parametrize("truth", ["intact", "sensor:front_left_angle"])
-def test_oscillators_err_by_exactly_nothing_too(robot: Robot, truth: str):
-    assert not command_errors(rhythmic(robot, truth)).any()
+def test_a_working_cpg_has_errors_of_exactly_0(robot: Robot, truth: str):
+    assert not command_errors(of_a_cpg(robot, truth)).any()
 
 
-def test_oscillators_that_hear_other_readings_are_at_another_phase_from_then_on(quadruped: Robot):
-    one = rhythmic(quadruped, "intact")
+def test_a_changed_reading_shifts_the_phase_of_a_cpg_from_the_next_step(quadruped: Robot):
+    one = of_a_cpg(quadruped, "intact")
     readings = one.behaviour["sensors"].copy()
     readings[30, 5] += 5
     errors = command_errors(with_signals(one, sensors=readings))
@@ -62,9 +63,9 @@ def test_oscillators_that_hear_other_readings_are_at_another_phase_from_then_on(
     assert errors[31:].all(axis=1).any()
 
 
-def test_a_motor_s_error_is_weighed_by_its_own_range(quadruped: Robot):
+def test_command_spans_are_relative_to_the_paper_s_range(quadruped: Robot):
     one = trial(quadruped)
-    network = quadruped.network
+    network = network_for(quadruped)
     wide = dataclasses.replace(network, ranges=((0.0, np.pi / 2), *network.ranges[1:]))
     driver = Controller(wide, one.plan.controller.genome)
     other = dataclasses.replace(one, plan=dataclasses.replace(one.plan, controller=driver))
@@ -74,14 +75,14 @@ def test_a_motor_s_error_is_weighed_by_its_own_range(quadruped: Robot):
 
 
 @pytest.mark.parametrize("neuron", [0, 1, 2])
-def test_a_silent_neuron_shows_from_the_first_step_in_every_motor(robot: Robot, neuron: int):
+def test_a_silent_neuron_causes_errors_in_every_motor_at_once(robot: Robot, neuron: int):
     errors = command_errors(trial(robot, f"neuron:{neuron}"))
 
     assert np.abs(errors[0]).max() > 0.01
     assert np.all(np.abs(errors).max(axis=0) > 0.01)
 
 
-def test_a_wrong_command_shows_at_its_step_in_its_motor_by_how_much_it_is_wrong(quadruped: Robot):
+def test_a_wrong_command_is_the_error_at_its_step_and_motor(quadruped: Robot):
     one = trial(quadruped)
     commands = one.behaviour["commands"].copy()
     commands[20, 3] += 0.25
@@ -92,7 +93,7 @@ def test_a_wrong_command_shows_at_its_step_in_its_motor_by_how_much_it_is_wrong(
     assert not errors.any()
 
 
-def test_a_network_that_is_fed_with_other_readings_gives_other_commands(quadruped: Robot):
+def test_a_changed_reading_causes_errors_of_a_network_from_its_step(quadruped: Robot):
     one = trial(quadruped)
     readings = one.behaviour["sensors"].copy()
     readings[30, 5] += 0.5
@@ -100,10 +101,10 @@ def test_a_network_that_is_fed_with_other_readings_gives_other_commands(quadrupe
 
     assert not errors[:30].any()
     assert errors[30].any()
-    assert errors[31].any()  # its neurons remember
+    assert errors[31].any()  # recurrent connections
 
 
-def test_from_the_first_unknown_reading_on_nothing_is_known(quadruped: Robot):
+def test_errors_are_nan_from_the_first_unobserved_reading(quadruped: Robot):
     one = trial(quadruped)
     readings = one.behaviour["sensors"].copy()
     readings[25, 2] = np.nan
@@ -113,7 +114,7 @@ def test_from_the_first_unknown_reading_on_nothing_is_known(quadruped: Robot):
     assert np.isnan(errors[25:]).all()
 
 
-def test_of_a_command_that_was_not_observed_alone_nothing_is_known(quadruped: Robot):
+def test_the_error_of_an_unobserved_command_alone_is_nan(quadruped: Robot):
     one = trial(quadruped)
     commands = one.behaviour["commands"].copy()
     commands[10] = np.nan
@@ -123,7 +124,7 @@ def test_of_a_command_that_was_not_observed_alone_nothing_is_known(quadruped: Ro
     assert not np.delete(errors, 10, axis=0).any()
 
 
-def test_of_what_other_software_commanded_nothing_is_held_against_it(quadruped: Robot):
+def test_a_playback_has_errors_of_exactly_0(quadruped: Robot):
     one = trial(quadruped, "neuron:0")
     driver = Playback(quadruped.anatomy.motors, one.behaviour["commands"])
     played = dataclasses.replace(one, plan=dataclasses.replace(one.plan, controller=driver))
