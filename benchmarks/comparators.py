@@ -15,12 +15,12 @@ import numpy as np
 from benchmarks.results import Facts
 from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT
 from selfmodel.controllers.controller import Controller
-from selfmodel.diagnosis.comparator import Comparator, Piecewise
+from selfmodel.diagnosis.comparator import Comparator, PiecewiseTrial
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.evidence import simulate
-from selfmodel.diagnosis.genome import VALUES, decode
 from selfmodel.experiments.ablation.bank import gait
 from selfmodel.experiments.reality import draw_reality
+from selfmodel.faults.hypothesis_space import GENE_VALUES, HypothesisSpace
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.robot.robot import Robot
@@ -138,26 +138,27 @@ def _known(name: str, threads: int, settings: Settings) -> Known:
 def _share(known: Known, comparator: Comparator, threads: int, settings: Settings) -> Facts:
     """Returns seconds of a comparator's arithmetic and physics, for one generation's children."""
     rounds = [_share_once(known, comparator, threads, settings) for _ in range(ROUNDS + 1)][1:]
-    request = comparator.request(known.failed[CASES[0]])
+    request = comparator.prepare(known.failed[CASES[0]]).request
     members = request.members if isinstance(request, Ensemble) else 1
     return {"members": members} | {key: median(one[key] for one in rounds) for key in rounds[0]}
 
 
 def _share_once(known: Known, comparator: Comparator, threads: int, settings: Settings) -> Facts:
     children = settings.population - settings.survivors
-    genomes = np.random.default_rng(0).random((children, VALUES * settings.genes))
-    hypotheses = [decode(genome, known.model.anatomy, PAPER_KINDS) for genome in genomes]
+    genomes = np.random.default_rng(0).random((children, GENE_VALUES * settings.genes))
+    space = HypothesisSpace(known.model.anatomy, PAPER_KINDS)
+    hypotheses = [space.decode(genome) for genome in genomes]
     simulator = Simulator(known.model, threads)
     trial = known.failed[CASES[0]]
     start = perf_counter()
-    request = comparator.request(trial)
+    prepared = comparator.prepare(trial)
     asked = perf_counter() - start
-    simulated = simulate(simulator, request, trial, hypotheses).behaviour
+    simulated = simulate(simulator, prepared.request, trial, hypotheses).behaviour
     start = perf_counter()
-    if isinstance(comparator, Piecewise):
-        comparator.losses(simulated, trial)
+    if isinstance(prepared, PiecewiseTrial):
+        prepared.losses(simulated)
     else:
-        comparator.distances(simulated, trial)
+        prepared.distances(simulated)
     return {
         "arithmetic_seconds": asked + perf_counter() - start,
         "physics_seconds": simulator.stats.physics_seconds,

@@ -14,6 +14,7 @@ from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.logs import TrialLog, read_log
+from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.robots import robot_of
 from selfmodel.logs.rosbag.importer import import_bag, write_recording
 from selfmodel.logs.rosbag.mapping_file import parse_mapping
@@ -60,7 +61,7 @@ def recorded(folder: Path, robot: Robot, truth: Hypothesis, gait: Controller) ->
     steps = SETTINGS.steps
     plan = TrialPlan("trial", "single", gait, steps, SEED)
     samples = SimulatedRobot(robot, truth).run(gait, steps)
-    exact = write_trial(folder / "exact.mcap", robot, plan, samples, settings=SETTINGS)
+    exact = write_trial(folder / "exact.mcap", robot, plan, samples, TrialHeader(SETTINGS))
     bag = driver.record(folder / "bag", robot, truth, gait, steps)
     mapping = parse_mapping(driver.mapping(robot, steps, None), "mapping")
     recording = import_bag(bag, mapping, robot)

@@ -19,10 +19,12 @@ from selfmodel.arrays import FloatArray
 from selfmodel.robot.parameters import Parameters, edited_model, factor_names, from_factors
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state_access import signal_fields, writer
-from selfmodel.simulation.calibration import CANDIDATE_DELAYS, MAX_LOG_FACTOR, SCALES
-from selfmodel.simulation.calibration_segments import HORIZON, LEAD, SEGMENTS
+from selfmodel.simulation.calibration import CANDIDATE_DELAYS, MAX_LOG_FACTOR
+from selfmodel.simulation.calibration_segments import HORIZON, MAX_SEGMENTS
+from selfmodel.simulation.requests import LEAD
 from selfmodel.trials.behaviour import Signal
 from selfmodel.trials.signal_difference import difference
+from selfmodel.trials.signal_scales import CALIBRATION_ERROR_SCALES
 from selfmodel.trials.state_estimation import STATE, estimated_states
 from selfmodel.trials.trial import Trial
 
@@ -79,7 +81,7 @@ def _sequences(robot: Robot, trials: Sequence[Trial], delay: int) -> Theirs:
         estimated = estimated_states(trial.behaviour)
         vectors = _vectors(robot, estimated)
         last = trial.behaviour.steps - 1 - HORIZON
-        for k in np.unique(np.linspace(LEAD, last, SEGMENTS).round().astype(int)):
+        for k in np.unique(np.linspace(LEAD, last, MAX_SEGMENTS).round().astype(int)):
             commands = trial.behaviour["commands"][k - delay : k - delay + HORIZON]
             # A last row that sysid drops.
             rows = np.concatenate([np.repeat(commands, robot.substeps, axis=0), commands[-1:]])
@@ -116,7 +118,7 @@ def _vectors(robot: Robot, states: Theirs) -> FloatArray:
 
 
 class _Residual:
-    """Returns the errors of a segment in units of ``SCALES``."""
+    """Returns the errors of a segment in units of ``CALIBRATION_ERROR_SCALES``."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
@@ -137,11 +139,14 @@ class _Residual:
         made = self._signals(state[substeps - 1 :: substeps, 1:])  # column 0 is the time
         seen = self._signals(observed.data)
         rows = []
-        for signal, scale in SCALES.items():
+        for signal, scale in CALIBRATION_ERROR_SCALES.items():
             rows.append((difference(signal, made[signal], seen[signal]) / scale).ravel())
         return np.concatenate(rows), observed, observed
 
     def _signals(self, rows: FloatArray) -> States:
         nq = self._robot.model.nq
         fields = {"qpos": rows[:, :nq], "qvel": rows[:, nq:]}
-        return {signal: self._where[signal].reader(fields.__getitem__)() for signal in SCALES}
+        return {
+            signal: self._where[signal].reader(fields.__getitem__)()
+            for signal in CALIBRATION_ERROR_SCALES
+        }

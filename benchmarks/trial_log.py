@@ -13,6 +13,7 @@ from mcap.writer import Writer
 from selfmodel.controllers.controller import Controller, draw_genomes
 from selfmodel.logs import read_log
 from selfmodel.logs.contents import read_contents
+from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import TrialWriter
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.designs import network_for
@@ -69,7 +70,7 @@ def measure(robot: Robot) -> dict[str, float]:
 def _write(path: Path, robot: Robot, plan: TrialPlan, samples: Sequence[Sample]) -> list[float]:
     """Writes a trial; returns the seconds that each step waited for the log."""
     delays = []
-    with TrialWriter(path, robot, plan, settings=Settings()) as writer:
+    with TrialWriter(path, robot, plan, TrialHeader(Settings())) as writer:
         for sample in samples:
             start = perf_counter()
             writer.add(sample)

@@ -15,6 +15,7 @@ import numpy as np
 
 from selfmodel.controllers.controller import Controller, draw_genomes
 from selfmodel.errors import InputError, TrialError, describe
+from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.environment_robot import EnvironmentRobot
 from selfmodel.physical.safety_limits import joint_limits, tilt_limit
@@ -107,7 +108,7 @@ def main(host: str, port: int, path: Path) -> None:
     )
     samples = physical.run(plan.controller, plan.steps)
     try:
-        write_trial(path, robot, plan, samples, timed=True, settings=Settings())
+        write_trial(path, robot, plan, samples, TrialHeader(Settings(), timed=True))
     except InputError as error:
         sys.exit(describe(error))
     except TrialError as error:

@@ -5,6 +5,7 @@ from functools import partial
 from pathlib import Path
 
 from selfmodel.comparators import SEGMENT_PREDICTION
+from selfmodel.controllers.command_source import CommandSource
 from selfmodel.controllers.controller import Controller, Design
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnosis import Diagnosis
@@ -16,8 +17,10 @@ from selfmodel.experiments.robots import is_model, robot_entry
 from selfmodel.faults import KINDS, PAPER_KINDS, FaultKind
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
-from selfmodel.faults.registry import known
-from selfmodel.logs.journal import open_journal
+from selfmodel.faults.registry import notation_kinds
+from selfmodel.logs import physical_trial
+from selfmodel.logs.journal import create_journal
+from selfmodel.logs.records import TrialHeader
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery import recover as loop
 from selfmodel.recovery.events import Event
@@ -36,7 +39,7 @@ from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.threads import thread_count
 from selfmodel.simulation.trial_replay import Replay
-from selfmodel.trials.trial import Trial
+from selfmodel.trials.trial import Stage, Trial, TrialPlan
 
 
 def _ignore(_event: object) -> None:
@@ -125,6 +128,38 @@ def evolve_controller(
     chosen = plugins.design(design, robot) if isinstance(design, str) else design
     search = RepairSearch(Simulator(robot, thread_count(threads)), settings or Settings(), chosen)
     return search(hypothesis, seeds, repair_stream(seed, 0), on_event)
+
+
+def run_trial(
+    physical: PhysicalRobot,
+    controller: CommandSource,
+    path: str | Path,
+    *,
+    robot: Robot,
+    steps: int = 1000,
+    stage: Stage = "single",
+    seed: int = 0,
+) -> Trial:
+    """Runs a physical trial, logs it while it runs, and returns the trial read from the log.
+
+    Args:
+        physical: The physical robot.
+        controller: Controller or playback that drives the robot.
+        path: Name of the log, ``NAME.mcap``; the trial is called NAME.
+        robot: The nominal robot.
+        steps: Control steps of the trial.
+        stage: Stage of the trial within a recovery.
+        seed: Seed of the trial, for the record.
+
+    Raises:
+        InputError: The log exists, NAME is no name of a trial, or the controller does not fit the
+            robot.
+        LogError: The robot stopped early, or the log failed its verification.
+        TrialError: The physical robot could not finish the trial.
+    """
+    path = Path(path)
+    plan = TrialPlan(path.stem, stage, controller, steps, seed)
+    return physical_trial.run_trial(physical, plan, path, robot, TrialHeader(Settings()))
 
 
 def calibrate(trials: Sequence[Trial], robot: Robot, *, threads: int = 0) -> Calibration:
@@ -253,12 +288,14 @@ def recover(
     """
     count = thread_count(threads)
     chosen = settings or Settings()
+    journal = create_journal(Path(folder), robot.anatomy, notation_kinds(kinds))
     return loop.recover(
         healthy=healthy,
         damaged=damaged,
         simulator=Simulator(robot, count),
         comparator=plugins.comparator(comparator) if isinstance(comparator, str) else comparator,
-        journal=open_journal(Path(folder), robot, chosen, hidden={}, kinds=known(kinds)),
+        run_trial=physical_trial.TrialRunner(journal.trials, robot, chosen),
+        journal=journal,
         settings=chosen,
         seed=seed,
         on_event=on_event,

@@ -15,7 +15,7 @@ from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError, TrialError
 from selfmodel.physical.cleanup import Cleanup
 from selfmodel.physical.safety_limits import Limit
-from selfmodel.physical.step_timing import TIMESTAMP, Stopwatch
+from selfmodel.physical.step_timing import TIMESTAMP, StepTimer
 from selfmodel.robot.actuator_ranges import command_ranges
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import SIGNALS, Names, Sample, Signal
@@ -153,7 +153,7 @@ class EnvironmentRobot:
     def _steps(self, controller: CommandSource, steps: int) -> Iterator[Sample]:
         robot = self._robot
         names, timestep = robot.anatomy.names, robot.control_timestep
-        brain = make_batch([controller], [self._silent_neurons], len(names.sensors))
+        controllers = make_batch([controller], [self._silent_neurons], len(names.sensors))
         commands = np.zeros((1, len(names.motors)))
         needed = {signal for limit in self._limits for signal in limit.signals}
         if not isinstance(controller, Playback):
@@ -163,7 +163,7 @@ class EnvironmentRobot:
             for signal in SIGNALS
             if signal in needed or signal == "sensors"
         }
-        stopwatch = Stopwatch(timestep, self._tolerance)
+        timer = StepTimer(timestep, self._tolerance)
         ended = False
         for k in range(steps):
             if ended:
@@ -174,17 +174,17 @@ class EnvironmentRobot:
             result = self._step_environment(commands[0] if k else None)
             ended = result is not None and result.last()
             observation = self._observe(result.observation) if result is not None else None
-            moment = stopwatch.update(self.clock(), observation)
-            values = _rows(names, {} if moment.missing or observation is None else observation)
+            timing = timer.update(self.clock(), observation)
+            values = _rows(names, {} if timing.missing or observation is None else observation)
             for signal, counts in missing_steps.items():
-                missing = np.isnan(values[signal]) & (signal in needed or moment.missing)
+                missing = np.isnan(values[signal]) & (signal in needed or timing.missing)
                 missing_steps[signal] = np.where(missing, counts + 1, 0)
-            self._check(k, values, missing_steps, missing=moment.missing)
+            self._check(k, values, missing_steps, missing=timing.missing)
             readings = values["sensors"]
-            np.copyto(brain.readings[0], readings, where=~np.isnan(readings))
-            brain.step(commands)
+            np.copyto(controllers.readings[0], readings, where=~np.isnan(readings))
+            controllers.step(commands)
             values["commands"] = commands[0].copy()
-            yield Sample(k * timestep, values, moment)
+            yield Sample(k * timestep, values, timing)
 
     def _step_environment(self, targets: FloatArray | None) -> dm_env.TimeStep | None:
         """Steps the environment, or resets it if there are no targets; None after a timeout."""

@@ -106,17 +106,19 @@ class SimulatedRobot:
             place_debris(model, data, self._limbs)
         mujoco.mj_forward(model, data)
         reader = SensorReader(model, robot.anatomy, [embodiment])
-        brain = make_batch([controller], [embodiment.silent_neurons], len(robot.anatomy.sensors))
+        controllers = make_batch(
+            [controller], [embodiment.silent_neurons], len(robot.anatomy.sensors)
+        )
         commands = np.zeros((1, model.nu))
         delay_line = deque(np.zeros((delay, model.nu)))
         # Logged commands are the controller's outputs, before the control delay.
         state_fields = signal_fields(robot, model)
         live = {signal: field.reader(fields_of(data)) for signal, field in state_fields.items()}
-        live |= {"sensors": lambda: brain.readings, "commands": lambda: commands}
+        live |= {"sensors": lambda: controllers.readings, "commands": lambda: commands}
         for k in range(steps):
-            reader.read(data.sensordata[np.newaxis], data.qpos[np.newaxis], brain.readings)
-            measurement.corrupt_readings(brain.readings[0])
-            brain.step(commands)
+            reader.read(data.sensordata[np.newaxis], data.qpos[np.newaxis], controllers.readings)
+            measurement.corrupt_readings(controllers.readings[0])
+            controllers.step(commands)
             delay_line.append(commands[0].copy())
             data.ctrl[:] = delay_line.popleft()
             yield Sample(

@@ -10,7 +10,7 @@ TIMESTAMP = "time"
 """Optional key of an observation, beside the signals: its time by the robot's clock, s."""
 
 
-class Stopwatch:
+class StepTimer:
     """Computes the timing of each control step.
 
     If the first observation has a timestamp, all times are timestamps of observations; otherwise

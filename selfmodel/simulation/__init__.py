@@ -1,1 +1,1 @@
-"""The self-model in motion: rollouts, short predictions, calibration, replay."""
+"""Simulation of the self-model: rollouts, short predictions, ensembles, calibration, replay."""

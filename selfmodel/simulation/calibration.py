@@ -16,7 +16,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
 from selfmodel.faults.build import apply_faults
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.robot.custom_numerics import MAX_CONTROL_DELAY
+from selfmodel.robot.control_delay import MAX_CONTROL_DELAY
 from selfmodel.robot.parameters import (
     Parameters,
     edited_model,
@@ -25,12 +25,16 @@ from selfmodel.robot.parameters import (
     with_parameters,
 )
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.calibration_segments import CalibrationSegments, cut_segments
+from selfmodel.simulation.calibration_segments import (
+    CalibrationSegments,
+    calibration_segments_of,
+)
 from selfmodel.simulation.outcome import SimulationStats
 from selfmodel.simulation.prediction import predict
 from selfmodel.simulation.requests import Segments
-from selfmodel.trials.behaviour import Behaviour, Signal
+from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signal_difference import difference
+from selfmodel.trials.signal_scales import CALIBRATION_ERROR_SCALES
 from selfmodel.trials.state_estimation import BASE
 from selfmodel.trials.trial import Trial
 
@@ -52,21 +56,11 @@ changes the time at which a foot makes contact."""
 CANDIDATE_DELAYS = range(MAX_CONTROL_DELAY + 1)
 """Control delays of the exhaustive search, control steps."""
 
-SCALES: dict[Signal, float] = {
-    "joint_positions": 0.03,
-    "joint_velocities": 1.0,
-    "base_position": 0.01,
-    "base_orientation": 0.03,
-    "base_linear_velocity": 0.1,
-    "base_angular_velocity": 0.3,
-}
-"""Errors beyond these count by their size, smaller ones by their square: an impact that is missed
-by a step is no statement about masses."""
-
 MAX_ITERATIONS = 3
 
 EXACT_ERROR = 0.01
-"""The root mean square error, in ``SCALES``, below which the model is taken to be the robot."""
+"""Root mean square error, in ``CALIBRATION_ERROR_SCALES``, below which the model is taken to be
+exact."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,8 +74,8 @@ class Calibration:
             order of ``Parameters.factors``; ``PRIOR_DEVIATION`` for a factor without influence on
             the trials.
         error_before: Root mean square error of the predictions with the nominal parameters, in
-            units of ``SCALES``.
-        error: The same with the fitted ones.
+            units of ``CALIBRATION_ERROR_SCALES``.
+        error: Root mean square error with the fitted parameters, in the same units.
     """
 
     robot: Robot
@@ -113,7 +107,7 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
     """
     if not trials:
         raise InputError("expected at least one trial of the healthy robot, got none")
-    data = [cut_segments(trial) for trial in trials]
+    data = [calibration_segments_of(trial) for trial in trials]
     start = nominal(robot)
     before = _error(robot, start, data, threads)
     deviations = np.full(len(start.factors), PRIOR_DEVIATION)
@@ -162,12 +156,13 @@ def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> flo
 
     Returns:
         The root mean square error over all columns after all judged steps, in units of
-        ``SCALES``.
+        ``CALIBRATION_ERROR_SCALES``.
 
     Raises:
         InputError: Too little of a trial was observed.
     """
-    return _error(robot, nominal(robot), [cut_segments(trial) for trial in trials], threads)
+    data = [calibration_segments_of(trial) for trial in trials]
+    return _error(robot, nominal(robot), data, threads)
 
 
 Residual = Callable[[FloatArray], FloatArray]
@@ -222,16 +217,15 @@ def _with_estimated_base(
 def _errors(
     robot: Robot, models: Sequence[Parameters], data: Sequence[CalibrationSegments], threads: int
 ) -> FloatArray:
-    """The errors of the predictions in units of ``SCALES``, ``(errors, models)``."""
-    predicted = _predictor(robot, models, threads)
+    """Returns prediction errors divided by their scales, ``(errors, models)``."""
+    predict_with = _predictor(robot, models, threads)
     rows = []
-    for stretches in data:
-        made = predicted(stretches.segments)
-        for signal, scale in SCALES.items():
-            if signal in stretches.observed:
-                observed = stretches.observed[signal]
-                error = difference(signal, made[signal][:, :, 1:], observed) / scale
-                rows.append(error[:, stretches.judged].reshape(len(models), -1))
+    for own in data:
+        predicted = predict_with(own.segments)
+        for signal, scale in CALIBRATION_ERROR_SCALES.items():
+            if signal in own.observed:
+                error = difference(signal, predicted[signal][:, :, 1:], own.observed[signal])
+                rows.append((error / scale)[:, own.judged].reshape(len(models), -1))
     return np.concatenate(rows, axis=1).T
 
 
@@ -248,13 +242,13 @@ def _predictor(
         for parameters in models
     ]
 
-    def predicted(segments: Segments) -> Behaviour:
+    def predict_with(segments: Segments) -> Behaviour:
         outcome = predict(
             robot, embodiments, segments, threads=threads, stats=SimulationStats(), delay=delay
         )
         return outcome.behaviour
 
-    return predicted
+    return predict_with
 
 
 def _damped(errors: FloatArray) -> FloatArray:

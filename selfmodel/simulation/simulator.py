@@ -23,7 +23,7 @@ from selfmodel.simulation.requests import Ensemble, Segments
 from selfmodel.trials.behaviour import Behaviour, Signal
 
 Run = tuple[Hypothesis, CommandSource]
-"""What one simulation runs: a robot with what the hypothesis says wrong, and what drives it."""
+"""A simulation: faults of the robot, and the source of its commands."""
 
 MAX_CACHED_EMBODIMENTS = 1024
 """Largest number of cached models, if ``MAX_CACHED_BYTES`` does not limit it."""
@@ -106,12 +106,17 @@ class Simulator:
     def _adapted_to_contacts(
         self, embodiment: Embodiment, hypothesis: Hypothesis, observed: Behaviour
     ) -> Embodiment:
-        ways = [(fault.kind.feel, fault) for fault in hypothesis.faults if fault.kind.feel]
-        if not ways:
+        """Returns an embodiment adapted to the ground contacts of a trial."""
+        hooks = [
+            (fault.kind.adapt_to_contacts, fault)
+            for fault in hypothesis.faults
+            if fault.kind.adapt_to_contacts
+        ]
+        if not hooks:
             return embodiment
         own = copy.deepcopy(embodiment)  # the argument is in the cache
-        for feel, fault in ways:
-            feel(own, fault, self._contact_points(observed))
+        for adapt_to_contacts, fault in hooks:
+            adapt_to_contacts(own, fault, self._contact_points(observed))
         return own
 
     def run_ensemble(
@@ -150,8 +155,8 @@ class Simulator:
     ) -> SimulationResult:
         robot, n = self.robot, len(embodiments)
         batch = new_batch(robot.model, embodiments, self.threads)
-        senses = SensorReader(robot.model, robot.anatomy, embodiments)
-        brains = make_batch(
+        reader = SensorReader(robot.model, robot.anatomy, embodiments)
+        controllers = make_batch(
             drivers,
             [embodiment.silent_neurons for embodiment in embodiments],
             len(robot.anatomy.sensors),
@@ -159,7 +164,7 @@ class Simulator:
         sensordata, qpos, ctrl = (batch.bind(field) for field in ("sensordata", "qpos", "ctrl"))
         motors = _DelayLine(ctrl, robot.control_delay)
         live = live_signals(robot, batch, embodiments, record)
-        live |= {"sensors": lambda: brains.readings, "commands": lambda: motors.inlet}
+        live |= {"sensors": lambda: controllers.readings, "commands": lambda: motors.inlet}
         # Steps first during the run, so that each step is written to contiguous memory.
         kept = {
             signal: np.empty((steps, n, robot.anatomy.names.width(signal))) for signal in record
@@ -169,8 +174,8 @@ class Simulator:
         alive = LiveBatch(batch)
         with silence_mujoco_warnings():
             for k in range(steps):
-                senses.read(sensordata, qpos, brains.readings)
-                brains.step(motors.inlet)
+                reader.read(sensordata, qpos, controllers.readings)
+                controllers.step(motors.inlet)
                 motors.advance()
                 for signal, rows in kept.items():
                     rows[k] = live[signal]()

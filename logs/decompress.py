@@ -1,4 +1,4 @@
-"""Unpacking that stops: what a few packed bytes claim to hold must not fill memory or disk."""
+"""Bounded decompression, against bombs that would fill memory or disk."""
 
 from pathlib import Path
 
@@ -6,46 +6,46 @@ import lz4.frame
 import zstandard
 
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
-"""How a zstd frame begins. No CDR message does: the first byte of one is 0."""
+"""First bytes of a zstd frame. A CDR message begins with 0."""
 
 LARGEST = 256 * 2**20
-"""Bytes that one chunk or message may have once it is unpacked."""
+"""Maximum decompressed size of a chunk or a message, bytes."""
 
 RATIO = 100
-"""How many times its size a packed file may unpack to: recordings shrink by 2 to 30 times."""
+"""Maximum compression ratio of a file: recordings have ratios of 2 to 30."""
 
 
 class BombError(ValueError):
-    """Something unpacks to more than it may."""
+    """Decompressed data exceed their limit."""
 
 
 def unzstd(data: bytes, limit: int = LARGEST) -> bytes:
-    """Returns what a zstd frame holds.
+    """Returns the content of a zstd frame.
 
     Args:
         data: The frame.
-        limit: Bytes that it may unpack to.
+        limit: Maximum decompressed size, bytes.
 
     Raises:
-        BombError: It unpacks to more.
-        zstandard.ZstdError: It is damaged.
+        BombError: The content exceeds the limit.
+        zstandard.ZstdError: The data are damaged.
     """
-    # Not decompress(): that allocates what the frame claims before it looks.
+    # Not decompress(), which allocates the size that the frame claims.
     with zstandard.ZstdDecompressor().stream_reader(data) as reader:
         unpacked = reader.read(limit + 1)
     return _within(unpacked, limit)
 
 
 def unlz4(data: bytes, limit: int = LARGEST) -> bytes:
-    """Returns what an lz4 frame holds.
+    """Returns the content of an lz4 frame.
 
     Args:
         data: The frame.
-        limit: Bytes that it may unpack to.
+        limit: Maximum decompressed size, bytes.
 
     Raises:
-        BombError: It unpacks to more.
-        RuntimeError: It is damaged.
+        BombError: The content exceeds the limit.
+        RuntimeError: The data are damaged.
     """
     unpacked: bytes = lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=limit + 1)
     return _within(unpacked, limit)
@@ -58,12 +58,12 @@ def _within(unpacked: bytes, limit: int) -> bytes:
 
 
 def unzstd_file(packed: Path, unpacked: Path) -> None:
-    """Unpacks a zstd file into another.
+    """Decompresses a zstd file into another file.
 
     Raises:
-        BombError: It unpacks to more than ``RATIO`` times its size, and more than ``LARGEST``.
-        zstandard.ZstdError: It is damaged.
-        OSError: A file could not be read or written.
+        BombError: The content exceeds ``RATIO`` times the file's size, and ``LARGEST``.
+        zstandard.ZstdError: The data are damaged.
+        OSError: Reading or writing failed.
     """
     limit = max(LARGEST, RATIO * packed.stat().st_size)
     with packed.open("rb") as source, unpacked.open("wb") as target:

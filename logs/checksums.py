@@ -1,7 +1,6 @@
-"""One strict pass over an MCAP file that lets no damaged byte through.
+"""Verification of all checksums and counts of an MCAP file, in one pass.
 
-The library's own reader checks too little by default: of flipped bits, three in four pass. Here
-every checksum that the format has is compared, and the counts too.
+With its default settings, the mcap library's own reader misses three of four flipped bits.
 """
 
 import zlib
@@ -34,19 +33,19 @@ from selfmodel.logs.framing import (
 )
 
 
-def scan(data: bytes) -> Iterator[McapRecord]:
-    """Yields each record of a file, the ones within chunks in their place, checking all.
+def verified_records(data: bytes) -> Iterator[McapRecord]:
+    """Yields the records of a file, including those within chunks, with all checksums verified.
 
-    A caller knows that the file is sound when the iteration ends without an exception.
+    The file is intact if the iteration ends without an exception.
 
     Args:
-        data: All of the file.
+        data: Bytes of the file.
 
     Raises:
-        Exception: One of ``selfmodel.logs.framing.FAILURES``: damage, as the library meets it.
+        Exception: One of ``selfmodel.logs.framing.FAILURES``: the file is damaged.
     """
     _check_start(data)
-    tally, budget = _Tally(), Budget()
+    counts, budget = _Counts(), Budget()
     end = len(MAGIC)
     for frame in frames(data):
         budget.frame(frame.opcode, len(frame.body))
@@ -56,10 +55,10 @@ def scan(data: bytes) -> Iterator[McapRecord]:
         elif isinstance(outer, Footer):
             _check_summary(data, frame, outer)
         for record in _opened(outer, budget):
-            tally.add(record)
+            counts.add(record)
             yield record
         end = frame.end
-    if not tally.counts[DataEnd]:
+    if not counts.by_type[DataEnd]:
         raise ContradictionError("the end of its data is not marked")
     _check_end(data, end)
 
@@ -81,7 +80,7 @@ def _check_end(data: bytes, end: int) -> None:
 
 
 def _opened(record: McapRecord | None, budget: Budget) -> list[McapRecord]:
-    """The record and, for a chunk, what is in it."""
+    """Records of a chunk, then the record itself."""
     if record is None:
         return []
     return [*unpack(record, budget), record] if isinstance(record, Chunk) else [record]
@@ -98,36 +97,36 @@ def _check_summary(data: bytes, frame: Frame, footer: Footer) -> None:
     start = footer.summary_start or frame.offset
     if start > frame.offset:
         raise ContradictionError("its footer points outside of the file")
-    # The checksum covers all of the footer but itself.
+    # The checksum covers the footer except its own bytes.
     if zlib.crc32(memoryview(data)[start : frame.end - 4]) != footer.summary_crc:
         raise ContradictionError("the checksum of its summary is wrong")
 
 
-class _Tally:
-    """Counts what a file holds, to compare it with what the file says it holds."""
+class _Counts:
+    """Numbers of records by type, for comparison with the statistics in the file."""
 
     def __init__(self) -> None:
-        self.counts: Counter[type[McapRecord]] = Counter()
+        self.by_type: Counter[type[McapRecord]] = Counter()
         self._by_channel: Counter[int] = Counter()
         self._ids: dict[type[McapRecord], set[int]] = {Schema: set(), Channel: set()}
 
     def add(self, record: McapRecord) -> None:
-        """Counts a record; one of statistics is compared with what came before it."""
+        """Counts a record; statistics are compared with the records before them."""
         if isinstance(record, Statistics):
             self._compare(record)
         elif isinstance(record, (Schema, Channel)):
             self._ids[type(record)].add(record.id)  # both are repeated at the end
         elif isinstance(record, Message):
             self._by_channel[record.channel_id] += 1
-        self.counts[type(record)] += 1
+        self.by_type[type(record)] += 1
 
     def _compare(self, statistics: Statistics) -> None:
         pairs = {
-            "messages": (statistics.message_count, self.counts[Message]),
+            "messages": (statistics.message_count, self.by_type[Message]),
             "messages by channel": (statistics.channel_message_counts, dict(self._by_channel)),
-            "attachments": (statistics.attachment_count, self.counts[Attachment]),
-            "metadata records": (statistics.metadata_count, self.counts[Metadata]),
-            "chunks": (statistics.chunk_count, self.counts[Chunk]),
+            "attachments": (statistics.attachment_count, self.by_type[Attachment]),
+            "metadata records": (statistics.metadata_count, self.by_type[Metadata]),
+            "chunks": (statistics.chunk_count, self.by_type[Chunk]),
             "schemas": (statistics.schema_count, len(self._ids[Schema])),
             "channels": (statistics.channel_count, len(self._ids[Channel])),
         }

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from selfmodel.comparators.trembling import LEAST, ORDER, trembling_loss
+from selfmodel.comparators.sensor_noise_level import MARGIN, ORDER, noise_level_loss
 
 SEGMENTS, ROWS, SENSORS = 80, 13, 4
 ALL = np.ones((1, SENSORS), dtype=bool)
@@ -24,7 +24,7 @@ def noisy(readings: np.ndarray, *deviations: float, seed: int = 0) -> np.ndarray
 
 def loss(predicted: np.ndarray, logged: np.ndarray, graded: np.ndarray = ALL) -> float:
     """Of one prediction."""
-    return float(trembling_loss(predicted[np.newaxis], logged, graded)[0])
+    return float(noise_level_loss(predicted[np.newaxis], logged, graded)[0])
 
 
 @given(st.integers(0, 99), st.floats(0, 0.8))
@@ -108,6 +108,6 @@ def test_of_a_single_sensor_nobody_knows_what_is_usual():
 
 
 def test_less_than_the_least_is_none():
-    logged = noisy(moving(0.05), 0, 0, 0.7 * LEAST, 0)
+    logged = noisy(moving(0.05), 0, 0, 0.7 * MARGIN, 0)
 
     assert loss(moving(0.05), logged) == 0

@@ -1,4 +1,4 @@
-"""Promises of the screen of a diagnosis: what is cheap says what is looked at closely."""
+"""Promises of the surrogate of a diagnosis: a low-cost comparison pre-selects hypotheses."""
 
 import dataclasses
 
@@ -15,6 +15,7 @@ from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour, collect
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.conftest import random_controllers
+from tests.helpers.comparators import PreparedPieces
 from tests.helpers.gaits import changed
 
 SMALL = dataclasses.replace(Settings().scaled(4), generations=1)
@@ -29,31 +30,34 @@ def trial(quadruped: Robot) -> Trial:
 
 
 @pytest.mark.parametrize("name", ["sensor-series", "gait-pattern", "noisy-transfer"])
-def test_a_comparator_of_whole_trials_screens_by_their_openings(
+def test_a_comparator_of_whole_trials_has_their_openings_as_surrogate(
     name: str, quadruped: Robot, trial: Trial
 ):
-    steps = {"evidence": set[int](), "screen": set[int]()}
+    steps = {"evidence": set[int](), "surrogate": set[int]()}
     comparator = COMPARATORS[name]
 
     class Watched:
         name = comparator.name
-        request = staticmethod(comparator.request)
-        distances = staticmethod(comparator.distances)
 
         @staticmethod
-        def losses(simulated: Behaviour, trial: Trial) -> FloatArray:
-            assert simulated.steps == trial.behaviour.steps
-            steps["evidence" if simulated.steps == 300 else "screen"].add(simulated.steps)
-            return comparator.losses(simulated, trial)
+        def prepare(trial: Trial) -> PreparedPieces:
+            prepared = comparator.prepare(trial)
+
+            def losses(simulated: Behaviour) -> FloatArray:
+                assert simulated.steps == trial.behaviour.steps
+                steps["evidence" if simulated.steps == 300 else "surrogate"].add(simulated.steps)
+                return prepared.losses(simulated)
+
+            return PreparedPieces(prepared.request, prepared.distances, losses)
 
     DiagnosticSearch(Simulator(quadruped, 1), Watched(), SMALL)(
         [trial], [], np.random.default_rng(0), lambda _: None
     )
 
-    assert steps == {"evidence": {300}, "screen": {100}}
+    assert steps == {"evidence": {300}, "surrogate": {100}}
 
 
-def test_where_the_opening_tells_nothing_the_whole_trial_is_the_screen(
+def test_where_the_opening_tells_nothing_the_whole_trial_is_the_surrogate(
     quadruped: Robot, trial: Trial
 ):
     run = trial.behaviour

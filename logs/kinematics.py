@@ -1,4 +1,4 @@
-"""Where each body of a robot is, as its own model says for the angles that were measured."""
+"""Forward kinematics: pose of each body, from the nominal model and the measured joint angles."""
 
 import mujoco
 import numpy as np
@@ -13,21 +13,21 @@ _POSITION_XYZW = [0, 1, 2, 4, 5, 6, 3]
 
 
 def body_names(model: mujoco.MjModel) -> tuple[str, ...]:
-    """Returns the name of each body but the world; it names the body's frame."""
+    """Returns the names of all bodies but the world, which are the names of their frames."""
     return tuple(model.body(b).name or f"body_{b}" for b in range(1, model.nbody))
 
 
 def parent_names(model: mujoco.MjModel) -> tuple[str, ...]:
-    """Returns, for each body but the world, the name of the frame that it is told in."""
+    """Returns the name of the parent's frame for each body but the world."""
     names = (WORLD, *body_names(model))
     return tuple(names[parent] for parent in model.body_parentid[1:])
 
 
 class Kinematics:
-    """Computes poses from joint angles, like ROS's robot_state_publisher.
+    """Forward kinematics of a nominal model, like ROS's robot_state_publisher.
 
     Args:
-        robot: Whose model is used: the nominal one, whatever is wrong with the physical robot.
+        robot: Robot without faults, also for a damaged physical robot.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -41,13 +41,13 @@ class Kinematics:
         """Returns the pose of each body in the frame of its parent.
 
         Args:
-            joint_positions: ``(steps, hinges)`` rad.
-            position: ``(steps, 3)`` of the root body, m.
-            orientation: ``(steps, 4)`` of the root body, w x y z.
+            joint_positions: Joint angles, ``(steps, hinges)`` rad.
+            position: Position of the root body, ``(steps, 3)`` m.
+            orientation: Quaternion of the root body, ``(steps, 4)``, w x y z.
 
         Returns:
-            ``(steps, 7 bodies)``: of each body x y z in metres and the quaternion x y z w, rounded
-            like all that is derived.
+            Position x y z in metres and quaternion x y z w of each body, ``(steps, 7 bodies)``,
+            rounded by ``to_micrometres``.
         """
         data = self._data
         poses = np.empty((len(position), self._model.nbody, 7))
@@ -63,28 +63,28 @@ class Kinematics:
             poses[k, :, :3] = data.xpos
             poses[k, :, 3:] = data.xquat
         parents = self._model.body_parentid[1:]
-        with np.errstate(over="ignore", invalid="ignore"):  # a robot may be lost to sight
+        with np.errstate(over="ignore", invalid="ignore"):  # unobserved or extreme values
             relative = _relative(poses[:, parents], poses[:, 1:])[..., _POSITION_XYZW]
         return to_micrometres(relative).reshape(len(position), 7 * len(parents))
 
 
 def to_micrometres(values: FloatArray) -> FloatArray:
-    """Returns derived numbers rounded to multiples of 2**-20.
+    """Returns numbers rounded to multiples of 2**-20: a micrometre, or a microradian.
 
-    They are for looking at: a micrometre and a microradian are enough for that, and what does not
-    move takes no place in the file.
+    Rounding is for derived numbers, which are only displayed: constant values compress to almost
+    nothing.
     """
-    with np.errstate(over="ignore"):  # a robot may be lost to sight
+    with np.errstate(over="ignore"):  # unobserved or extreme values
         rounded: FloatArray = np.rint(values * 2.0**20) / 2.0**20
     return rounded + 0.0  # 0 is 0, never -0
 
 
-def into_child_frame(velocity: FloatArray, orientation: FloatArray) -> FloatArray:
-    """Returns vectors of the world's frame in the frame of a body.
+def to_body_frame(velocity: FloatArray, orientation: FloatArray) -> FloatArray:
+    """Returns vectors in the frame of a body, as nav_msgs/Odometry requires for velocities.
 
     Args:
-        velocity: ``(..., 3)`` in the world's frame: for nav_msgs/Odometry, which wants it so.
-        orientation: ``(..., 4)`` of the body, w x y z.
+        velocity: Vectors in the world frame, ``(..., 3)``.
+        orientation: Quaternion of the body, ``(..., 4)``, w x y z.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         scalar, axis = orientation[..., :1], -orientation[..., 1:]
@@ -94,7 +94,7 @@ def into_child_frame(velocity: FloatArray, orientation: FloatArray) -> FloatArra
 
 
 def _relative(parents: FloatArray, children: FloatArray) -> FloatArray:
-    """The poses of children in the frames of their parents, each ``(..., 7)``, w x y z last."""
+    """Poses of children in the frames of their parents, ``(..., 7)`` each, w x y z last."""
     back = parents[..., 3:] * (1.0, -1.0, -1.0, -1.0)
-    moved = into_child_frame(children[..., :3] - parents[..., :3], parents[..., 3:])
+    moved = to_body_frame(children[..., :3] - parents[..., :3], parents[..., 3:])
     return np.concatenate([moved, product(back, children[..., 3:])], axis=-1)

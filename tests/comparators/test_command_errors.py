@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from selfmodel.comparators.arithmetic import command_errors, command_spans
+from selfmodel.comparators.command_errors import command_errors, command_spans
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
 from selfmodel.faults.notation import parse
@@ -15,7 +15,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import SIGNALS, Behaviour
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.conftest import random_controllers, random_cpgs
-from tests.helpers.memory import MemoryJournal
+from tests.helpers.memory import in_memory
 
 STEPS = 60
 
@@ -23,7 +23,7 @@ STEPS = 60
 def trial(robot: Robot, truth: str = "intact", number: int = 0) -> Trial:
     controller = random_controllers(robot, number + 1)[number]
     physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
-    return MemoryJournal(robot).record(physical, TrialPlan("t", "after", controller, STEPS, 0))
+    return in_memory(robot)(physical, TrialPlan("t", "after", controller, STEPS, 0))
 
 
 def with_signals(one: Trial, **signals: np.ndarray) -> Trial:
@@ -45,7 +45,7 @@ def of_a_cpg(robot: Robot, truth: str) -> Trial:
     """A trial of a CPG."""
     (driver,) = random_cpgs(robot, 1)
     physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
-    return MemoryJournal(robot).record(physical, TrialPlan("t", "after", driver, STEPS, 0))
+    return in_memory(robot)(physical, TrialPlan("t", "after", driver, STEPS, 0))
 
 
 @pytest.mark.parametrize("truth", ["intact", "sensor:front_left_angle"])
