@@ -30,7 +30,7 @@ EXAMPLE = ROOT / "examples" / "drive_a_robot.py"
 def robot(folder: Path, **failures: float | str) -> Iterator[str]:
     """A robot in another process; gives its port."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "tests.socket_robot", folder / "heard", json.dumps(failures)],
+        [sys.executable, "-m", "tests.helpers.socket_robot", folder / "heard", json.dumps(failures)],
         cwd=ROOT,
         env={**os.environ, "MUJOCO_GL": "disable"},
         stdout=subprocess.PIPE,

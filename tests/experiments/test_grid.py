@@ -53,11 +53,11 @@ def silent(_event: GridBegins | PartEnds) -> None:
 SCRIPT = """
 import sys
 from pathlib import Path
-from selfmodel.grid import run_grid
+from selfmodel.experiments.grid import run_grid
 from tests.experiments.test_grid import jobs, silent, work
 
 if __name__ == "__main__":
-    run_grid(Path(sys.argv[1]), jobs(6, seconds=0.3), work, workers=2, watch=print)
+    run_grid(Path(sys.argv[1]), jobs(6, seconds=0.3), work, workers=2, on_event=print)
 """
 
 

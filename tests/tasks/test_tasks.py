@@ -20,7 +20,7 @@ from dm_env import specs
 from selfmodel import tasks
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.faults.kind import Fault, FaultKind, between, grid
+from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import KINDS
 from selfmodel.robot.anatomy import Anatomy
@@ -107,7 +107,11 @@ def test_a_robot_may_have_a_fault_of_a_kind_of_ones_own():
         embodiment.model.body_mass[1] *= fault.severity
 
     kind = FaultKind(
-        name="lighter", word="lighter", apply=lighter, degrees=between(0.1, 0.9), levels=grid(0.5)
+        name="lighter",
+        keyword="lighter",
+        apply=lighter,
+        severity_bounds=uniform_bounds(0.1, 0.9),
+        levels=uniform_levels(0.5),
     )
     robot = ROBOTS["quadruped"].robot()
     made = parse("lighter=0.5", robot.anatomy, (*KINDS.values(), kind))
