@@ -24,13 +24,20 @@ from tests.helpers.socket_robot import OBSERVED, STOP, TIMESTEP, slow_quadruped
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "drive_a_robot.py"
+SERVER = (sys.executable, "-m", "tests.helpers.socket_robot")
 
 
 @contextmanager
 def robot(folder: Path, **failures: float | str) -> Iterator[str]:
     """A robot in another process; gives its port."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "tests.helpers.socket_robot", folder / "heard", json.dumps(failures)],
+        [
+            sys.executable,
+            "-m",
+            "tests.helpers.socket_robot",
+            folder / "heard",
+            json.dumps(failures),
+        ],
         cwd=ROOT,
         env={**os.environ, "MUJOCO_GL": "disable"},
         stdout=subprocess.PIPE,

@@ -1,4 +1,4 @@
-"""Promises of the two searches: what is fit, what ranks first, what is right, what is refused."""
+"""The diagnostic search: rank of the truth, of diverged models and of ties, and refusals."""
 
 import dataclasses
 from collections.abc import Callable
@@ -10,7 +10,6 @@ from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.controllers.network import Controller
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.errors import InputError
-from selfmodel.experiments.scoring import is_correct
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated_robot import SimulatedRobot
@@ -19,7 +18,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.requests import ClosedLoop
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import Behaviour, forward_displacement
+from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.conftest import exploding, random_controllers
 from tests.helpers.memory import MemoryJournal
@@ -61,31 +60,6 @@ def test_a_diverging_hypothesis_is_infinitely_far_and_a_diverging_gait_is_worst(
     assert ways[0] == -np.inf
     assert np.isfinite(ways[1])
     assert simulator.stats.diverged == 2
-
-
-def test_a_diagnosis_is_correct_if_it_cannot_be_told_from_the_truth(quadruped: Robot):
-    simulator = Simulator(quadruped, 2)
-    deaf = Controller(quadruped.network, np.zeros(quadruped.network.weights))
-    (awake,) = random_controllers(quadruped, 1)
-    truth = parse("neuron:0", quadruped.anatomy)
-
-    asleep = [logged(quadruped, "neuron:0", deaf)]
-    assert is_correct(INTACT, truth, asleep, simulator)  # its neurons do nothing anyway
-    assert not is_correct(INTACT, truth, [*asleep, logged(quadruped, "neuron:0", awake)], simulator)
-    assert is_correct(truth, truth, [logged(quadruped, "neuron:0", awake)], simulator)
-
-
-def test_a_repair_starts_from_the_controllers_it_is_given(quadruped: Robot):
-    settings = dataclasses.replace(SMALL, generations=1)
-    seeds = random_controllers(quadruped, 20, seed=3)
-    simulator = Simulator(quadruped, 2)
-    best = RepairSearch(simulator, settings)(
-        INTACT, seeds, np.random.default_rng(0), lambda _: None
-    )
-    runs = [(INTACT, seed) for seed in seeds]
-    behaviour = simulator.run(runs, settings.steps, ["base_position"]).behaviour
-
-    assert best == seeds[int(np.argmax(forward_displacement(behaviour)))]
 
 
 def test_the_distance_to_several_trials_is_the_sum_of_the_distances(quadruped: Robot):
