@@ -32,7 +32,14 @@ def logged(robot: Robot, truth: str, controller: Controller, steps: int = 300) -
     return MemoryJournal(robot).record(physical, TrialPlan(truth, "after", controller, steps, 0))
 
 
-@pytest.mark.parametrize("truth", ["break:front_left_knee", "jam:back_right_shoulder", "intact"])
+@pytest.mark.parametrize(
+    "truth",
+    [
+        "break:front_left_knee",
+        pytest.param("jam:back_right_shoulder", marks=pytest.mark.search),
+        pytest.param("intact", marks=pytest.mark.search),
+    ],
+)
 def test_the_truth_is_at_distance_zero_and_ranks_first(quadruped: Robot, truth: str):
     trials = [logged(quadruped, truth, c) for c in random_controllers(quadruped, 2)]
     diagnose = DiagnosticSearch(Simulator(quadruped, 2), FORWARD_DISPLACEMENT, Settings())

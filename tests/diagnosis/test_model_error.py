@@ -87,6 +87,7 @@ def diagnosed(robot: Robot, truth: str, *, looks_back: bool) -> Diagnosis:
     return search(after, [], np.random.default_rng(0), lambda _: None)
 
 
+@pytest.mark.search
 @pytest.mark.parametrize("truth", ["intact", "jam:front_left_knee"])
 def test_ground_that_always_was_slippery_is_no_change_nor_part_of_a_rival(
     quadruped: Robot, truth: str

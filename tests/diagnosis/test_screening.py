@@ -28,7 +28,14 @@ def trial(quadruped: Robot) -> Trial:
     return Trial(plan, quadruped.name, run, "nowhere.mcap")
 
 
-@pytest.mark.parametrize("name", ["sensor-series", "gait-pattern", "noisy-transfer"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "gait-pattern",
+        pytest.param("sensor-series", marks=pytest.mark.search),
+        pytest.param("noisy-transfer", marks=pytest.mark.search),
+    ],
+)
 def test_a_comparator_of_whole_trials_screens_by_their_openings(
     name: str, quadruped: Robot, trial: Trial
 ):
@@ -53,6 +60,7 @@ def test_a_comparator_of_whole_trials_screens_by_their_openings(
     assert steps == {"evidence": {300}, "screen": {100}}
 
 
+@pytest.mark.search
 def test_where_the_opening_tells_nothing_the_whole_trial_is_the_screen(
     quadruped: Robot, trial: Trial
 ):

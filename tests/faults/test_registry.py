@@ -99,6 +99,7 @@ def test_a_recovery_of_a_robot_with_nothing_to_strike_is_refused_before_any_tria
     assert list(tmp_path.rglob("*.mcap*")) == []
 
 
+@pytest.mark.search
 def test_a_joint_that_turns_out_to_be_jammed_at_0_is_found_among_angles_trial_after_trial(
     quadruped: Robot,
 ):

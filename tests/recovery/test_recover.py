@@ -33,7 +33,21 @@ from selfmodel.trials.trial import Trial
 from tests.conftest import random_controllers
 from tests.helpers.memory import MemoryJournal
 
+TINY = dataclasses.replace(Settings().scaled(6), generations=2, steps=60)
 SMALL = dataclasses.replace(Settings().scaled(20), generations=5, steps=200)
+BUDGET = TINY
+"""The settings of every recovery here: each test runs with both budgets."""
+
+
+@pytest.fixture(
+    autouse=True,
+    params=[
+        pytest.param(TINY, id="tiny"),
+        pytest.param(SMALL, id="small", marks=pytest.mark.search),
+    ],
+)
+def _budget(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(globals(), "BUDGET", request.param)
 
 
 class CountingSimulator(Simulator):
@@ -88,7 +102,7 @@ def recovery(
         simulator=simulator,
         comparator=FORWARD_DISPLACEMENT,
         journal=MemoryJournal(robot),
-        settings=dataclasses.replace(SMALL, trials=trials),
+        settings=dataclasses.replace(BUDGET, trials=trials),
         seed=seed,
         on_event=events.append,
         gait=gait,
@@ -117,7 +131,9 @@ def test_a_recovery_tells_the_papers_story(robot: Robot):
     diagnoses = [event for event in events if isinstance(event, Diagnosis)]
     assert [diagnosis.trials for diagnosis in diagnoses] == [1, 2, 3, 4]
     assert [diagnosis.best for diagnosis in diagnoses[:3]] == list(outcome.tried[2:])
-    assert outcome.repair_evaluations == outcome.diagnostic_evaluations == 4 * (20 + 4 * 10)
+    children = BUDGET.population // 2
+    evaluations = BUDGET.population + (BUDGET.generations - 1) * children
+    assert outcome.repair_evaluations == outcome.diagnostic_evaluations == 4 * evaluations
     assert outcome.recovered == max(trial.displacement for trial in outcome.trials[2:])
 
 
@@ -176,7 +192,7 @@ def test_the_truth_changes_a_diagnosis_only_through_what_the_robot_did(quadruped
             simulator=Simulator(quadruped, 2),
             comparator=FORWARD_DISPLACEMENT,
             journal=MemoryJournal(quadruped),
-            settings=dataclasses.replace(SMALL, trials=1),
+            settings=dataclasses.replace(BUDGET, trials=1),
             seed=1,
             on_event=events.append,
         )
@@ -214,7 +230,7 @@ def test_every_search_starts_from_what_the_database_holds(
     diagnoses = [event for event in events if isinstance(event, Diagnosis)]
     genomes = [trial.plan.controller.genome.tobytes() for trial in outcome.trials]
     encoded = [
-        [encode(c.hypothesis, SMALL.genes, quadruped.anatomy).tobytes() for c in d.ranked]
+        [encode(c.hypothesis, BUDGET.genes, quadruped.anatomy).tobytes() for c in d.ranked]
         for d in diagnoses
     ]
 
@@ -272,7 +288,7 @@ def test_a_journal_of_files_shows_the_algorithm_no_more_than_its_three_methods(
     truth = parse("break:back_left_knee", quadruped.anatomy)
     outcomes = []
     for name, hidden in (("told", {"after": str(truth)}), ("not-told", {})):
-        journal = open_journal(tmp_path / name, quadruped, SMALL, hidden)
+        journal = open_journal(tmp_path / name, quadruped, BUDGET, hidden)
         outcomes.append(
             recover(
                 healthy=SimulatedRobot(quadruped),
@@ -280,7 +296,7 @@ def test_a_journal_of_files_shows_the_algorithm_no_more_than_its_three_methods(
                 simulator=Simulator(quadruped, 2),
                 comparator=FORWARD_DISPLACEMENT,
                 journal=SealedJournal(journal),
-                settings=dataclasses.replace(SMALL, trials=1),
+                settings=dataclasses.replace(BUDGET, trials=1),
                 seed=1,
                 on_event=lambda _: None,
             )

@@ -56,6 +56,7 @@ def test_the_factors_go_from_nominal_towards_the_truth():
     assert np.linalg.norm(found - true) < 0.9 * np.linalg.norm(true)
 
 
+@pytest.mark.search
 def test_with_a_weak_prior_the_factors_of_a_robot_without_noise_are_found(
     monkeypatch: pytest.MonkeyPatch,
 ):
@@ -93,6 +94,7 @@ def test_a_model_that_is_exact_is_left_as_it_is_to_the_bit(robot: Robot):
     assert set(found.deviations) == {PRIOR}
 
 
+@pytest.mark.search
 def test_the_number_of_threads_does_not_matter():
     again = calibrate(QUADRUPED, trials(with_parameters(QUADRUPED, TRUE)), threads=3)
 
@@ -101,6 +103,7 @@ def test_the_number_of_threads_does_not_matter():
     assert again.deviations.tobytes() == fitted().deviations.tobytes()
 
 
+@pytest.mark.search
 def test_under_noise_factors_stay_near_nominal_and_within_bounds():
     gap = draw_gap(QUADRUPED, 0.1, np.random.default_rng(1))
     physical = SimulatedRobot(QUADRUPED, gap=gap)
