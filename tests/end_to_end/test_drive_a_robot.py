@@ -16,6 +16,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from selfmodel.logs.verify import verify
 from selfmodel.tasks.walking import environment, motion_capture
@@ -104,6 +105,7 @@ def observed(commands: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
         yield observe(env.step(targets).observation)
 
 
+@pytest.mark.process
 def test_a_dropped_connection_stops_the_robot_and_leaves_a_whole_log(tmp_path: Path):
     with robot(tmp_path, **{"70": "hang up"}) as port:
         _, errors = (process := driver(tmp_path, port)).communicate(timeout=120)
@@ -122,6 +124,7 @@ def test_a_dropped_connection_stops_the_robot_and_leaves_a_whole_log(tmp_path: P
     assert told.stdout == f"ok: trial.mcap: 70 steps, stopped ({log.reason})\n"
 
 
+@pytest.mark.process
 def test_the_operator_is_told_that_the_robot_could_not_be_stopped(tmp_path: Path):
     with robot(tmp_path, **{"40": "die"}) as port:
         _, errors = (process := driver(tmp_path, port)).communicate(timeout=120)
@@ -135,6 +138,7 @@ def test_the_operator_is_told_that_the_robot_could_not_be_stopped(tmp_path: Path
     )
 
 
+@pytest.mark.process
 def test_a_robot_that_is_not_there_is_said_so_and_can_be_tried_again(tmp_path: Path):
     for _ in range(2):
         _, errors = (process := driver(tmp_path, "1")).communicate(timeout=120)  # nobody is there
@@ -176,6 +180,7 @@ def test_the_driver_that_the_docs_show_is_the_example_s_and_has_forty_lines():
     assert f"```python\n{shown}\n```" in docs
 
 
+@pytest.mark.process
 def test_the_trial_of_the_docs_runs(tmp_path: Path):
     docs = (ROOT / "docs" / "real-robots.md").read_text(encoding="utf-8")
     (block,) = re.findall(r"```python\n(from pathlib.*?)```", docs, flags=re.DOTALL)

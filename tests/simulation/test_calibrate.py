@@ -115,6 +115,7 @@ def test_under_noise_factors_stay_near_nominal_and_within_bounds():
     assert ((found.deviations > 0) & (found.deviations <= PRIOR)).all()
 
 
+@pytest.mark.search
 def test_what_the_trials_do_not_show_is_as_uncertain_as_before_them_however_many_they_are():
     """A robot that floats shows nothing of the ground's friction."""
     mjcf = QUADRUPED.mjcf.replace("<option ", '<option gravity="0 0 0" ', 1)
@@ -135,6 +136,7 @@ def test_what_the_trials_show_is_less_uncertain_than_before_them():
     assert (fitted().deviations > 0.2 * PRIOR).all()
 
 
+@pytest.mark.search
 def test_a_robot_that_nobody_sees_is_calibrated_from_what_it_has_on_board():
     real = with_parameters(QUADRUPED, TRUE)
     seen = [trial(real, SimulatedRobot(real), 7)]
@@ -158,6 +160,7 @@ def test_an_exact_model_of_a_robot_that_nobody_sees_is_left_as_it_is(robot: Robo
     assert set(found.deviations) == {PRIOR}
 
 
+@pytest.mark.search
 def test_trials_in_which_the_base_was_seen_and_others_are_fitted_to_together():
     real = with_parameters(QUADRUPED, TRUE)
     one, other = trials(real)

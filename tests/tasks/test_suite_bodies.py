@@ -17,7 +17,12 @@ from selfmodel.trials.behaviour import SIGNALS, Behaviour, collect
 from tests.conftest import random_controllers
 
 STEPS = 60
-FIRST = [(domain, tasks[0]) for domain, tasks in suite_bodies.DOMAINS.items()]
+FIRST = [
+    pytest.param(
+        *(domain, tasks[0]), marks=() if domain in ("walker", "hopper") else pytest.mark.bodies
+    )
+    for domain, tasks in suite_bodies.DOMAINS.items()
+]
 TOUCHING = ("dog",)
 """Domains whose reward is also of contact forces, which are those of another physics step."""
 

@@ -294,6 +294,7 @@ os._exit(0)  # the order in which OpenGL's parts go is not ours
 """
 
 
+@pytest.mark.opengl
 @draws
 @every_task
 def test_the_viewer_shows_a_damaged_robot_in_a_window_of_ours(domain: str, task: str):
