@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.onboard import without_base
-from selfmodel.controllers.driver import Evolved
+from selfmodel.controllers.controller import Controller
 from selfmodel.experiments.ablation.bank import gait
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.physical.reality_gap import Gap, draw_gap, perturbed
@@ -87,7 +87,9 @@ def _peer() -> dict[str, Way]:
     return {"mujoco.sysid": lambda robot, trials: (sysid_parameters(robot, trials), [])}
 
 
-def _compare(robot: Robot, gaits: Sequence[Evolved], gap: Gap, ways: dict[str, Way]) -> list[Facts]:
+def _compare(
+    robot: Robot, gaits: Sequence[Controller], gap: Gap, ways: dict[str, Way]
+) -> list[Facts]:
     """A row a way, one of the nominal model, one of the physical robot's own model."""
     noisy = SimulatedRobot(robot, gap=gap)
     trials = [_trial(robot, noisy, gaits[number]) for number in range(SEEN)]
@@ -138,13 +140,13 @@ def _against_truth(robot: Robot, gap: Gap, found: Parameters, deviations: Sequen
     }
 
 
-def _trial(robot: Robot, physical: SimulatedRobot, driver: Evolved) -> Trial:
+def _trial(robot: Robot, physical: SimulatedRobot, driver: Controller) -> Trial:
     steps = Settings().steps
     behaviour = collect(robot.anatomy.names, physical.run(driver, steps))
     return Trial(TrialPlan("trial", "before", driver, steps, 0), robot.name, behaviour, "a trial")
 
 
-def _gait(robot: Robot, number: int, bank: Path | None) -> Evolved:
+def _gait(robot: Robot, number: int, bank: Path | None) -> Controller:
     if bank is not None:
         return gait(bank, robot.name, number)
     repair = RepairSearch(Simulator(robot, threads=1), Settings())

@@ -14,7 +14,7 @@ import numpy as np
 
 from benchmarks.results import Facts
 from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT
-from selfmodel.controllers.driver import Evolved
+from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.comparator import Comparator, Piecewise
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.evidence import simulate
@@ -126,7 +126,7 @@ def _known(name: str, threads: int, settings: Settings) -> Known:
     reality = draw_reality(robot, seed=0, level=GAP, structure=False)
     gaits = [gait(BANK, name, number) for number in range(HEALTHY_TRIALS)]
 
-    def trial(stage: Stage, truth: str, number: int, controller: Evolved) -> Trial:
+    def trial(stage: Stage, truth: str, number: int, controller: Controller) -> Trial:
         plan = TrialPlan(f"{number:02d}-{stage}", stage, controller, settings.steps, 0)
         physical = reality.robot(robot, parse(truth, robot.anatomy), stream=number)
         behaviour = collect(robot.anatomy.names, physical.run(controller, plan.steps))

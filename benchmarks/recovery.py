@@ -16,7 +16,7 @@ from statistics import median
 from time import perf_counter
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT
-from selfmodel.controllers.driver import Driver
+from selfmodel.controllers.command_source import CommandSource
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.faults.notation import parse
 from selfmodel.logs.journal import open_journal
@@ -40,7 +40,7 @@ class TimedRobot:
         self._robot = robot
         self.seconds = 0.0
 
-    def run(self, controller: Driver, steps: int) -> Iterator[Sample]:
+    def run(self, controller: CommandSource, steps: int) -> Iterator[Sample]:
         """Runs a controller."""
         samples = self._robot.run(controller, steps)
         while True:

@@ -9,7 +9,7 @@ import tempfile
 from pathlib import Path
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT
-from selfmodel.controllers.driver import Evolved
+from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
 from selfmodel.faults.registry import PAPER_KINDS
@@ -55,7 +55,7 @@ def single_faults(robot: Robot) -> list[Hypothesis]:
     ]
 
 
-def recorded(folder: Path, robot: Robot, truth: Hypothesis, gait: Evolved) -> list[TrialLog]:
+def recorded(folder: Path, robot: Robot, truth: Hypothesis, gait: Controller) -> list[TrialLog]:
     """Returns one trial as simulated, as imported, and as imported without its controller."""
     steps = SETTINGS.steps
     plan = TrialPlan("trial", "single", gait, steps, SEED)

@@ -10,9 +10,10 @@ from mujoco import rollout
 
 from benchmarks.results import Facts
 from selfmodel import tasks
-from selfmodel.controllers.driver import drive
-from selfmodel.controllers.network import Controller, draw_weights
+from selfmodel.controllers.command_source import make_batch
+from selfmodel.controllers.controller import Controller, draw_genomes
 from selfmodel.faults.hypothesis import INTACT
+from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Run, Simulator
 
@@ -25,8 +26,9 @@ LOOPED = 5
 
 def runs(robot: Robot, count: int) -> list[Run]:
     """Returns runs of an intact robot with random controllers."""
-    genomes = draw_weights(np.random.default_rng(0), (count, robot.network.weights))
-    return [(INTACT, Controller(robot.network, genome)) for genome in genomes]
+    network = network_for(robot)
+    genomes = draw_genomes(np.random.default_rng(0), (count, network.weights))
+    return [(INTACT, Controller(network, genome)) for genome in genomes]
 
 
 def closed_loop_over_rollout(robot: Robot, count: int, steps: int, threads: int) -> Facts:
@@ -64,8 +66,7 @@ def closed_loop_over_environment(robot: Robot, count: int, steps: int, threads: 
 
     def loop() -> None:
         for _, controller in batch[:LOOPED]:
-            neurons = np.ones((1, robot.network.hidden))
-            alone = drive([controller], neurons, len(robot.anatomy.sensors))
+            alone = make_batch([controller], [frozenset()], len(robot.anatomy.sensors))
             step = environment.reset()
             for _ in range(steps - 1):
                 alone.readings[:] = step.observation["sensors"]

@@ -10,11 +10,12 @@ import numpy as np
 from mcap.reader import make_reader
 from mcap.writer import Writer
 
-from selfmodel.controllers.network import Controller, draw_weights
+from selfmodel.controllers.controller import Controller, draw_genomes
 from selfmodel.logs import read_log
 from selfmodel.logs.contents import read_contents
 from selfmodel.logs.writer import TrialWriter
 from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Sample
@@ -31,8 +32,8 @@ def measure(robot: Robot) -> dict[str, float]:
     looked at, and no message decoded.
     """
     settings = Settings()
-    genome = draw_weights(np.random.default_rng(0), (robot.network.weights,))
-    controller = Controller(robot.network, genome)
+    network = network_for(robot)
+    controller = Controller(network, draw_genomes(np.random.default_rng(0), (network.weights,)))
     samples = list(SimulatedRobot(robot).run(controller, settings.steps))
     plan = TrialPlan("trial", "single", controller, settings.steps, 0)
     duration = settings.steps * robot.control_timestep

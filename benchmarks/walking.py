@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from selfmodel.controllers.driver import Evolved, drive
+from selfmodel.controllers.command_source import make_batch
+from selfmodel.controllers.controller import Controller
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.robot.robot import Robot
@@ -34,13 +35,13 @@ class Walk:
         return self.lowest > 0 and self.highest < 2 and self.deepest <= 0.01
 
 
-def walk(robot: Robot, controller: Evolved, steps: int) -> Walk:
+def walk(robot: Robot, controller: Controller, steps: int) -> Walk:
     """Returns how a controller makes an intact robot walk."""
     embodiment = build(robot, INTACT)
     model, data = embodiment.model, mujoco.MjData(embodiment.model)
     mujoco.mj_forward(model, data)
     senses = SensorReader(model, robot.anatomy, [embodiment])
-    brain = drive([controller], embodiment.neurons[np.newaxis], len(robot.anatomy.sensors))
+    brain = make_batch([controller], [embodiment.silent_neurons], len(robot.anatomy.sensors))
     start, heights, deepest = data.qpos[0], [data.qpos[2]], 0.0
     for step in range(steps):
         senses.read(data.sensordata[np.newaxis], data.qpos[np.newaxis], brain.readings)

@@ -1,51 +1,50 @@
-"""The controller's own arithmetic: what it commanded against what it makes of its input.
+"""Command errors of a trial: logged commands compared with those that its controller computes.
 
-No physics is needed to judge it, so a difference means something is wrong with the controller.
+The comparison needs no physics, so a nonzero error is a fault of the controller itself.
 """
 
 import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.command_range import TARGET_RANGE
-from selfmodel.controllers.driver import drive
+from selfmodel.controllers.command_source import make_batch
 from selfmodel.controllers.playback import Playback
 from selfmodel.trials.trial import Trial
 
 
 def command_errors(trial: Trial) -> FloatArray:
-    """Returns by how much each command differs from what the controller gives.
+    """Returns the difference between the logged commands and those of the controller.
 
     Args:
         trial: A logged trial.
 
     Returns:
-        ``(steps, motors)`` in each motor's unit, exactly 0 where the robot did as its controller
-        says. From the first reading that was not observed on, nothing is known of the controller's
-        state: NaN. All 0 where no controller is known.
+        ``(steps, motors)`` in each motor's unit, exactly 0 where the robot executed its controller.
+        NaN from the first reading that was not observed, because the controller's state is unknown
+        from there. All 0 for a playback, whose controller is unknown.
     """
-    behaviour, driver = trial.behaviour, trial.plan.controller
+    behaviour, source = trial.behaviour, trial.plan.controller
     commands, readings = behaviour["commands"], behaviour["sensors"]
-    if isinstance(driver, Playback):
+    if isinstance(source, Playback):
         return np.zeros_like(commands)
-    whole = np.ones((1, 0))  # no neuron of it is silent
-    brain = drive([driver], whole, readings.shape[1])
+    batch = make_batch([source], [frozenset()], readings.shape[1])
     errors = np.full_like(commands, np.nan)
-    given = np.empty((1, commands.shape[1]))
+    expected = np.empty((1, commands.shape[1]))
     for step in range(len(commands)):
         if not np.isfinite(readings[step]).all():
             break
-        brain.readings[0] = readings[step]
-        brain.step(given)
-        errors[step] = commands[step] - given[0]
+        batch.readings[0] = readings[step]
+        batch.step(expected)
+        errors[step] = commands[step] - expected[0]
     return errors
 
 
 def command_spans(trial: Trial) -> FloatArray:
-    """Returns how wide each motor's command range is beside the paper's, ``(motors,)``.
+    """Returns the width of each motor's command range relative to the paper's, ``(motors,)``.
 
-    All 1 where no controller is known.
+    All 1 for a playback, whose command ranges are unknown.
     """
-    driver = trial.plan.controller
-    if isinstance(driver, Playback):
-        return np.ones(len(driver.motors))
-    return np.array([half / TARGET_RANGE for _, half in driver.design.ranges])
+    source = trial.plan.controller
+    if isinstance(source, Playback):
+        return np.ones(len(source.motors))
+    return np.array([half / TARGET_RANGE for _, half in source.design.ranges])

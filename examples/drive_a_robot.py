@@ -13,11 +13,12 @@ from pathlib import Path
 import dm_env
 import numpy as np
 
-from selfmodel.controllers.network import Controller, draw_weights
-from selfmodel.errors import InputError, TrialError, in_words
+from selfmodel.controllers.controller import Controller, draw_genomes
+from selfmodel.errors import InputError, TrialError, describe
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.environment_robot import EnvironmentRobot
 from selfmodel.physical.safety_limits import joint_limits, tilt_limit
+from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.tasks import ROBOTS
@@ -97,8 +98,9 @@ class SocketRobot(dm_env.Environment):
 def main(host: str, port: int, path: Path) -> None:
     """Runs five seconds of a random controller, and logs them."""
     robot = dataclasses.replace(ROBOTS["quadruped"].robot(), control_timestep=0.02)
-    weights = draw_weights(np.random.default_rng(0), (robot.network.weights,))
-    plan = TrialPlan(path.stem, "single", Controller(robot.network, weights), steps=250, seed=0)
+    network = network_for(robot)
+    genome = draw_genomes(np.random.default_rng(0), (network.weights,))
+    plan = TrialPlan(path.stem, "single", Controller(network, genome), steps=250, seed=0)
     driver = SocketRobot((host, port), robot)
     physical = EnvironmentRobot(
         driver, robot, stop=driver.stop, limits=[joint_limits(robot, 0.2), tilt_limit(1.0)]
@@ -107,10 +109,10 @@ def main(host: str, port: int, path: Path) -> None:
     try:
         write_trial(path, robot, plan, samples, timed=True, settings=Settings())
     except InputError as error:
-        sys.exit(in_words(error))
+        sys.exit(describe(error))
     except TrialError as error:
         kept = f"what was observed until then is in {path}" if path.exists() else "there is no log"
-        sys.exit(f"{in_words(error)}; {kept}")
+        sys.exit(f"{describe(error)}; {kept}")
     print(f"{plan.steps} steps: {path}")
 
 

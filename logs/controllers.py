@@ -1,9 +1,9 @@
-"""Controllers as ``.npz`` files: numpy arrays and nothing that could run.
+"""Controller files: ``.npz`` archives of numpy arrays, without pickled objects.
 
-The arrays: ``kind``, ``sensors`` and ``motors`` (names) and ``genome`` (float64); of the kind
-"network" also ``hidden`` (a count), of the kind "cpg" also ``timestep`` (s). Where motors have
-other command ranges than the paper's, also ``ranges`` (float64, by motor the centre and half the
-range).
+The arrays of every file: ``kind`` (the name of the design), ``sensors`` and ``motors`` (names), the
+design's own arrays (``KINDS``: ``hidden``, a count, of a network; ``timestep``, s, of a CPG) and
+``genome`` (float64). Controllers whose command ranges differ from the paper's also have ``ranges``
+(float64, centre and half width per motor).
 """
 
 import io
@@ -11,7 +11,8 @@ import struct
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -19,45 +20,88 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from selfmodel.controllers.command_range import checked_ranges
+from selfmodel.controllers.command_range import Ranges, checked_ranges
+from selfmodel.controllers.controller import Controller, Design
 from selfmodel.controllers.cpg import Cpg
-from selfmodel.controllers.driver import Design, Evolved
 from selfmodel.controllers.network import Network
 from selfmodel.errors import InputError
 from selfmodel.logs.errors import LogWriteError
 from selfmodel.logs.files import read_bounded
 
 LARGEST = 2**20
-"""Bytes that a controller may have: the paper's have under 3,000."""
+"""Largest size of a controller file, bytes; those of the paper's robots are under 3,000."""
 
-_TYPES: Mapping[str, tuple[str, int]] = MappingProxyType(
+Arrays = Mapping[str, NDArray[Any]]
+"""Arrays of a controller file, by name."""
+
+_COMMON: Mapping[str, tuple[str, int]] = MappingProxyType(
+    {"kind": ("U", 0), "sensors": ("U", 1), "motors": ("U", 1), "genome": ("f", 1)}
+)
+"""Type code and rank of the arrays of every controller file."""
+
+_RANGES = ("f", 2)
+"""Type code and rank of the optional array ``ranges``."""
+
+
+@dataclass(frozen=True)
+class KindFormat:
+    """Format of the arrays of one kind of design.
+
+    Attributes:
+        arrays: Type code and rank of the design's own arrays, by name, in the order of the file.
+        write: Function from a design of the kind to its own arrays.
+        read: Function from sensors, motors, command ranges and the arrays of a file to the design.
+    """
+
+    arrays: Mapping[str, tuple[str, int]]
+    write: Callable[[Any], Arrays]
+    read: Callable[[tuple[str, ...], tuple[str, ...], Ranges, Arrays], Design]
+
+    @property
+    def types(self) -> dict[str, tuple[str, int]]:
+        """Type code and rank of all required arrays, by name, in the order of the file."""
+        return {
+            **{name: _COMMON[name] for name in ("kind", "sensors", "motors")},
+            **self.arrays,
+            "genome": _COMMON["genome"],
+        }
+
+
+def _write_network(design: Network) -> Arrays:
+    return {"hidden": np.array(design.hidden, dtype=np.int64)}
+
+
+def _read_network(
+    sensors: tuple[str, ...], motors: tuple[str, ...], ranges: Ranges, arrays: Arrays
+) -> Network:
+    return Network(sensors, motors, int(arrays["hidden"]), ranges)
+
+
+def _write_cpg(design: Cpg) -> Arrays:
+    return {"timestep": np.array(design.timestep)}
+
+
+def _read_cpg(
+    sensors: tuple[str, ...], motors: tuple[str, ...], ranges: Ranges, arrays: Arrays
+) -> Cpg:
+    return Cpg(sensors, motors, float(arrays["timestep"]), ranges)
+
+
+KINDS: Mapping[str, KindFormat] = MappingProxyType(
     {
-        "kind": ("U", 0),
-        "sensors": ("U", 1),
-        "motors": ("U", 1),
-        "hidden": ("i", 0),
-        "timestep": ("f", 0),
-        "genome": ("f", 1),
-        "ranges": ("f", 2),
+        Network.name: KindFormat({"hidden": ("i", 0)}, _write_network, _read_network),
+        Cpg.name: KindFormat({"timestep": ("f", 0)}, _write_cpg, _read_cpg),
     }
 )
-"""Of every array the type and the rank."""
-
-_ARRAYS: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {
-        "network": ("kind", "sensors", "motors", "hidden", "genome"),
-        "cpg": ("kind", "sensors", "motors", "timestep", "genome"),
-    }
-)
-"""Of each kind the arrays, in their order; ``ranges`` may follow."""
+"""Format of each kind of design, by its name."""
 
 
-def save_controller(path: Path, controller: Evolved) -> None:
-    """Writes a controller to a file that does not exist yet.
+def save_controller(path: Path, controller: Controller) -> None:
+    """Writes a controller to a new file.
 
     Raises:
         InputError: The file exists.
-        LogWriteError: It could not be written.
+        LogWriteError: The file could not be written.
     """
     try:
         with path.open("xb") as file:
@@ -68,66 +112,60 @@ def save_controller(path: Path, controller: Evolved) -> None:
         raise LogWriteError(path, error) from error
 
 
-def load_controller(path: Path) -> Evolved:
+def load_controller(path: Path) -> Controller:
     """Returns the controller in a file.
 
     Raises:
-        InputError: There is none; the message names the file.
+        InputError: The file contains no controller; the message names the file.
     """
     return parse_controller(read_bounded(path, "a controller file", LARGEST), str(path))
 
 
-def controller_bytes(controller: Evolved) -> bytes:
+def controller_bytes(controller: Controller) -> bytes:
     """Returns a controller as the bytes of an ``.npz`` file; equal controllers, equal bytes."""
     design = controller.design
-    own: dict[str, NDArray[Any]] = (
-        {"kind": np.array("network"), "hidden": np.array(design.hidden, dtype=np.int64)}
-        if isinstance(design, Network)
-        else {"kind": np.array("cpg"), "timestep": np.array(design.timestep)}
-    )
-    arrays = {
+    kind = KINDS[design.name]
+    arrays: dict[str, NDArray[Any]] = {
+        "kind": np.array(design.name),
         "sensors": np.array(design.sensors, dtype=np.str_),
         "motors": np.array(design.motors, dtype=np.str_),
+        **kind.write(design),
         "genome": controller.genome,
-        **own,
     }
-    ordered = {name: arrays[name] for name in _ARRAYS[str(own["kind"])]}
     if design.ranges != checked_ranges(design.motors, ()):
-        ordered["ranges"] = np.array(design.ranges)
+        arrays["ranges"] = np.array(design.ranges)
     file = io.BytesIO()
-    np.savez(file, allow_pickle=False, **ordered)
+    np.savez(file, allow_pickle=False, **arrays)
     return file.getvalue()
 
 
-def parse_controller(data: bytes, source: str) -> Evolved:
-    """Returns the controller that ``controller_bytes`` was given.
+def parse_controller(data: bytes, source: str) -> Controller:
+    """Returns the controller of bytes that ``controller_bytes`` made.
 
     Args:
         data: The bytes of an ``.npz`` file.
-        source: Where they come from, for the error.
+        source: Name of the file, for the error message.
 
     Raises:
-        InputError: They are not a controller.
+        InputError: The bytes are not a controller file.
     """
     try:
         arrays = _arrays(data)
-        return _design(arrays).controller(arrays["genome"])
+        return Controller(_design(arrays), arrays["genome"])
     except _FAILURES as failure:
         raise InputError(
             f"{source}: expected a controller (.npz with the arrays "
-            f"{', '.join(_ARRAYS['network'])}, or those of a CPG): "
+            f"{', '.join(KINDS['network'].types)}, or those of a CPG): "
             f"{failure or type(failure).__name__}"
         ) from failure
 
 
-def _design(arrays: Mapping[str, NDArray[Any]]) -> Design:
+def _design(arrays: Arrays) -> Design:
     sensors, motors = (tuple(arrays[name].tolist()) for name in ("sensors", "motors"))
     ranges = tuple(
         (float(centre), float(half)) for centre, half in arrays.get("ranges", np.empty((0, 2)))
     )
-    if "hidden" in arrays:
-        return Network(sensors, motors, int(arrays["hidden"]), ranges)
-    return Cpg(sensors, motors, float(arrays["timestep"]), ranges)
+    return KINDS[str(arrays["kind"])].read(sensors, motors, ranges, arrays)
 
 
 _FAILURES = (
@@ -144,7 +182,7 @@ _FAILURES = (
     zipfile.BadZipFile,
     zlib.error,
 )
-"""Everything that zipfile and numpy raise over bytes that are not what they expect."""
+"""Every exception of zipfile and numpy for malformed bytes."""
 
 
 def _arrays(data: bytes) -> dict[str, NDArray[Any]]:
@@ -155,16 +193,16 @@ def _arrays(data: bytes) -> dict[str, NDArray[Any]]:
         if sum(info.file_size for info in members.values()) > LARGEST:
             raise ValueError(f"it unpacks to more than {LARGEST} bytes")
         kind = _kind(archive) if "kind.npy" in members else "network"
-        expected = _ARRAYS[kind] + (("ranges",) if "ranges.npy" in members else ())
+        expected = KINDS[kind].types | ({"ranges": _RANGES} if "ranges.npy" in members else {})
         names = {f"{name}.npy" for name in expected}
         if set(members) != names or len(archive.infolist()) != len(names):
             raise ValueError(f"it holds {', '.join(sorted(members)) or 'nothing'}")
         found = {name: _array(archive.read(f"{name}.npy")) for name in expected}
     types = {name: array.dtype.kind for name, array in found.items()}
     ranks = {name: array.ndim for name, array in found.items()}
-    if types != {name: _TYPES[name][0] for name in expected}:
+    if types != {name: type_code for name, (type_code, _) in expected.items()}:
         raise ValueError(f"its arrays have the types {types}")
-    if ranks != {name: _TYPES[name][1] for name in expected}:
+    if ranks != {name: rank for name, (_, rank) in expected.items()}:
         raise ValueError(f"its arrays have the ranks {ranks}")
     for name, array in found.items():
         if array.dtype.kind == "f" and array.dtype != np.float64:
@@ -174,13 +212,13 @@ def _arrays(data: bytes) -> dict[str, NDArray[Any]]:
 
 def _kind(archive: zipfile.ZipFile) -> str:
     kind = str(_array(archive.read("kind.npy")))
-    if kind not in _ARRAYS:
-        raise ValueError(f"expected the kind {' or '.join(map(repr, _ARRAYS))}, got {kind!r}")
+    if kind not in KINDS:
+        raise ValueError(f"expected the kind {' or '.join(map(repr, KINDS))}, got {kind!r}")
     return kind
 
 
 def _array(data: bytes) -> NDArray[Any]:
-    """Reads an ``.npy``; its header is held against its size before anything is allocated."""
+    """Reads an ``.npy``; the header is checked against the size before memory is allocated."""
     file = io.BytesIO(data)
     if np.lib.format.read_magic(file) != (1, 0):
         raise ValueError("it has arrays of another version than 1.0")

@@ -6,9 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from selfmodel.controllers.cpg import Oscillators
-from selfmodel.controllers.driver import Driver
-from selfmodel.controllers.network import Controller
 from selfmodel.logs.contents import Contents, read_contents
 from selfmodel.logs.reader import TrialLog, interpret
 from selfmodel.logs.records import HIDDEN, IMPORT, SALVAGE
@@ -75,17 +72,9 @@ def read_info(path: Path) -> Info:
             signal: float(np.mean(~np.isnan(behaviour[signal]))) if behaviour[signal].size else 1.0
             for signal in SIGNALS
         },
-        driver=_in_words(driver),
+        driver=driver.summary,
         source=contents.metadata.get(SALVAGE) or contents.metadata.get(IMPORT) or {},
     )
-
-
-def _in_words(driver: Driver) -> str:
-    if isinstance(driver, Controller):
-        return f"its controller, a network of {driver.network.hidden} hidden neurons"
-    if isinstance(driver, Oscillators):
-        return f"its controller, oscillators of {driver.frequency:.2f} Hz"
-    return "other software; its commands are played back"
 
 
 def hides_truth(info: Info) -> bool:

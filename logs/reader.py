@@ -7,8 +7,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from selfmodel.controllers.driver import Driver, Evolved
-from selfmodel.controllers.playback import played_back
+from selfmodel.controllers.controller import Controller
+from selfmodel.controllers.playback import Playback, played_back
 from selfmodel.errors import InputError
 from selfmodel.logs.contents import Contents, read_contents
 from selfmodel.logs.controllers import parse_controller
@@ -245,7 +245,7 @@ def read_attachment(path: Path, contents: Contents, name: str, expected: str = "
     return data
 
 
-def read_controller(path: Path, contents: Contents, record: TrialRecord) -> Evolved | None:
+def read_controller(path: Path, contents: Contents, record: TrialRecord) -> Controller | None:
     """Returns what drove the robot; None if that is not known.
 
     Raises:
@@ -288,7 +288,7 @@ def _result(path: Path, contents: Contents, record: TrialRecord) -> Result:
     return result
 
 
-def _playback(path: Path, behaviour: Behaviour) -> Driver:
+def _playback(path: Path, behaviour: Behaviour) -> Playback:
     try:
         return played_back(behaviour.names.motors, behaviour["commands"])
     except ValueError as error:

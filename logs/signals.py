@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from selfmodel.arrays import FloatArray, frozen
-from selfmodel.controllers.driver import Evolved
+from selfmodel.controllers.controller import Controller
 from selfmodel.logs.cdr import names_of
 from selfmodel.logs.contents import Contents, Messages
 from selfmodel.logs.errors import CorruptError, SchemaMismatchError
@@ -15,7 +15,7 @@ from selfmodel.trials.behaviour import SIGNALS, Behaviour, Names, Signal
 
 
 def read_behaviour(
-    path: Path, contents: Contents, record: TrialRecord, steps: int, controller: Evolved | None
+    path: Path, contents: Contents, record: TrialRecord, steps: int, controller: Controller | None
 ) -> Behaviour:
     """Returns what the messages of a log say.
 

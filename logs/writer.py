@@ -7,9 +7,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from selfmodel.controllers.driver import Driver
+from selfmodel.controllers.command_source import CommandSource
 from selfmodel.controllers.playback import Playback
-from selfmodel.errors import InputError, in_words
+from selfmodel.errors import InputError, describe
 from selfmodel.logs.atomic import part_of
 from selfmodel.logs.encoder import Encoder, empty_rows, parts_of
 from selfmodel.logs.errors import IncompleteError, salvage_it
@@ -239,12 +239,12 @@ class TrialWriter:
 
 
 def _in_words(error: BaseException) -> str:
-    text = " ".join(f"{type(error).__name__}: {in_words(error)}".split()).removesuffix(":")
+    text = " ".join(f"{type(error).__name__}: {describe(error)}".split()).removesuffix(":")
     # A file's name that is no text comes with surrogates, which a log cannot hold.
     return text.encode("utf-8", "backslashreplace").decode()
 
 
-def _check_ends(robot: str, names: Names, driver: Driver) -> None:
+def _check_ends(robot: str, names: Names, driver: CommandSource) -> None:
     if isinstance(driver, Playback):
         sensors, motors = names.sensors, driver.motors
     else:

@@ -9,14 +9,14 @@ IndexArray = NDArray[np.intp]
 
 
 def frozen(values: FloatArray) -> FloatArray:
-    """Returns ``values`` as a C-contiguous float64 copy that refuses to be written."""
+    """Returns ``values`` as a C-contiguous float64 read-only copy."""
     copy = np.array(values, dtype=np.float64, order="C")
     copy.flags.writeable = False
     return copy
 
 
 def columns(indices: list[int]) -> slice | list[int]:
-    """Returns what selects these columns of an array: a slice, which copies nothing, if it can."""
+    """Returns an index of array columns: a slice where they are contiguous, to avoid a copy."""
     first = indices[0] if indices else 0
     if indices == list(range(first, first + len(indices))):
         return slice(first, first + len(indices))

@@ -1,36 +1,36 @@
-"""The errors that a user meets, and the sentence for a name nobody knows."""
+"""The errors of selfmodel, and the message for an unknown name."""
 
 import difflib
 from collections.abc import Iterable
 
 
 class InputError(ValueError):
-    """What a user gave cannot be used.
+    """Invalid input of the user.
 
-    The message is one sentence that says what was expected, what came, and how to mend it; the
-    command line prints it as it is and exits with status 2.
+    The message is one sentence: the expected input, the actual input, and the remedy. The command
+    line prints the message and exits with status 2.
     """
 
 
 class WorkError(RuntimeError):
-    """The work could not be done, through no fault of what the user gave."""
+    """Failed work, although the input was valid."""
 
 
 class TrialError(WorkError):
-    """A physical robot could not finish a trial."""
+    """A trial that a physical robot could not finish."""
 
 
-def in_words(error: BaseException) -> str:
-    """Returns what an error says, its notes too: that a robot was not stopped is only in a note."""
+def describe(error: BaseException) -> str:
+    """Returns the message of an error with its notes, such as that a robot was not stopped."""
     return "; ".join(filter(None, (str(error), *getattr(error, "__notes__", ()))))
 
 
 def unknown_name(what: str, name: str, known: Iterable[str]) -> InputError:
-    """Returns the error for a name that is none of ``known``, with the nearest of them.
+    """Returns the error for an unknown name; its message lists the closest known names.
 
     Args:
-        what: What the name should have named, such as ``"robot"``.
-        name: What came.
+        what: The kind of object that was named, such as ``"robot"``.
+        name: The unknown name.
         known: Every valid name.
     """
     names = [str(item) for item in known]

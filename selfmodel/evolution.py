@@ -1,4 +1,4 @@
-"""The paper's evolutionary algorithm, as ask / tell / stop; both EAs are this one."""
+"""The generational EA of the paper, with an ask / tell / stop interface."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -15,14 +15,14 @@ Draw = Callable[[np.random.Generator, tuple[int, ...]], FloatArray]
 
 @dataclass(frozen=True)
 class Generation:
-    """How far a search has come.
+    """Progress of a search.
 
     Attributes:
-        number: Generations evaluated.
-        total: Generations there will be.
+        number: Generations evaluated so far.
+        total: Generations of the whole search.
         best: Highest fitness so far.
         evaluations: Genomes evaluated so far.
-        seconds: Since the search began.
+        seconds: Wall time since the start of the search.
     """
 
     number: int
@@ -33,22 +33,23 @@ class Generation:
 
 
 GenerationCallback = Callable[[Generation], None]
-"""Is told of every generation; what it does with that is its own affair."""
+"""Callback, called after each generation."""
 
 
 class Evolution:
-    """A population that is asked for genomes and told how fit they are; fitness is maximised.
+    """Generational EA with an ask / tell interface; fitness is maximised.
 
-    Half the population survives; the other half are children: each the winner of a tournament
-    among the survivors, mutated, some of the pairs then crossed at one point. Source: the paper,
+    The best half of the population survives. The other half are children: copies of tournament
+    winners among the survivors, mutated, some pairs with one-point crossover. Source: the paper,
     section III.
 
     Args:
-        length: Values of a genome.
-        draw: Draws values, for new genomes and for mutations.
-        settings: The numbers of the search.
-        rng: Every random choice comes from it.
-        seeds: Genomes to start from, beside random ones; those beyond the population are left out.
+        length: Number of values of a genome.
+        draw: Draws the values of random genomes and of mutations.
+        settings: Parameters of the search.
+        rng: Source of all random numbers.
+        seeds: Genomes of the first generation beside random genomes; at most a population of seeds
+            is used.
     """
 
     def __init__(
@@ -72,14 +73,14 @@ class Evolution:
         self.evaluations = 0
 
     def ask(self) -> FloatArray:
-        """Returns the genomes to evaluate, ``(n, length)``: everybody at first, then children."""
+        """Returns the genomes to evaluate, ``(n, length)``: first the population, then children."""
         return self._asked
 
     def tell(self, fitness: FloatArray) -> None:
-        """Takes the fitness of the genomes last asked for, ``(n,)``, and breeds the next.
+        """Takes the fitness of the genomes last asked for, ``(n,)``, and generates children.
 
         Raises:
-            ValueError: There is not one number for each genome, or one is not a number.
+            ValueError: ``fitness`` has another shape, or a NaN.
         """
         if fitness.shape != (len(self._asked),) or np.isnan(fitness).any():
             raise ValueError(
@@ -97,7 +98,7 @@ class Evolution:
         self._asked = self._children()
 
     def stop(self) -> dict[str, int]:
-        """Returns why the search is over, such as ``{"generations": 30}``, or nothing."""
+        """Returns the stop reason, such as ``{"generations": 30}``; empty while the search runs."""
         if self.generation >= self.generations:
             return {"generations": self.generations}
         return {}
@@ -113,13 +114,13 @@ class Evolution:
 def reproduce(
     parents: FloatArray, draw: Draw, settings: Settings, rng: np.random.Generator
 ) -> FloatArray:
-    """Returns a child of each genome: mutated, and some of the pairs of neighbours then crossed.
+    """Returns one child per parent: mutated, then some adjacent pairs with one-point crossover.
 
     Args:
-        parents: ``(n, length)``; they are not changed.
-        draw: Draws values for mutations.
-        settings: How often a value mutates and how many pairs cross.
-        rng: Every random choice comes from it.
+        parents: Genomes, ``(n, length)``; not changed.
+        draw: Draws the values of mutations.
+        settings: Mutation probability and number of crossovers.
+        rng: Source of all random numbers.
     """
     mutated = rng.random(parents.shape) < settings.mutation
     children = np.where(mutated, draw(rng, parents.shape), parents)
@@ -140,9 +141,9 @@ def evolve(
     """Runs a search to its end.
 
     Args:
-        search: Where to start; afterwards its ``best`` is the best genome found.
-        fitness: From genomes ``(n, length)`` to a fitness each ``(n,)``.
-        on_generation: Is told of every generation.
+        search: The search; after the call, ``search.best`` is the best genome found.
+        fitness: Fitness function, from genomes ``(n, length)`` to ``(n,)``.
+        on_generation: Called after each generation.
     """
     start = perf_counter()
     while not search.stop():

@@ -1,4 +1,4 @@
-"""The paper's numbers, as one record."""
+"""The parameters of the paper: run length, both EAs, number of trials."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -7,19 +7,20 @@ from types import MappingProxyType
 
 from selfmodel.errors import InputError
 
-MOST: Mapping[str, int] = MappingProxyType(
+MAX_SETTINGS: Mapping[str, int] = MappingProxyType(
     {
         **dict.fromkeys(("population", "generations", "kept"), 10_000),
         **dict.fromkeys(("genes", "trials", "tournament"), 100),
         "steps": 10**6,
     }
 )
-"""The largest settings: more would fill the memory, and they may come from somebody's log."""
+"""Upper bounds of the settings. Settings may be read from an untrusted log, and larger values would
+exhaust the memory."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How long a run is, how both EAs search, and how many trials a recovery may spend.
+    """Run length, parameters of both EAs, and the number of recovery trials.
 
     Source: the paper, sections III and IV. Its surviving text has lost digits; the values of
     ``steps``, ``population``, ``generations`` and ``survivors`` are reconstructed.
@@ -29,15 +30,15 @@ class Settings:
         trials: Physical trials after the failing one.
         population: Genomes in a generation.
         generations: Generations of an EA, the random first one included.
-        survivors: How many of the best live on.
-        tournament: How many survivors compete to be a child's parent.
+        survivors: Number of the best genomes that survive a generation.
+        tournament: Number of survivors that compete to become a parent.
         mutation: Probability that a value of a child is drawn anew.
-        crossovers: How many of the pairs of children cross over, at one point.
-        genes: Faults that a diagnostic genome has room for.
-        kept: Hypotheses that a diagnosis reports and that seed the next one.
+        crossovers: Number of pairs of children with one-point crossover.
+        genes: Number of genes of a diagnostic genome, the largest number of faults.
+        kept: Number of hypotheses that a diagnosis reports and that seed the next diagnosis.
 
     Raises:
-        InputError: A number does not fit the others.
+        InputError: A setting is out of range, or inconsistent with another setting.
     """
 
     steps: int = 1000
@@ -55,7 +56,7 @@ class Settings:
         for name in ("trials", "generations", "survivors", "tournament", "genes", "kept"):
             if getattr(self, name) < 1:
                 raise InputError(f"{name} must be at least 1, got {getattr(self, name)}")
-        for name, most in MOST.items():
+        for name, most in MAX_SETTINGS.items():
             if getattr(self, name) > most:
                 raise InputError(f"{name} must be at most {most}, got {getattr(self, name)}")
         if self.steps < 2:
@@ -76,7 +77,7 @@ class Settings:
             )
 
     def scaled(self, population: int) -> "Settings":
-        """Returns these settings for another population, in the paper's proportions.
+        """Returns these settings for another population size, in the paper's proportions.
 
         Raises:
             InputError: ``population`` is below 2.

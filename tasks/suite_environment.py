@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.controllers.driver import Driver
+from selfmodel.controllers.command_source import CommandSource
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.physical.environment_robot import EnvironmentRobot
@@ -55,10 +55,12 @@ class SuiteRobot:
         env = control.Environment(physics(embodiment.model), stepped, n_sub_steps=robot.substeps)
         self.returns = stepped.returns
         # Nothing but a simulation is to be brought to rest; and a step would be rewarded.
-        self._robot = EnvironmentRobot(env, robot, stop=lambda: None, neurons=embodiment.neurons)
+        self._robot = EnvironmentRobot(
+            env, robot, stop=lambda: None, silent_neurons=embodiment.silent_neurons
+        )
         self.clock = self._robot.clock
 
-    def run(self, controller: Driver, steps: int) -> Iterator[Sample]:
+    def run(self, controller: CommandSource, steps: int) -> Iterator[Sample]:
         """Runs a controller; see ``PhysicalRobot``."""
         return self._robot.run(controller, steps)
 

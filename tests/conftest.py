@@ -16,8 +16,9 @@ from selfmodel.tasks import ROBOTS
 from tests.helpers.command import SMALL, selfmodel
 from tests.helpers.drivers import (  # noqa: F401  # until every test imports from the helpers
     random_controllers,
+    random_cpgs,
     random_motion,
-    random_oscillators,
+    random_of,
 )
 from tests.helpers.hostile import exploding, lacking  # noqa: F401  # as above
 

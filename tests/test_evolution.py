@@ -195,17 +195,19 @@ def test_a_memo_computes_every_key_once():
 
     memo: Cache[str] = Cache()
 
-    assert np.array_equal(memo.values(["a", "bb", "a"], compute), [[1, -1], [2, -2], [1, -1]])
-    assert np.array_equal(memo.values(["bb", "ccc"], compute), [[2, -2], [3, -3]])
+    assert np.array_equal(
+        memo.get_or_compute(["a", "bb", "a"], compute), [[1, -1], [2, -2], [1, -1]]
+    )
+    assert np.array_equal(memo.get_or_compute(["bb", "ccc"], compute), [[2, -2], [3, -3]])
     assert list(memo) == computed == ["a", "bb", "ccc"]
     assert len(memo) == 3
 
 
 def test_a_memo_learns_from_another_what_is_asked_for_and_no_more():
     other: Cache[str] = Cache()
-    other.values(["a", "bb"], lambda keys: np.array([[len(key)] for key in keys]))
+    other.get_or_compute(["a", "bb"], lambda keys: np.array([[len(key)] for key in keys]))
     memo: Cache[str] = Cache()
-    memo.learn(other, ["bb", "ccc"])
+    memo.update_from(other, ["bb", "ccc"])
 
     assert list(memo) == ["bb"]
     assert memo["bb"] == other["bb"] == 2

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from selfmodel.arrays import FloatArray, frozen
-from selfmodel.controllers.driver import Evolved
+from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
 from selfmodel.logs.records import Imported
 from selfmodel.logs.rosbag.bag import Source, open_bag
@@ -117,7 +117,7 @@ def write_recording(
     robot: Robot,
     recording: Recording,
     mapping: BagMapping,
-    controller: Evolved | None,
+    controller: Controller | None,
 ) -> Path:
     """Writes a recording as a trial's log.
 

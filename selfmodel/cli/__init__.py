@@ -14,7 +14,7 @@ from selfmodel.cli.render import render
 from selfmodel.cli.replay import replay
 from selfmodel.cli.robots import robots
 from selfmodel.cli.trial import trial
-from selfmodel.errors import InputError, WorkError, in_words
+from selfmodel.errors import InputError, WorkError, describe
 
 app = typer.Typer(
     name="selfmodel",
@@ -41,10 +41,10 @@ def main() -> None:
     try:
         app()
     except InputError as error:
-        _fail(in_words(error), 2)
+        _fail(describe(error), 2)
     except (OSError, WorkError) as error:
         # A disk that is full, a folder that may not be written: the file's name is in it.
-        _fail(in_words(error), 1)
+        _fail(describe(error), 1)
     except MemoryError as error:
         _fail(f"there is not enough memory ({error or 'for this'}): ask for less at once", 1)
     except KeyboardInterrupt:

@@ -112,7 +112,7 @@ Neurons = Annotated[
         min=1,
         max=100,
         help="Hidden neurons of the network.",
-        show_default="the robot's own, 3 for those that come with selfmodel",
+        show_default="3",
     ),
 ]
 NextTrialName = Annotated[

@@ -63,8 +63,10 @@ def recover(
     from selfmodel.cli import inputs  # noqa: PLC0415
     from selfmodel.cli.output.display import display  # noqa: PLC0415
     from selfmodel.cli.output.report import as_object, print_report  # noqa: PLC0415
+    from selfmodel.controllers.controller import check_silent_neurons  # noqa: PLC0415
     from selfmodel.experiments import plugins, robots  # noqa: PLC0415
     from selfmodel.experiments.experiment import Experiment, run  # noqa: PLC0415
+    from selfmodel.faults.neuron import silent_neurons  # noqa: PLC0415
     from selfmodel.faults.notation import parse  # noqa: PLC0415
     from selfmodel.faults.registry import known  # noqa: PLC0415
     from selfmodel.logs.files import replace  # noqa: PLC0415
@@ -74,10 +76,10 @@ def recover(
     entry = robots.robot_entry(robot, model_settings or ())
     considered = plugins.kinds(kinds)
     damaged = inputs.case_notation(entry, case, damage)
-    made = robots.with_neurons(entry.robot(), neurons, controller)
-    design = plugins.design(controller, made)
+    made = entry.robot()
+    design = plugins.design(controller, made, neurons)
     truth = parse(damaged, made.anatomy, known(considered))
-    plugins.check_neurons(truth, design)
+    check_silent_neurons(design, silent_neurons(truth))
     experiment = Experiment(
         robot=made,
         case=case,

@@ -49,15 +49,18 @@ def robots(
 
 
 def _facts(entry: "Entry") -> dict[str, Any]:
+    from selfmodel.robot.designs import network_for  # noqa: PLC0415  # imports MuJoCo
+
     made = entry.robot()
+    network = network_for(made)
     return {
         "robot": made.name,
         "joints": [joint.name for joint in made.anatomy.joints],
         "hinges": list(made.anatomy.hinges),
         "sensors": [sensor.name for sensor in made.anatomy.sensors],
         "motors": list(made.anatomy.motors),
-        "hidden_neurons": made.anatomy.neurons,
-        "weights": made.network.weights,
+        "hidden_neurons": network.hidden,
+        "weights": network.weights,
         "control_timestep": made.control_timestep,
         "tasks": list(entry.suite),
         "cases": {str(number): notation for number, notation in entry.cases.items()},

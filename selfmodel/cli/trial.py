@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -19,9 +19,6 @@ from selfmodel.cli.options import (
     Structural,
     check_log_name,
 )
-
-if TYPE_CHECKING:
-    from selfmodel.controllers.driver import Evolved
 
 
 def trial(
@@ -56,34 +53,35 @@ def trial(
     import numpy as np  # noqa: PLC0415
 
     from selfmodel.cli import inputs  # noqa: PLC0415
-    from selfmodel.controllers.network import draw_weights  # noqa: PLC0415
+    from selfmodel.controllers.controller import (  # noqa: PLC0415
+        Controller,
+        check_silent_neurons,
+        draw_genomes,
+    )
     from selfmodel.experiments import plugins, robots, trial_logs  # noqa: PLC0415
     from selfmodel.experiments.reality import draw_reality  # noqa: PLC0415
+    from selfmodel.faults.neuron import silent_neurons  # noqa: PLC0415
     from selfmodel.faults.notation import parse  # noqa: PLC0415
     from selfmodel.faults.registry import known  # noqa: PLC0415
     from selfmodel.logs import read_log  # noqa: PLC0415
     from selfmodel.logs.writer import write_trial  # noqa: PLC0415
+    from selfmodel.robot.designs import DESIGNS  # noqa: PLC0415
     from selfmodel.settings import Settings  # noqa: PLC0415
     from selfmodel.trials.trial import TrialPlan  # noqa: PLC0415
 
     kind = "network" if controller is None else str(controller)
-    made = robots.with_neurons(
-        robots.robot_entry(robot, model_settings or ()).robot(),
-        neurons,
-        "cpg" if kind == "cpg" else "network",
-    )
+    made = robots.robot_entry(robot, model_settings or ()).robot()
     check_log_name(out)
     hidden = parse(
         "intact" if damage is None else damage, made.anatomy, known(plugins.kinds(kinds))
     )
     reality = draw_reality(made, seed, gap, structure=structure)
-    driver: Evolved
-    if kind in plugins.DESIGNS:
-        design = plugins.design(kind, made)
-        driver = design.controller(draw_weights(np.random.default_rng(seed), (design.weights,)))
+    if kind in DESIGNS:
+        design = plugins.design(kind, made, neurons)
+        driver = Controller(design, draw_genomes(np.random.default_rng(seed), (design.weights,)))
     else:
-        driver = trial_logs.controller(Path(kind), made)
-    plugins.check_neurons(hidden, driver)
+        driver = trial_logs.controller(Path(kind), made, neurons)
+    check_silent_neurons(driver.design, silent_neurons(hidden))
     settings = Settings()
     plan = TrialPlan("trial", inputs.stage(stage), driver, settings.steps, seed)
     samples = reality.robot(made, hidden).run(driver, settings.steps)

@@ -1,4 +1,4 @@
-"""Command ranges of motors, and outputs in [-1, 1] scaled to them."""
+"""Command ranges of motors, and the scaling of controller outputs to them."""
 
 import math
 
@@ -7,19 +7,19 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 
 TARGET_RANGE = np.pi / 4
-"""The paper's motor targets span plus and minus this angle, rad."""
+"""Half range of the paper's motor targets about 0, rad."""
 
 
 Ranges = tuple[tuple[float, float], ...]
-"""Of each motor the centre of what it is commanded, and half the range, in the motor's own unit:
-rad for a position servo, rad/s for a velocity servo, a part of its torque for many a motor."""
+"""Centre and half width of the command range per motor, in the motor's unit: rad for a position
+servo, rad/s for a velocity servo, a fraction of the largest torque for many torque motors."""
 
 
 def checked_ranges(motors: tuple[str, ...], ranges: Ranges) -> Ranges:
-    """Returns the command ranges of some motors, the paper's for all where none is given.
+    """Returns the command ranges of some motors, by default the paper's for all.
 
     Raises:
-        ValueError: They do not fit the motors, or one is not finite or has no width.
+        ValueError: The ranges do not fit the motors, or one is not finite or has no width.
     """
     if not ranges:
         return ((0.0, TARGET_RANGE),) * len(motors)
@@ -34,11 +34,11 @@ def checked_ranges(motors: tuple[str, ...], ranges: Ranges) -> Ranges:
     return ranges
 
 
-class Commands:
-    """Turns outputs in [-1, 1] into the commands of many robots of the same motors.
+class CommandScaler:
+    """Scales outputs in [-1, 1] to the command ranges of the motors.
 
     Args:
-        ranges: What each motor is commanded.
+        ranges: Command range of each motor.
     """
 
     def __init__(self, ranges: Ranges) -> None:
@@ -47,7 +47,7 @@ class Commands:
         self._centre = centre if centre.any() else None
 
     def write(self, outputs: FloatArray, commands: FloatArray) -> None:
-        """Writes the commands, ``(n, motors)``, for outputs of that shape."""
+        """Writes the commands of outputs in [-1, 1]; both are ``(n, motors)``."""
         np.multiply(outputs, self._half, out=commands)
         if self._centre is not None:
             commands += self._centre

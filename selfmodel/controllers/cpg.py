@@ -1,48 +1,53 @@
-"""The second kind of controller: a central pattern generator of phase oscillators.
+"""Central pattern generator (CPG): a controller design of coupled phase oscillators.
 
-One oscillator drives each motor. All share one frequency, and keep their amplitude, offset and
-phase; they start from rest, and what the sensors read makes their common clock run faster or
-slower. Source: Ijspeert, Crespi, Ryczko and Cabelguen, *From swimming to walking with a salamander
-robot driven by a spinal cord model* (Science 315:1416, 2007), of which these are the oscillators
-after their phases have locked. That readings change the speed of the phase is from Righetti and
-Ijspeert, *Pattern generators with sensory feedback for the control of quadruped locomotion* (ICRA
-2008).
+The CPG has one oscillator per motor. All oscillators share one frequency; each has an amplitude, an
+offset and a phase. The amplitudes grow from 0 at the start, and sensor readings speed up or slow
+down the shared phase. Source: Ijspeert, Crespi, Ryczko and Cabelguen, *From swimming to walking
+with a salamander robot driven by a spinal cord model* (Science 315:1416, 2007); these are its
+oscillators after their phases have locked. The feedback of readings on the speed of the phase is
+from Righetti and Ijspeert, *Pattern generators with sensory feedback for the control of quadruped
+locomotion* (ICRA 2008).
 """
 
 import math
 from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
-from selfmodel.arrays import FloatArray, frozen
-from selfmodel.controllers.command_range import Commands, Ranges, checked_ranges
+from selfmodel.arrays import FloatArray
+from selfmodel.controllers.command_range import CommandScaler, Ranges, checked_ranges
 
-SLOWEST, FASTEST = 0.5, 4.0
-"""Strides a second that a genome can ask for. A leg of 0.1 to 1 m swings by itself 0.5 to 1.6 times
-a second, as a pendulum; animals and robots of that size run at two to three times that."""
+MIN_FREQUENCY, MAX_FREQUENCY = 0.5, 4.0
+"""Bounds of the stride frequency, Hz. A leg of 0.1 to 1 m has a natural pendulum frequency of 0.5
+to 1.6 Hz; animals and robots of that size run at two to three times that."""
 
-GROWTH = 20.0
-"""How fast the amplitudes grow from 0, 1/s: 96 % after half a second. It is the source's."""
+AMPLITUDE_RATE = 20.0
+"""Rate at which the amplitudes grow from 0, 1/s: 96 % after half a second. From the source."""
 
-FEEDBACK = 0.5
-"""By what part of its speed all sensors together can change the clock, each reading 1: they bend
-the rhythm, and it never stands still."""
+MAX_FEEDBACK = 0.5
+"""Largest relative change of the phase speed by all sensors together, each reading 1. Below 1, so
+the phase always advances."""
 
 
 @dataclass(frozen=True)
 class Cpg:
-    """What oscillators are connected to, and how often they are asked.
+    """Design of a CPG.
 
     Attributes:
-        sensors: Names of what changes their speed, in order.
-        motors: Names of what they drive, in order.
-        timestep: Seconds between two commands.
-        ranges: What each motor is commanded; the paper's where none is given.
+        sensors: Names of the inputs, in order.
+        motors: Names of the outputs, in order.
+        timestep: Control time step, s.
+        ranges: Command range of each motor; the paper's for all by default.
 
     Raises:
         ValueError: The time step is not above 0, or the ranges do not fit the motors.
     """
+
+    name: ClassVar[str] = "cpg"
+    hidden: ClassVar[int] = 0
 
     sensors: tuple[str, ...]
     motors: tuple[str, ...]
@@ -56,141 +61,114 @@ class Cpg:
 
     @property
     def weights(self) -> int:
-        """How many values a genome has: 33 for the paper's quadruped, 67 for its hexapod."""
+        """Length of a genome: 33 for the paper's quadruped, 67 for its hexapod."""
         return 1 + 3 * len(self.motors) + len(self.sensors)
 
-    def controller(self, genome: FloatArray) -> "Oscillators":
-        """Returns the oscillators of a genome, ``(weights,)``."""
-        return Oscillators(self, genome)
+    @property
+    def description(self) -> str:
+        """Numbers of sensors and motors and the time step, in words."""
+        return (
+            f"a CPG of {len(self.sensors)} sensors and {len(self.motors)} motors with steps of "
+            f"{self.timestep:g} s"
+        )
+
+    def summary(self, genome: FloatArray) -> str:
+        """Returns the stride frequency, in words."""
+        return f"a CPG of {self.decode(genome).frequency:.2f} Hz"
+
+    def decode(self, genome: FloatArray) -> "CpgParameters":
+        """Returns the parameters of a genome.
+
+        Args:
+            genome: ``(weights,)``, each value in [-1, 1]: the frequency, then per motor the
+                amplitudes, the offsets and the phases, then per sensor the feedback.
+        """
+        amplitude, offset, phase = genome[1 : 1 + 3 * len(self.motors)].reshape(3, len(self.motors))
+        feedback = genome[1 + 3 * len(self.motors) :]
+        middle = math.sqrt(MIN_FREQUENCY * MAX_FREQUENCY)
+        width = MAX_FREQUENCY / MIN_FREQUENCY
+        amplitudes = (amplitude + 1) / 2
+        return CpgParameters(
+            frequency=float(middle * width ** (float(genome[0]) / 2)),
+            amplitudes=amplitudes,
+            offsets=offset * (1 - amplitudes),
+            phases=phase / 2,
+            feedback=feedback * (MAX_FEEDBACK / max(1, len(self.sensors))),
+        )
+
+    def batch(self, genomes: FloatArray, _silent: Sequence[AbstractSet[int]]) -> "CpgBatch":
+        """Returns the batch of the CPGs of some genomes; see ``Design.batch``."""
+        return CpgBatch(self, genomes)
 
 
 @dataclass(frozen=True, eq=False)
-class Oscillators:
-    """Oscillators as their genome says; two are equal when all of that is.
+class CpgParameters:
+    """Decoded parameters of one CPG.
 
     Attributes:
-        cpg: What they are connected to.
-        genome: ``(weights,)``, each in [-1, 1]: the frequency, then by motor the amplitudes, the
-            offsets and the phases, then by sensor the feedback.
-
-    Raises:
-        ValueError: The genome does not fit.
+        frequency: Stride frequency while all sensors read 0, Hz; logarithmic in its gene.
+        amplitudes: Fraction of each motor's half range, 0 to 1, ``(motors,)``.
+        offsets: Centre of each oscillation, as a fraction of the half range, ``(motors,)``;
+            amplitude and offset together stay within the range.
+        phases: Phase lead of each oscillator, in strides, -1/2 to 1/2, ``(motors,)``.
+        feedback: Relative change of the phase speed per sensor reading of 1, ``(sensors,)``.
     """
 
-    cpg: Cpg
-    genome: FloatArray
-
-    def __post_init__(self) -> None:
-        if self.genome.shape != (self.cpg.weights,):
-            raise ValueError(
-                f"oscillators for {len(self.cpg.sensors)} sensors and {len(self.cpg.motors)} "
-                f"motors have {self.cpg.weights} values, got a genome of shape {self.genome.shape}"
-            )
-        if not np.all(np.abs(self.genome) <= 1):
-            raise ValueError("every value of a genome must lie in [-1, 1]")
-        object.__setattr__(self, "genome", frozen(self.genome))
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Oscillators):
-            return NotImplemented
-        return self.cpg == other.cpg and self.genome.tobytes() == other.genome.tobytes()
-
-    def __hash__(self) -> int:
-        return hash((self.cpg, self.genome.tobytes()))
-
-    @property
-    def design(self) -> Cpg:
-        """What the genome is decoded with."""
-        return self.cpg
-
-    @property
-    def frequency(self) -> float:
-        """Strides a second while all sensors read 0: equal steps of a gene are equal ratios."""
-        middle, width = math.sqrt(SLOWEST * FASTEST), FASTEST / SLOWEST
-        return float(middle * width ** (float(self.genome[0]) / 2))
-
-    @property
-    def amplitudes(self) -> FloatArray:
-        """How far each motor swings, 0 to 1 of its half range, ``(motors,)``."""
-        return np.asarray((self._by_motor(0) + 1) / 2)
-
-    @property
-    def offsets(self) -> FloatArray:
-        """What it swings about, as far as its range leaves room, ``(motors,)``."""
-        return np.asarray(self._by_motor(1) * (1 - self.amplitudes))
-
-    @property
-    def phases(self) -> FloatArray:
-        """By what part of a stride each is ahead of the clock, -1/2 to 1/2, ``(motors,)``."""
-        return np.asarray(self._by_motor(2) / 2)
-
-    @property
-    def feedback(self) -> FloatArray:
-        """By what part each sensor changes the clock's speed where it reads 1, ``(sensors,)``."""
-        return np.asarray(self.genome[1 + 3 * len(self.cpg.motors) :] * self._share)
-
-    @property
-    def _share(self) -> float:
-        return FEEDBACK / max(1, len(self.cpg.sensors))
-
-    def _by_motor(self, which: int) -> FloatArray:
-        motors = len(self.cpg.motors)
-        return self.genome[1 + which * motors : 1 + (which + 1) * motors]
+    frequency: float
+    amplitudes: FloatArray
+    offsets: FloatArray
+    phases: FloatArray
+    feedback: FloatArray
 
 
-class Rhythms:
-    """The oscillators of many robots, stepped together like a ``Population``.
+class CpgBatch:
+    """The CPGs of many robots; a ``ControllerBatch``.
 
-    A robot's arithmetic is the same to the bit whatever the number of rows and its place among
-    them. Between two commands a reading stands, so the clock's advance is exact.
+    Readings are constant between two commands, so the advance of the phase is exact.
 
     Args:
-        oscillators: One a robot, all of the same ``Cpg``.
-
-    Raises:
-        ValueError: They are not.
+        cpg: The design of all.
+        genomes: ``(n, weights)``.
     """
 
-    def __init__(self, oscillators: Sequence[Oscillators]) -> None:
-        cpg = oscillators[0].cpg
-        if any(one.cpg != cpg for one in oscillators):
-            raise ValueError("oscillators that are stepped together must be connected alike")
+    def __init__(self, cpg: Cpg, genomes: FloatArray) -> None:
+        decoded = [cpg.decode(genome) for genome in genomes]
         self._timestep = cpg.timestep
-        self._commands = Commands(cpg.ranges)
-        self._stride = np.array([one.frequency * cpg.timestep for one in oscillators])
-        self._amplitudes = np.array([one.amplitudes for one in oscillators])
-        self._offsets = np.array([one.offsets for one in oscillators])
-        self._phases = np.array([one.phases for one in oscillators])
-        self._feedback = np.array([one.feedback for one in oscillators])
-        self._clock = np.zeros(len(oscillators))
+        self._scaler = CommandScaler(cpg.ranges)
+        self._stride = np.array([one.frequency * cpg.timestep for one in decoded])
+        self._amplitudes = np.array([one.amplitudes for one in decoded])
+        self._offsets = np.array([one.offsets for one in decoded])
+        self._phases = np.array([one.phases for one in decoded])
+        self._feedback = np.array([one.feedback for one in decoded])
+        self._phase = np.zeros(len(decoded))
         self._step = 0
-        self.readings = np.zeros((len(oscillators), len(cpg.sensors)))
+        self.readings = np.zeros((len(decoded), len(cpg.sensors)))
 
     def step(self, targets: FloatArray) -> None:
-        """Computes the commands of the next step, from what stands in ``readings``.
+        """Computes the commands of the next control step from ``readings``.
 
         Args:
-            targets: ``(n, motors)``, written: within the ranges, in each motor's unit.
+            targets: Commands, ``(n, motors)``, each in its motor's unit; written in place.
         """
-        turned = self._clock[:, np.newaxis] + self._phases
-        turned -= np.floor(turned)
-        outputs = np.cos(2 * np.pi * turned)
+        phases = self._phase[:, np.newaxis] + self._phases
+        phases -= np.floor(phases)
+        outputs = np.cos(2 * np.pi * phases)
         outputs *= self._amplitudes
         outputs += self._offsets
         outputs *= amplitude_rise(self._step * self._timestep)
-        self._commands.write(outputs, targets)
+        self._scaler.write(outputs, targets)
         # einsum sums each row by itself, in an order that the number of rows does not change.
         speed = 1 + np.einsum("ns,ns->n", self._feedback, self.readings)
-        self._clock += self._stride * speed
-        self._clock -= np.floor(self._clock)
+        self._phase += self._stride * speed
+        self._phase -= np.floor(self._phase)
         self._step += 1
 
 
 def amplitude_rise(time: float) -> float:
-    """Returns what part of their amplitude oscillators have after some time, s.
+    """Returns the fraction of the final amplitude that is reached after some time, s.
 
-    It is the solution of r'' = a (a (1 - r) / 4 - r') from rest, where a is ``GROWTH``: critically
-    damped, so that the first commands are no jolt.
+    The fraction r solves r'' = a (a (1 - r) / 4 - r') from rest, with a = ``AMPLITUDE_RATE``. The
+    equation is critically damped, so the first commands do not jump.
     """
-    turned = GROWTH * time / 2
+    turned = AMPLITUDE_RATE * time / 2
     return 1 - (1 + turned) * math.exp(-turned)

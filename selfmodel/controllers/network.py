@@ -1,29 +1,37 @@
-"""The controller: the paper's recurrent network, decoded from a genome."""
+"""Recurrent network: the paper's controller design."""
 
 from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
-from selfmodel.arrays import FloatArray, frozen
-from selfmodel.controllers.command_range import Commands, Ranges, checked_ranges
+from selfmodel.arrays import FloatArray
+from selfmodel.controllers.command_range import CommandScaler, Ranges, checked_ranges
 
 HIDDEN_NEURONS = 3
+"""Hidden neurons of the paper's network."""
+
+MAX_HIDDEN_NEURONS = 100
+"""Largest number of hidden neurons that a network may be given."""
 
 
 @dataclass(frozen=True)
 class Network:
-    """The size of a network and what its ends are connected to.
+    """Design of a recurrent network with one hidden layer.
 
     Attributes:
-        sensors: Names of its inputs, in order.
-        motors: Names of its outputs, in order.
+        sensors: Names of the inputs, in order.
+        motors: Names of the outputs, in order.
         hidden: Number of hidden neurons.
-        ranges: What each motor is commanded; the paper's where none is given.
+        ranges: Command range of each motor; the paper's for all by default.
 
     Raises:
-        ValueError: The ranges do not fit the motors, or one is none.
+        ValueError: The ranges do not fit the motors, or one is not finite or has no width.
     """
+
+    name: ClassVar[str] = "network"
 
     sensors: tuple[str, ...]
     motors: tuple[str, ...]
@@ -33,21 +41,33 @@ class Network:
     def __post_init__(self) -> None:
         object.__setattr__(self, "ranges", checked_ranges(self.motors, self.ranges))
 
-    def controller(self, genome: FloatArray) -> "Controller":
-        """Returns this network with the weights of a genome, ``(weights,)``."""
-        return Controller(self, genome)
-
     @property
     def weights(self) -> int:
-        """How many weights it has: 68 for the paper's quadruped, 120 for its hexapod."""
+        """Number of weights: 68 for the paper's quadruped, 120 for its hexapod."""
         return sum(rows * columns for rows, columns in self._shapes())
+
+    @property
+    def description(self) -> str:
+        """Numbers of sensors, hidden neurons and motors, in words."""
+        return (
+            f"a network of {len(self.sensors)} sensors, {self.hidden} hidden neurons and "
+            f"{len(self.motors)} motors"
+        )
+
+    def summary(self, _genome: FloatArray) -> str:
+        """Returns the number of hidden neurons, in words."""
+        return f"a network of {self.hidden} hidden neurons"
+
+    def batch(self, genomes: FloatArray, silent: Sequence[AbstractSet[int]]) -> "NetworkBatch":
+        """Returns the batch of the networks of some genomes; see ``Design.batch``."""
+        return NetworkBatch(self, genomes, silent)
 
     def layers(self, genomes: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Returns the weights as matrices.
 
         Args:
             genomes: ``(n, weights)``: input to hidden with the bias last, hidden to hidden, hidden
-                to motors with the bias last, each by rows of the neuron that receives.
+                to motors with the bias last, each by rows of the receiving neuron.
 
         Returns:
             ``(n, hidden, sensors + hidden + 1)`` and ``(n, motors, hidden + 1)``, the bias last.
@@ -72,72 +92,23 @@ class Network:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class Controller:
-    """A network with its weights; two are equal when all of that is.
-
-    Attributes:
-        network: Its size and ends.
-        genome: ``(weights,)``, each in [-1, 1].
-
-    Raises:
-        ValueError: The genome does not fit the network.
-    """
-
-    network: Network
-    genome: FloatArray
-
-    @property
-    def design(self) -> Network:
-        """What the genome is decoded with."""
-        return self.network
-
-    def __post_init__(self) -> None:
-        if self.genome.shape != (self.network.weights,):
-            raise ValueError(
-                f"a network of {len(self.network.sensors)} sensors, {self.network.hidden} hidden "
-                f"neurons and {len(self.network.motors)} motors has {self.network.weights} "
-                f"weights, got a genome of shape {self.genome.shape}"
-            )
-        if not np.all(np.abs(self.genome) <= 1):
-            raise ValueError("every weight must lie in [-1, 1]")
-        object.__setattr__(self, "genome", frozen(self.genome))
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Controller):
-            return NotImplemented
-        return self.network == other.network and self.genome.tobytes() == other.genome.tobytes()
-
-    def __hash__(self) -> int:
-        return hash((self.network, self.genome.tobytes()))
-
-
-def draw_weights(rng: np.random.Generator, shape: tuple[int, ...]) -> FloatArray:
-    """Returns random weights of ``shape``: uniform in [-1, 1], to two decimals."""
-    return rng.integers(-100, 101, size=shape) / 100
-
-
-class Population:
-    """The networks of many robots, stepped together.
-
-    A robot's arithmetic is the same to the bit whatever the number of rows and its place among
-    them: contact is chaotic, and a last bit grows to half a metre.
+class NetworkBatch:
+    """The networks of many robots; a ``ControllerBatch``.
 
     Args:
-        controllers: One a robot, all of the same network.
-        neurons: ``(n, hidden)``: 1 for a neuron that works, 0 for a silent one.
+        network: The design of all.
+        genomes: ``(n, weights)``.
+        silent: Indices of the silent hidden neurons per robot; their activation is 0.
     """
 
-    def __init__(self, controllers: Sequence[Controller], neurons: FloatArray) -> None:
-        network = controllers[0].network
-        if any(controller.network != network for controller in controllers):
-            raise ValueError("controllers of one population must have the same network")
-        genomes = np.array([controller.genome for controller in controllers])
+    def __init__(
+        self, network: Network, genomes: FloatArray, silent: Sequence[AbstractSet[int]]
+    ) -> None:
         self._to_hidden, self._to_motors = network.layers(genomes)
-        self._commands = Commands(network.ranges)
-        self._neurons = None if np.all(neurons == 1) else neurons
+        self._scaler = CommandScaler(network.ranges)
+        self._working = _working_neurons(silent, network.hidden)
         sensors = len(network.sensors)
-        # Sensors, hidden neurons and the bias in one row: what feeds either layer is a slice of it.
+        # Sensors, hidden neurons and the bias in one row: the input of either layer is a slice.
         self._inputs = np.zeros((len(genomes), sensors + network.hidden + 1))
         self._inputs[:, -1] = 1.0
         self.readings = self._inputs[:, :sensors]
@@ -145,16 +116,26 @@ class Population:
         self._outputs = self._inputs[:, sensors:]
 
     def step(self, targets: FloatArray) -> None:
-        """Computes the commands for what stands in ``readings``.
+        """Computes the commands of the next control step from ``readings``.
 
         Args:
-            targets: ``(n, motors)``, written: within the network's ranges, in each motor's unit.
+            targets: Commands, ``(n, motors)``, each in its motor's unit; written in place.
         """
         # einsum sums each row by itself, in an order that the number of rows does not change.
         hidden = np.einsum("nij,nj->ni", self._to_hidden, self._inputs)
         np.tanh(hidden, out=self._hidden)
-        if self._neurons is not None:
-            self._hidden *= self._neurons
+        if self._working is not None:
+            self._hidden *= self._working
         motors = np.einsum("nij,nj->ni", self._to_motors, self._outputs)
         np.tanh(motors, out=motors)
-        self._commands.write(motors, targets)
+        self._scaler.write(motors, targets)
+
+
+def _working_neurons(silent: Sequence[AbstractSet[int]], hidden: int) -> FloatArray | None:
+    """Returns 0 per silent neuron and 1 per other one, ``(n, hidden)``; None if all work."""
+    if not any(silent):
+        return None
+    working = np.ones((len(silent), hidden))
+    for row, neurons in zip(working, silent, strict=True):
+        row[sorted(neurons)] = 0.0
+    return working

@@ -1,4 +1,4 @@
-"""What drives a robot whose controller is not known: the commands that were recorded."""
+"""Playback of recorded commands, for a robot whose controller is unknown."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,11 +10,12 @@ from selfmodel.arrays import FloatArray, frozen
 
 @dataclass(frozen=True, eq=False)
 class Playback:
-    """Recorded commands, given again step by step, whatever the sensors say.
+    """Recorded commands, repeated step by step independently of the sensors.
 
     Attributes:
-        motors: What is commanded, in order.
-        commands: ``(steps, motors)``, each in its motor's unit. The last stands when they end.
+        motors: Names of the motors, in order.
+        commands: ``(steps, motors)``, each in its motor's unit. The last command is held after the
+            end of the recording.
 
     Raises:
         ValueError: There are no commands, they do not fit the motors, or one is not finite.
@@ -45,30 +46,35 @@ class Playback:
     def _bytes(self) -> tuple[tuple[int, ...], bytes]:
         return self.commands.shape, self.commands.tobytes()
 
+    @property
+    def summary(self) -> str:
+        """Short description, for the contents of a log."""
+        return "other software; its commands are played back"
+
 
 def played_back(motors: tuple[str, ...], commands: FloatArray) -> Playback:
-    """Returns the recording of commands of which some may not be known: NaN.
+    """Returns the playback of a recording with missing commands.
 
-    A command that was lost is taken to be the one before it, which stood until the next.
+    A missing command is replaced by the command before it, which the motor held.
 
     Args:
-        motors: What is commanded, in order.
-        commands: ``(steps, motors)``, each in its motor's unit.
+        motors: Names of the motors, in order.
+        commands: ``(steps, motors)``, each in its motor's unit; NaN where missing.
 
     Raises:
-        ValueError: The first is not known.
+        ValueError: A command of the first step is missing.
     """
     last = np.where(np.isnan(commands), 0, np.arange(len(commands))[:, np.newaxis])
     np.maximum.accumulate(last, axis=0, out=last)
     return Playback(motors, np.take_along_axis(commands, last, axis=0))
 
 
-class Playbacks:
-    """The recorded commands of many robots, stepped together like a ``Population``.
+class PlaybackBatch:
+    """The recorded commands of many robots; a ``ControllerBatch``.
 
     Args:
-        playbacks: One a robot.
-        sensors: How many readings a robot has; nobody looks at them.
+        playbacks: One per robot.
+        sensors: Number of sensors of a robot; the readings do not affect the commands.
     """
 
     def __init__(self, playbacks: Sequence[Playback], sensors: int) -> None:
@@ -77,10 +83,10 @@ class Playbacks:
         self.readings = np.zeros((len(playbacks), sensors))
 
     def step(self, targets: FloatArray) -> None:
-        """Gives the commands of the next step.
+        """Writes the commands of the next control step.
 
         Args:
-            targets: ``(n, motors)``, written: each in its motor's unit.
+            targets: Commands, ``(n, motors)``, each in its motor's unit; written in place.
         """
         for target, commands in zip(targets, self._commands, strict=True):
             target[:] = commands[min(self._step, len(commands) - 1)]

@@ -3,13 +3,15 @@
 import mujoco
 import numpy as np
 
-from selfmodel.controllers.network import Controller
+from selfmodel.controllers.controller import Controller
+from selfmodel.controllers.network import MAX_HIDDEN_NEURONS
 from selfmodel.diagnosis.genome import decode, encode
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
 from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import known
+from selfmodel.robot.designs import network_for
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
@@ -94,8 +96,9 @@ def _check_batch(kind: FaultKind, robot: Robot) -> None:
     """One candidate a part, beside an intact robot, and alone."""
     firsts = {fault.part: fault for fault in reversed(kind.candidates(robot.anatomy))}
     hypotheses = [INTACT, *(Hypothesis((fault,)) for fault in firsts.values())]
-    genome = np.linspace(-1, 1, robot.network.weights)
-    runs = [(hypothesis, Controller(robot.network, genome)) for hypothesis in hypotheses]
+    network = network_for(robot, MAX_HIDDEN_NEURONS)  # it has the neuron of every fault
+    controller = Controller(network, np.linspace(-1, 1, network.weights))
+    runs = [(hypothesis, controller) for hypothesis in hypotheses]
     simulator = Simulator(robot, 1)
     together = simulator.run(runs, STEPS, SIGNALS)
     for row, run in enumerate(runs):
@@ -124,7 +127,7 @@ def _contents(embodiment: Embodiment) -> tuple[bytes, ...]:
     parts = (embodiment.gain, embodiment.offset, embodiment.bias, embodiment.noise)
     return (
         _saved(embodiment.model),
-        embodiment.neurons.tobytes(),
+        str(sorted(embodiment.silent_neurons)).encode(),
         *(part.tobytes() for part in parts),
     )
 

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from time import perf_counter
 
-from selfmodel.controllers.driver import Design, Evolved
+from selfmodel.controllers.controller import Controller, Design
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.experiments.fitting import fitted
 from selfmodel.experiments.plugins import NEXT_TRIAL
@@ -59,7 +59,7 @@ class Experiment:
     seed: int
     threads: int
     folder: Path
-    gait: Evolved | None = None
+    gait: Controller | None = None
     gap: float = 0.0
     structure: bool = False
     kinds: tuple[FaultKind, ...] = PAPER_KINDS

@@ -2,29 +2,21 @@
 
 import importlib
 import sys
-from collections.abc import Callable, Iterable, Mapping
-from operator import attrgetter
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 
 from selfmodel.comparators import COMPARATORS
-from selfmodel.controllers.driver import Design, Driver
-from selfmodel.controllers.network import Controller, Network
+from selfmodel.controllers.controller import Design
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.kind import FaultKind
-from selfmodel.faults.neuron import SILENT_NEURON
 from selfmodel.faults.registry import ALL_KINDS, KINDS
 from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.next_trial import NextTrial, by_disagreement, by_repair
+from selfmodel.robot.designs import DESIGNS
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import Entry
-
-DESIGNS: Mapping[str, Callable[[Robot], Design]] = MappingProxyType(
-    {"network": attrgetter("network"), "cpg": attrgetter("cpg")}
-)
-"""The kinds of controller that a repair EA can evolve."""
 
 NEXT_TRIAL: Mapping[str, NextTrial] = MappingProxyType(
     {"repair": by_repair, "disagreement": by_disagreement}
@@ -121,15 +113,21 @@ def _plugged_in(what: str, name: str, known: Iterable[str]) -> object:
         ) from error
 
 
-def design(name: str, robot: Robot) -> Design:
-    """Returns the kind of controller of that name, for a robot.
+def design(name: str, robot: Robot, neurons: int | None = None) -> Design:
+    """Returns the controller design of that name for a robot.
+
+    Args:
+        name: One of ``DESIGNS``.
+        robot: The robot that the design is for.
+        neurons: Number of hidden neurons; the design's default if not given.
 
     Raises:
-        InputError: There is no such kind, or a motor does not say what it may be commanded.
+        InputError: There is no such design, it cannot have that many hidden neurons, or a motor
+            has no command range.
     """
     if name not in DESIGNS:
         raise unknown_name("kind of controller", name, DESIGNS)
-    return DESIGNS[name](robot)
+    return DESIGNS[name](robot, neurons)
 
 
 def score(name: str, robot: str, entry: Entry) -> Score:
@@ -148,19 +146,3 @@ def score(name: str, robot: str, entry: Entry) -> Score:
             f"{DISPLACEMENT.name}"
         )
     return entry.episode_return
-
-
-def check_neurons(truth: Hypothesis, driver: Design | Driver) -> None:
-    """Checks that what drives a robot has neurons where one of them is to be silent.
-
-    Raises:
-        InputError: It has none.
-    """
-    if isinstance(driver, Network | Controller):
-        return
-    for fault in truth.faults:
-        if fault.kind is SILENT_NEURON:
-            raise InputError(
-                f"{fault} means nothing to a robot that oscillators drive, which have no hidden "
-                f"neurons: leave it out, or drive the robot with a network"
-            )

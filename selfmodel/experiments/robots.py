@@ -11,7 +11,6 @@ from selfmodel.robot.mjcf.adaptation import adapt
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings, parse_setting, read_settings
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.robot import with_neurons as neurons_in
 from selfmodel.tasks import Entry, entry
 
 LARGEST_MODEL = 64 * 2**20
@@ -77,16 +76,3 @@ def robot(name: str, control_timestep: float) -> Robot:
         raise InputError(
             f"{path}: expected an MJCF file of a robot that needs no other file: {what}"
         ) from error
-
-
-def with_neurons(robot: Robot, neurons: int | None, design: str) -> Robot:
-    """Returns the robot with that many hidden neurons, or as it is where none are asked for.
-
-    Raises:
-        InputError: They are too many or none, or its controller is to be of a kind without them.
-    """
-    if neurons is None:
-        return robot
-    if design != "network":
-        raise InputError(f"--neurons {neurons} is of a network: leave it out with {design!r}")
-    return neurons_in(robot, neurons)

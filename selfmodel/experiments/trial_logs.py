@@ -4,17 +4,16 @@ import hashlib
 from collections.abc import Sequence
 from pathlib import Path
 
-from selfmodel.controllers.driver import Design, Evolved
-from selfmodel.controllers.network import Controller
+from selfmodel.controllers.controller import Controller, Design
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError
 from selfmodel.experiments.robots import is_model, robot, robot_entry
 from selfmodel.logs import LogError, TrialLog, load_controller, read_log
 from selfmodel.logs.robots import described_difference, the_robot_of
+from selfmodel.robot.designs import DESIGNS
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import read_settings
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.behaviour import Names
 
 
 def logs(paths: Sequence[Path]) -> list[TrialLog]:
@@ -81,11 +80,16 @@ def _override(name: str, own: Robot) -> Robot:
     return ready
 
 
-def controller(path: Path, robot: Robot) -> Evolved:
+def controller(path: Path, robot: Robot, neurons: int | None = None) -> Controller:
     """Returns the controller in a ``.npz`` file or in a trial's log.
 
+    Args:
+        path: The file.
+        robot: The robot that the controller must fit.
+        neurons: Number of hidden neurons that the controller must have; any if not given.
+
     Raises:
-        InputError: The file cannot be read as either, or its controller fits another robot.
+        InputError: The file contains no controller, or one that does not fit.
     """
     try:
         loaded = (
@@ -100,25 +104,19 @@ def controller(path: Path, robot: Robot) -> Evolved:
             f"{path} has no controller, only the commands that were recorded: give the log of a "
             f"robot that selfmodel drove, or a .npz"
         )
-    needed = _described(
-        robot.anatomy.names,
-        f"with {robot.anatomy.neurons} hidden neurons"
-        if isinstance(loaded, Controller)
-        else f"every {robot.control_timestep:g} s",
-    )
-    found = _described(
-        loaded.design,
-        f"with {loaded.network.hidden} hidden neurons"
-        if isinstance(loaded, Controller)
-        else f"every {loaded.cpg.timestep:g} s",
-    )
-    if found != needed:
+    found = loaded.design
+    hidden = (found.hidden or None) if neurons is None else neurons
+    needed = DESIGNS[found.name](robot, hidden)
+    if _connections(found) != _connections(needed):
         raise InputError(
-            f"{path} has a controller for {found}; this robot needs one for {needed}: give one "
-            f"that was made for it"
+            f"{path} has a controller for {_connections(found)}; this robot needs one for "
+            f"{_connections(needed)}: give one that was made for it"
         )
     return loaded
 
 
-def _described(ends: Design | Names, more: str) -> str:
-    return f"the sensors {', '.join(ends.sensors)}, the motors {', '.join(ends.motors)}, {more}"
+def _connections(design: Design) -> str:
+    return (
+        f"the sensors {', '.join(design.sensors)} and the motors {', '.join(design.motors)}, "
+        f"{design.description}"
+    )

@@ -1,7 +1,9 @@
-"""A silent hidden neuron: a fault of the physical robot that no hypothesis can express."""
+"""Silent hidden neuron: a fault of the controller, which no diagnosis may propose."""
 
 from typing import TYPE_CHECKING
 
+from selfmodel.controllers.network import MAX_HIDDEN_NEURONS
+from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.robot.anatomy import Anatomy
 
@@ -9,14 +11,20 @@ if TYPE_CHECKING:
     from selfmodel.robot.embodiment import Embodiment
 
 
-def _parts(anatomy: Anatomy) -> tuple[str, ...]:
-    return tuple(str(neuron) for neuron in range(anatomy.neurons))
+def _parts(_anatomy: Anatomy) -> tuple[str, ...]:
+    # Of any network; the number of neurons is known where a controller is.
+    return tuple(str(neuron) for neuron in range(MAX_HIDDEN_NEURONS))
 
 
 def _apply(embodiment: "Embodiment", _anatomy: Anatomy, fault: Fault) -> None:
-    embodiment.neurons[int(fault.part)] = 0.0
+    embodiment.silent_neurons.add(int(fault.part))
 
 
 SILENT_NEURON = FaultKind(
     name="neuron", keyword="neuron", parts=_parts, apply=_apply, searchable=False
 )
+
+
+def silent_neurons(hypothesis: Hypothesis) -> frozenset[int]:
+    """Returns the indices of the hidden neurons that are silent under a hypothesis."""
+    return frozenset(int(fault.part) for fault in hypothesis.faults if fault.kind is SILENT_NEURON)

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from types import TracebackType
 
-from selfmodel.errors import WorkError, in_words
+from selfmodel.errors import WorkError, describe
 
 
 @dataclass(frozen=True)
@@ -35,4 +35,4 @@ class Ending:
         except (OSError, WorkError) as failure:
             if reason is None or isinstance(reason, GeneratorExit):
                 raise
-            reason.add_note(in_words(failure))
+            reason.add_note(describe(failure))

@@ -1,7 +1,7 @@
 """A physical robot behind any ``dm_env.Environment``: how real hardware is driven."""
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from typing import Any
@@ -10,16 +10,17 @@ import dm_env
 import numpy as np
 
 from selfmodel.arrays import FloatArray, IndexArray
-from selfmodel.controllers.driver import Driver, drive
+from selfmodel.controllers.command_source import CommandSource, make_batch
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError, TrialError
 from selfmodel.physical.cleanup import Ending
 from selfmodel.physical.safety_limits import Limit
 from selfmodel.physical.step_timing import TIME, Stopwatch
+from selfmodel.robot.actuator_ranges import command_ranges
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import SIGNALS, Names, Sample, Signal
 
-GenerationCallback = Callable[[Any], Mapping[str, Any] | None]
+Observe = Callable[[Any], Mapping[str, Any] | None]
 """Turns an observation into our signals, each ``(width,)``, and perhaps ``time``; what it leaves
 out, and what is NaN, was not observed. None: nothing was."""
 
@@ -75,8 +76,7 @@ class EnvironmentRobot:
         critical: Signals of which no number may be NaN in an observation that came.
         patience: Steps in a row for which a reading may be missing.
         tolerance: By how much of a control time step a step may be late.
-        neurons: 1 for each hidden neuron of the controller that works, 0 for a silent one,
-            ``(hidden,)``; all work if not given.
+        silent_neurons: Indices of the silent hidden neurons of the controller.
         clock: Tells the time, s; it never goes back. The environment's observations may tell it
             better, as ``time``.
 
@@ -90,14 +90,14 @@ class EnvironmentRobot:
         env: dm_env.Environment,
         robot: Robot,
         *,
-        observe: GenerationCallback = by_name,
+        observe: Observe = by_name,
         stop: Callable[[], object] | None = None,
         safe: FloatArray | None = None,
         limits: Sequence[Limit] = (),
         critical: Sequence[Signal] = (),
         patience: int = 5,
         tolerance: float = 0.25,
-        neurons: FloatArray | None = None,
+        silent_neurons: Iterable[int] = (),
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         motors = (len(robot.anatomy.motors),)
@@ -115,10 +115,10 @@ class EnvironmentRobot:
         self._halt = stop or partial(_step_to, env, targets)
         self._limits, self._critical = tuple(limits), tuple(critical)
         self._patience, self._tolerance = patience, tolerance
-        self._neurons = np.ones(robot.anatomy.neurons) if neurons is None else np.array(neurons)
+        self._silent_neurons = frozenset(silent_neurons)
         self.clock = clock
 
-    def run(self, controller: Driver, steps: int) -> Iterator[Sample]:
+    def run(self, controller: CommandSource, steps: int) -> Iterator[Sample]:
         """Runs a controller; see ``PhysicalRobot``.
 
         Close what this returns when done, as ``write_trial`` does: that stops the robot.
@@ -146,10 +146,10 @@ class EnvironmentRobot:
         except Exception as error:  # a driver is somebody else's, and may raise anything
             raise TrialError(f"the safe command could not be sent: {_told(error)}") from error
 
-    def _steps(self, controller: Driver, steps: int) -> Iterator[Sample]:
+    def _steps(self, controller: CommandSource, steps: int) -> Iterator[Sample]:
         robot = self._robot
         names, timestep = robot.anatomy.names, robot.control_timestep
-        brain = drive([controller], self._neurons[np.newaxis], len(names.sensors))
+        brain = make_batch([controller], [self._silent_neurons], len(names.sensors))
         commands = np.zeros((1, len(names.motors)))
         needed = {signal for limit in self._limits for signal in limit.signals}
         if not isinstance(controller, Playback):
@@ -230,7 +230,7 @@ def _step_to(env: dm_env.Environment, targets: FloatArray) -> None:
 
 
 def _nearest_to_zero(robot: Robot) -> FloatArray:
-    centre, half = np.array(robot.network.ranges).T
+    centre, half = np.array(command_ranges(robot.model)).T
     return np.asarray(np.clip(0.0, centre - half, centre + half))
 
 

@@ -3,14 +3,14 @@
 from collections.abc import Callable, Iterator
 from typing import Protocol, runtime_checkable
 
-from selfmodel.controllers.driver import Driver
+from selfmodel.controllers.command_source import CommandSource
 from selfmodel.trials.behaviour import Sample
 
 
 class PhysicalRobot(Protocol):
     """The only way in which the algorithm reaches a robot: it runs a controller and looks on."""
 
-    def run(self, controller: Driver, steps: int) -> Iterator[Sample]:
+    def run(self, controller: CommandSource, steps: int) -> Iterator[Sample]:
         """Runs a controller from the start position, one sample a control step as it happens.
 
         A caller that stops iterating stops the robot.

@@ -14,6 +14,7 @@ from selfmodel.errors import InputError
 from selfmodel.faults.build import compile_model
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.robot.robot import Robot
+from selfmodel.robot.scaling import scale_model
 
 WIDEST = 0.5
 """The largest level: beyond it, a third of the factors would be at their floor or unbelievable."""
@@ -114,24 +115,18 @@ def perturbed(model: mujoco.MjModel, gap: Gap) -> mujoco.MjModel:
         model: The robot with nothing wrong; it is not changed.
         gap: What is different.
     """
-    model = copy.copy(model)
     if gap.level == 0:
-        return model
-    for b in range(1, model.nbody):
-        name = model.body(b).name.removeprefix(DEBRIS)
-        model.body_mass[b] *= gap.mass.get(name, 1.0)
-        model.body_inertia[b] *= gap.inertia.get(name, 1.0)
-    model.geom_friction[:, 0] *= gap.friction
-    model.pair_friction[:, :2] *= gap.friction
-    model.dof_damping *= gap.damping
-    model.dof_dampingpoly *= gap.damping
-    for name, factor in gap.motors.items():
-        motor = model.actuator(name).id
-        # A servo's stiffness stands in both: together they scale the torque, at the same target.
-        model.actuator_gainprm[motor] *= factor
-        model.actuator_biasprm[motor] *= factor
-    mujoco.mj_setConst(model, mujoco.MjData(model))
-    return model
+        return copy.copy(model)
+    names = [model.body(b).name.removeprefix(DEBRIS) for b in range(model.nbody)]
+    motors = [model.actuator(k).name for k in range(model.nu)]
+    return scale_model(
+        model,
+        mass=_by_name(gap.mass, names),
+        inertia=_by_name(gap.inertia, names),
+        friction=gap.friction,
+        damping=gap.damping,
+        motor_gains=_by_name(gap.motors, motors),
+    )
 
 
 def perturbed_models(
@@ -154,3 +149,8 @@ def perturbed_models(
 
 def _factor(spread: float, normal: FloatArray) -> FloatArray:
     return np.maximum(FLOOR, 1 + spread * normal)
+
+
+def _by_name(factors: Mapping[str, float], names: list[str]) -> FloatArray:
+    """The factor of each name, ``(names,)``; 1 for a name without a factor."""
+    return np.array([factors.get(name, 1.0) for name in names])

@@ -8,7 +8,7 @@ from functools import partial
 import mujoco
 import numpy as np
 
-from selfmodel.controllers.driver import Driver, drive
+from selfmodel.controllers.command_source import CommandSource, make_batch
 from selfmodel.errors import TrialError
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
@@ -64,7 +64,7 @@ class SimulatedRobot:
         )
         self._noise = np.random.SeedSequence(seed, spawn_key=(stream,))
 
-    def run(self, controller: Driver, steps: int) -> Iterator[Sample]:
+    def run(self, controller: CommandSource, steps: int) -> Iterator[Sample]:
         """Runs a controller; see ``PhysicalRobot``.
 
         Without a gap, the same bits as the ``Simulator``'s, unless something about the fault is
@@ -83,7 +83,11 @@ class SimulatedRobot:
         return self._run(embodiment, controller, steps, np.random.default_rng(child))
 
     def _run(
-        self, embodiment: Embodiment, controller: Driver, steps: int, rng: np.random.Generator
+        self,
+        embodiment: Embodiment,
+        controller: CommandSource,
+        steps: int,
+        rng: np.random.Generator,
     ) -> Iterator[Sample]:
         robot = self._robot
         model, data = embodiment.model, mujoco.MjData(embodiment.model)
@@ -99,7 +103,7 @@ class SimulatedRobot:
             drop_debris(model, data, self._limbs)
         mujoco.mj_forward(model, data)
         senses = SensorReader(model, robot.anatomy, [embodiment])
-        brain = drive([controller], embodiment.neurons[np.newaxis], len(robot.anatomy.sensors))
+        brain = make_batch([controller], [embodiment.silent_neurons], len(robot.anatomy.sensors))
         commands = np.zeros((1, model.nu))
         underway = deque(np.zeros((delay, model.nu)))
         # What is logged as commanded is what the controller said, not what the motors have got.

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Protocol
 
-from selfmodel.controllers.driver import Evolved
+from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.physical.interface import PhysicalRobot
@@ -25,10 +25,10 @@ class Database:
     diagnoses: tuple[Diagnosis, ...] = ()
 
     @property
-    def controllers(self) -> tuple[Evolved, ...]:
+    def controllers(self) -> tuple[Controller, ...]:
         """Every controller that a physical robot has run, the newest first, each once."""
         drivers = dict.fromkeys(trial.plan.controller for trial in reversed(self.trials))
-        return tuple(driver for driver in drivers if isinstance(driver, Evolved))
+        return tuple(driver for driver in drivers if isinstance(driver, Controller))
 
     @property
     def evidence(self) -> tuple[Trial, ...]:

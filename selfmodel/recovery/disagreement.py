@@ -11,7 +11,8 @@ from types import MappingProxyType
 import numpy as np
 
 from selfmodel.arrays import FloatArray, IndexArray
-from selfmodel.controllers.driver import Driver, Evolved
+from selfmodel.controllers.command_source import CommandSource
+from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
@@ -65,9 +66,9 @@ class Disagreement:
     def __init__(self, hypotheses: Sequence[Hypothesis], simulator: Simulator, steps: int) -> None:
         self._hypotheses, self._simulator, self._steps = tuple(hypotheses), simulator, steps
         self._early = min(steps, EARLY)
-        self._seen: Cache[Evolved] = Cache()
+        self._seen: Cache[Controller] = Cache()
 
-    def most_discriminative(self, candidates: Sequence[Evolved]) -> Evolved:
+    def most_discriminative(self, candidates: Sequence[Controller]) -> Controller:
         """Returns the controller whose trial is predicted to tell the hypotheses apart best.
 
         A controller with which the robot falls under any of the hypotheses, or whose simulation
@@ -86,19 +87,19 @@ class Disagreement:
                 return candidates[i]
         return candidates[int(falls.argmax())]
 
-    def most_discriminative_first(self, candidates: Sequence[Evolved]) -> list[Evolved]:
+    def most_discriminative_first(self, candidates: Sequence[Controller]) -> list[Controller]:
         """Returns the controllers, those on which the hypotheses disagree most first.
 
         Those with which the robot falls at once come last, the earliest fall at the end.
         """
         return [candidates[i] for i in self._ordered(candidates)[1]]
 
-    def _ordered(self, candidates: Sequence[Evolved]) -> tuple[IndexArray, list[int]]:
+    def _ordered(self, candidates: Sequence[Controller]) -> tuple[IndexArray, list[int]]:
         """When the robot first falls with each, and the numbers of all, the most telling first."""
         falls, telling = np.array(self._seen.get_or_compute(candidates, self._looked_at)).T
         return falls.astype(np.intp), np.lexsort((-telling, -falls)).tolist()
 
-    def _looked_at(self, candidates: Sequence[Evolved]) -> FloatArray:
+    def _looked_at(self, candidates: Sequence[Controller]) -> FloatArray:
         """When the robot first falls with each, and how much is disagreed on until then."""
         early = self._predicted(candidates, self._early)
         falls = self._first_falls(early)
@@ -112,7 +113,7 @@ class Disagreement:
             telling[upright] = np.where(found.diverged.any(axis=1), -1.0, parted)
         return np.stack([falls, telling], axis=1)
 
-    def _predicted(self, drivers: Sequence[Driver], steps: int) -> SimulationResult:
+    def _predicted(self, drivers: Sequence[CommandSource], steps: int) -> SimulationResult:
         """Each driver under each hypothesis, ``(drivers, hypotheses, steps, width)``."""
         runs = [(hypothesis, one) for one in drivers for hypothesis in self._hypotheses]
         outcome = self._simulator.run(runs, steps, (*SCALES, "commands"))

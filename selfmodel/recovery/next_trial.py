@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from selfmodel.controllers.driver import Evolved
-from selfmodel.controllers.network import draw_weights
+from selfmodel.controllers.controller import Controller, draw_genomes
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.evolution import reproduce
 from selfmodel.faults.hypothesis import Hypothesis
@@ -44,20 +43,20 @@ class Situation:
     simulator: Simulator
     settings: Settings
     rng: np.random.Generator
-    repaired: Callable[[], Evolved]
+    repaired: Callable[[], Controller]
     on_event: Callable[[Event], None]
 
 
-NextTrial = Callable[[Situation], Evolved]
+NextTrial = Callable[[Situation], Controller]
 """A way to choose the controller of the next physical trial."""
 
 
-def by_repair(situation: Situation) -> Evolved:
+def by_repair(situation: Situation) -> Controller:
     """Chooses the controller that compensates for the best hypothesis, as the paper does."""
     return situation.repaired()
 
 
-def by_disagreement(situation: Situation) -> Evolved:
+def by_disagreement(situation: Situation) -> Controller:
     """Chooses the controller on which hypotheses disagree, and a repair when that is over.
 
     It is over once a diagnosis is ``explained``, and nothing may be wrong unseen besides or the
@@ -81,11 +80,11 @@ def by_disagreement(situation: Situation) -> Evolved:
 
 def discriminating_controller(
     diagnosis: Diagnosis,
-    known: Sequence[Evolved],
+    known: Sequence[Controller],
     simulator: Simulator,
     settings: Settings,
     rng: np.random.Generator,
-) -> Evolved:
+) -> Controller:
     """Returns the controller on which the hypotheses that are in the running disagree most.
 
     Args:
@@ -119,8 +118,8 @@ def candidates_to_separate(diagnosis: Diagnosis) -> tuple[Hypothesis, ...]:
 
 
 def candidates(
-    known: Sequence[Evolved], settings: Settings, rng: np.random.Generator
-) -> list[Evolved]:
+    known: Sequence[Controller], settings: Settings, rng: np.random.Generator
+) -> list[Controller]:
     """Returns the controllers that a choice is made from, each once, the tried ones first.
 
     Args:
@@ -134,13 +133,13 @@ def candidates(
     bred = offspring(alike, settings, rng)
     found = [one for one in dict.fromkeys([*alike, *bred]) if one != newest]
     if not found:  # no child is another than its parent, as where nothing mutates
-        found = [newest.design.controller(draw_weights(rng, newest.genome.shape))]
+        found = [Controller(newest.design, draw_genomes(rng, newest.genome.shape))]
     return found
 
 
 def offspring(
-    parents: Sequence[Evolved], settings: Settings, rng: np.random.Generator
-) -> list[Evolved]:
+    parents: Sequence[Controller], settings: Settings, rng: np.random.Generator
+) -> list[Controller]:
     """Returns as many children as an EA has genomes.
 
     Args:
@@ -150,6 +149,6 @@ def offspring(
     """
     genomes = np.array([parent.genome for parent in parents])
     bred = reproduce(
-        np.resize(genomes, (settings.population, genomes.shape[1])), draw_weights, settings, rng
+        np.resize(genomes, (settings.population, genomes.shape[1])), draw_genomes, settings, rng
     )
-    return [parents[0].design.controller(genome) for genome in bred]
+    return [Controller(parents[0].design, genome) for genome in bred]

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from selfmodel.controllers.driver import Design, Evolved
+from selfmodel.controllers.controller import Controller, Design
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
@@ -19,6 +19,7 @@ from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.next_trial import NextTrial, Situation, by_repair
 from selfmodel.recovery.random_streams import choice_stream, diagnosis_stream, repair_stream
 from selfmodel.recovery.repair import RepairSearch
+from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibrate import Calibration
 from selfmodel.simulation.simulator import Simulator
@@ -77,7 +78,7 @@ def recover(
     settings: Settings,
     seed: int,
     on_event: Callable[[Event], None],
-    gait: Evolved | None = None,
+    gait: Controller | None = None,
     design: Design | None = None,
     kinds: Sequence[FaultKind] = PAPER_KINDS,
     calibrate: Callable[[Sequence[Trial]], Calibration] | None = None,
@@ -108,11 +109,11 @@ def recover(
         What the journal says at the end.
     """
     # As the robot's own model says: a fitted one is written with fewer digits.
-    design = simulator.robot.network if design is None else design
+    design = network_for(simulator.robot) if design is None else design
     repair = RepairSearch(simulator, settings, design, score=score)
     tried: list[Hypothesis] = []
 
-    def evolve_controller(hypothesis: Hypothesis) -> Evolved:
+    def evolve_controller(hypothesis: Hypothesis) -> Controller:
         on_event(SearchBegins("repair", hypothesis))
         known = journal.read()
         rng = repair_stream(seed, len(known.diagnoses))
@@ -127,7 +128,7 @@ def recover(
         on_event(diagnosis)
         return diagnosis
 
-    def act(robot: PhysicalRobot, stage: Stage, believed: Hypothesis, by: Evolved) -> None:
+    def act(robot: PhysicalRobot, stage: Stage, believed: Hypothesis, by: Controller) -> None:
         plan = TrialPlan(f"{len(tried):02d}-{stage}", stage, by, settings.steps, seed)
         tried.append(believed)
         on_event(journal.record(robot, plan))

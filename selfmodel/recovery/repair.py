@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.controllers.driver import Design, Evolved
-from selfmodel.controllers.network import draw_weights
+from selfmodel.controllers.controller import Controller, Design, draw_genomes
 from selfmodel.evolution import Evolution, GenerationCallback, evolve
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.recovery.fitness import DISPLACEMENT, Score
+from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
 from selfmodel.simulation.cache import Cache
 from selfmodel.simulation.simulator import Run, Simulator
@@ -40,7 +40,7 @@ class RepairSearch:
     ) -> None:
         self._simulator = simulator
         self._settings = settings
-        self._design = simulator.robot.network if design is None else design
+        self._design = network_for(simulator.robot) if design is None else design
         self._fitness: Cache[Run] = Cache()
         self._score = score
         self.evaluations = evaluations
@@ -48,10 +48,10 @@ class RepairSearch:
     def __call__(
         self,
         hypothesis: Hypothesis,
-        seeds: Sequence[Evolved],
+        seeds: Sequence[Controller],
         rng: np.random.Generator,
         on_generation: GenerationCallback,
-    ) -> Evolved:
+    ) -> Controller:
         """Returns the best controller found.
 
         Args:
@@ -64,19 +64,19 @@ class RepairSearch:
         design = self._design
 
         def fitness(genomes: FloatArray) -> FloatArray:
-            runs: list[Run] = [(hypothesis, design.controller(genome)) for genome in genomes]
+            runs: list[Run] = [(hypothesis, Controller(design, genome)) for genome in genomes]
             return np.array(self._fitness.get_or_compute(runs, self._simulate))
 
         search = Evolution(
             design.weights,
-            draw_weights,
+            draw_genomes,
             self._settings,
             rng,
             [controller.genome for controller in seeds if controller.design == design],
         )
         evolve(search, fitness, on_generation)
         self.evaluations += search.evaluations
-        return design.controller(search.best)
+        return Controller(design, search.best)
 
     def _simulate(self, runs: list[Run]) -> FloatArray:
         """The fitness of runs with one hypothesis; the worst for those that diverge."""

@@ -67,14 +67,12 @@ class Anatomy:
         sensors: What feeds the controller, touch before angle, in its order.
         motors: What the controller commands, in its order.
         hinges: Every hinge of the model but its root's, in its order.
-        neurons: How many hidden neurons its controller has.
     """
 
     joints: tuple[Joint, ...]
     sensors: tuple[Sensor, ...]
     motors: tuple[str, ...]
     hinges: tuple[str, ...]
-    neurons: int
 
     def joint(self, name: str) -> Joint:
         """Returns the joint of that name.

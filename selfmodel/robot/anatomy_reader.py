@@ -4,7 +4,6 @@ import math
 
 import mujoco
 
-from selfmodel.controllers.network import HIDDEN_NEURONS
 from selfmodel.robot.anatomy import Anatomy, Joint, Sensor
 from selfmodel.robot.floating_base import joints_of
 from selfmodel.robot.transmission import descends, motor_bodies, motor_joints
@@ -19,7 +18,7 @@ def driven_joints(model: mujoco.MjModel) -> frozenset[int]:
     return frozenset[int]().union(*(motor_joints(model, m) for m in range(model.nu)))
 
 
-def read_anatomy(model: mujoco.MjModel, root: int, neurons: int = HIDDEN_NEURONS) -> Anatomy:
+def read_anatomy(model: mujoco.MjModel, root: int) -> Anatomy:
     """Returns the parts of a robot that its model names.
 
     The hinges of one body are one joint if a motor moves any of them. It is called by what their
@@ -29,7 +28,6 @@ def read_anatomy(model: mujoco.MjModel, root: int, neurons: int = HIDDEN_NEURONS
     Args:
         model: A compiled MJCF that ``carried.check_model`` lets through.
         root: The number of the root body, whose own joints are not the limbs'.
-        neurons: Hidden neurons of its controller.
 
     Raises:
         ValueError: Two joints would be called alike.
@@ -48,7 +46,6 @@ def read_anatomy(model: mujoco.MjModel, root: int, neurons: int = HIDDEN_NEURONS
         sensors=sensors,
         motors=tuple(model.actuator(m).name for m in range(model.nu)),
         hinges=tuple(model.joint(j).name for j in hinges),
-        neurons=neurons,
     )
 
 

@@ -37,7 +37,7 @@ class Embodiment:
         offset: Is added to it then, ``(sensors,)``.
         bias: Is added to that, whatever the sensor measures, ``(sensors,)``.
         noise: Standard deviation of what is added last, ``(sensors,)``; see ``robot.noise``.
-        neurons: 1 for each hidden neuron that works, 0 for a silent one, ``(hidden,)``.
+        silent_neurons: Indices of the silent hidden neurons of the controller.
         welded: Of each hinge that is held still its places in ``qpos`` and ``qvel`` and its angle.
         detached: The joints of lost bodies, by name: nothing moves them.
         seed: Of what is random in it: the noise, and the shape of rough terrain.
@@ -49,7 +49,7 @@ class Embodiment:
     offset: FloatArray
     bias: FloatArray
     noise: FloatArray
-    neurons: FloatArray
+    silent_neurons: set[int] = field(default_factory=set)
     welded: list[tuple[int, int, float]] = field(default_factory=list)
     detached: set[str] = field(default_factory=set)
     seed: int = 0
@@ -71,7 +71,6 @@ class Embodiment:
             offset=np.zeros(sensors),
             bias=np.zeros(sensors),
             noise=np.zeros(sensors),
-            neurons=np.ones(anatomy.neurons),
             seed=seed,
         )
 

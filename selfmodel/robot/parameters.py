@@ -1,6 +1,5 @@
 """The continuous parameters of a self-model, and the robot that has others."""
 
-import copy
 import dataclasses
 from dataclasses import dataclass
 
@@ -10,6 +9,7 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.robot.custom_numerics import CONTROL_DELAY
 from selfmodel.robot.robot import Robot
+from selfmodel.robot.scaling import scale_model
 
 
 @dataclass(frozen=True)
@@ -58,19 +58,15 @@ def from_factors(factors: FloatArray, delay: int) -> Parameters:
 
 def edited_model(robot: Robot, parameters: Parameters) -> mujoco.MjModel:
     """Returns a copy of a robot's model that has these parameters, but for the delay."""
-    model = copy.copy(robot.model)
     masses = _mass_factors(robot, parameters)
-    model.body_mass *= masses
-    model.body_inertia *= masses[:, np.newaxis]
-    model.geom_friction[:, 0] *= parameters.friction
-    model.pair_friction[:, :2] *= parameters.friction
-    model.dof_damping *= parameters.damping
-    model.dof_dampingpoly *= parameters.damping
-    motors = np.array(parameters.motor_gains)[:, np.newaxis]
-    model.actuator_gainprm *= motors
-    model.actuator_biasprm *= motors
-    mujoco.mj_setConst(model, mujoco.MjData(model))
-    return model
+    return scale_model(
+        robot.model,
+        mass=masses,
+        inertia=masses,
+        friction=parameters.friction,
+        damping=parameters.damping,
+        motor_gains=np.array(parameters.motor_gains),
+    )
 
 
 def with_parameters(robot: Robot, parameters: Parameters) -> Robot:

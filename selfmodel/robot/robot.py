@@ -1,25 +1,14 @@
 """A robot: an MJCF model, its parts by name, and its rhythm."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from xml.etree import ElementTree as ET
+from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
 
-from selfmodel.controllers.cpg import Cpg
-from selfmodel.controllers.network import Network
-from selfmodel.errors import InputError
-from selfmodel.robot.actuator_ranges import command_ranges
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.anatomy_reader import driven_joints, read_anatomy
-from selfmodel.robot.custom_numerics import (
-    CONTROL_DELAY,
-    MAX_HIDDEN_NEURONS,
-    NEURONS,
-    control_delay,
-    hidden_neurons,
-)
+from selfmodel.robot.custom_numerics import CONTROL_DELAY, control_delay
 from selfmodel.robot.floating_base import find_root
 from selfmodel.robot.model_checks import check_model
 
@@ -56,7 +45,7 @@ class Robot:
         root = find_root(model, driven_joints(model))
         check_model(model, root)
         object.__setattr__(self, "model", model)
-        object.__setattr__(self, "anatomy", read_anatomy(model, root, hidden_neurons(model)))
+        object.__setattr__(self, "anatomy", read_anatomy(model, root))
         object.__setattr__(self, "root", str(model.body(root).name))
         control_delay(model)  # raises ValueError
         if not np.isclose(self.substeps * model.opt.timestep, self.control_timestep, rtol=1e-9):
@@ -82,26 +71,6 @@ class Robot:
         return found >= 0
 
     @property
-    def network(self) -> Network:
-        """The network that controls it.
-
-        Raises:
-            InputError: A motor does not say what it may be commanded.
-        """
-        names, ranges = self.anatomy.names, command_ranges(self.model)
-        return Network(names.sensors, names.motors, self.anatomy.neurons, ranges)
-
-    @property
-    def cpg(self) -> Cpg:
-        """The oscillators that can control it in the network's place.
-
-        Raises:
-            InputError: A motor does not say what it may be commanded.
-        """
-        names, ranges = self.anatomy.names, command_ranges(self.model)
-        return Cpg(names.sensors, names.motors, self.control_timestep, ranges)
-
-    @property
     def standing_height(self) -> float:
         """Height of the root body above the ground at the start, m."""
         return float(self.model.body(self.root).pos[2])
@@ -109,24 +78,3 @@ class Robot:
     def specification(self) -> mujoco.MjSpec:
         """Returns the MJCF as a specification that can be edited before it is compiled."""
         return mujoco.MjSpec.from_string(self.mjcf, assets=dict(self.assets))
-
-
-def with_neurons(robot: Robot, neurons: int) -> Robot:
-    """Returns the robot with that many hidden neurons in its network.
-
-    Its MJCF says so, and is otherwise the same to the digit, so that it moves the same to the bit.
-
-    Raises:
-        InputError: They are too many, or none.
-    """
-    if not 1 <= neurons <= MAX_HIDDEN_NEURONS:
-        raise InputError(f"a network has 1 to {MAX_HIDDEN_NEURONS} hidden neurons, got {neurons}")
-    if neurons == robot.anatomy.neurons:
-        return robot
-    root = ET.fromstring(robot.mjcf)  # noqa: S314  # a robot's own, which MuJoCo has read
-    for custom in root.findall("custom"):
-        for numeric in custom.findall("numeric"):
-            if numeric.get("name") == NEURONS:
-                custom.remove(numeric)
-    ET.SubElement(ET.SubElement(root, "custom"), "numeric", name=NEURONS, data=str(neurons))
-    return replace(robot, mjcf=ET.tostring(root, encoding="unicode"))

@@ -8,7 +8,7 @@ from time import perf_counter
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.controllers.driver import Driver, drive
+from selfmodel.controllers.command_source import CommandSource, make_batch
 from selfmodel.faults.build import apply_faults, build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.physical.reality_gap import perturbed_models
@@ -22,7 +22,7 @@ from selfmodel.simulation.prediction import predict
 from selfmodel.simulation.requests import Ensemble, Segments
 from selfmodel.trials.behaviour import Behaviour, Signal
 
-Run = tuple[Hypothesis, Driver]
+Run = tuple[Hypothesis, CommandSource]
 """What one simulation runs: a robot with what the hypothesis says wrong, and what drives it."""
 
 REMEMBERED_EMBODIMENTS = 1024
@@ -117,7 +117,7 @@ class Simulator:
     def run_ensemble(
         self,
         hypotheses: Sequence[Hypothesis],
-        driver: Driver,
+        driver: CommandSource,
         steps: int,
         ensemble: Ensemble,
     ) -> SimulationResult:
@@ -144,16 +144,16 @@ class Simulator:
     def _run(
         self,
         embodiments: Sequence[Embodiment],
-        drivers: Sequence[Driver],
+        drivers: Sequence[CommandSource],
         steps: int,
         record: Sequence[Signal],
     ) -> SimulationResult:
         robot, n = self.robot, len(embodiments)
         batch = new_batch(robot.model, embodiments, self.threads)
         senses = SensorReader(robot.model, robot.anatomy, embodiments)
-        brains = drive(
+        brains = make_batch(
             drivers,
-            np.array([embodiment.neurons for embodiment in embodiments]),
+            [embodiment.silent_neurons for embodiment in embodiments],
             len(robot.anatomy.sensors),
         )
         sensordata, qpos, ctrl = (batch.bind(field) for field in ("sensordata", "qpos", "ctrl"))

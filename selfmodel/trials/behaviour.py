@@ -1,4 +1,4 @@
-"""What a run of a robot looked like: the record that simulation, logs and comparators share."""
+"""Behaviour: the recorded signals of one run or a batch of runs (in the field: a trajectory)."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -22,10 +22,10 @@ Signal = Literal[
 ]
 
 SIGNALS: tuple[Signal, ...] = get_args(Signal)
-"""Every signal of a run, in the order in which a log lists them.
+"""Every signal of a run, in the order of the trial log.
 
-``sensors``: what the controller received (touch 0 or 1, angles scaled to the joint's range).
-``commands``: what goes into the motors, each in its own unit: a position servo's target, rad.
+``sensors``: the readings that the controller received (touch 0 or 1, angles scaled to the joint's
+range). ``commands``: actuator controls, each in its own unit: a position servo's target, rad.
 ``joint_positions``: rad. ``joint_velocities``: rad/s.
 ``joint_efforts``: torque at the joint over the last physics step, N m; 0 at the start.
 ``base_position``: root body, world frame, m. ``base_orientation``: unit quaternion, w x y z.
@@ -35,12 +35,12 @@ SIGNALS: tuple[Signal, ...] = get_args(Signal)
 
 @dataclass(frozen=True)
 class Names:
-    """The names that the columns of a behaviour's signals carry.
+    """Column names of the signals of a behaviour.
 
     Attributes:
-        sensors: What feeds the controller, in its order.
-        motors: What the controller commands, in its order.
-        hinges: The single-degree joints of the model, in its order.
+        sensors: Inputs of the controller, in its order.
+        motors: Outputs of the controller, in its order.
+        hinges: Hinge joints of the model, in its order.
     """
 
     sensors: tuple[str, ...]
@@ -48,11 +48,11 @@ class Names:
     hinges: tuple[str, ...]
 
     def width(self, signal: Signal) -> int:
-        """Returns how many columns ``signal`` has."""
+        """Returns the number of columns of a signal."""
         return len(self.columns(signal))
 
     def columns(self, signal: Signal) -> tuple[str, ...]:
-        """Returns the name of each column of ``signal``."""
+        """Returns the column names of a signal."""
         return {
             "sensors": self.sensors,
             "commands": self.motors,
@@ -65,13 +65,13 @@ class Names:
 
 @dataclass(frozen=True)
 class StepTiming:
-    """When a control step of a robot with a clock of its own really happened.
+    """Measured time of one control step, for a robot with its own clock.
 
     Attributes:
-        elapsed: Seconds from the first observation to this one by the robot's clock; NaN where it
-            did not say.
-        late: Whether it came more than a tolerance later than a control time step after the one
-            before, or, as where a driver catches up, sooner.
+        elapsed: Seconds from the first observation to this one by the robot's clock; NaN if
+            unknown.
+        late: Whether the time since the previous step differs from the control time step by more
+            than a tolerance, in either direction.
         missing: Whether nothing was observed.
     """
 
@@ -82,13 +82,13 @@ class StepTiming:
 
 @dataclass(frozen=True)
 class Sample:
-    """One control step of a run, as it happened: the state, what was read, what was commanded.
+    """State, readings and commands of one control step.
 
     Attributes:
-        time: Seconds since the start of the run, when the sensors were to be read: a multiple of
-            the control time step.
-        values: Each signal's row at that moment, ``(width,)``.
-        moment: When that really was, where the robot has a clock of its own.
+        time: Scheduled time of the step, s since the start of the run: a multiple of the control
+            time step.
+        values: The row of each signal, ``(width,)``.
+        moment: Measured time of the step, for a robot with its own clock.
     """
 
     time: float
@@ -98,20 +98,20 @@ class Sample:
 
 @dataclass(frozen=True, eq=False)
 class Behaviour:
-    """The signals of one run, or of a batch of runs.
+    """The signals of one run or of a batch of runs.
 
     Row k is the state in which command k was computed, so the last command has no consequence in
     the record. A batch has a leading axis of runs.
 
     Attributes:
-        names: What the columns are called.
-        time: ``(steps,)`` seconds since the start of the run, strictly increasing.
-        signals: What was recorded, each ``(..., steps, width)``.
-        late: ``(steps,)``: whether other than a control time step lies between a row and the one
-            before, as on a robot with a clock of its own; None where that is never so.
+        names: Column names of the signals.
+        time: Seconds since the start of the run, ``(steps,)``, strictly increasing.
+        signals: Recorded signals, each ``(..., steps, width)``.
+        late: Late steps, ``(steps,)``: whether the time since the previous row differs from the
+            control time step; None for a robot without its own clock.
 
     Raises:
-        ValueError: A shape does not fit its names, or time does not increase.
+        ValueError: A shape is inconsistent with the names, or time does not increase.
     """
 
     names: Names
@@ -139,7 +139,7 @@ class Behaviour:
         """Returns one signal, ``(..., steps, width)``.
 
         Raises:
-            KeyError: It was not recorded; a comparator asks for what it needs by ``needs``.
+            KeyError: The signal was not recorded.
         """
         try:
             return self.signals[signal]
@@ -149,23 +149,34 @@ class Behaviour:
 
     @property
     def steady_commands(self) -> FloatArray:
-        """The commands, with NaN for each that stood for other than a control time step.
+        """Commands, with NaN for each command that was held for other than one control time step.
 
-        What was commanded then is known; what it led to is at another time than a row says.
+        Such a command is known, but the next row is not one control time step after it.
         """
         commands = self["commands"]
         if self.late is None:
             return commands
-        until_late = np.append(self.late[1:], False)  # the last leads nowhere
+        until_late = np.append(self.late[1:], False)  # no row follows the last command
         return np.where(until_late[:, np.newaxis], np.nan, commands)
+
+    def __repr__(self) -> str:
+        runs = next((values.shape[:-2] for values in self.signals.values()), ())
+        batch = f"{'x'.join(map(str, runs))} runs of " if runs else ""
+        widths = ", ".join(f"{name} ({self.names.width(name)})" for name in self.signals)
+        late = "" if self.late is None else f"\n  late steps: {int(self.late.sum())}"
+        end = float(self.time[-1]) if self.steps else 0.0
+        return (
+            f"<Behaviour: {batch}{self.steps} steps to {end:g} s"
+            f"\n  signals (width): {widths or 'none'}{late}>"
+        )
 
     @property
     def steps(self) -> int:
-        """How many control steps were recorded."""
+        """Number of recorded control steps."""
         return len(self.time)
 
     def first(self, steps: int) -> "Behaviour":
-        """Returns the first steps of it, or all of it if it has no more."""
+        """Returns the behaviour of the first ``steps`` steps, at most all."""
         return Behaviour(
             names=self.names,
             time=self.time[:steps],
@@ -175,10 +186,10 @@ class Behaviour:
 
 
 def collect(names: Names, samples: Iterable[Sample]) -> Behaviour:
-    """Returns the behaviour that ``samples`` make up, for a run that needs no log.
+    """Returns the behaviour of a sequence of samples.
 
     Raises:
-        ValueError: There are no samples, or their rows do not fit ``names``.
+        ValueError: There are no samples, or a row is inconsistent with ``names``.
     """
     rows = list(samples)
     if not rows:
@@ -195,18 +206,18 @@ def collect(names: Names, samples: Iterable[Sample]) -> Behaviour:
 
 
 def late_steps(moments: Sequence[StepTiming | None]) -> BoolArray | None:
-    """Returns which steps were late, ``(steps,)``; None for a robot without a clock of its own."""
+    """Returns which steps were late, ``(steps,)``; None for a robot without its own clock."""
     known = [moment for moment in moments if moment is not None]
     return np.array([moment.late for moment in known]) if known else None
 
 
 def forward_displacement(behaviour: Behaviour) -> FloatArray:
-    """Returns d(T) - d(1), how far the root body travelled along the world's x axis.
+    """Returns the forward displacement d(T) - d(1) of the root body along the world's x axis.
 
     Source: the paper, section III (fitness of the repair EA).
 
     Returns:
-        Metres, one number a run: shape ``(...)``, ``()`` for a single run.
+        Displacement of each run, m, ``(...)``; ``()`` for a single run.
     """
     x = behaviour["base_position"][..., 0]
     return np.asarray(x[..., -1] - x[..., 0])

@@ -6,15 +6,15 @@ from selfmodel.arrays import FloatArray
 
 
 def rotation_between(to: FloatArray, start: FloatArray) -> FloatArray:
-    """Returns by how much one orientation is turned from another.
+    """Returns the rotation from one orientation to another, as a small rotation vector.
 
     Args:
         to: ``(..., 4)``.
         start: ``(..., 4)``, of a shape that broadcasts to that of ``to``.
 
     Returns:
-        ``(..., 3)`` twice the vector part of the rotation in the frame of ``start``: its axis times
-        its angle, rad, as long as the angle is small, and at most 2 long.
+        Twice the vector part of the rotation in the frame of ``start``, ``(..., 3)``: axis times
+        angle, rad, for small angles; its norm is at most 2.
     """
     w, v = start[..., :1], start[..., 1:]
     scalar = (to * start).sum(axis=-1, keepdims=True)
@@ -23,16 +23,16 @@ def rotation_between(to: FloatArray, start: FloatArray) -> FloatArray:
 
 
 def directions(orientation: FloatArray) -> FloatArray:
-    """Returns where the axes of a body point that say how it lies and where it heads.
+    """Returns the heading and the tilt of a body as direction cosines.
 
-    Unlike a quaternion, they do not change when its sign does.
+    The result is the same for a quaternion and its negative.
 
     Args:
         orientation: ``(..., 4)``.
 
     Returns:
-        ``(..., 5)``: the horizontal part of where its x axis points in the world, then the
-        world's upward direction in the body's frame.
+        ``(..., 5)``: the horizontal components of the body's x axis in the world frame, then the
+        world's upward direction in the body frame.
     """
     w, x, y, z = np.moveaxis(orientation, -1, 0)
     forward = (1 - 2 * (y * y + z * z), 2 * (x * y + w * z))
@@ -41,7 +41,7 @@ def directions(orientation: FloatArray) -> FloatArray:
 
 
 def product(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Returns the rotations that turn by the second and then by the first.
+    """Returns the quaternion product: the second rotation followed by the first.
 
     Args:
         first: ``(..., 4)``, w x y z.
@@ -55,7 +55,7 @@ def product(first: FloatArray, second: FloatArray) -> FloatArray:
 
 
 def rotated(vectors: FloatArray, orientation: FloatArray) -> FloatArray:
-    """Returns vectors of a body's frame as the world has them.
+    """Returns vectors rotated from the body frame to the world frame.
 
     Args:
         vectors: ``(..., 3)``.
@@ -66,9 +66,9 @@ def rotated(vectors: FloatArray, orientation: FloatArray) -> FloatArray:
 
 
 def cross(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Returns cross products, to the bit as ``numpy.cross`` has them, in half of its time.
+    """Returns cross products, bit-identical to ``numpy.cross`` in half of its time.
 
-    A planar body needs two of them a control step to know where it is.
+    The pose of a planar body needs two cross products per control step.
 
     Args:
         first: ``(..., 3)``.

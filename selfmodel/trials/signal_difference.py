@@ -1,4 +1,4 @@
-"""Signals made comparable: all but the orientation are what they are, column by column."""
+"""Differences of signals; orientations are compared as rotations."""
 
 import numpy as np
 
@@ -8,15 +8,15 @@ from selfmodel.trials.rotation import directions, rotation_between
 
 
 def difference(signal: Signal, one: FloatArray, other: FloatArray) -> FloatArray:
-    """Returns by how much values of a signal differ; of orientations, the rotation between them.
+    """Returns the difference of values of a signal: the rotation between them for orientations.
 
     Args:
-        signal: What the values are of.
+        signal: Name of the signal.
         one: ``(..., width)``.
-        other: ``(..., width)``, of a shape that broadcasts to that of ``one``.
+        other: ``(..., width)``, broadcastable to the shape of ``one``.
 
     Returns:
-        ``(..., width)``, but ``(..., 3)`` of an orientation; in the signal's unit, rad.
+        ``(..., width)`` in the signal's unit; ``(..., 3)``, rad, for an orientation.
     """
     if signal == "base_orientation":
         return rotation_between(one, other)
@@ -24,13 +24,13 @@ def difference(signal: Signal, one: FloatArray, other: FloatArray) -> FloatArray
 
 
 def comparable(signal: Signal, values: FloatArray) -> FloatArray:
-    """Returns columns of a signal that may be averaged and subtracted one by one.
+    """Returns the columns of a signal in a form that may be averaged and subtracted.
 
     Args:
-        signal: What the values are of.
+        signal: Name of the signal.
         values: ``(..., width)``.
 
     Returns:
-        ``(..., columns)``: of an orientation, where it points; otherwise the values.
+        ``(..., columns)``: direction cosines for an orientation; otherwise the values.
     """
     return directions(values) if signal == "base_orientation" else values

@@ -1,7 +1,8 @@
-"""The state of a robot at each step of a trial, as well as its log tells it.
+"""State estimation: smoothed positions from logged positions and velocities.
 
-Positions are noisy; how far a body moved between two steps is known better, from its velocity. So a
-position is averaged over the steps around it, each moved along by the velocities between.
+Logged positions are noisy; the displacement between two steps is known better, from the velocity.
+A position is the mean of the positions of the neighbouring steps, each propagated by the
+velocities in between.
 """
 
 from collections.abc import Mapping
@@ -15,40 +16,41 @@ JOINTS: tuple[Signal, ...] = ("joint_positions", "joint_velocities")
 IMU: tuple[Signal, ...] = ("base_orientation", "base_angular_velocity")
 BASE: tuple[Signal, ...] = ("base_position", "base_linear_velocity")
 ONBOARD: tuple[Signal, ...] = JOINTS + IMU
-"""The part of the state that a robot can tell by itself."""
+"""The part of the state that onboard sensors measure."""
 STATE: tuple[Signal, ...] = ONBOARD + BASE
 """The signals that make up the state."""
 
-MOSTLY, HALF = 0.6, 0.5
-"""From which share of contradicting moves on there is noise, in the mean of the columns and in
-each. Where it is all there is, two in three contradict each other; without noise fewer than a half
-do, but for joints that tremble."""
+NOISE_SHARE, NOISE_SHARE_PER_COLUMN = 0.6, 0.5
+"""Smallest shares of successive residuals of opposite sign that count as noise: in the mean over
+the columns, and in each column. For pure noise the share is two thirds; without noise it is below
+one half, except for joints that oscillate at every step."""
 
-OF_TURNS = 0.5
-"""Which part of the moves may be left, where they are no noise. Of the noise of 370 trials with a
-gap 0.98 was left, and of a cheetah that trembles less than 0.001."""
+MAX_UNEXPLAINED_SHARE = 0.5
+"""Largest share of the residuals left after regression on the velocity changes at which the
+residuals count as dynamics, not noise. Noise in 370 trials with a gap left 0.98; an oscillating
+cheetah left less than 0.001."""
 
 _SMOOTHED: tuple[tuple[Signal, Signal, int, float], ...] = (
     ("joint_positions", "joint_velocities", 3, 1e-3),
     ("base_position", "base_linear_velocity", 6, 1e-4),
 )
-"""Which positions move by which velocities, over how many steps to either side they are averaged,
-and what noise, in their unit, is not worth it."""
+"""Position signal, its velocity signal, half width of the mean in steps, and the smallest noise
+that is smoothed, in the position's unit."""
 
 
 def estimated_states(
     behaviour: Behaviour, signals: tuple[Signal, ...] = STATE
 ) -> Mapping[Signal, FloatArray]:
-    """Returns the state at each step.
+    """Returns the estimated state at each step.
 
     Args:
-        behaviour: Of one run.
-        signals: The parts of the state that are to be estimated.
+        behaviour: Behaviour of one run.
+        signals: The signals of the state to estimate.
 
     Returns:
-        Each signal, ``(steps, width)``. Where no noise shows it is what was logged, to the bit;
-        NaN where something that it would be estimated from was not observed, or a step that was
-        late lies between.
+        Each signal, ``(steps, width)``. A signal without detectable noise is the logged signal,
+        bit-identical. The result is NaN where a value it depends on was not observed, or a late
+        step is in between.
     """
     states = {signal: behaviour[signal] for signal in signals}
     timestep = float(behaviour.time[1] - behaviour.time[0]) if behaviour.steps > 1 else 0.0
@@ -66,21 +68,21 @@ def estimated_states(
 
 
 def _steps_along(velocities: FloatArray, timestep: float) -> FloatArray:
-    """How far the velocities lead from each step to the next.
+    """Displacement from each step to the next, integrated from the velocities.
 
-    Physics moves a body by the velocity that it has at the end of a step, and a control step of two
-    physics steps ends with one half of the way and passes the middle with the other.
+    The integrator is semi-implicit: a physics step moves by the velocity at its end. For a control
+    step of two physics steps the weights of its first and last velocity are 1/4 and 3/4.
     """
     return np.asarray((velocities[:-1] + 3 * velocities[1:]) / 4 * timestep)
 
 
 def _is_noise(moved: FloatArray, little: float) -> bool:
-    """Whether what the velocities do not explain is mostly noise, in every column, and not little.
+    """Whether the residual displacements are mostly measurement noise, in every column.
 
-    Noise that puts a position too high at one step makes the move to it too long and the one from
-    it too short, so it has successive moves contradict each other, two times in three where it is
-    all there is. What impacts and the length of a step leave unexplained rather persists. A joint
-    may tremble, but not all of them do at every step.
+    A position error makes the residual before it too large and the residual after it too small, so
+    successive residuals have opposite signs: in two of three pairs for pure noise. Residuals from
+    impacts and from the step length persist in sign. Single joints may oscillate at every step, but
+    not all of them.
     """
     product = moved[1:] * moved[:-1]
     known = np.isfinite(product)
@@ -90,23 +92,23 @@ def _is_noise(moved: FloatArray, little: float) -> bool:
     return bool(
         len(enough)
         and np.median(enough) > little
-        and shares.mean() > MOSTLY
-        and np.all(shares > HALF)
+        and shares.mean() > NOISE_SHARE
+        and np.all(shares > NOISE_SHARE_PER_COLUMN)
     )
 
 
 def _is_of_turns(moved: FloatArray, turns: FloatArray) -> bool:
-    """Whether what is left of the moves is in truth how the velocities change within each step.
+    """Whether the residual displacements are a linear function of the velocity changes.
 
-    A robot that is driven to and fro at every step moves like one that is measured with noise. But
-    its moves then follow from its velocities: by another weight of the two than that of a control
-    step of two physics steps. Of noise, next to nothing follows.
+    The residuals of a robot whose joints oscillate at every step look like noise, but are
+    proportional to the velocity changes: the step has other integration weights than those of two
+    physics steps. Noise is not proportional to the velocity changes.
     """
     known = np.isfinite(moved) & np.isfinite(turns)
     rest, turn = np.where(known, moved, 0.0), np.where(known, turns, 0.0)
     weights = (rest * turn).sum(axis=0) / np.maximum((turn * turn).sum(axis=0), 1e-300)
     left = np.abs(rest - weights * turn)[known]
-    return bool(np.median(left) < OF_TURNS * np.median(np.abs(rest[known])))
+    return bool(np.median(left) < MAX_UNEXPLAINED_SHARE * np.median(np.abs(rest[known])))
 
 
 def _averaged(

@@ -1,54 +1,53 @@
-"""A trial: one run of the physical robot with one controller, as its log tells it."""
+"""A trial: one logged run of the physical robot with one command source."""
 
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from selfmodel.controllers.driver import Driver
+from selfmodel.controllers.command_source import CommandSource
 from selfmodel.trials.behaviour import Behaviour, forward_displacement
 
 Stage = Literal["before", "after", "recovery", "single"]
-"""Where in a story a trial stands: the robot walks (``before``), no longer does as its model says
-(``after``), tries a compensating controller (``recovery``), or runs outside a recovery
-(``single``). What was ``before`` is not explained by a diagnosis: it shows how the robot moves with
-nothing wrong."""
+"""Stage of a recovery: ``before`` (healthy robot), ``after`` (failed robot, old controller),
+``recovery`` (failed robot, compensating controller), or ``single`` (outside of a recovery). A
+diagnosis explains all trials but those of the stage ``before``, which calibrate the self-model."""
 
 STAGES: tuple[Stage, ...] = get_args(Stage)
 
 
 def stage_of(name: str) -> Stage | None:
-    """Returns the stage of that name; None if there is none."""
+    """Returns the stage of a name; None if no stage has the name."""
     return next((stage for stage in STAGES if stage == name), None)
 
 
 @dataclass(frozen=True)
 class TrialPlan:
-    """What is known of a trial before it starts.
+    """The plan of a trial, known before it starts.
 
     Attributes:
-        name: Identifies the trial within its run, and names its file: letters, digits, ``-``.
-        stage: Where in the story it stands.
-        controller: What drives the robot.
-        steps: Control steps that it is to last.
-        seed: From which everything random about it is drawn.
+        name: Name of the trial within its run and of its file: letters, digits, ``-``.
+        stage: Stage of the recovery.
+        controller: Command source of the robot.
+        steps: Planned control steps.
+        seed: Seed of all random numbers of the trial.
     """
 
     name: str
     stage: Stage
-    controller: Driver
+    controller: CommandSource
     steps: int
     seed: int
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A trial that ran, to its end or until it was interrupted.
+    """A trial that ran to its end, or until it was interrupted.
 
     Attributes:
-        plan: What was to be done.
-        robot: The name of the robot.
-        behaviour: What was observed, every signal of it: ``plan.steps`` steps, or fewer where the
-            trial was interrupted. What is NaN was not observed.
-        path: The log it was read from.
+        plan: The plan of the trial.
+        robot: Name of the robot.
+        behaviour: Every signal that was observed: ``plan.steps`` steps, or fewer where the trial
+            was interrupted; NaN for values that were not observed.
+        path: Path of the log.
     """
 
     plan: TrialPlan
@@ -58,5 +57,5 @@ class Trial:
 
     @property
     def displacement(self) -> float:
-        """How far the robot travelled forward, m."""
+        """Forward displacement, m."""
         return float(forward_displacement(self.behaviour))

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from selfmodel.controllers.cpg import Oscillators
 from selfmodel.logs import read_log
 from tests.helpers.command import SMALL, selfmodel
 
@@ -27,7 +26,7 @@ def test_a_recovery_evolves_oscillators_where_they_are_asked_for(rhythmic: tuple
 
     assert told["controller"] == "cpg"
     assert len(drivers) == 3
-    assert all(isinstance(driver, Oscillators) for driver in drivers)
+    assert all(driver.design.name == "cpg" for driver in drivers)
     assert drivers[0] == drivers[1] != drivers[2]
 
 
@@ -50,18 +49,18 @@ def test_oscillators_of_a_log_drive_another_trial_which_replays(rhythmic: tuple[
     info = selfmodel("logs", "info", "broken.mcap", cwd=folder)
 
     assert json.loads(again.stdout)["identical"] is True
-    assert "oscillators of" in info.stdout
+    assert "a CPG of" in info.stdout
 
 
-def test_a_trial_takes_random_oscillators_or_a_random_network_of_any_size(tmp_path: Path):
+def test_a_trial_takes_random_cpgs_or_a_random_network_of_any_size(tmp_path: Path):
     for number, asked in enumerate((["--controller", "cpg"], ["--neurons", "6"])):
         out = f"{number}.mcap"
         done = selfmodel("trial", "quadruped", *asked, "--out", out, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
     rhythmic, large = (read_log(tmp_path / f"{k}.mcap").trial.plan.controller for k in (0, 1))
 
-    assert isinstance(rhythmic, Oscillators)
-    assert large.network.hidden == 6
+    assert rhythmic.design.name == "cpg"
+    assert large.design.hidden == 6
 
 
 def test_a_recovery_s_network_has_as_many_neurons_as_are_asked_for(tmp_path: Path):
@@ -73,7 +72,7 @@ def test_a_recovery_s_network_has_as_many_neurons_as_are_asked_for(tmp_path: Pat
 
     assert told["neurons"] == 5
     assert told["controller"] == "network"
-    assert log.trial.plan.controller.network.hidden == 5
+    assert log.trial.plan.controller.design.hidden == 5
 
 
 @pytest.mark.parametrize(
@@ -81,7 +80,7 @@ def test_a_recovery_s_network_has_as_many_neurons_as_are_asked_for(tmp_path: Pat
     [
         (("--controller", "cpq"), "unknown kind of controller 'cpq': did you mean cpg?"),
         (("--controller", "cpg", "--neurons", "4"), "--neurons 4 is of a network: leave it out"),
-        (("--controller", "cpg", "--case", "10"), "neuron:0 means nothing to a robot that osc"),
+        (("--controller", "cpg", "--case", "10"), "neuron:0 does not apply to a CPG"),
         (("--neurons", "101"), "less than or equal to 100"),
     ],
 )
@@ -99,10 +98,23 @@ def test_what_cannot_be_evolved_is_said_before_anything_runs(
 def test_a_controller_of_another_size_is_refused_by_what_differs(tmp_path: Path):
     first = selfmodel("trial", "quadruped", "--neurons", "6", "--out", "6.mcap", cwd=tmp_path)
     done = selfmodel(
-        *("trial", "quadruped", "--controller", "6.mcap", "--out", "3.mcap"), cwd=tmp_path
+        *("trial", "quadruped", "--controller", "6.mcap", "--neurons", "3", "--out", "3.mcap"),
+        cwd=tmp_path,
     )
 
     assert first.returncode == 0
     assert done.returncode == 2
-    assert "6 hidden neurons; this robot needs one for" in done.stderr
+    assert "6 hidden neurons and 8 motors; this robot needs one for" in done.stderr
     assert "3 hidden neurons" in done.stderr
+
+
+def test_a_given_controller_brings_its_number_of_hidden_neurons(tmp_path: Path):
+    first = selfmodel("trial", "quadruped", "--neurons", "6", "--out", "6.mcap", cwd=tmp_path)
+    given = ("--controller", "6.mcap", "--damage", "neuron:5", "--out", "again.mcap")
+    done = selfmodel("trial", "quadruped", *given, cwd=tmp_path)
+
+    assert first.returncode == done.returncode == 0, done.stderr
+    controllers = [
+        read_log(tmp_path / name).trial.plan.controller for name in ("6.mcap", "again.mcap")
+    ]
+    assert controllers[0] == controllers[1]

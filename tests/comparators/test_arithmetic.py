@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 
 from selfmodel.comparators.arithmetic import command_errors, command_spans
-from selfmodel.controllers.network import Controller
+from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import SIGNALS, Behaviour
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.conftest import random_controllers, random_oscillators
+from tests.conftest import random_controllers, random_cpgs
 from tests.helpers.memory import MemoryJournal
 
 STEPS = 60
@@ -42,7 +43,7 @@ def test_a_controller_that_works_errs_by_exactly_nothing_whatever_else_is_wrong(
 
 def rhythmic(robot: Robot, truth: str) -> Trial:
     """A trial that oscillators drive."""
-    (driver,) = random_oscillators(robot, 1)
+    (driver,) = random_cpgs(robot, 1)
     physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
     return MemoryJournal(robot).record(physical, TrialPlan("t", "after", driver, STEPS, 0))
 
@@ -64,7 +65,7 @@ def test_oscillators_that_hear_other_readings_are_at_another_phase_from_then_on(
 
 def test_a_motor_s_error_is_weighed_by_its_own_range(quadruped: Robot):
     one = trial(quadruped)
-    network = quadruped.network
+    network = network_for(quadruped)
     wide = dataclasses.replace(network, ranges=((0.0, np.pi / 2), *network.ranges[1:]))
     driver = Controller(wide, one.plan.controller.genome)
     other = dataclasses.replace(one, plan=dataclasses.replace(one.plan, controller=driver))

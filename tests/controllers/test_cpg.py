@@ -1,4 +1,4 @@
-"""Promises of the oscillators: what their genome says, and arithmetic that knows no other rows."""
+"""Tests of CPGs: decoding, bounds and formula, and rows that are independent of each other."""
 
 import math
 from collections.abc import Callable
@@ -9,47 +9,47 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from selfmodel.controllers.command_range import TARGET_RANGE
+from selfmodel.controllers.command_source import make_batch
+from selfmodel.controllers.controller import Controller, draw_genomes
 from selfmodel.controllers.cpg import (
-    FASTEST,
-    FEEDBACK,
-    SLOWEST,
+    MAX_FEEDBACK,
+    MAX_FREQUENCY,
+    MIN_FREQUENCY,
     Cpg,
-    Oscillators,
-    Rhythms,
     amplitude_rise,
 )
-from selfmodel.controllers.driver import drive
-from selfmodel.controllers.network import draw_weights
 from selfmodel.errors import InputError
 from selfmodel.faults.notation import parse
+from selfmodel.robot.designs import cpg_for
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import SIGNALS
-from tests.conftest import random_controllers, random_oscillators
+from tests.conftest import random_controllers, random_cpgs
 
 RANGES = ((0.5, 0.25), (0.0, 1.0), (-2.0, 1.0))
 CPG = Cpg(("touch", "angle"), ("hip", "knee", "ankle"), 0.01, RANGES)
 
 
 def genomes(count: int, seed: int = 0) -> np.ndarray:
-    return draw_weights(np.random.default_rng(seed), (count, CPG.weights))
+    return draw_genomes(np.random.default_rng(seed), (count, CPG.weights))
 
 
-def given_by(oscillators: Oscillators, readings: np.ndarray) -> np.ndarray:
-    """The commands for readings ``(steps, sensors)``, ``(steps, motors)``."""
-    rhythms, commands = Rhythms([oscillators]), np.empty((len(readings), 1, 3))
+def commanded(genome: np.ndarray, readings: np.ndarray) -> np.ndarray:
+    """Returns the commands, ``(steps, motors)``, for readings, ``(steps, sensors)``."""
+    batch, commands = CPG.batch(genome[np.newaxis], [frozenset()]), np.empty((len(readings), 1, 3))
     for reading, command in zip(readings, commands, strict=True):
-        rhythms.readings[0] = reading
-        rhythms.step(command)
+        batch.readings[0] = reading
+        batch.step(command)
     return commands[:, 0]
 
 
 def test_a_genome_has_a_value_for_each_thing_that_it_says(robot: Robot):
-    assert robot.cpg.weights == {"quadruped": 33, "hexapod": 67}[robot.name]
+    assert cpg_for(robot).weights == {"quadruped": 33, "hexapod": 67}[robot.name]
 
 
 def test_a_step_is_the_formula_of_the_docs():
-    one = Oscillators(CPG, genomes(1)[0])
+    genome = genomes(1)[0]
+    one = CPG.decode(genome)
     readings = np.random.default_rng(1).uniform(-1, 1, (300, 2))
     clock, expected = 0.0, []
     for step, reading in enumerate(readings):
@@ -59,24 +59,25 @@ def test_a_step_is_the_formula_of_the_docs():
         expected.append([0.5, 0.0, -2.0] + np.array([0.25, 1.0, 1.0]) * envelope * swing)
         clock += 0.01 * one.frequency * (1 + one.feedback @ reading)
 
-    np.testing.assert_allclose(given_by(one, readings), expected, atol=1e-12)
+    np.testing.assert_allclose(commanded(genome, readings), expected, atol=1e-12)
 
 
 @given(seed=st.integers(0, 10_000), reading=st.floats(-1, 1))
 def test_no_genome_leaves_the_ranges_of_its_motors_or_stops_its_clock(seed: int, reading: float):
-    one = Oscillators(CPG, genomes(1, seed)[0])
-    commands = given_by(one, np.full((50, 2), reading))
+    genome = genomes(1, seed)[0]
+    one = CPG.decode(genome)
+    commands = commanded(genome, np.full((50, 2), reading))
     centre, half = np.array(RANGES).T
 
     assert np.all(np.abs(commands - centre) <= half * (1 + 1e-12))
     assert np.all(np.abs(one.offsets) + one.amplitudes <= 1 + 1e-12)
-    assert SLOWEST * (1 - 1e-12) <= one.frequency <= FASTEST * (1 + 1e-12)
-    assert np.abs(one.feedback).sum() <= FEEDBACK + 1e-12
+    assert MIN_FREQUENCY * (1 - 1e-12) <= one.frequency <= MAX_FREQUENCY * (1 + 1e-12)
+    assert np.abs(one.feedback).sum() <= MAX_FEEDBACK + 1e-12
 
 
 def test_they_start_from_the_centre_without_a_jolt_and_reach_their_amplitude():
-    one = Oscillators(CPG, np.concatenate([np.ones(1 + 3), np.zeros(CPG.weights - 4)]))
-    commands = given_by(one, np.zeros((300, 2)))
+    genome = np.concatenate([np.ones(1 + 3), np.zeros(CPG.weights - 4)])
+    commands = commanded(genome, np.zeros((300, 2)))
 
     assert np.array_equal(commands[0], [0.5, 0.0, -2.0])
     assert np.abs(commands[1] - commands[0]).max() < 0.01
@@ -92,9 +93,10 @@ def test_amplitudes_grow_as_their_differential_equation_says():
 
 
 def test_they_repeat_themselves_at_their_frequency():
-    one = Oscillators(CPG, genomes(1, 3)[0])
+    genome = genomes(1, 3)[0]
+    one = CPG.decode(genome)
     steps = 100 / (one.frequency * 0.01)  # of a hundred strides
-    commands = given_by(one, np.zeros((200 + round(steps), 2)))
+    commands = commanded(genome, np.zeros((200 + round(steps), 2)))
     drift = np.abs(round(steps) - steps) * 0.01 * 2 * np.pi * one.frequency
 
     apart = np.abs(commands[150:200] - commands[150 + round(steps) : 200 + round(steps)])
@@ -104,9 +106,9 @@ def test_they_repeat_themselves_at_their_frequency():
 def test_a_reading_bends_the_rhythm_and_without_feedback_none_does():
     genome = genomes(1, 5)[0].copy()
     genome[-2:] = [1.0, 0.0]
-    quiet = given_by(Oscillators(CPG, genome), np.zeros((200, 2)))
-    touched = given_by(Oscillators(CPG, genome), np.tile([1.0, 0.0], (200, 1)))
-    unheard = given_by(Oscillators(CPG, genome), np.tile([0.0, 1.0], (200, 1)))
+    quiet = commanded(genome, np.zeros((200, 2)))
+    touched = commanded(genome, np.tile([1.0, 0.0], (200, 1)))
+    unheard = commanded(genome, np.tile([0.0, 1.0], (200, 1)))
 
     assert np.abs(touched - quiet).max() > 0.05
     assert np.array_equal(unheard, quiet)
@@ -116,9 +118,10 @@ def test_a_reading_bends_the_rhythm_and_without_feedback_none_does():
 @given(rows=st.integers(1, 40), data=st.data())
 def test_a_robot_gets_the_same_bits_in_any_batch_and_any_place(rows: int, data: st.DataObject):
     place = data.draw(st.integers(0, rows - 1))
-    oscillators = [Oscillators(CPG, genome) for genome in genomes(rows, rows)]
+    drawn = genomes(rows, rows)
     readings = np.random.default_rng(place).normal(size=(20, rows, 2))
-    together, alone = Rhythms(oscillators), Rhythms([oscillators[place]])
+    together = CPG.batch(drawn, [frozenset()] * rows)
+    alone = CPG.batch(drawn[place : place + 1], [frozenset()])
     for reading in readings:
         many, one = np.empty((rows, 3)), np.empty((1, 3))
         together.readings[:], alone.readings[:] = reading, reading[place]
@@ -131,7 +134,7 @@ def test_a_driven_robot_moves_by_the_same_bits_in_any_batch_on_any_threads(robot
     hypotheses = [parse("intact", robot.anatomy)] * 6
     hypotheses[1] = parse(f"break:{robot.anatomy.joints[0].name}", robot.anatomy)
     hypotheses[2] = parse(f"sensor:{robot.anatomy.sensors[0].name}", robot.anatomy)
-    runs = list(zip(hypotheses, random_oscillators(robot, 6), strict=True))
+    runs = list(zip(hypotheses, random_cpgs(robot, 6), strict=True))
     together = Simulator(robot, 2).run(runs, 60, SIGNALS).behaviour
     backwards = Simulator(robot, 1).run(runs[::-1], 60, SIGNALS).behaviour
     for row, run in enumerate(runs[:3]):
@@ -143,8 +146,8 @@ def test_a_driven_robot_moves_by_the_same_bits_in_any_batch_on_any_threads(robot
 
 def test_a_dead_sensor_that_they_listen_to_changes_how_a_robot_moves(quadruped: Robot):
     genome = np.concatenate([np.full(25, 0.5), np.ones(8)])
-    one = Oscillators(quadruped.cpg, genome)
-    deaf = Oscillators(quadruped.cpg, np.concatenate([np.full(25, 0.5), np.zeros(8)]))
+    one = Controller(cpg_for(quadruped), genome)
+    deaf = Controller(cpg_for(quadruped), np.concatenate([np.full(25, 0.5), np.zeros(8)]))
     dead = parse("sensor:front_left_touch", quadruped.anatomy)
     intact = parse("intact", quadruped.anatomy)
     runs = [(intact, one), (dead, one), (intact, deaf), (dead, deaf)]
@@ -155,39 +158,39 @@ def test_a_dead_sensor_that_they_listen_to_changes_how_a_robot_moves(quadruped: 
 
 
 def test_a_silent_neuron_means_nothing_to_them(quadruped: Robot):
-    run = (parse("neuron:0", quadruped.anatomy), random_oscillators(quadruped, 1)[0])
-    with pytest.raises(InputError, match=r"have no hidden neurons: leave neuron:\.\.\. out"):
+    run = (parse("neuron:0", quadruped.anatomy), random_cpgs(quadruped, 1)[0])
+    with pytest.raises(InputError, match="has no hidden neurons: leave neuron:0 out"):
         Simulator(quadruped, 1).run([run], 2, ["sensors"])
 
 
 def test_they_share_no_batch_with_networks_or_with_others_that_are_connected_otherwise(
     quadruped: Robot,
 ):
-    (network,), (one,) = random_controllers(quadruped, 1), random_oscillators(quadruped, 1)
-    with pytest.raises(ValueError, match="got 1 networks, 1 sets of oscillators and 0 recordings"):
-        drive([network, one], np.ones((2, 3)), sensors=8)
-    other = Oscillators(CPG, genomes(1)[0])
-    with pytest.raises(ValueError, match="must be connected alike"):
-        Rhythms([one, other])
+    (network,), (one,) = random_controllers(quadruped, 1), random_cpgs(quadruped, 1)
+    with pytest.raises(ValueError, match=r"got 1 x a network of .*; 1 x a CPG of .*; 0 play"):
+        make_batch([network, one], [frozenset()] * 2, sensors=8)
+    other = Controller(CPG, genomes(1)[0])
+    with pytest.raises(ValueError, match=r"got 1 x a CPG of 8 .*; 1 x a CPG of 2 sensors"):
+        make_batch([one, other], [frozenset()] * 2, sensors=8)
 
 
 def test_two_are_equal_when_their_genome_and_connections_are():
     genome = genomes(1)[0]
 
-    assert Oscillators(CPG, genome) == Oscillators(CPG, genome.copy())
-    assert len({Oscillators(CPG, genome), Oscillators(CPG, genome.copy())}) == 1
-    assert Oscillators(CPG, genome) != Oscillators(CPG, -genome)
+    assert Controller(CPG, genome) == Controller(CPG, genome.copy())
+    assert len({Controller(CPG, genome), Controller(CPG, genome.copy())}) == 1
+    assert Controller(CPG, genome) != Controller(CPG, -genome)
     other = Cpg(CPG.sensors, CPG.motors, 0.02, CPG.ranges)
-    assert Oscillators(CPG, genome) != Oscillators(other, genome)
-    assert Oscillators(CPG, genome) != "oscillators"
+    assert Controller(CPG, genome) != Controller(other, genome)
+    assert Controller(CPG, genome) != "a controller"
 
 
 @pytest.mark.parametrize(
     ("make", "match"),
     [
-        (lambda: Oscillators(CPG, np.zeros(11)), "have 12 values, got a genome of shape"),
-        (lambda: Oscillators(CPG, np.full(12, 1.1)), r"must lie in \[-1, 1\]"),
-        (lambda: Oscillators(CPG, np.full(12, np.nan)), r"must lie in \[-1, 1\]"),
+        (lambda: Controller(CPG, np.zeros(11)), "has 12 weights, got a genome of shape"),
+        (lambda: Controller(CPG, np.full(12, 1.1)), r"must lie in \[-1, 1\]"),
+        (lambda: Controller(CPG, np.full(12, np.nan)), r"must lie in \[-1, 1\]"),
         (lambda: Cpg((), ("hip",), 0.0), "time step must be above 0 s, got 0.0"),
         (lambda: Cpg((), ("hip",), math.nan), "time step must be above 0 s, got nan"),
         (lambda: Cpg((), ("hip",), 0.1, ((0.0, 1.0),) * 2), "1 motors need a command range each"),

@@ -1,9 +1,9 @@
-"""Promises of recorded commands: given again as they were, whatever the sensors say."""
+"""Tests of playbacks: the recorded commands are repeated, independently of the sensors."""
 
 import numpy as np
 import pytest
 
-from selfmodel.controllers.driver import drive
+from selfmodel.controllers.command_source import make_batch
 from selfmodel.controllers.playback import Playback, played_back
 from selfmodel.robot.robot import Robot
 from tests.conftest import random_controllers
@@ -13,7 +13,7 @@ COMMANDS = np.array([[0.1, 0.2], [0.3, 0.4], [0.5, 0.6]])
 
 def test_commands_are_given_in_turn_and_the_last_one_stands():
     robots = [Playback(("a", "b"), COMMANDS), Playback(("a", "b"), -COMMANDS[:1])]
-    brains = drive(robots, np.ones((2, 3)), sensors=4)
+    brains = make_batch(robots, [frozenset(), {1}], sensors=4)
     targets = np.zeros((2, 2))
     given = []
     for _ in range(5):
@@ -76,5 +76,5 @@ def test_robots_of_one_batch_are_driven_alike(quadruped: Robot):
     motors = quadruped.anatomy.motors
     (controller,) = random_controllers(quadruped, 1)
     mixed = [controller, Playback(motors, np.zeros((1, len(motors))))]
-    with pytest.raises(ValueError, match="got 1 networks, 0 sets of oscillators and 1 recordings"):
-        drive(mixed, np.ones((2, 3)), sensors=8)
+    with pytest.raises(ValueError, match=r"got 1 x a network of .*; 1 playbacks"):
+        make_batch(mixed, [frozenset()] * 2, sensors=8)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT
-from selfmodel.controllers.network import Controller
+from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT

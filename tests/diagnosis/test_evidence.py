@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT, SEGMENT_PREDICTION, SENSOR_SERIES
-from selfmodel.controllers.driver import Driver
+from selfmodel.controllers.command_source import CommandSource
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.evidence import Evidence
@@ -57,7 +57,11 @@ class CountingSimulator(Simulator):
         return super().predict(hypotheses, segments, observed)
 
     def run_ensemble(
-        self, hypotheses: Sequence[Hypothesis], driver: Driver, steps: int, ensemble: Ensemble
+        self,
+        hypotheses: Sequence[Hypothesis],
+        driver: CommandSource,
+        steps: int,
+        ensemble: Ensemble,
     ) -> SimulationResult:
         """Simulates as ever."""
         self.times.update((one, driver) for one in hypotheses)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from selfmodel.comparators import SEGMENT_PREDICTION
-from selfmodel.controllers.network import Controller
+from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.diagnosis.loss_functions import Losses, LossFunctions

@@ -8,7 +8,7 @@ import pytest
 
 from selfmodel.cli.output.ranking import as_values, in_words, sureness
 from selfmodel.comparators import SEGMENT_PREDICTION, SENSOR_SERIES
-from selfmodel.controllers.network import Controller
+from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis, UnsearchedFault
 from selfmodel.diagnosis.loss_functions import LossFunctions

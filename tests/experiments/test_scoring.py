@@ -2,11 +2,12 @@
 
 import numpy as np
 
-from selfmodel.controllers.network import Controller
+from selfmodel.controllers.controller import Controller
 from selfmodel.experiments.scoring import is_correct
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Trial, TrialPlan
@@ -22,7 +23,7 @@ def logged(robot: Robot, truth: str, controller: Controller) -> Trial:
 
 def test_a_diagnosis_is_correct_if_it_cannot_be_told_from_the_truth(quadruped: Robot):
     simulator = Simulator(quadruped, 2)
-    deaf = Controller(quadruped.network, np.zeros(quadruped.network.weights))
+    deaf = Controller(network_for(quadruped), np.zeros(network_for(quadruped).weights))
     (awake,) = random_controllers(quadruped, 1)
     truth = parse("neuron:0", quadruped.anatomy)
 

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from selfmodel.controllers.driver import Driver
+from selfmodel.controllers.command_source import CommandSource
 from selfmodel.controllers.playback import played_back
 from selfmodel.robot.robot import Robot
 
@@ -136,6 +136,6 @@ def swinging(robot: Robot, steps: int) -> np.ndarray:
     return (low + high) / 2 + (high - low) / 4 * wave
 
 
-def swung(robot: Robot, steps: int) -> Driver:
+def swung(robot: Robot, steps: int) -> CommandSource:
     """A driver that gives these commands."""
     return played_back(robot.anatomy.motors, swinging(robot, steps))

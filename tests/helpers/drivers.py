@@ -2,21 +2,25 @@
 
 import numpy as np
 
-from selfmodel.controllers.cpg import Oscillators
-from selfmodel.controllers.network import Controller, draw_weights
+from selfmodel.controllers.controller import Controller, Design, draw_genomes
+from selfmodel.robot.designs import cpg_for, network_for
 from selfmodel.robot.robot import Robot
 
 
 def random_controllers(robot: Robot, count: int, seed: int = 0) -> list[Controller]:
-    """Returns controllers with random weights for a robot."""
-    genomes = draw_weights(np.random.default_rng(seed), (count, robot.network.weights))
-    return [Controller(robot.network, genome) for genome in genomes]
+    """Returns networks with random weights for a robot."""
+    return random_of(network_for(robot), count, seed)
 
 
-def random_oscillators(robot: Robot, count: int, seed: int = 0) -> list[Oscillators]:
+def random_cpgs(robot: Robot, count: int, seed: int = 0) -> list[Controller]:
     """Returns CPGs with random genomes for a robot."""
-    genomes = draw_weights(np.random.default_rng(seed), (count, robot.cpg.weights))
-    return [Oscillators(robot.cpg, genome) for genome in genomes]
+    return random_of(cpg_for(robot), count, seed)
+
+
+def random_of(design: Design, count: int, seed: int = 0) -> list[Controller]:
+    """Returns controllers of a design with random genomes."""
+    genomes = draw_genomes(np.random.default_rng(seed), (count, design.weights))
+    return [Controller(design, genome) for genome in genomes]
 
 
 def random_motion(robot: Robot, steps: int, seed: int = 0) -> np.ndarray:

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from selfmodel.controllers.network import Controller, draw_weights
+from selfmodel.controllers.controller import Controller, draw_genomes
 from selfmodel.logs.writer import write_trial
+from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import SIGNALS, Sample, StepTiming
@@ -81,8 +82,8 @@ def log(biped: Robot, plan: TrialPlan, tmp_path: Path) -> Path:
 
 def plan_of(robot: Robot, steps: int, name: str = "00-before") -> TrialPlan:
     """Returns a plan with a random controller."""
-    genome = draw_weights(np.random.default_rng(1), (robot.network.weights,))
-    return TrialPlan(name, "before", Controller(robot.network, genome), steps, seed=7)
+    genome = draw_genomes(np.random.default_rng(1), (network_for(robot).weights,))
+    return TrialPlan(name, "before", Controller(network_for(robot), genome), steps, seed=7)
 
 
 def timed(samples: Iterable[Sample]) -> Iterator[Sample]:

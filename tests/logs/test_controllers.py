@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from selfmodel.controllers.controller import Controller, Design, draw_genomes
 from selfmodel.controllers.cpg import Cpg
-from selfmodel.controllers.driver import Design
-from selfmodel.controllers.network import Controller, Network, draw_weights
+from selfmodel.controllers.network import Network
 from selfmodel.errors import InputError
 from selfmodel.logs import load_controller, save_controller
 from selfmodel.logs.controllers import LARGEST, controller_bytes, parse_controller
@@ -24,7 +24,7 @@ CPG = Cpg(("touch", "angle"), ("hip", "knee"), 0.02)
 
 def controller() -> Controller:
     network = Network(("touch", "angle"), ("hip", "knee"), 3)
-    return Controller(network, draw_weights(np.random.default_rng(0), (network.weights,)))
+    return Controller(network, draw_genomes(np.random.default_rng(0), (network.weights,)))
 
 
 def archive(**replaced: object) -> bytes:
@@ -32,8 +32,8 @@ def archive(**replaced: object) -> bytes:
     good = controller()
     arrays: dict[str, object] = {
         "kind": np.array("network"),
-        "sensors": np.array(good.network.sensors),
-        "motors": np.array(good.network.motors),
+        "sensors": np.array(good.design.sensors),
+        "motors": np.array(good.design.motors),
         "hidden": np.array(3),
         "genome": good.genome,
     } | replaced
@@ -42,8 +42,8 @@ def archive(**replaced: object) -> bytes:
     return file.getvalue()
 
 
-def oscillators(**replaced: object) -> bytes:
-    """The bytes of a file of oscillators with some of its arrays replaced."""
+def cpg(**replaced: object) -> bytes:
+    """The bytes of a file of a CPG with some of its arrays replaced."""
     own = {"kind": np.array("cpg"), "hidden": None, "timestep": np.array(0.02)}
     return archive(**own | {"genome": np.zeros(9)} | replaced)
 
@@ -53,7 +53,7 @@ RANGE = st.tuples(st.floats(-1e3, 1e3), st.floats(1e-3, 1e3))
 
 @st.composite
 def designs(draw: st.DrawFn) -> Design:
-    """Networks and oscillators of any size, with the paper's command ranges or others."""
+    """Networks and CPGs of any size, with the paper's command ranges or others."""
     sensors, motors = draw(PARTS), draw(PARTS)
     some = st.lists(RANGE, min_size=len(motors), max_size=len(motors)).map(tuple)
     ranges = draw(st.just(()) | some)
@@ -65,7 +65,7 @@ def designs(draw: st.DrawFn) -> Design:
 
 @given(design=designs(), seed=st.integers(0, 99))
 def test_a_controller_comes_back_equal(design: Design, seed: int):
-    before = design.controller(draw_weights(np.random.default_rng(seed), (design.weights,)))
+    before = Controller(design, draw_genomes(np.random.default_rng(seed), (design.weights,)))
     data = controller_bytes(before)
     assert parse_controller(data, "here") == before
     assert controller_bytes(parse_controller(data, "here")) == data
@@ -79,12 +79,12 @@ def test_a_file_of_the_paper_s_ranges_has_the_bytes_that_it_always_had():
 
     assert names == ["kind.npy", "sensors.npy", "motors.npy", "hidden.npy", "genome.npy"]
     assert digest == "d63d2b7afbe6bd76c61499b9508b9c27fad4ce6aacdb7f758d6feb48977c7637"
-    assert controller().network == plain
+    assert controller().design == plain
 
 
 def test_a_controller_says_of_which_kind_it_is():
-    for design, kind in ((controller().network, "network"), (CPG, "cpg")):
-        data = controller_bytes(design.controller(np.zeros(design.weights)))
+    for design, kind in ((controller().design, "network"), (CPG, "cpg")):
+        data = controller_bytes(Controller(design, np.zeros(design.weights)))
         with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
             assert str(arrays["kind"]) == kind
 
@@ -128,11 +128,11 @@ def test_equal_controllers_give_equal_bytes_at_any_time():
         (archive(ranges=np.full((2, 2), np.nan)), "needs a finite command range"),
         (archive(ranges=np.zeros((2, 2))), "needs a finite command range of some width"),
         (archive(kind=np.array("cpg")), "it holds genome.npy, hidden.npy"),
-        (oscillators(timestep=np.array(0.0)), "time step must be above 0 s"),
-        (oscillators(timestep=np.array(np.inf)), "time step must be above 0 s"),
-        (oscillators(timestep=np.array(1)), "its arrays have the types"),
-        (oscillators(genome=np.zeros(8)), "have 9 values, got a genome of shape"),
-        (oscillators(genome=np.full(9, np.nan)), "must lie in"),
+        (cpg(timestep=np.array(0.0)), "time step must be above 0 s"),
+        (cpg(timestep=np.array(np.inf)), "time step must be above 0 s"),
+        (cpg(timestep=np.array(1)), "its arrays have the types"),
+        (cpg(genome=np.zeros(8)), "has 9 weights, got a genome of shape"),
+        (cpg(genome=np.full(9, np.nan)), "must lie in"),
     ],
 )
 def test_what_is_no_controller_is_refused(tmp_path: Path, data: bytes, match: str):
@@ -165,8 +165,8 @@ def test_a_bomb_is_not_unpacked():
 
 @pytest.mark.parametrize("kind", ["network", "cpg"])
 def test_no_damage_to_a_controller_raises_anything_else(kind: str):
-    design = {"network": controller().network, "cpg": CPG}[kind]
-    good = controller_bytes(design.controller(np.zeros(design.weights)))
+    design = {"network": controller().design, "cpg": CPG}[kind]
+    good = controller_bytes(Controller(design, np.zeros(design.weights)))
     rng = np.random.default_rng(3)
     for _ in range(1000):
         damaged = bytearray(good)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from selfmodel.controllers.network import Controller
+from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, UnsearchedFault
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, canonical

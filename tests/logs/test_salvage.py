@@ -10,7 +10,7 @@ import pytest
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 
-from selfmodel.controllers.network import Controller
+from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError
 from selfmodel.logs import CorruptError, LogError, LogWriteError, read_log, read_truth

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.comparators.arithmetic import command_errors
-from selfmodel.controllers.network import Controller, Population
+from selfmodel.controllers.command_source import make_batch
+from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError, TrialError
 from selfmodel.faults.notation import parse
@@ -96,7 +97,8 @@ def test_the_controller_goes_on_with_the_readings_that_it_had(nothing: object):
     assert not np.isnan(held[[6, 9]]).any()
     held[7:9] = held[6]
 
-    brain, commands = Population([CONTROLLER], np.ones((1, 3))), np.empty((1, len(NAMES.motors)))
+    brain = make_batch([CONTROLLER], [frozenset()], len(NAMES.sensors))
+    commands = np.empty((1, len(NAMES.motors)))
     for k in range(STEPS):
         brain.readings[0] = held[k]
         brain.step(commands)

@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from selfmodel.controllers.network import Controller, Network
+from selfmodel.controllers.controller import Controller
+from selfmodel.controllers.network import Network
 from selfmodel.controllers.playback import Playback
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
@@ -22,6 +23,7 @@ from selfmodel.recovery.disagreement import (
     disagreements,
     first_falls,
 )
+from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.simulator import Run, Simulator
@@ -100,7 +102,7 @@ def chosen(quadruped: Robot, fates: Sequence[Fate], steps: int = 400) -> int:
 
 def moving(robot: Robot, motor: str) -> Controller:
     """A controller that turns one joint and leaves the others where they are."""
-    network, genome = robot.network, np.zeros(robot.network.weights)
+    network, genome = network_for(robot), np.zeros(network_for(robot).weights)
     to_motors = genome[-len(network.motors) * (network.hidden + 1) :]
     to_motors.reshape(len(network.motors), -1)[network.motors.index(motor), -1] = 1.0
     return Controller(network, genome)

@@ -11,7 +11,7 @@ import pytest
 from numpy.random import Generator
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT
-from selfmodel.controllers.network import Controller
+from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.diagnosis.genome import encode
 from selfmodel.evolution import Draw, Evolution, Generation

@@ -13,11 +13,12 @@ from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.recovery.next_trial import candidates, discriminating_controller
 from selfmodel.recovery.recover import Recovery, recover
 from selfmodel.recovery.repair import RepairSearch
+from selfmodel.robot.designs import DESIGNS, cpg_for
 from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
-from tests.conftest import random_controllers, random_oscillators
+from tests.conftest import random_controllers, random_cpgs
 from tests.helpers.memory import MemoryJournal
 
 FEW = dataclasses.replace(Settings(generations=2, steps=60, trials=2).scaled(8), kept=4)
@@ -43,7 +44,7 @@ def evolved(robot: Robot, kind: str, next_trial: str = "repair") -> Recovery:
         settings=FEW,
         seed=0,
         on_event=lambda _event: None,
-        design=getattr(robot, kind),
+        design=DESIGNS[kind](robot, None),
         calibrate=lambda _trials: SimpleNamespace(robot=fitted, summary=None),
         next_trial=choose,
     )
@@ -65,8 +66,8 @@ def test_a_recovery_has_one_design_though_a_fitted_model_is_rounded(
     trials = evolved(asymmetric, kind, next_trial).trials
     designs = {trial.plan.controller.design for trial in trials}
 
-    assert designs == {getattr(asymmetric, kind)}
-    assert designs != {getattr(with_parameters(asymmetric, nominal(asymmetric)), kind)}
+    assert designs == {DESIGNS[kind](asymmetric, None)}
+    assert designs != {DESIGNS[kind](with_parameters(asymmetric, nominal(asymmetric)), None)}
 
 
 def test_commands_stay_in_the_ranges_of_the_motors(asymmetric: Robot):
@@ -77,18 +78,18 @@ def test_commands_stay_in_the_ranges_of_the_motors(asymmetric: Robot):
 
 
 def test_a_search_for_one_kind_does_not_start_from_controllers_of_the_other(quadruped: Robot):
-    seeds = [*random_controllers(quadruped, 2), *random_oscillators(quadruped, 2)]
+    seeds = [*random_controllers(quadruped, 2), *random_cpgs(quadruped, 2)]
     for kind in ("network", "cpg"):
-        design = getattr(quadruped, kind)
+        design = DESIGNS[kind](quadruped, None)
         search = RepairSearch(Simulator(quadruped, 1), FEW, design)
         found = search(INTACT, seeds, np.random.default_rng(0), lambda _generation: None)
         assert found.design == design
 
 
 def test_candidates_are_of_the_newest_controller_s_kind(quadruped: Robot):
-    (network,), (newest, older) = random_controllers(quadruped, 1), random_oscillators(quadruped, 2)
+    (network,), (newest, older) = random_controllers(quadruped, 1), random_cpgs(quadruped, 2)
     found = candidates([newest, network, older], FEW, np.random.default_rng(0))
 
     assert older in found
     assert newest not in found
-    assert {one.design for one in found} == {quadruped.cpg}
+    assert {one.design for one in found} == {cpg_for(quadruped)}

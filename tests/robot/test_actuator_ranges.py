@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from selfmodel.controllers.command_range import TARGET_RANGE
-from selfmodel.controllers.network import Controller, Network, Population, draw_weights
+from selfmodel.controllers.controller import draw_genomes
+from selfmodel.controllers.network import Network
 from selfmodel.errors import InputError
 from selfmodel.robot.actuator_ranges import command_ranges
+from selfmodel.robot.designs import cpg_for, network_for
 from selfmodel.robot.robot import Robot
 
 MJCF = """
@@ -37,8 +39,8 @@ def test_our_own_robots_span_the_paper_s_range_to_the_bit(robot: Robot):
     paper = ((0.0, TARGET_RANGE),) * len(robot.anatomy.motors)
 
     assert command_ranges(robot.model) == paper
-    assert robot.network == Network(robot.anatomy.names.sensors, robot.anatomy.motors)
-    assert robot.cpg.ranges == paper
+    assert network_for(robot) == Network(robot.anatomy.names.sensors, robot.anatomy.motors)
+    assert cpg_for(robot).ranges == paper
 
 
 @pytest.mark.parametrize(
@@ -105,19 +107,19 @@ def test_a_robot_is_known_where_only_its_controller_would_need_the_range():
 
     assert made.anatomy.motors == ("m",)
     with pytest.raises(InputError, match="the motor m does not say"):
-        _ = made.network
+        _ = network_for(made)
     with pytest.raises(InputError, match="the motor m does not say"):
-        _ = made.cpg
+        _ = cpg_for(made)
 
 
 def test_a_network_s_outputs_span_the_range_of_each_motor():
     ranges = ((0.0, 2.0), (-1.0, 0.5), (3.0, 1.0))
     narrow = Network(("a",), ("x", "y", "z"), 3)
     wide = Network(("a",), ("x", "y", "z"), 3, ranges)
-    genome = draw_weights(np.random.default_rng(0), (wide.weights,))
+    genome = draw_genomes(np.random.default_rng(0), (wide.weights,))
     commands = np.empty((2, 1, 3))
     for network, command in zip((narrow, wide), commands, strict=True):
-        Population([Controller(network, genome)], np.ones((1, 3))).step(command)
+        network.batch(genome[np.newaxis], [frozenset()]).step(command)
     outputs = commands[0] / TARGET_RANGE
 
     np.testing.assert_allclose(

@@ -7,12 +7,13 @@ import pytest
 from scipy.ndimage import map_coordinates
 
 from selfmodel.comparators import SEGMENT_PREDICTION
-from selfmodel.controllers.cpg import Oscillators
+from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.evidence import Evidence
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.faults.terrain import CELL, HALF_EXTENT, PLACES, TOUCHES, felt_heights, unit_heights
 from selfmodel.physical.simulated_robot import OWN_SEED, SimulatedRobot
+from selfmodel.robot.designs import cpg_for
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.ground_contacts import felt_points
 from selfmodel.simulation.simulator import Simulator
@@ -35,24 +36,24 @@ def height(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def walk(quadruped: Robot) -> Oscillators:
+def walk(quadruped: Robot) -> Controller:
     """A gait that leaves the flat ground around the start, made without a search."""
     rng = np.random.default_rng(0)
-    genomes = rng.uniform(-1, 1, (40, quadruped.cpg.weights))
-    drivers = [Oscillators(quadruped.cpg, genome) for genome in genomes]
+    cpg = cpg_for(quadruped)
+    drivers = [Controller(cpg, genome) for genome in rng.uniform(-1, 1, (40, cpg.weights))]
     intact = Hypothesis()
     runs = [(intact, driver) for driver in drivers]
     way = Simulator(quadruped, 2).run(runs, STEPS, ["base_position"]).behaviour["base_position"]
     return drivers[int(np.argmax(np.linalg.norm(way[:, -1, :2], axis=1)))]
 
 
-def observed(robot: Robot, truth: str, walk: Oscillators) -> Behaviour:
+def observed(robot: Robot, truth: str, walk: Controller) -> Behaviour:
     physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
     return collect(robot.anatomy.names, physical.run(walk, STEPS))
 
 
 @pytest.mark.parametrize("roughness", [0.02, 0.04])
-def test_feet_feel_the_ground_where_they_are(quadruped: Robot, walk: Oscillators, roughness: float):
+def test_feet_feel_the_ground_where_they_are(quadruped: Robot, walk: Controller, roughness: float):
     points = felt_points(quadruped, observed(quadruped, f"roughness={roughness}", walk))
     x, y, z = points.T
 
@@ -61,7 +62,7 @@ def test_feet_feel_the_ground_where_they_are(quadruped: Robot, walk: Oscillators
     assert np.median(np.abs(z - MARGIN - roughness * height(x, y))) < 0.003
 
 
-def test_on_level_ground_they_feel_no_height(quadruped: Robot, walk: Oscillators):
+def test_on_level_ground_they_feel_no_height(quadruped: Robot, walk: Controller):
     z = felt_points(quadruped, observed(quadruped, "intact", walk))[:, 2]
 
     assert np.median(np.abs(z - MARGIN)) < 0.001
@@ -70,7 +71,7 @@ def test_on_level_ground_they_feel_no_height(quadruped: Robot, walk: Oscillators
 @pytest.mark.parametrize("truth", ["intact", "roughness=0.01", "roughness=0.02", "roughness=0.04"])
 @pytest.mark.parametrize("slope", ["", "slope=0.1"])
 def test_the_right_roughness_predicts_best_though_its_bumps_are_unknown(
-    quadruped: Robot, walk: Oscillators, truth: str, slope: str
+    quadruped: Robot, walk: Controller, truth: str, slope: str
 ):
     def both(text: str) -> str:
         return "+".join(filter(None, (slope, text.removeprefix("intact")))) or "intact"
@@ -116,7 +117,7 @@ def test_a_touch_that_errs_does_not_raise_the_ground():
     np.testing.assert_array_equal(felt_heights(np.vstack([right, once])), felt_heights(right))
 
 
-def test_what_was_not_observed_is_not_felt(quadruped: Robot, walk: Oscillators):
+def test_what_was_not_observed_is_not_felt(quadruped: Robot, walk: Controller):
     whole = observed(quadruped, "intact", walk)
     blind = {signal: values.copy() for signal, values in whole.signals.items()}
     blind["base_position"][100:] = np.nan
@@ -128,7 +129,7 @@ def test_what_was_not_observed_is_not_felt(quadruped: Robot, walk: Oscillators):
 
 
 def test_a_robot_on_its_back_or_far_away_feels_nothing_and_is_diagnosed_all_the_same(
-    quadruped: Robot, walk: Oscillators
+    quadruped: Robot, walk: Controller
 ):
     whole = observed(quadruped, "intact", walk)
     in_the_air = {signal: values.copy() for signal, values in whole.signals.items()}
@@ -146,7 +147,7 @@ def test_a_robot_on_its_back_or_far_away_feels_nothing_and_is_diagnosed_all_the_
         assert np.isfinite(evidence.distances([rough], [trial])).all()
 
 
-def test_the_ground_is_the_plane_that_lies_level_not_a_wall(quadruped: Robot, walk: Oscillators):
+def test_the_ground_is_the_plane_that_lies_level_not_a_wall(quadruped: Robot, walk: Controller):
     wall = '<worldbody><geom type="plane" size="5 5 1" pos="9 0 0" euler="0 -90 0"/>'
     walled = dataclasses.replace(quadruped, mjcf=quadruped.mjcf.replace("<worldbody>", wall, 1))
     behaviour = observed(quadruped, "intact", walk)

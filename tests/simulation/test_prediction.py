@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from selfmodel.controllers.driver import Driver
+from selfmodel.controllers.command_source import CommandSource
 from selfmodel.controllers.playback import played_back
 from selfmodel.errors import InputError
 from selfmodel.experiments import robots
@@ -32,7 +32,7 @@ RECORD: tuple[Signal, ...] = (*STATE, "sensors")
 EXACT = 1e-6
 
 
-def moved(robot: Robot, steps: int = STEPS) -> Driver:
+def moved(robot: Robot, steps: int = STEPS) -> CommandSource:
     """A driver that moves every joint."""
     return played_back(robot.anatomy.motors, random_motion(robot, steps))
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from selfmodel.controllers.driver import Driver
+from selfmodel.controllers.command_source import CommandSource
 from selfmodel.controllers.playback import Playback
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
@@ -13,19 +13,20 @@ from selfmodel.logs import read_log
 from selfmodel.logs.robots import robot_of
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.simulated_robot import SimulatedRobot
-from selfmodel.robot.robot import Robot, with_neurons
+from selfmodel.robot.designs import network_for
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.replay import replay
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import SIGNALS, Behaviour
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.conftest import random_controllers, random_oscillators
+from tests.conftest import random_controllers, random_cpgs, random_of
 
 STEPS = 1000
 
 
-def logged(folder: Path, robot: Robot, truth: str, driver: Driver) -> Path:
+def logged(folder: Path, robot: Robot, truth: str, driver: CommandSource) -> Path:
     """Logs a trial of a robot with something wrong."""
     plan = TrialPlan("trial", "single", driver, STEPS, 0)
     samples = SimulatedRobot(robot, parse(truth, robot.anatomy)).run(driver, STEPS)
@@ -54,7 +55,7 @@ def test_every_case_replays_to_the_bit_from_its_log_alone(name: str, case: int, 
 def test_a_trial_that_oscillators_drove_replays_to_the_bit(
     robot: Robot, truth: str, tmp_path: Path
 ):
-    (driver,) = random_oscillators(robot, 1)
+    (driver,) = random_cpgs(robot, 1)
     log = read_log(logged(tmp_path, robot, truth, driver))
     hypothesis = parse(truth, robot.anatomy)
 
@@ -65,12 +66,11 @@ def test_a_trial_that_oscillators_drove_replays_to_the_bit(
 def test_a_trial_of_a_larger_network_replays_to_the_bit_with_its_neurons(
     quadruped: Robot, tmp_path: Path
 ):
-    large = with_neurons(quadruped, 5)
-    (controller,) = random_controllers(large, 1)
-    log = read_log(logged(tmp_path, large, "neuron:4", controller))
+    (controller,) = random_of(network_for(quadruped, 5), 1)
+    log = read_log(logged(tmp_path, quadruped, "neuron:4", controller))
     robot = robot_of(log)
 
-    assert robot.anatomy.neurons == 5
+    assert log.trial.plan.controller.design.hidden == 5
     assert replay(log.trial, parse("neuron:4", robot.anatomy), Simulator(robot, 1)).identical
     assert not replay(log.trial, INTACT, Simulator(robot, 1)).identical
 

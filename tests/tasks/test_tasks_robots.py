@@ -6,9 +6,11 @@ from dm_env import StepType
 
 from selfmodel import tasks
 from selfmodel.controllers.command_range import TARGET_RANGE
-from selfmodel.controllers.network import Controller, Population
+from selfmodel.controllers.command_source import make_batch
+from selfmodel.controllers.controller import Controller
 from selfmodel.errors import InputError
 from selfmodel.faults.notation import parse
+from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ALL_TASKS, ROBOTS
@@ -50,7 +52,7 @@ def test_its_joints_flex_and_extend_thirty_degrees(robot: Robot):
 
 
 def test_told_to_stand_it_stands(robot: Robot):
-    still = Controller(robot.network, np.zeros(robot.network.weights))
+    still = Controller(network_for(robot), np.zeros(network_for(robot).weights))
     path = Simulator(robot, 1).run(
         [(parse("intact", robot.anatomy), still)], 1000, ["base_position"]
     )
@@ -118,7 +120,8 @@ def test_an_environment_moves_like_the_simulator_to_the_bit(domain: str, task: s
         [(parse(hypothesis, robot.anatomy), controller)], 200, ["sensors", "base_position"]
     )
     environment = tasks.load(domain, task, task_kwargs={"hypothesis": hypothesis})
-    brain, action = Population([controller], np.ones((1, 3))), np.empty((1, robot.model.nu))
+    brain = make_batch([controller], [frozenset()], len(robot.anatomy.sensors))
+    action = np.empty((1, robot.model.nu))
     step, travelled = environment.reset(), 0.0
     for k in range(200):
         readings = step.observation["sensors"]

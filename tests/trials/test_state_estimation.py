@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from selfmodel.controllers.driver import Driver
+from selfmodel.controllers.command_source import CommandSource
 from selfmodel.controllers.playback import played_back
 from selfmodel.faults.notation import parse
 from selfmodel.robot.robot import Robot
@@ -22,7 +22,9 @@ REACH = {"joint_positions": 3, "base_position": 6}
 """Steps to either side that an average takes in."""
 
 
-def runs(robot: Robot, text: str, drivers: Sequence[Driver], steps: int = 300) -> list[Behaviour]:
+def runs(
+    robot: Robot, text: str, drivers: Sequence[CommandSource], steps: int = 300
+) -> list[Behaviour]:
     hypothesis = parse(text, robot.anatomy)
     pairs = [(hypothesis, driver) for driver in drivers]
     batch = Simulator(robot, 1).run(pairs, steps, SIGNALS).behaviour
@@ -32,7 +34,7 @@ def runs(robot: Robot, text: str, drivers: Sequence[Driver], steps: int = 300) -
     ]
 
 
-def smooth(robot: Robot, count: int, steps: int = 300) -> list[Driver]:
+def smooth(robot: Robot, count: int, steps: int = 300) -> list[CommandSource]:
     """Drivers that move every joint once a second."""
     motors = robot.anatomy.motors
     return [played_back(motors, random_motion(robot, steps, seed)) for seed in range(count)]

@@ -11,7 +11,7 @@ from selfmodel.cli.output.plain import plain
 from selfmodel.errors import InputError
 
 if TYPE_CHECKING:
-    from selfmodel.controllers.driver import Evolved
+    from selfmodel.controllers.controller import Controller
     from selfmodel.logs.rosbag.importer import Recording
     from selfmodel.logs.rosbag.mapping import BagMapping
     from selfmodel.robot.robot import Robot
@@ -129,7 +129,7 @@ def _mapped_robot(mapping: "BagMapping", folder: Path) -> "Robot":
         raise mapping.document.error(("robot",), str(error)) from error
 
 
-def _controller(mapping: "BagMapping", folder: Path, robot: "Robot") -> "Evolved | None":
+def _controller(mapping: "BagMapping", folder: Path, robot: "Robot") -> "Controller | None":
     from selfmodel.experiments import trial_logs  # noqa: PLC0415
 
     if mapping.controller is None:

@@ -8,9 +8,9 @@ from rich.console import Console
 from rich.table import Table
 
 from selfmodel.cli.output.ranking import as_values, in_words, ranking_table, sureness
-from selfmodel.controllers.cpg import Cpg
 from selfmodel.experiments.experiment import Experiment, Outcome
 from selfmodel.experiments.fitting import calibration_values
+from selfmodel.robot.designs import network_for
 
 
 def as_object(experiment: Experiment, outcome: Outcome) -> str:
@@ -53,6 +53,7 @@ def _reality(found: dict[str, Any]) -> str:
 def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
     """Returns the outcome as plain values, as ``recover --json`` prints it."""
     recovery, stats = outcome.recovery, outcome.stats
+    design = experiment.design or network_for(experiment.robot)
     return {
         "robot": experiment.robot.name,
         "case": experiment.case,
@@ -62,8 +63,8 @@ def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
         "gap": experiment.gap,
         "structure": experiment.structure,
         "next_trial": experiment.next_trial,
-        "controller": "cpg" if isinstance(experiment.design, Cpg) else "network",
-        "neurons": 0 if isinstance(experiment.design, Cpg) else experiment.robot.anatomy.neurons,
+        "controller": design.name,
+        "neurons": design.hidden,
         "seed": experiment.seed,
         "trials": [
             {

@@ -36,6 +36,7 @@ def list_bodies(*, as_json: Json = False) -> None:
 def _facts(domain: str) -> dict[str, Any]:
     from selfmodel.experiments.robots import robot_entry  # noqa: PLC0415
     from selfmodel.experiments.suite.bodies import DOMAINS, bodies  # noqa: PLC0415
+    from selfmodel.robot.designs import network_for  # noqa: PLC0415
 
     entry = robot_entry(bodies([domain], None)[0])
     robot = entry.robot()
@@ -47,7 +48,7 @@ def _facts(domain: str) -> dict[str, Any]:
         "hinges": len(robot.anatomy.hinges),
         "sensors": len(robot.anatomy.sensors),
         "motors": len(robot.anatomy.motors),
-        "weights": robot.network.weights,
+        "weights": network_for(robot).weights,
         "physics_timestep": float(robot.model.opt.timestep),
         "substeps": robot.substeps,
         "control_timestep": robot.control_timestep,

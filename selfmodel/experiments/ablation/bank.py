@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from selfmodel import __version__
-from selfmodel.controllers.driver import Evolved
+from selfmodel.controllers.controller import Controller
 from selfmodel.experiments import robots, trial_logs
 from selfmodel.experiments.ablation.plan import Ablation, Cell, model_digest
 from selfmodel.experiments.grid import GridBegins, Job, PartEnds, run_grid
@@ -64,7 +64,7 @@ def folder(ablation: Ablation) -> Path:
     return ablation.folder / "bank" if ablation.bank is None else ablation.bank
 
 
-def gait(bank: Path, robot: str, number: int) -> Evolved:
+def gait(bank: Path, robot: str, number: int) -> Controller:
     """Returns a gait of the bank.
 
     Raises:

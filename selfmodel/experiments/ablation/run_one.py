@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from urllib.parse import quote
 
-from selfmodel.controllers.driver import Evolved
+from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.experiments import plugins, robots
@@ -51,7 +51,7 @@ def run_one(spec: Spec, comparator: str, folder: Path, gaits: Path) -> list[Row]
 
 
 def setting_of(
-    spec: Spec, comparator: str, folder: Path, gaits: tuple[Evolved, ...] = ()
+    spec: Spec, comparator: str, folder: Path, gaits: tuple[Controller, ...] = ()
 ) -> Setting:
     """Returns the objects that a run's specification stands for.
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from selfmodel.controllers.driver import Evolved
+from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.experiments.ablation.plan import HEALTHY_TRIALS, Spec
 from selfmodel.experiments.reality import draw_reality
@@ -37,7 +37,7 @@ class Setting:
     name: str
     robot: Robot
     truth: Hypothesis
-    gaits: tuple[Evolved, ...]
+    gaits: tuple[Controller, ...]
     folder: Path
 
 
@@ -49,7 +49,7 @@ def before_failure(setting: Setting) -> list[Trial]:
     ]
 
 
-def after_failure(setting: Setting, number: int, controller: Evolved) -> Trial:
+def after_failure(setting: Setting, number: int, controller: Controller) -> Trial:
     """Returns the trial of that number, from 0, of the damaged robot; see ``before_failure``."""
     return _trial(setting, HEALTHY_TRIALS + number, "after", controller)
 
@@ -65,7 +65,7 @@ def calibrated_robot(setting: Setting, intact: Sequence[Trial]) -> Robot:
     return dataclasses.replace(robot, mjcf=path.read_text(encoding="utf-8"))
 
 
-def _trial(setting: Setting, number: int, stage: Stage, gait: Evolved) -> Trial:
+def _trial(setting: Setting, number: int, stage: Stage, gait: Controller) -> Trial:
     """The trial as its log says it; run if there is no log yet."""
     steps, seed = setting.spec.settings.steps, setting.spec.cell.seed
     plan = TrialPlan(f"{number:02d}-{stage}", stage, gait, steps, seed)

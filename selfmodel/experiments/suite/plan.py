@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from selfmodel import __version__
-from selfmodel.controllers.network import Network
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.experiments import plugins, robots
 from selfmodel.experiments.grid import Job, check_shared, finished
 from selfmodel.experiments.keys import check_keys, key_of
-from selfmodel.faults.neuron import SILENT_NEURON
+from selfmodel.faults.neuron import silent_neurons
 from selfmodel.faults.notation import parse
 from selfmodel.settings import Settings
 from selfmodel.tasks import Entry
@@ -133,11 +132,10 @@ def recovery_jobs(study: Study) -> list[Job]:
 
 
 def _means_something(study: Study, entry: Entry, case: int) -> bool:
-    """Whether a failure is one as the study drives the robot: oscillators have no neurons."""
+    """Returns whether the study's controllers have the hidden neurons that a failure silences."""
     robot = entry.robot()
-    faults = parse(entry.cases[case], robot.anatomy).faults
-    drives = plugins.design(study.controller, robot)
-    return isinstance(drives, Network) or all(fault.kind is not SILENT_NEURON for fault in faults)
+    silent = silent_neurons(parse(entry.cases[case], robot.anatomy))
+    return max(silent, default=-1) < plugins.design(study.controller, robot).hidden
 
 
 def gait_path(folder: Path, key: str) -> Path:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from selfmodel.controllers.controller import check_silent_neurons
 from selfmodel.experiments import plugins, robots, trial_logs
 from selfmodel.experiments.experiment import Experiment
 from selfmodel.experiments.experiment import run as run_experiment
@@ -14,6 +15,7 @@ from selfmodel.experiments.grid import GridBegins, Job, PartEnds, run_grid
 from selfmodel.experiments.suite.plan import Study, check, gait_jobs, gait_path, recovery_jobs
 from selfmodel.experiments.suite.rows import Row, as_objects
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.neuron import silent_neurons
 from selfmodel.faults.notation import parse
 from selfmodel.logs.atomic import put
 from selfmodel.logs.controllers import controller_bytes
@@ -73,7 +75,7 @@ def _recover(job: Job, _part: str, run: Path) -> Any:  # noqa: ANN401  # JSON
     robot = entry.robot()
     truth = parse(said["truth"], robot.anatomy)
     design = plugins.design(shared["controller"], robot)
-    plugins.check_neurons(truth, design)
+    check_silent_neurons(design, silent_neurons(truth))
     folder = run / "recovery"
     shutil.rmtree(folder, ignore_errors=True)  # what is left of a run that was killed
     experiment = Experiment(

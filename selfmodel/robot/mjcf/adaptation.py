@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from selfmodel.errors import InputError
-from selfmodel.robot.mjcf.commands import add_commands
+from selfmodel.robot.mjcf.command_ranges import add_command_ranges
 from selfmodel.robot.mjcf.document import Document, read_document
 from selfmodel.robot.mjcf.expand import expand, refuse_unloggable
 from selfmodel.robot.mjcf.files import Folder, InMemory, read_file
@@ -102,7 +102,7 @@ def _adapted(name: str, document: Document, settings: MjcfSettings) -> Adapted:
     turn_forward(document, compiled(document.text, document.assets), settings)
     add_ground(document, compiled(document.text, document.assets))
     add_sensors(document, compiled(document.text, document.assets), settings)
-    add_commands(document, model, settings)
+    add_command_ranges(document, model, settings)
     try:
         checked = checked_model(document.text, document.assets)
     except ValueError as error:

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.robot.custom_numerics import MAX_HIDDEN_NEURONS
 from selfmodel.robot.mjcf.files import read_file
 
 LARGEST = 2**16
@@ -33,7 +32,6 @@ class MjcfSettings:
         touch: The bodies that get a touch sensor; None for every distal limb.
         angle: The joints that get an angle sensor; None for every hinge that a motor drives.
         ctrlrange: Lowest and highest command of motors that have no range of their own.
-        neurons: Hidden neurons of its controller; None for those that the file says.
     """
 
     forward: str = "x"
@@ -42,7 +40,6 @@ class MjcfSettings:
     touch: tuple[str, ...] | None = None
     angle: tuple[str, ...] | None = None
     ctrlrange: tuple[float, float] | None = None
-    neurons: int | None = None
 
 
 def read_settings(path: Path, extra: Mapping[str, Any] | None = None) -> MjcfSettings:
@@ -91,16 +88,16 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
         InputError: One is not; the sentence says which and what it may be.
     """
     for key in given:
+        if key == "neurons":
+            raise InputError(
+                "neurons is not a setting of a robot, but of its controller: leave it out, and "
+                "give --neurons N to the command"
+            )
         if key not in {field.name for field in fields(MjcfSettings)}:
             raise unknown_name("setting", key, [field.name for field in fields(MjcfSettings)])
     step = given.get("control_timestep")
     if step is not None and not (_is_number(step) and 0 < step <= 10):
         raise InputError(f"control_timestep needs a number from above 0 to 10 s, got {step!r}")
-    neurons = given.get("neurons")
-    if neurons is not None and not (type(neurons) is int and 1 <= neurons <= MAX_HIDDEN_NEURONS):
-        raise InputError(
-            f"neurons needs a whole number from 1 to {MAX_HIDDEN_NEURONS}, got {neurons!r}"
-        )
     forward, keyframe = given.get("forward", "x"), given.get("keyframe", "")
     if not isinstance(forward, str) or forward not in DIRECTIONS:
         raise InputError(f"forward needs one of {', '.join(DIRECTIONS)}, got {forward!r}")
@@ -113,7 +110,6 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
         touch=_names(given, "touch"),
         angle=_names(given, "angle"),
         ctrlrange=_range(given),
-        neurons=neurons,
     )
 
 

@@ -12,7 +12,8 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.controllers.driver import Evolved, drive
+from selfmodel.controllers.command_source import make_batch
+from selfmodel.controllers.controller import Controller
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.robot.robot import Robot
@@ -28,7 +29,9 @@ BEFORE, AFTER = 0.1, 0.05
 and after the trial, while the controller goes on."""
 
 
-def record(folder: Path, robot: Robot, hidden: Hypothesis, controller: Evolved, steps: int) -> Path:
+def record(
+    folder: Path, robot: Robot, hidden: Hypothesis, controller: Controller, steps: int
+) -> Path:
     """Drives a robot and writes the bag: joints at 200 Hz, odometry at 50, the rest at its own.
 
     Args:
@@ -64,12 +67,12 @@ def mapping(robot: Robot, steps: int, controller: str | None) -> str:
     )
 
 
-def _driven(robot: Robot, hidden: Hypothesis, controller: Evolved, steps: int) -> Iterator[Item]:
+def _driven(robot: Robot, hidden: Hypothesis, controller: Controller, steps: int) -> Iterator[Item]:
     embodiment = build(robot, hidden)
     model, data = embodiment.model, mujoco.MjData(embodiment.model)
     mujoco.mj_forward(model, data)
     senses = SensorReader(model, robot.anatomy, [embodiment])
-    brain = drive([controller], embodiment.neurons[np.newaxis], len(robot.anatomy.sensors))
+    brain = make_batch([controller], [embodiment.silent_neurons], len(robot.anatomy.sensors))
     where = signal_fields(robot)
     states: list[dict[str, FloatArray]] = []
 

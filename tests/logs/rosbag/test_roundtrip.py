@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from selfmodel.comparators import COMPARATORS, DEFAULT
-from selfmodel.controllers.network import Controller
+from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.notation import parse

@@ -294,7 +294,7 @@ def test_sensors_of_what_no_motor_drives_are_left_out(tmp_path: Path):
         ("control_timestep = -1", "from above 0 to 10 s, got -1"),
         ("control_timestep = true", "got True"),
         ("touch = 'left'", "needs a list of names"),
-        ("neurons = 0", "from 1 to 100, got 0"),
+        ("neurons = 5", "leave it out, and give --neurons N to the command"),
         ("ctrlrange = [1, -1]", "lower end first"),
         ("keyframe = 3", "name of a keyframe"),
         ("forward", "in TOML"),
@@ -317,12 +317,12 @@ def test_brackets_without_end_are_no_list_of_names(tmp_path: Path):
 
 def test_the_file_beside_is_read_and_options_count_before_it(tmp_path: Path):
     path = written(tmp_path, mjcf(motors=MOTORS.replace('ctrlrange="-1 1"', "")))
-    beside = 'forward = "y"\ncontrol_timestep = 0.02\nctrlrange = [-2, 2]\nneurons = 5\n'
+    beside = 'forward = "y"\ncontrol_timestep = 0.02\nctrlrange = [-2, 2]\n'
     path.with_suffix(".toml").write_text(beside, encoding="utf-8")
 
     robot = load_mjcf(path)
 
-    assert (robot.control_timestep, robot.anatomy.neurons) == (0.02, 5)
+    assert robot.control_timestep == 0.02
     assert robot.model.actuator_ctrlrange.tolist() == [[-2, 2], [-2, 2]]
     extra = parse_setting("forward=-x") | parse_setting("touch=['left']")
     assert read_settings(path, extra).forward == "-x"

@@ -71,10 +71,10 @@ def test_what_was_found_is_shown(ant: Path, tmp_path: Path):
 
 
 def test_settings_are_options_too(ant: Path, tmp_path: Path):
-    options = ("--set", "control_timestep=0.02", "--set", "touch=[]", "--set", "neurons=4")
+    options = ("--set", "control_timestep=0.02", "--set", "touch=[]")
     told = json.loads(selfmodel("robots", str(ant), *options, "--json", cwd=tmp_path).stdout)
 
-    assert (told["control_timestep"], told["hidden_neurons"]) == (0.02, 4)
+    assert (told["control_timestep"], told["hidden_neurons"]) == (0.02, 3)
     assert not any(sensor["kind"] == "touch" for sensor in told["sensor_details"])
 
 
@@ -86,6 +86,7 @@ def test_settings_are_options_too(ant: Path, tmp_path: Path):
         (("recover", "ant.xml", "--damage", "break:hipp"), "did you mean hip_"),
         (("recover", "quadruped", "--case", "1", "--set", "forward=y"), "has all that it needs"),
         (("robots", "ant.xml", "--set", "forwards=y"), "did you mean forward"),
+        (("robots", "ant.xml", "--set", "neurons=4"), "give --neurons N to the command"),
         (("robots", "ant.xml", "--set", "y"), "a setting such as forward=-x, got 'y'"),
         (("robots", "ant.xml", "--set", "touch=['torso_geom']"), "unknown body"),
         (("robots", "no.xml"), "no.xml: expected an MJCF file"),

@@ -4,11 +4,12 @@ from pathlib import Path
 
 import numpy as np
 
-from selfmodel.controllers.cpg import Oscillators
+from selfmodel.controllers.controller import Controller
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.logs import read_log
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.robot.designs import cpg_for
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.settings import Settings
@@ -21,7 +22,7 @@ from tests.robot.mjcf.awkward import mjcf
 def test_a_robot_without_any_sensor_moves_as_a_physical_and_as_a_simulated_one(tmp_path: Path):
     (tmp_path / "robot.xml").write_text(mjcf(), encoding="utf-8")
     robot = load_mjcf(tmp_path / "robot.xml", MjcfSettings(touch=(), angle=()))
-    driver = Oscillators(robot.cpg, np.full(robot.cpg.weights, 0.5))
+    driver = Controller(cpg_for(robot), np.full(cpg_for(robot).weights, 0.5))
     simulated = Simulator(robot, 1).run([(INTACT, driver)], 20, ["joint_positions"]).behaviour
     physical = collect(robot.anatomy.names, SimulatedRobot(robot).run(driver, 20))
 
@@ -33,7 +34,7 @@ def test_a_robot_without_any_sensor_moves_as_a_physical_and_as_a_simulated_one(t
 def test_a_trial_of_a_robot_without_any_sensor_is_logged_and_read(tmp_path: Path):
     (tmp_path / "robot.xml").write_text(mjcf(), encoding="utf-8")
     robot = load_mjcf(tmp_path / "robot.xml", MjcfSettings(touch=(), angle=()))
-    driver = Oscillators(robot.cpg, np.full(robot.cpg.weights, 0.5))
+    driver = Controller(cpg_for(robot), np.full(cpg_for(robot).weights, 0.5))
     path = write_trial(
         tmp_path / "trial.mcap",
         robot,

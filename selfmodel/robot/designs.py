@@ -1,0 +1,51 @@
+"""Controller designs for a robot, by name."""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+from selfmodel.controllers.controller import Design
+from selfmodel.controllers.cpg import Cpg
+from selfmodel.controllers.network import HIDDEN_NEURONS, MAX_HIDDEN_NEURONS, Network
+from selfmodel.errors import InputError
+from selfmodel.robot.actuator_ranges import command_ranges
+from selfmodel.robot.robot import Robot
+
+
+def network_for(robot: Robot, hidden: int | None = None) -> Network:
+    """Returns the network that controls a robot.
+
+    Args:
+        robot: The robot.
+        hidden: Number of hidden neurons; the paper's by default.
+
+    Raises:
+        InputError: The number of hidden neurons is out of range, or a motor has no command range.
+    """
+    neurons = HIDDEN_NEURONS if hidden is None else hidden
+    if not 1 <= neurons <= MAX_HIDDEN_NEURONS:
+        raise InputError(f"a network has 1 to {MAX_HIDDEN_NEURONS} hidden neurons, got {neurons}")
+    names = robot.anatomy.names
+    return Network(names.sensors, names.motors, neurons, command_ranges(robot.model))
+
+
+def cpg_for(robot: Robot, hidden: int | None = None) -> Cpg:
+    """Returns the CPG that controls a robot.
+
+    Args:
+        robot: The robot.
+        hidden: None; a CPG has no hidden neurons.
+
+    Raises:
+        InputError: A number of hidden neurons is given, or a motor has no command range.
+    """
+    if hidden is not None:
+        raise InputError(f"--neurons {hidden} is of a network: leave it out with 'cpg'")
+    names = robot.anatomy.names
+    ranges = command_ranges(robot.model)
+    return Cpg(names.sensors, names.motors, robot.control_timestep, ranges)
+
+
+DESIGNS: Mapping[str, Callable[[Robot, int | None], Design]] = MappingProxyType(
+    {Network.name: network_for, Cpg.name: cpg_for}
+)
+"""Design for a robot with a number of hidden neurons, or the default number for None, by name."""

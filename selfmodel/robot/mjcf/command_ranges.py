@@ -1,0 +1,32 @@
+"""Command ranges in an MJCF document."""
+
+import mujoco
+
+from selfmodel.errors import InputError
+from selfmodel.robot.actuator_ranges import command_ranges, says_its_range
+from selfmodel.robot.mjcf.document import Document
+from selfmodel.robot.mjcf.mujoco_errors import compiled
+from selfmodel.robot.mjcf.settings import MjcfSettings
+
+
+def add_command_ranges(document: Document, model: mujoco.MjModel, settings: MjcfSettings) -> None:
+    """Adds the ``ctrlrange`` of the settings to each motor without a command range.
+
+    Args:
+        document: The MJCF, edited in place.
+        model: The compiled document.
+        settings: How to read the MJCF.
+
+    Raises:
+        InputError: A motor has no command range, and the settings have none.
+    """
+    if settings.ctrlrange is not None:
+        ends = f"{settings.ctrlrange[0]!r} {settings.ctrlrange[1]!r}"
+        for motor, element in enumerate(document.children("actuator")):
+            if not says_its_range(model, motor):
+                element.set("ctrlrange", ends)
+                element.set("ctrllimited", "true")
+    try:
+        command_ranges(compiled(document.text, document.assets))
+    except InputError as error:
+        raise InputError(f"{error}; or set ctrlrange=[-1, 1] for all that have none") from error

@@ -1,0 +1,134 @@
+"""Promises that logs, controllers, models and diagnoses written by version 0.1 stay readable.
+
+`tests/data/logs-0.1/README.md` describes the files; `expected.json` beside it has the commands and
+the output of version 0.1.
+"""
+
+import json
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+from typer.testing import CliRunner
+
+from selfmodel.cli import app
+from selfmodel.logs.journal import read_database
+from selfmodel.tasks import ROBOTS
+
+DATA = Path(__file__).parents[1] / "data" / "logs-0.1"
+EXPECTED = json.loads((DATA / "expected.json").read_text(encoding="utf-8"))
+LEFT_OUT = {"seconds", "running", "test", "driver", "notes"}
+"""Keys of times, of the running MuJoCo's version, and of sentences."""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the files, and a folder for the output of commands."""
+    copy = tmp_path_factory.mktemp("logs") / "data"
+    shutil.copytree(DATA, copy)
+    (copy / "out").mkdir()
+    return copy
+
+
+def printed(*command: str, exit_code: int = 0) -> dict:
+    """Runs a command in this process and returns the JSON that it printed."""
+    done = CliRunner().invoke(app, list(command), env={**os.environ})
+    assert done.exit_code == exit_code, (done.output, done.exception)
+    return json.loads(done.stdout)
+
+
+def facts(value: object) -> object:
+    """Returns JSON without times, versions and sentences; its numbers equal others within 1e-9."""
+    if isinstance(value, dict):
+        return {
+            key: facts(item)
+            for key, item in value.items()
+            if key not in LEFT_OUT and not (key == "error" and isinstance(item, str))
+        }
+    if isinstance(value, list):
+        return [facts(item) for item in value]
+    # Another processor's arithmetic may differ in the last digits.
+    return pytest.approx(value, rel=1e-9, abs=1e-12) if isinstance(value, float) else value
+
+
+def of_0_1(found: object, expected: object) -> object:
+    """Returns JSON without keys that version 0.1 did not have."""
+    if isinstance(found, dict) and isinstance(expected, dict):
+        return {key: of_0_1(found[key], expected[key]) for key in expected if key in found}
+    if isinstance(found, list) and isinstance(expected, list) and len(found) == len(expected):
+        return [of_0_1(*pair) for pair in zip(found, expected, strict=True)]
+    return found
+
+
+def messages(log: str) -> list[tuple[str, int, bytes]]:
+    """Returns the topic, time and content of all messages of a log."""
+    with Path(log).open("rb") as file:
+        read = make_reader(file).iter_messages()
+        return [(channel.topic, message.log_time, message.data) for _, channel, message in read]
+
+
+@pytest.mark.parametrize("entry", EXPECTED, ids=lambda entry: " ".join(entry["command"])[:60])
+def test_a_command_prints_the_same_as_version_0_1(
+    entry: dict, folder: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(folder)
+    found = printed(*entry["command"], exit_code=entry["exit"])
+
+    expected = facts(entry["json"])
+    assert of_0_1(found, expected) == expected
+
+
+def test_trials_of_every_kind_replay_to_the_bit():
+    replays = [entry for entry in EXPECTED if entry["command"][0] == "replay"]
+
+    identical = {entry["command"][1] for entry in replays if entry["json"]["identical"]}
+    assert identical == {
+        *("trials/kinds.mcap", "trials/silent-neuron.mcap", "trials/clock.mcap"),
+        *("mjcf/trial.mcap", "mjcf/walker.mcap", "calibrated/trial.mcap", "damaged/salvaged.mcap"),
+        *(f"cpg/trials/{name}.mcap" for name in ("00-before", "01-after", "02-recovery")),
+    }
+
+
+def test_the_logs_of_a_run_give_the_diagnosis_that_the_run_found(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(folder)
+    result = json.loads(Path("cpg/result.json").read_text(encoding="utf-8"))
+    logs = [trial["log"] for trial in result["trials"]]
+
+    found = printed("diagnose", *logs, "--threads", "1", "--json")
+
+    for key in ("diagnosis", "verdict", "rivals", "unseen", "intact_distance"):
+        assert found[key] == facts(result[key])
+
+
+@pytest.mark.parametrize(("run", "robot"), [("recovery", "quadruped"), ("cpg", "hexapod")])
+def test_a_run_is_read_from_its_folder(run: str, robot: str):
+    database = read_database(DATA / run, ROBOTS[robot].robot().anatomy)
+    result = json.loads((DATA / run / "result.json").read_text(encoding="utf-8"))
+
+    assert [t.displacement for t in database.trials] == [
+        trial["displacement"] for trial in result["trials"]
+    ]
+    assert [str(h) for h in database.hypotheses] == [
+        ranked["hypothesis"] for ranked in result["diagnosis"]
+    ]
+
+
+@pytest.mark.parametrize(
+    ("command", "before"),
+    [
+        (("salvage", "damaged/trial.mcap"), "damaged/salvaged.mcap"),
+        (("import", "imported/bag", "--mapping", "imported/map.toml"), "imported/trial.mcap"),
+    ],
+    ids=["salvage", "import"],
+)
+def test_what_is_written_again_is_the_same(
+    command: tuple[str, ...], before: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(folder)
+    printed("logs", *command, "--out", f"out/again-{command[0]}.mcap", "--json")
+
+    assert messages(f"out/again-{command[0]}.mcap") == messages(before)
