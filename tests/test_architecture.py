@@ -181,6 +181,7 @@ BY_THEME = {
     "logs/test_messages": "the message of every topic",
     "logs/test_roundtrip": "the writer and the reader together",
     "logs/test_without_mujoco": "the room as a whole",
+    "robot/mjcf/test_commands": "the commands that take a file of the user",
 }
 """Test files that are named by a theme of several modules, and the theme."""
 

@@ -66,6 +66,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made
 
 
+@pytest.mark.search
 def test_a_calibrated_model_is_one_for_replay_and_diagnose(folder: Path):
     done = selfmodel("calibrate", "intact.mcap", "-o", "fit.xml", "--json", cwd=folder)
     assert done.returncode == 0, done.stderr
@@ -88,6 +89,7 @@ def test_a_calibrated_model_is_one_for_replay_and_diagnose(folder: Path):
     assert again.returncode == 0, again.stderr
 
 
+@pytest.mark.search
 def test_a_trial_from_before_the_failure_is_fitted_to_and_not_explained(tmp_path: Path):
     healthy = selfmodel(
         *("trial", "quadruped", "--stage", "before", "--out", "healthy.mcap"), cwd=tmp_path
@@ -147,6 +149,7 @@ def test_what_cannot_be_used_is_said_in_one_sentence(
     assert (folder / "taken.xml").read_text(encoding="utf-8") == "mine"
 
 
+@pytest.mark.search
 def test_a_robot_that_nobody_sees_is_calibrated_and_diagnosed(folder: Path):
     fit = selfmodel("calibrate", "unseen.mcap", "-o", "unseen.xml", "--json", cwd=folder)
     done = selfmodel(

@@ -2,7 +2,7 @@
 
 import pytest
 
-from selfmodel.errors import WorkError, in_words
+from selfmodel.errors import WorkError, describe
 from selfmodel.physical.cleanup import Ending
 
 FAILURES = (OSError("the port is gone"), WorkError("the robot does not answer"))
@@ -23,7 +23,7 @@ def test_what_ended_a_block_goes_on_and_a_failing_end_is_a_note_to_it(
 ):
     with pytest.raises(type(reason)) as raised, failing(failure):
         raise type(reason)(*reason.args)
-    assert in_words(raised.value) == f"{reason}; {failure}"
+    assert describe(raised.value) == f"{reason}; {failure}"
 
 
 @pytest.mark.parametrize("failure", FAILURES, ids=repr)

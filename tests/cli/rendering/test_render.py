@@ -79,6 +79,7 @@ def test_a_strip_is_drawn_whatever_there_is_of_opengl(folder: Path, tmp_path: Pa
     assert [p.name for p in tmp_path.iterdir()] == ["strip.png"]
 
 
+@pytest.mark.opengl
 @draws
 def test_a_film_is_drawn_by_mujoco_with_what_works_of_itself(folder: Path, tmp_path: Path):
     frames = {}
@@ -152,6 +153,7 @@ def test_what_cannot_be_drawn_is_refused_in_a_sentence(
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.opengl
 def test_the_best_of_a_diagnosis_is_drawn(folder: Path, tmp_path: Path):
     (tmp_path / "result.json").write_text(
         json.dumps({"diagnosis": [{"hypothesis": DAMAGE}, {"hypothesis": "intact"}]})
