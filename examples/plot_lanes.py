@@ -18,7 +18,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.cli.rendering.film import evenly, film_of
 from selfmodel.faults.notation import parse
 from selfmodel.logs import TrialLog, read_log
-from selfmodel.logs.robots import the_robot_of
+from selfmodel.logs.robots import common_robot
 
 WIDTH, HEIGHT = 1280, 560
 LANE = 1.15
@@ -57,7 +57,7 @@ def _rendered(
     lanes: list[tuple[TrialLog, str]], colours: list[tuple[float, float, float]]
 ) -> np.ndarray:
     """The picture of all lanes in one scene, ``(height, width, 3)``."""
-    robot = the_robot_of([log for log, _ in lanes])
+    robot = common_robot([log for log, _ in lanes])
     floor = mujoco.MjModel.from_xml_string(
         f"""<mujoco><visual><global offwidth="{WIDTH}" offheight="{HEIGHT}" fovy="14"/>
         <headlight ambient=".45 .45 .45" diffuse=".35 .35 .35" specular="0 0 0"/></visual>

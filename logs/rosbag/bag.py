@@ -14,13 +14,13 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from selfmodel.errors import InputError
+from selfmodel.files import check_regular, read_file
+from selfmodel.logs.decompress import ZSTD_MAGIC, BombError, unzstd, unzstd_file
 from selfmodel.logs.errors import CorruptError, NotMcapError
-from selfmodel.logs.files import check_regular, read_bounded
 from selfmodel.logs.framing import MAGIC
 from selfmodel.logs.rosbag.stored import Announced, Stored
 from selfmodel.logs.rosbag.stored_mcap import read_mcap
 from selfmodel.logs.rosbag.stored_sqlite import SQLITE_MAGIC, read_sqlite
-from selfmodel.logs.unpack import ZSTD_MAGIC, BombError, unzstd, unzstd_file
 
 METADATA = "metadata.yaml"
 EXPECTED = "give a bag's folder, or its .mcap or .db3"
@@ -159,7 +159,7 @@ def _listed(path: Path) -> list[str]:
     """The files that ``metadata.yaml`` lists; of older versions, with the folder before them."""
     try:
         # The base loader makes everything a text, so no value can fail to be what it claims.
-        data: Any = YAML(typ="base", pure=True).load(read_bounded(path, METADATA, 2**20))
+        data: Any = YAML(typ="base", pure=True).load(read_file(path, METADATA, 2**20))
         listed = data["rosbag2_bagfile_information"]["relative_file_paths"]
     except (YAMLError, ValueError, KeyError, TypeError, RecursionError) as failure:
         reason = re.sub(r"\s+", " ", str(failure))

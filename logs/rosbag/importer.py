@@ -10,7 +10,7 @@ import numpy as np
 from selfmodel.arrays import FloatArray, frozen
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
-from selfmodel.logs.records import Imported
+from selfmodel.logs.records import Imported, TrialHeader
 from selfmodel.logs.rosbag.bag import Source, open_bag
 from selfmodel.logs.rosbag.checks import check_columns, check_names, check_topics
 from selfmodel.logs.rosbag.clock import Clocked, ClocksApartError, clocked
@@ -139,8 +139,7 @@ def write_recording(
         robot,
         TrialPlan("imported", mapping.stage, driver, behaviour.steps, seed=0),
         _samples(behaviour),
-        settings=Settings(),
-        imported=Imported(recording.facts(), mapping.document.text),
+        TrialHeader(Settings(), imported=Imported(recording.facts(), mapping.document.text)),
     )
 
 

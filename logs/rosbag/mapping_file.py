@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Literal
 
 from selfmodel.errors import InputError
-from selfmodel.logs.files import read_bounded
+from selfmodel.files import read_file
 from selfmodel.logs.rosbag.mapping import (
     ANGLES,
     CLOCKS,
@@ -32,7 +32,7 @@ def read_mapping(path: Path) -> BagMapping:
         InputError: It cannot be read, or is wrong; the sentence names the line.
     """
     try:
-        text = read_bounded(path, "a mapping", LARGEST).decode()
+        text = read_file(path, "a mapping", LARGEST).decode()
     except UnicodeDecodeError as failure:
         raise InputError(f"{path}: expected TOML in UTF-8, got: {failure.reason}") from failure
     return parse_mapping(text, path.name)

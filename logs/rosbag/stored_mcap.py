@@ -15,10 +15,10 @@ from mcap.exceptions import EndOfFile, InvalidMagic, McapError
 from mcap.records import Channel, Chunk, Footer, McapRecord, Message, Schema, Statistics
 from mcap.stream_reader import StreamReader, breakup_chunk
 
+from selfmodel.logs.decompress import LARGEST
 from selfmodel.logs.errors import CorruptError, LogError, NotMcapError, TruncatedError
 from selfmodel.logs.framing import unpack_chunk
 from selfmodel.logs.rosbag.stored import Announced, DamageError, Stored, checked_time
-from selfmodel.logs.unpack import LARGEST
 
 ADVICE = "record it again, or recover what is whole with `mcap recover`"
 

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
+from selfmodel.logs.decompress import LARGEST
 from selfmodel.logs.errors import CorruptError, IncompleteError
 from selfmodel.logs.rosbag.stored import Announced, DamageError, Stored, checked_time
-from selfmodel.logs.unpack import LARGEST
 
 SQLITE_MAGIC = b"SQLite format 3\x00"
 

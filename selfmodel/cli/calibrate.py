@@ -34,7 +34,7 @@ def calibrate(
     """
     # Whatever brings MuJoCo waits until the command runs.
     from selfmodel.experiments import trial_logs  # noqa: PLC0415
-    from selfmodel.logs.files import create_part, explained, publish, refuse_existing  # noqa: PLC0415
+    from selfmodel.logs.files import as_write_error, create_partial, publish, refuse_existing  # noqa: PLC0415
     from selfmodel.robot.parameters import factor_names  # noqa: PLC0415
     from selfmodel.simulation.calibrate import calibrate as fit_to  # noqa: PLC0415
     from selfmodel.simulation.threads import thread_count  # noqa: PLC0415
@@ -47,7 +47,7 @@ def calibrate(
     before = trial_logs.robot_of_logs(logs, robot)
     _refuse_assets(before, robot or str(files[0]))
     fit = fit_to(before, [log.trial for log in logs], thread_count(threads))
-    with create_part(out) as file, explained(out):
+    with create_partial(out) as file, as_write_error(out):
         file.write(fit.robot.mjcf.encode())
         publish(file, out)
     result = {

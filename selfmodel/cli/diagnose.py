@@ -27,7 +27,7 @@ def diagnose(
     files: LogFiles,
     *,
     robot: RobotOrModel = None,
-    comparator: ComparatorName = DEFAULT,
+    comparator: ComparatorName = DEFAULT.name,
     kinds: KindNames = DEFAULT_KINDS,
     calibrate: Calibrated = True,
     seed: Annotated[
@@ -46,8 +46,11 @@ def diagnose(
     """
     # Whatever brings MuJoCo waits until the command runs.
     from selfmodel.cli.output.display import display  # noqa: PLC0415
-    from selfmodel.cli.output.ranking import as_values, sureness  # noqa: PLC0415
     from selfmodel.diagnosis.diagnose import DiagnosticSearch  # noqa: PLC0415
+    from selfmodel.diagnosis.serialization import (  # noqa: PLC0415
+        confidence_to_dict,
+        ranking_to_list,
+    )
     from selfmodel.experiments import plugins, trial_logs  # noqa: PLC0415
     from selfmodel.experiments.fitting import calibration_values, fitted  # noqa: PLC0415
     from selfmodel.recovery.explain import diagnose_trials  # noqa: PLC0415
@@ -82,8 +85,8 @@ def diagnose(
         "played_back": [log.trial.path for log in used if _is_played_back(log)],
         "intact": [trial.path for trial in intact],
         "calibration": calibration_values(fit),
-        "diagnosis": as_values(diagnosis.ranked),
-        **sureness(diagnosis),
+        "diagnosis": ranking_to_list(diagnosis.ranked),
+        **confidence_to_dict(diagnosis),
         "evaluations": search.evaluations,
         "distinct_hypotheses": search.distinct_hypotheses,
         "seconds": perf_counter() - start,

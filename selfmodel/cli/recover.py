@@ -35,7 +35,7 @@ def recover(
     ] = None,
     damage: Damage = None,
     model_settings: ModelSettings = None,
-    comparator: ComparatorName = DEFAULT,
+    comparator: ComparatorName = DEFAULT.name,
     calibrate: Calibrated = True,
     gap: GapLevel = 0.0,
     structure: Structural = False,
@@ -69,7 +69,7 @@ def recover(
     from selfmodel.faults.neuron import silent_neurons  # noqa: PLC0415
     from selfmodel.faults.notation import parse  # noqa: PLC0415
     from selfmodel.faults.registry import known  # noqa: PLC0415
-    from selfmodel.logs.files import replace  # noqa: PLC0415
+    from selfmodel.logs.files import replace_file  # noqa: PLC0415
     from selfmodel.settings import Settings  # noqa: PLC0415
     from selfmodel.simulation.threads import thread_count  # noqa: PLC0415
 
@@ -105,7 +105,7 @@ def recover(
         raise typer.Exit(130) from None
     result = as_object(experiment, outcome)
     try:
-        replace(experiment.folder / "result.json", f"{result}\n".encode())
+        replace_file(experiment.folder / "result.json", f"{result}\n".encode())
     finally:  # what was found is said even where the disk is full
         if as_json:
             typer.echo(result)

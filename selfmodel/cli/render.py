@@ -86,7 +86,7 @@ def render(
     from selfmodel.faults.notation import parse  # noqa: PLC0415
     from selfmodel.faults.registry import known  # noqa: PLC0415
     from selfmodel.logs.errors import LogWriteError  # noqa: PLC0415
-    from selfmodel.logs.files import replace  # noqa: PLC0415
+    from selfmodel.logs.files import replace_file  # noqa: PLC0415
     from selfmodel.simulation.threads import thread_count  # noqa: PLC0415
 
     if diagnosis is not None:
@@ -104,7 +104,7 @@ def render(
         typer.echo(f"note: {note}", err=True)
     data = _drawn(film, out, sticks=gl is None)
     try:
-        replace(out, data)
+        replace_file(out, data)
     except LogWriteError as error:
         raise WorkError(f"{out}: it could not be written: {error.reason}") from error
     result = {

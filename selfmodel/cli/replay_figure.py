@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from selfmodel.errors import InputError, WorkError
 from selfmodel.logs.errors import LogWriteError
-from selfmodel.logs.files import refuse_existing, replace
+from selfmodel.logs.files import refuse_existing, replace_file
 from selfmodel.logs.reader import TrialLog
 from selfmodel.simulation.replay import Replay
 
@@ -72,7 +72,7 @@ def draw(path: Path, log: TrialLog, found: Replay, hypothesis: str) -> None:
     data = io.BytesIO()
     figure.savefig(data, format=path.suffix.lower().removeprefix("."), dpi=150)
     try:
-        replace(path, data.getvalue())
+        replace_file(path, data.getvalue())
     except LogWriteError as error:
         raise WorkError(f"{path}: the figure could not be written: {error.reason}") from error
 

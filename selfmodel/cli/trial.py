@@ -63,8 +63,8 @@ def trial(
     from selfmodel.faults.neuron import silent_neurons  # noqa: PLC0415
     from selfmodel.faults.notation import parse  # noqa: PLC0415
     from selfmodel.faults.registry import known  # noqa: PLC0415
-    from selfmodel.logs import read_log  # noqa: PLC0415
-    from selfmodel.logs.writer import write_trial  # noqa: PLC0415
+    from selfmodel.logs.physical_trial import run_trial  # noqa: PLC0415
+    from selfmodel.logs.records import TrialHeader  # noqa: PLC0415
     from selfmodel.robot.designs import DESIGNS  # noqa: PLC0415
     from selfmodel.settings import Settings  # noqa: PLC0415
     from selfmodel.trials.trial import TrialPlan  # noqa: PLC0415
@@ -84,15 +84,12 @@ def trial(
     check_silent_neurons(driver.design, silent_neurons(hidden))
     settings = Settings()
     plan = TrialPlan("trial", inputs.stage(stage), driver, settings.steps, seed)
-    samples = reality.robot(made, hidden).run(driver, settings.steps)
+    header = TrialHeader(settings, hidden=str(hidden), gap=reality.text)
     try:
-        write_trial(
-            out, made, plan, samples, settings=settings, hidden=str(hidden), gap=reality.text
-        )
+        logged = run_trial(reality.robot(made, hidden), plan, out, made, header)
     except KeyboardInterrupt:
         typer.echo(f"interrupted: the steps so far are in {out}.part", err=True)
         raise typer.Exit(130) from None
-    log = read_log(out)
     facts = {
         "log": str(out),
         "robot": made.name,
@@ -100,10 +97,10 @@ def trial(
         "gap": gap,
         "structure": structure,
         "seed": seed,
-        "steps": log.trial.behaviour.steps,
-        "displacement": log.trial.displacement,
+        "steps": logged.behaviour.steps,
+        "displacement": logged.displacement,
     }
     if as_json:
         typer.echo(json.dumps(facts, indent=2))
     else:
-        typer.echo(f"{made.name} ({hidden}) went {log.trial.displacement:.3f} m forward: {out}")
+        typer.echo(f"{made.name} ({hidden}) went {logged.displacement:.3f} m forward: {out}")

@@ -37,37 +37,42 @@ class Design(Protocol):
     """Structure of a controller: its inputs, its outputs, and the arithmetic between them.
 
     A design is immutable, hashable and equal to every design of the same structure.
-
-    Attributes:
-        name: Name of the kind of design, such as ``network``, in options and controller files.
-        sensors: Names of the inputs, in order.
-        motors: Names of the outputs, in order.
-        ranges: Command range of each motor.
-        hidden: Number of hidden neurons; 0 for a design without neurons.
-        weights: Length of a genome.
-        description: Short description with its sizes, for error messages.
     """
 
     @property
-    def name(self) -> str: ...  # noqa: D102  # documented above, like the other properties
+    def name(self) -> str:
+        """Name of the kind of design in options and controller files, such as ``network``."""
+        ...
 
     @property
-    def sensors(self) -> tuple[str, ...]: ...  # noqa: D102
+    def sensors(self) -> tuple[str, ...]:
+        """Names of the inputs, in order."""
+        ...
 
     @property
-    def motors(self) -> tuple[str, ...]: ...  # noqa: D102
+    def motors(self) -> tuple[str, ...]:
+        """Names of the outputs, in order."""
+        ...
 
     @property
-    def ranges(self) -> Ranges: ...  # noqa: D102
+    def ranges(self) -> Ranges:
+        """Command range of each motor."""
+        ...
 
     @property
-    def hidden(self) -> int: ...  # noqa: D102
+    def hidden(self) -> int:
+        """Number of hidden neurons; 0 for a design without neurons."""
+        ...
 
     @property
-    def weights(self) -> int: ...  # noqa: D102
+    def weights(self) -> int:
+        """Length of a genome."""
+        ...
 
     @property
-    def description(self) -> str: ...  # noqa: D102
+    def description(self) -> str:
+        """Sizes of the design in words, for error messages."""
+        ...
 
     def summary(self, genome: FloatArray) -> str:
         """Returns a short description of the controller with that genome, ``(weights,)``."""

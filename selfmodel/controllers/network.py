@@ -132,7 +132,7 @@ class NetworkBatch:
 
 
 def _working_neurons(silent: Sequence[AbstractSet[int]], hidden: int) -> FloatArray | None:
-    """Returns 0 per silent neuron and 1 per other one, ``(n, hidden)``; None if all work."""
+    """Returns 0 per silent neuron and 1 per working neuron, ``(n, hidden)``; None if all work."""
     if not any(silent):
         return None
     working = np.ones((len(silent), hidden))

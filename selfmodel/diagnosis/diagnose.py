@@ -10,12 +10,12 @@ from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, UnsearchedFault, Verdict
 from selfmodel.diagnosis.evidence import Evidence
 from selfmodel.diagnosis.genome import VALUES, decode, encode
-from selfmodel.diagnosis.loss_functions import LossFunctions
+from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
 from selfmodel.diagnosis.model_error import any_fault_is_model_error
 from selfmodel.diagnosis.refine import refined
-from selfmodel.diagnosis.screening import screen_of
 from selfmodel.diagnosis.severity import coarse_candidates
 from selfmodel.diagnosis.significance import TEST, exceeds_healthy_loss, is_better
+from selfmodel.diagnosis.surrogate import Surrogate, own_surrogate, surrogate_of
 from selfmodel.diagnosis.undetectable import undetectable_faults
 from selfmodel.diagnosis.unsearched import best_unsearched_fault
 from selfmodel.evolution import Evolution, GenerationCallback, evolve
@@ -65,9 +65,8 @@ class DiagnosticSearch:
         self._kinds = applicable_kinds(kinds, self._anatomy)
         self._intact = tuple(intact)
         self.evidence = Evidence(simulator, comparator)
-        self._screen = screen_of(comparator, simulator, self.evidence)
-        # What is only looked at is remembered apart, so that it is never ranked.
-        self._aside, self._screen_aside = self.evidence.aside(), self._screen.aside()
+        self._own_surrogate = own_surrogate(comparator, simulator)
+        self._proposed: set[Hypothesis] = set()
         self.evaluations = 0
 
     def __call__(
@@ -85,19 +84,24 @@ class DiagnosticSearch:
             rng: Every random choice comes from it.
             on_generation: Is told of every generation.
         """
-        found = self._evolved(trials, seeds, rng, on_generation)
-        best, aside = found[0], self._looks_aside(trials)
-        if self.evidence.is_piecewise:
-            best = self._refined(trials, found[:KNOWN], aside)
-        judged = list(self.evidence.judged(trials) | {best, INTACT})
+        surrogate = surrogate_of(self.evidence, self._own_surrogate, trials)
+        is_piecewise = self.evidence.is_piecewise(trials)
+        found = self._evolved(surrogate, seeds, rng, on_generation)
+        best, looks = found[0], self._loss_functions(trials, surrogate)
+        # Ranked: hypotheses that were proposed and compared with the whole trials. Hypotheses that
+        # only the tests below compare with the trials are never ranked.
+        ranked: set[Hypothesis] = set() if is_piecewise else set(found)
+        if is_piecewise:
+            best = self._refined(found[:KNOWN], looks, ranked)
+        ranked |= {best, INTACT}
+        self._proposed |= ranked
+        judged = list(ranked)
         totals = dict(zip(judged, map(float, self.evidence.distances(judged, trials)), strict=True))
         others = [one for one in _ranked(totals) if one != best]
-        indistinguishable = self._indistinguishable(best, others, aside)
-        better = best_unsearched_fault(best, self._kinds, self._anatomy, aside)
+        indistinguishable = self._indistinguishable(best, others, looks, is_piecewise=is_piecewise)
+        better = best_unsearched_fault(best, self._kinds, self._anatomy, looks)
         besides = (
-            undetectable_faults(best, self._kinds, self._anatomy, aside)
-            if self.evidence.is_piecewise
-            else []
+            undetectable_faults(best, self._kinds, self._anatomy, looks) if is_piecewise else []
         )
         kept = self._settings.kept
         return Diagnosis(
@@ -105,8 +109,8 @@ class DiagnosticSearch:
             trials=len(trials),
             intact_distance=totals[INTACT],
             indistinguishable=indistinguishable[:kept],
-            verdict=self._verdict(best, indistinguishable, better, aside),
-            test=TEST if self.evidence.is_piecewise else EQUAL,
+            verdict=self._verdict(best, indistinguishable, better, looks),
+            test=TEST if is_piecewise else EQUAL,
             unsearched=better,
             undetectable=tuple(besides[:kept]),
         )
@@ -118,28 +122,28 @@ class DiagnosticSearch:
             InputError: It cannot; the sentence names every trial that it cannot judge, and why.
         """
         self.evidence.check([*self._intact, *trials])
-        self._screen.evidence.check(self._screen.of(trials))
+        surrogate = surrogate_of(self.evidence, self._own_surrogate, trials)
+        surrogate.evidence.check(surrogate.trials)
 
     @property
     def distinct_hypotheses(self) -> int:
-        """How many hypotheses of the considered kinds were ever simulated."""
-        return len(self.evidence.hypotheses | self._screen.evidence.hypotheses)
+        """Number of distinct hypotheses that were proposed, by all searches so far."""
+        return len(self._proposed)
 
     def _evolved(
         self,
-        trials: Sequence[Trial],
+        surrogate: Surrogate,
         seeds: Sequence[Hypothesis],
         rng: np.random.Generator,
         on_generation: GenerationCallback,
     ) -> list[Hypothesis]:
         """The hypotheses that the EA looked at, closest first."""
         genes, anatomy = self._settings.genes, self._anatomy
-        looked_at = self._screen.of(trials)
         totals: dict[Hypothesis, float] = {}
 
         def fitness(genomes: FloatArray) -> FloatArray:
             hypotheses = [decode(genome, anatomy, self._kinds) for genome in genomes]
-            distances = self._screen.evidence.distances(hypotheses, looked_at)
+            distances = surrogate.distances(hypotheses)
             totals.update(zip(hypotheses, map(float, distances), strict=True))
             return 0.0 - distances  # not -distances: a perfect fitness reads 0, not -0
 
@@ -152,54 +156,66 @@ class DiagnosticSearch:
         )
         evolve(search, fitness, on_generation)
         self.evaluations += search.evaluations
+        self._proposed |= totals.keys()
         return _ranked(totals)
 
-    def _looks_aside(self, trials: Sequence[Trial]) -> LossFunctions:
-        """How badly hypotheses predict the trials, without a trace in what is ranked.
+    def _loss_functions(self, trials: Sequence[Trial], surrogate: Surrogate) -> LossFunctions:
+        """Returns the losses on the trials, the surrogate's, and those on healthy trials.
 
-        Pieces of a whole trial, closed loop, hang together: what helps there may be luck, and is
-        not compared with what helped before.
+        Closed-loop windows are correlated, so gains on them are not compared with gains on healthy
+        trials.
         """
         known = [*self._intact, *trials]
-        comparable = self.evidence.is_piecewise and self.evidence.uses_segments(known)
+        comparable = self.evidence.is_piecewise(trials) and self.evidence.uses_segments(known)
         return LossFunctions(
-            after=partial(self._aside.losses, trials=trials),
-            screen=partial(self._screen_aside.losses, trials=trials),
-            before=partial(self._aside.losses, trials=self._intact)
+            after=partial(self.evidence.losses, trials=trials),
+            screen=surrogate.losses,
+            before=partial(self.evidence.losses, trials=self._intact)
             if comparable and self._intact
             else None,
         )
 
     def _refined(
-        self, trials: Sequence[Trial], known: Sequence[Hypothesis], aside: LossFunctions
+        self, known: Sequence[Hypothesis], looks: LossFunctions, compared: set[Hypothesis]
     ) -> Hypothesis:
-        """The best hypothesis around those known."""
+        """Returns the best hypothesis around the known ones.
+
+        Args:
+            known: Hypotheses to start from.
+            looks: Losses on the trials.
+            compared: Every hypothesis that is compared with the whole trials is added.
+        """
         return refined(
             known,
             coarse_candidates(self._kinds, self._anatomy),
             self._settings.genes,
             LossFunctions(
-                after=partial(self.evidence.losses, trials=trials),
-                screen=partial(self._screen.losses, trials=trials),
-                before=aside.before,
+                after=_recorded(looks.after, compared),
+                screen=_recorded(looks.screen, self._proposed),
+                before=looks.before,
             ),
             self._anatomy,
         )
 
     def _indistinguishable(
-        self, best: Hypothesis, others: Sequence[Hypothesis], aside: LossFunctions
+        self,
+        best: Hypothesis,
+        others: Sequence[Hypothesis],
+        looks: LossFunctions,
+        *,
+        is_piecewise: bool,
     ) -> tuple[Hypothesis, ...]:
         """Those that cannot be told from the best, but for those that only say more of the same."""
         said = _without_severities(best)
         candidates = [other for other in others if not said <= _without_severities(other)]
-        mine, *theirs = aside.after([best, *candidates])
-        if self.evidence.is_piecewise:
+        mine, *theirs = looks.after([best, *candidates])
+        if is_piecewise:
             told = [is_better(mine, losses) for losses in theirs]
         else:
             told = [bool(losses.sum() != mine.sum()) for losses in theirs]
         untold = [other for other, apart in zip(candidates, told, strict=True) if not apart]
         return tuple(
-            one for one in untold if not any_fault_is_model_error(one, aside, self._anatomy)
+            one for one in untold if not any_fault_is_model_error(one, looks, self._anatomy)
         )
 
     def _verdict(
@@ -207,15 +223,25 @@ class DiagnosticSearch:
         best: Hypothesis,
         indistinguishable: Sequence[Hypothesis],
         better: UnsearchedFault | None,
-        aside: LossFunctions,
+        looks: LossFunctions,
     ) -> Verdict:
         if better is not None:
             return "unexplained"
         if self._intact:
-            usual = self._aside.losses([INTACT], self._intact)[0]
-            if exceeds_healthy_loss(aside.after([best])[0], usual):
+            usual = self.evidence.losses([INTACT], self._intact)[0]
+            if exceeds_healthy_loss(looks.after([best])[0], usual):
                 return "unexplained"
         return "ambiguous" if indistinguishable else "explained"
+
+
+def _recorded(losses: Losses, into: set[Hypothesis]) -> Losses:
+    """Returns a loss function that adds every hypothesis to a set."""
+
+    def recorded(hypotheses: Sequence[Hypothesis]) -> FloatArray:
+        into.update(hypotheses)
+        return losses(hypotheses)
+
+    return recorded
 
 
 def _without_severities(hypothesis: Hypothesis) -> set[tuple[FaultKind, str]]:

@@ -36,6 +36,40 @@ class Reality:
         return SimulatedRobot(robot, hidden, self.gap, self.structure, stream)
 
 
+def simulated_robot(
+    robot: Robot,
+    hypothesis: Hypothesis = INTACT,
+    *,
+    gap: float = 0.0,
+    structure: bool = False,
+    seed: int = 0,
+) -> SimulatedRobot:
+    """Returns a physical robot in simulation, with hidden faults and a reality gap.
+
+    Robots of the same seed and gap are one robot before and after its failure; the healthy and the
+    damaged robot have different streams of measurement noise.
+
+    Example:
+        >>> import selfmodel
+        >>> robot = selfmodel.load_robot("quadruped")
+        >>> damaged = selfmodel.parse_hypothesis("break:front_left_knee", robot)
+        >>> selfmodel.simulated_robot(robot, damaged, gap=0.05)
+        <SimulatedRobot quadruped: break:front_left_knee, gap 0.05>
+
+    Args:
+        robot: The nominal robot.
+        hypothesis: The faults of the physical robot.
+        gap: Level of the reality gap, the relative standard deviation of its factors; 0 is none.
+        structure: Whether the physical robot also differs in structure from its model.
+        seed: Seed of the gap, the structure and the noise.
+
+    Raises:
+        InputError: The level is out of range.
+    """
+    stream = 1 if hypothesis.faults else 0
+    return draw_reality(robot, seed, gap, structure=structure).robot(robot, hypothesis, stream)
+
+
 def draw_reality(robot: Robot, seed: int, level: float, *, structure: bool) -> Reality:
     """Returns what a physical robot is like.
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from selfmodel.errors import InputError
 from selfmodel.faults.table_one import cases_of
-from selfmodel.logs.files import read_bounded
+from selfmodel.files import read_file
 from selfmodel.robot.mjcf.adaptation import adapt
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings, parse_setting, read_settings
@@ -68,7 +68,7 @@ def robot(name: str, control_timestep: float) -> Robot:
     path = Path(name)
     if not is_model(name):
         return robot_entry(name).robot()
-    data = read_bounded(path, "an MJCF file", LARGEST_MODEL)
+    data = read_file(path, "an MJCF file", LARGEST_MODEL)
     try:
         return Robot(path.stem, data.decode(), control_timestep)
     except (ValueError, KeyError) as error:

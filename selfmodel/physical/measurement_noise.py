@@ -9,17 +9,7 @@ from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.embodiment import WELD_ARMATURE, Embodiment
 from selfmodel.trials.behaviour import Signal
-
-FULL_SCALE: dict[Signal, float] = {
-    "joint_velocities": 2.0,
-    "joint_efforts": 5.0,
-    "base_position": 0.1,
-    "base_orientation": 0.1,
-    "base_linear_velocity": 0.5,
-    "base_angular_velocity": 0.5,
-}
-"""What the noise of a logged signal is relative to, in the signal's unit; rad for an orientation.
-A joint position's is half the range of its hinge. Commands have none: they are known."""
+from selfmodel.trials.signal_scales import MEASUREMENT_FULL_SCALES
 
 
 class Measurement(Protocol):
@@ -83,9 +73,10 @@ class NoisyMeasurement:
         if signal in ("sensors", "commands"):
             return values
         if signal == "base_orientation":
-            turn = self._level * FULL_SCALE[signal] * self._rng.standard_normal(3)
+            turn = self._level * MEASUREMENT_FULL_SCALES[signal] * self._rng.standard_normal(3)
             return turned(values, turn)
-        scale = self._half_ranges if signal == "joint_positions" else FULL_SCALE[signal]
+        joints = signal == "joint_positions"
+        scale = self._half_ranges if joints else MEASUREMENT_FULL_SCALES[signal]
         return np.asarray(values + self._level * scale * self._rng.standard_normal(values.shape))
 
 

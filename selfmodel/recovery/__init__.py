@@ -1,1 +1,1 @@
-"""The recovery loop: repair EA, choice of the next trial, database and journal."""
+"""The paper's recovery loop: repair EA, choice of the next trial, and database."""

@@ -1,4 +1,4 @@
-"""The paper's algorithm: act, log, diagnose, repair, with as few physical trials as possible."""
+"""The paper's algorithm: run and log a trial, diagnose, repair, with few physical trials."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -13,7 +13,7 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import PAPER_KINDS, applicable_kinds
 from selfmodel.physical.interface import PhysicalRobot
-from selfmodel.recovery.database import Journal
+from selfmodel.recovery.database import Database, Journal, RunTrial
 from selfmodel.recovery.events import Event, SearchBegins
 from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.next_trial import NextTrial, Situation, by_repair
@@ -28,16 +28,16 @@ from selfmodel.trials.trial import Stage, Trial, TrialPlan
 
 @dataclass(frozen=True)
 class Recovery:
-    """How a recovery went.
+    """Result of a recovery.
 
     Attributes:
-        trials: Every physical trial, in order: ``before``, ``after``, then the recoveries.
-        tried: The best hypothesis when each trial's controller was chosen.
-        diagnosis: The last one, which explains all trials.
-        repair_evaluations: Controllers that the repair EA asked about.
-        diagnostic_evaluations: Hypotheses that the diagnostic EA asked about.
-        distinct_hypotheses: How many of those differ.
-        calibration: How the self-model was fitted to the trials before the failure, if it was.
+        trials: Physical trials, in order: ``before``, ``after``, then those of stage ``recovery``.
+        tried: Best hypothesis at the time when the controller was chosen, one per trial.
+        diagnosis: Last diagnosis, which explains all trials.
+        repair_evaluations: Number of controllers that the repair EA evaluated.
+        diagnostic_evaluations: Number of hypotheses that the diagnostic EA evaluated.
+        distinct_hypotheses: Number of distinct hypotheses among them.
+        calibration: Fit of the self-model to the trials before the failure; None without one.
     """
 
     trials: tuple[Trial, ...]
@@ -60,12 +60,9 @@ class Recovery:
 
     @property
     def recovered(self) -> float:
-        """Forward displacement of the best of the recovery trials, m.
-
-        NaN if it was observed in none of them.
-        """
-        ways = [trial.displacement for trial in self.trials[2:]]
-        return max((way for way in ways if not math.isnan(way)), default=math.nan)
+        """Largest forward displacement of the recovery trials, m; NaN if unobserved in all."""
+        displacements = [trial.displacement for trial in self.trials[2:]]
+        return max((value for value in displacements if not math.isnan(value)), default=math.nan)
 
 
 def recover(
@@ -74,6 +71,7 @@ def recover(
     damaged: PhysicalRobot,
     simulator: Simulator,
     comparator: Comparator,
+    run_trial: RunTrial,
     journal: Journal,
     settings: Settings,
     seed: int,
@@ -85,88 +83,92 @@ def recover(
     next_trial: NextTrial = by_repair,
     score: Score = DISPLACEMENT,
 ) -> Recovery:
-    """Lets a robot walk until it fails, then finds out what is wrong and how it walks again.
+    """Runs the recovery of a robot: a healthy trial, a failing one, then diagnosis and repair.
 
     Args:
-        healthy: The physical robot before it fails.
-        damaged: The same robot afterwards.
-        simulator: The self-model.
-        comparator: Judges hypotheses by the logged trials.
-        journal: Keeps the trials and diagnoses; everything about the past is read back from it.
+        healthy: Physical robot before the failure.
+        damaged: Physical robot after the failure.
+        simulator: Self-model.
+        comparator: Distance between the predictions of hypotheses and the logged trials.
+        run_trial: Runs and logs a physical trial. The trial that ``run_trial`` returns is all that
+            the algorithm observes of the robot.
+        journal: Storage of the diagnoses.
         settings: The paper's numbers.
-        seed: Every random choice comes from it.
-        on_event: Is told what happens.
-        gait: How the robot walks before it fails; evolved if there is none. The rest of the
-            recovery is the same whether a gait was evolved here, or earlier from the same seed.
-        design: The kind of controller to evolve; the paper's network if none is given.
-        kinds: What a diagnosis considers.
-        calibrate: Fits the self-model to the trials before the failure; without it, the self-model
-            stays as it is.
+        seed: Seed of all random choices.
+        on_event: Callback, called with each event as it happens.
+        gait: Controller of the robot before the failure; evolved if not given. The rest of the
+            recovery is the same for a gait that was evolved here and for the same gait, given.
+        design: Design of the controllers to evolve; the paper's network if not given.
+        kinds: Fault kinds that a diagnosis searches.
+        calibrate: Fits the self-model to the trials before the failure; no fit if not given.
         next_trial: Chooses the controller of each trial after the failing one.
-        score: What controllers are evolved for.
+        score: Fitness of the repair EA.
 
     Returns:
-        What the journal says at the end.
+        The trials, the last diagnosis and the number of evaluations.
     """
-    # As the robot's own model says: a fitted one is written with fewer digits.
+    # Not of the calibrated model, which is written with fewer digits.
     design = network_for(simulator.robot) if design is None else design
     repair = RepairSearch(simulator, settings, design, score=score)
     tried: list[Hypothesis] = []
+    database = Database()
 
     def evolve_controller(hypothesis: Hypothesis) -> Controller:
         on_event(SearchBegins("repair", hypothesis))
-        known = journal.read()
-        rng = repair_stream(seed, len(known.diagnoses))
-        return repair(hypothesis, known.controllers, rng, on_event)
+        rng = repair_stream(seed, len(database.diagnoses))
+        return repair(hypothesis, database.controllers, rng, on_event)
 
-    def diagnose_trials() -> Diagnosis:
+    def diagnose() -> Diagnosis:
+        nonlocal database
         on_event(SearchBegins("diagnostic"))
-        known = journal.read()
-        rng = diagnosis_stream(seed, len(known.diagnoses) + 1)
-        diagnosis = diagnose(known.evidence, known.hypotheses, rng, on_event)
-        journal.note(diagnosis)
+        rng = diagnosis_stream(seed, len(database.diagnoses) + 1)
+        diagnosis = search(database.evidence, database.hypotheses, rng, on_event)
+        journal.add(diagnosis)
+        database = database.with_diagnosis(diagnosis)
         on_event(diagnosis)
         return diagnosis
 
-    def act(robot: PhysicalRobot, stage: Stage, believed: Hypothesis, by: Controller) -> None:
-        plan = TrialPlan(f"{len(tried):02d}-{stage}", stage, by, settings.steps, seed)
-        tried.append(believed)
-        on_event(journal.record(robot, plan))
+    def act(robot: PhysicalRobot, stage: Stage, best: Hypothesis, controller: Controller) -> None:
+        nonlocal database
+        plan = TrialPlan(f"{len(tried):02d}-{stage}", stage, controller, settings.steps, seed)
+        tried.append(best)
+        trial = run_trial(robot, plan)
+        database = database.with_trial(trial)
+        on_event(trial)
 
-    applicable_kinds(kinds, simulator.robot.anatomy)  # before any trial is spent
+    applicable_kinds(kinds, simulator.robot.anatomy)  # before any physical trial
     if gait is None:
         gait = evolve_controller(INTACT)
     act(healthy, "before", INTACT, gait)
-    intact = journal.read().trials
-    calibration = calibrate(intact) if calibrate else None
+    healthy_trials = database.trials
+    calibration = calibrate(healthy_trials) if calibrate else None
     if calibration is not None:
         on_event(calibration)
         if calibration.robot is not simulator.robot:
             simulator = Simulator(calibration.robot, simulator.threads, simulator.stats)
             repair = RepairSearch(simulator, settings, design, repair.evaluations, score)
-    diagnose = DiagnosticSearch(simulator, comparator, settings, kinds, intact=intact)
+    search = DiagnosticSearch(simulator, comparator, settings, kinds, intact=healthy_trials)
     act(damaged, "after", INTACT, gait)
     for trials_left in range(settings.trials, 0, -1):
-        believed = diagnose_trials().best
-        known = journal.read()
+        best = diagnose().best
         situation = Situation(
-            known=known,
+            known=database,
             trials_left=trials_left,
             simulator=simulator,
             settings=settings,
-            rng=choice_stream(seed, len(known.diagnoses)),
-            repaired=partial(evolve_controller, believed),
+            rng=choice_stream(seed, len(database.diagnoses)),
+            repaired=partial(evolve_controller, best),
             on_event=on_event,
         )
-        act(damaged, "recovery", believed, next_trial(situation))
-    diagnosis = diagnose_trials()
+        act(damaged, "recovery", best, next_trial(situation))
+    diagnosis = diagnose()
 
     return Recovery(
-        trials=journal.read().trials,
+        trials=database.trials,
         tried=tuple(tried),
         diagnosis=diagnosis,
         repair_evaluations=repair.evaluations,
-        diagnostic_evaluations=diagnose.evaluations,
-        distinct_hypotheses=diagnose.distinct_hypotheses,
+        diagnostic_evaluations=search.evaluations,
+        distinct_hypotheses=search.distinct_hypotheses,
         calibration=calibration,
     )

@@ -16,7 +16,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
 from selfmodel.faults.build import apply_faults
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.robot.custom_numerics import MAX_CONTROL_DELAY
+from selfmodel.robot.control_delay import MAX_CONTROL_DELAY
 from selfmodel.robot.parameters import (
     Parameters,
     edited_model,
@@ -25,12 +25,16 @@ from selfmodel.robot.parameters import (
     with_parameters,
 )
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.calibration_segments import CalibrationSegments, cut_segments
+from selfmodel.simulation.calibration_segments import (
+    CalibrationSegments,
+    calibration_segments_of,
+)
 from selfmodel.simulation.outcome import SimulationStats
 from selfmodel.simulation.prediction import predict
 from selfmodel.simulation.requests import Segments
-from selfmodel.trials.behaviour import Behaviour, Signal
+from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signal_difference import difference
+from selfmodel.trials.signal_scales import CALIBRATION_ERROR_SCALES
 from selfmodel.trials.state_estimation import BASE
 from selfmodel.trials.trial import Trial
 
@@ -52,21 +56,11 @@ when a foot comes down, and that shows as noise between near values."""
 DELAYS = range(MAX_CONTROL_DELAY + 1)
 """Control delays that are tried."""
 
-SCALES: dict[Signal, float] = {
-    "joint_positions": 0.03,
-    "joint_velocities": 1.0,
-    "base_position": 0.01,
-    "base_orientation": 0.03,
-    "base_linear_velocity": 0.1,
-    "base_angular_velocity": 0.3,
-}
-"""Errors beyond these count by their size, smaller ones by their square: an impact that is missed
-by a step is no statement about masses."""
-
 ITERATIONS = 3
 
 EXACT = 0.01
-"""The root mean square error, in ``SCALES``, below which the model is taken to be the robot."""
+"""The root mean square error, in ``CALIBRATION_ERROR_SCALES``, below which the model is taken to be
+the robot."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +74,7 @@ class Calibration:
             of ``Parameters.factors``: that of the prior where the trials show nothing, less where
             they show something.
         error_before: Root mean square error of the predictions with the nominal parameters, in
-            units of ``SCALES``.
+            units of ``CALIBRATION_ERROR_SCALES``.
         error: The same with the fitted ones.
     """
 
@@ -113,7 +107,7 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
     """
     if not trials:
         raise InputError("expected at least one trial of the intact robot, got none")
-    data = [cut_segments(trial) for trial in trials]
+    data = [calibration_segments_of(trial) for trial in trials]
     start = nominal(robot)
     before = _error(robot, start, data, threads)
     deviations = np.full(len(start.factors), PRIOR)
@@ -159,12 +153,13 @@ def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> flo
 
     Returns:
         The root mean square error over all columns after all steps that are judged, in units of
-        ``SCALES``.
+        ``CALIBRATION_ERROR_SCALES``.
 
     Raises:
         InputError: A trial was not observed well enough.
     """
-    return _error(robot, nominal(robot), [cut_segments(trial) for trial in trials], threads)
+    data = [calibration_segments_of(trial) for trial in trials]
+    return _error(robot, nominal(robot), data, threads)
 
 
 Residual = Callable[[FloatArray], FloatArray]
@@ -219,12 +214,12 @@ def _placed(
 def _errors(
     robot: Robot, models: Sequence[Parameters], data: Sequence[CalibrationSegments], threads: int
 ) -> FloatArray:
-    """The errors of the predictions in units of ``SCALES``, ``(errors, models)``."""
+    """The errors of the predictions in units of the scales, ``(errors, models)``."""
     predicted = _predictor(robot, models, threads)
     rows = []
     for stretches in data:
         made = predicted(stretches.segments)
-        for signal, scale in SCALES.items():
+        for signal, scale in CALIBRATION_ERROR_SCALES.items():
             if signal in stretches.observed:
                 observed = stretches.observed[signal]
                 error = difference(signal, made[signal][:, :, 1:], observed) / scale

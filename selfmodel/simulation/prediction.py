@@ -8,7 +8,7 @@ import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.errors import InputError
-from selfmodel.robot.custom_numerics import MAX_CONTROL_DELAY
+from selfmodel.robot.control_delay import MAX_CONTROL_DELAY
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from selfmodel.controllers.playback import played_back
+from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.reality_gap import draw_gap
 from selfmodel.physical.simulated_robot import SimulatedRobot
@@ -46,7 +47,7 @@ def write(
         for sample in SimulatedRobot(robot, gap=gap).run(driver, STEPS)
     )
     return write_trial(
-        path, robot, TrialPlan(path.stem, stage, driver, STEPS, 0), samples, settings=SETTINGS
+        path, robot, TrialPlan(path.stem, stage, driver, STEPS, 0), samples, TrialHeader(SETTINGS)
     )
 
 
@@ -132,7 +133,7 @@ def test_a_table_says_each_factor_and_how_sure_it_is(folder: Path):
         (["none.mcap", "-o", "a.xml"], "none.mcap"),
         (
             ["intact.mcap", "numb.mcap", "-o", "a.xml"],
-            "numb.mcap: calibration needs stretches of 16 steps or more, none of them late, with ",
+            "numb.mcap: calibration needs segments of 16 steps or more, none of them late, with ",
         ),
         (["numb.mcap", "-o", "a.xml"], "the log never has joint_velocities: leave"),
     ],

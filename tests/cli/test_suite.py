@@ -40,7 +40,7 @@ STUDY = Study(
     settings=Settings(),
     score="displacement",
     controller="network",
-    comparator=DEFAULT,
+    comparator=DEFAULT.name,
 )
 
 BIPED = """

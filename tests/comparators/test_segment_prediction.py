@@ -15,16 +15,16 @@ TOUCH = 0
 def losses(trial: Behaviour, readings: np.ndarray) -> np.ndarray:
     """The loss of each segment where only these readings, ``(segments, 13, 4)``, are predicted."""
     told = logged(trial)
-    perfect = shown(SEGMENT_PREDICTION.request(told), told)
+    perfect = shown(SEGMENT_PREDICTION.prepare(told).request, told)
     signals = {**perfect.signals, "sensors": readings[np.newaxis]}
     found = Behaviour(perfect.names, perfect.time, signals)
-    return SEGMENT_PREDICTION.losses(found, told)[0]
+    return SEGMENT_PREDICTION.prepare(told).losses(found)[0]
 
 
 def predicted(trial: Behaviour) -> np.ndarray:
     """The readings of a perfect prediction, ``(segments, 13, 4)``."""
     told = logged(trial)
-    return shown(SEGMENT_PREDICTION.request(told), told)["sensors"][0].copy()
+    return shown(SEGMENT_PREDICTION.prepare(told).request, told)["sensors"][0].copy()
 
 
 def test_a_touch_at_the_beginning_of_a_segment_is_judged_only_where_the_robot_stands():

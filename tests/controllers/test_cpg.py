@@ -43,7 +43,7 @@ def commanded(genome: np.ndarray, readings: np.ndarray) -> np.ndarray:
     return commands[:, 0]
 
 
-def test_a_genome_has_a_value_for_each_thing_that_it_says(robot: Robot):
+def test_a_genome_has_the_documented_length(robot: Robot):
     assert cpg_for(robot).weights == {"quadruped": 33, "hexapod": 67}[robot.name]
 
 
@@ -63,7 +63,7 @@ def test_a_step_is_the_formula_of_the_docs():
 
 
 @given(seed=st.integers(0, 10_000), reading=st.floats(-1, 1))
-def test_no_genome_leaves_the_ranges_of_its_motors_or_stops_its_clock(seed: int, reading: float):
+def test_every_genome_keeps_commands_in_range_and_the_phase_advancing(seed: int, reading: float):
     genome = genomes(1, seed)[0]
     one = CPG.decode(genome)
     commands = commanded(genome, np.full((50, 2), reading))
@@ -75,7 +75,7 @@ def test_no_genome_leaves_the_ranges_of_its_motors_or_stops_its_clock(seed: int,
     assert np.abs(one.feedback).sum() <= MAX_FEEDBACK + 1e-12
 
 
-def test_they_start_from_the_centre_without_a_jolt_and_reach_their_amplitude():
+def test_commands_start_at_the_centre_and_reach_their_amplitude_smoothly():
     genome = np.concatenate([np.ones(1 + 3), np.zeros(CPG.weights - 4)])
     commands = commanded(genome, np.zeros((300, 2)))
 
@@ -84,7 +84,7 @@ def test_they_start_from_the_centre_without_a_jolt_and_reach_their_amplitude():
     assert np.ptp(commands[100:], axis=0) == pytest.approx([0.5, 2.0, 2.0], rel=0.02)
 
 
-def test_amplitudes_grow_as_their_differential_equation_says():
+def test_the_amplitude_rise_solves_its_differential_equation():
     a, step = 20.0, 1e-4
     r, speed = 0.0, 0.0
     for k in range(5000):
@@ -92,7 +92,7 @@ def test_amplitudes_grow_as_their_differential_equation_says():
         r, speed = r + step * speed, speed + step * a * (a / 4 * (1 - r) - speed)
 
 
-def test_they_repeat_themselves_at_their_frequency():
+def test_commands_are_periodic_at_the_stride_frequency():
     genome = genomes(1, 3)[0]
     one = CPG.decode(genome)
     steps = 100 / (one.frequency * 0.01)  # of a hundred strides
@@ -103,20 +103,20 @@ def test_they_repeat_themselves_at_their_frequency():
     assert apart.max() <= drift + 2e-5 * 100
 
 
-def test_a_reading_bends_the_rhythm_and_without_feedback_none_does():
+def test_a_reading_changes_the_commands_only_with_feedback():
     genome = genomes(1, 5)[0].copy()
     genome[-2:] = [1.0, 0.0]
     quiet = commanded(genome, np.zeros((200, 2)))
     touched = commanded(genome, np.tile([1.0, 0.0], (200, 1)))
-    unheard = commanded(genome, np.tile([0.0, 1.0], (200, 1)))
+    without_gain = commanded(genome, np.tile([0.0, 1.0], (200, 1)))
 
     assert np.abs(touched - quiet).max() > 0.05
-    assert np.array_equal(unheard, quiet)
+    assert np.array_equal(without_gain, quiet)
 
 
 @settings(max_examples=30)
 @given(rows=st.integers(1, 40), data=st.data())
-def test_a_robot_gets_the_same_bits_in_any_batch_and_any_place(rows: int, data: st.DataObject):
+def test_a_row_is_the_same_to_the_bit_in_any_batch_and_place(rows: int, data: st.DataObject):
     place = data.draw(st.integers(0, rows - 1))
     drawn = genomes(rows, rows)
     readings = np.random.default_rng(place).normal(size=(20, rows, 2))
@@ -130,7 +130,7 @@ def test_a_robot_gets_the_same_bits_in_any_batch_and_any_place(rows: int, data: 
         assert many[place].tobytes() == one.tobytes()
 
 
-def test_a_driven_robot_moves_by_the_same_bits_in_any_batch_on_any_threads(robot: Robot):
+def test_a_robot_moves_the_same_to_the_bit_in_any_batch_on_any_threads(robot: Robot):
     hypotheses = [parse("intact", robot.anatomy)] * 6
     hypotheses[1] = parse(f"break:{robot.anatomy.joints[0].name}", robot.anatomy)
     hypotheses[2] = parse(f"sensor:{robot.anatomy.sensors[0].name}", robot.anatomy)
@@ -144,26 +144,28 @@ def test_a_driven_robot_moves_by_the_same_bits_in_any_batch_on_any_threads(robot
             assert alone[signal][0].tobytes() == backwards[signal][5 - row].tobytes()
 
 
-def test_a_dead_sensor_that_they_listen_to_changes_how_a_robot_moves(quadruped: Robot):
-    genome = np.concatenate([np.full(25, 0.5), np.ones(8)])
-    one = Controller(cpg_for(quadruped), genome)
-    deaf = Controller(cpg_for(quadruped), np.concatenate([np.full(25, 0.5), np.zeros(8)]))
+def test_a_failed_sensor_changes_the_motion_only_with_feedback(quadruped: Robot):
+    cpg = cpg_for(quadruped)
+    one, without_feedback = (
+        Controller(cpg, np.concatenate([np.full(25, 0.5), np.full(8, feedback)]))
+        for feedback in (1.0, 0.0)
+    )
     dead = parse("sensor:front_left_touch", quadruped.anatomy)
     intact = parse("intact", quadruped.anatomy)
-    runs = [(intact, one), (dead, one), (intact, deaf), (dead, deaf)]
+    runs = [(intact, one), (dead, one), (intact, without_feedback), (dead, without_feedback)]
     moved = Simulator(quadruped, 1).run(runs, 150, ["joint_positions"]).behaviour["joint_positions"]
 
     assert np.abs(moved[0] - moved[1]).max() > 0.01
     assert np.array_equal(moved[2], moved[3])
 
 
-def test_a_silent_neuron_means_nothing_to_them(quadruped: Robot):
+def test_a_silent_neuron_is_refused(quadruped: Robot):
     run = (parse("neuron:0", quadruped.anatomy), random_cpgs(quadruped, 1)[0])
     with pytest.raises(InputError, match="has no hidden neurons: leave neuron:0 out"):
         Simulator(quadruped, 1).run([run], 2, ["sensors"])
 
 
-def test_they_share_no_batch_with_networks_or_with_others_that_are_connected_otherwise(
+def test_a_batch_with_another_design_is_refused(
     quadruped: Robot,
 ):
     (network,), (one,) = random_controllers(quadruped, 1), random_cpgs(quadruped, 1)
@@ -174,7 +176,7 @@ def test_they_share_no_batch_with_networks_or_with_others_that_are_connected_oth
         make_batch([one, other], [frozenset()] * 2, sensors=8)
 
 
-def test_two_are_equal_when_their_genome_and_connections_are():
+def test_controllers_are_equal_when_their_genome_and_design_are():
     genome = genomes(1)[0]
 
     assert Controller(CPG, genome) == Controller(CPG, genome.copy())
@@ -196,10 +198,10 @@ def test_two_are_equal_when_their_genome_and_connections_are():
         (lambda: Cpg((), ("hip",), 0.1, ((0.0, 1.0),) * 2), "1 motors need a command range each"),
     ],
 )
-def test_what_are_no_oscillators_is_refused(make: Callable[[], object], match: str):
+def test_a_genome_or_design_that_does_not_fit_is_refused(make: Callable[[], object], match: str):
     with pytest.raises(ValueError, match=match):
         make()
 
 
-def test_where_nothing_else_is_said_they_command_what_the_paper_s_network_does():
+def test_command_ranges_are_the_paper_s_by_default():
     assert Cpg((), ("hip",), 0.1).ranges == ((0.0, TARGET_RANGE),)

@@ -45,9 +45,7 @@ def test_a_step_is_the_papers_network():
 
 
 @given(rows=st.integers(1, 130), place=st.integers(0, 129), seed=st.integers(0, 1000))
-def test_a_robots_arithmetic_does_not_depend_on_the_rows_around_it(
-    rows: int, place: int, seed: int
-):
+def test_a_row_is_the_same_to_the_bit_in_any_batch_and_place(rows: int, place: int, seed: int):
     rng = np.random.default_rng(seed)
     place %= rows
     genomes = draw_genomes(rng, (rows, 68))
@@ -95,7 +93,7 @@ def test_a_genome_that_does_not_fit_is_refused(genome: np.ndarray, said: str):
         Controller(QUADRUPED, genome)
 
 
-def test_controllers_with_the_same_weights_are_one():
+def test_controllers_are_equal_when_their_genome_and_design_are():
     genome = draw_genomes(np.random.default_rng(0), (68,))
 
     assert Controller(QUADRUPED, genome) == Controller(QUADRUPED, genome.copy())

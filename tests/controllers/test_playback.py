@@ -11,7 +11,7 @@ from tests.conftest import random_controllers
 COMMANDS = np.array([[0.1, 0.2], [0.3, 0.4], [0.5, 0.6]])
 
 
-def test_commands_are_given_in_turn_and_the_last_one_stands():
+def test_commands_are_repeated_in_order_and_the_last_is_held():
     robots = [Playback(("a", "b"), COMMANDS), Playback(("a", "b"), -COMMANDS[:1])]
     brains = make_batch(robots, [frozenset(), {1}], sensors=4)
     targets = np.zeros((2, 2))
@@ -36,7 +36,7 @@ def test_two_recordings_are_equal_when_their_motors_and_bits_are():
     assert same != "a recording"
 
 
-def test_a_command_that_was_lost_is_the_one_before_it():
+def test_a_missing_command_is_replaced_by_the_one_before_it():
     lost = COMMANDS.copy()
     lost[1, 0] = lost[1:, 1] = np.nan
 
@@ -57,7 +57,7 @@ def test_a_command_that_was_lost_is_the_one_before_it():
         (np.array([[0.0, np.inf]]), "of step 0 are not all known"),
     ],
 )
-def test_commands_that_cannot_be_given_are_refused(commands: np.ndarray, match: str):
+def test_commands_that_do_not_fit_are_refused(commands: np.ndarray, match: str):
     with pytest.raises(ValueError, match=match):
         Playback(("a", "b"), commands)
 
@@ -72,7 +72,7 @@ def test_a_recording_cannot_be_changed_from_outside():
         playback.commands[0] = 1
 
 
-def test_robots_of_one_batch_are_driven_alike(quadruped: Robot):
+def test_a_batch_of_playbacks_and_controllers_is_refused(quadruped: Robot):
     motors = quadruped.anatomy.motors
     (controller,) = random_controllers(quadruped, 1)
     mixed = [controller, Playback(motors, np.zeros((1, len(motors))))]

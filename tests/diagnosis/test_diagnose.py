@@ -18,10 +18,10 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.requests import ClosedLoop
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.conftest import exploding, random_controllers
-from tests.helpers.memory import MemoryJournal
+from tests.helpers.comparators import Prepared
+from tests.helpers.memory import in_memory
 
 SMALL = dataclasses.replace(Settings().scaled(20), generations=5, steps=200)
 
@@ -29,7 +29,7 @@ SMALL = dataclasses.replace(Settings().scaled(20), generations=5, steps=200)
 def logged(robot: Robot, truth: str, controller: Controller, steps: int = 300) -> Trial:
     """A trial of a damaged robot."""
     physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
-    return MemoryJournal(robot).record(physical, TrialPlan(truth, "after", controller, steps, 0))
+    return in_memory(robot)(physical, TrialPlan(truth, "after", controller, steps, 0))
 
 
 @pytest.mark.parametrize(
@@ -93,13 +93,12 @@ class Indifferent:
     def __init__(self, distances: Callable[[int], object] = np.zeros) -> None:
         self._distances = distances
 
-    def request(self, _trial: Trial) -> ClosedLoop:
-        """Asks for the way of the root body."""
-        return ClosedLoop(record=("base_position",))
-
-    def distances(self, simulated: Behaviour, _trial: Trial) -> object:
-        """Looks at how many there are."""
-        return self._distances(len(simulated["base_position"]))
+    def prepare(self, _trial: Trial) -> Prepared:
+        """Prepares nothing of the trial."""
+        return Prepared(
+            ClosedLoop(record=("base_position",)),
+            lambda simulated: self._distances(len(simulated["base_position"])),
+        )
 
 
 def test_of_hypotheses_that_explain_as_well_the_one_with_fewer_faults_ranks_first(

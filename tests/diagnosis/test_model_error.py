@@ -22,7 +22,7 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
 from tests.conftest import random_controllers
-from tests.helpers.memory import MemoryJournal
+from tests.helpers.memory import in_memory
 
 PIECES = 60
 SMALL = dataclasses.replace(Settings().scaled(12), generations=2, steps=400)
@@ -71,7 +71,7 @@ def trial(robot: Robot, truth: str, gait: Controller, stage: Stage, number: int)
     reality = draw_reality(robot, 3, 0.02, structure=False)
     hidden = parse("+".join({truth, SLIPPERY} - {"intact"}), robot.anatomy)
     plan = TrialPlan(f"{number:02d}-{stage}", stage, gait, SMALL.steps, 0)
-    return MemoryJournal(robot).record(reality.robot(robot, hidden, stream=number), plan)
+    return in_memory(robot)(reality.robot(robot, hidden, stream=number), plan)
 
 
 def diagnosed(robot: Robot, truth: str, *, looks_back: bool) -> Diagnosis:

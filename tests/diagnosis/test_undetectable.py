@@ -5,9 +5,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pytest
 
-from selfmodel.cli.output.ranking import as_values, in_words, sureness
+from selfmodel.cli.output.ranking import in_words
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
 from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
+from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
 from selfmodel.diagnosis.undetectable import undetectable_faults
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
@@ -121,7 +122,7 @@ def test_a_report_names_what_is_unseen(quadruped: Robot, best: str, besides: lis
     diagnosis = Diagnosis(
         (Candidate(known, 0.1),), 1, 0.2, (), "explained", "by eye", undetectable=tuple(more)
     )
-    found = {"diagnosis": as_values(diagnosis.ranked), **sureness(diagnosis)}
+    found = {"diagnosis": ranking_to_list(diagnosis.ranked), **confidence_to_dict(diagnosis)}
 
     assert found["unseen"] == besides
     sure = ", and nothing else as well." if not besides else "."

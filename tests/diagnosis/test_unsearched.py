@@ -6,12 +6,13 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 import pytest
 
-from selfmodel.cli.output.ranking import as_values, in_words, sureness
+from selfmodel.cli.output.ranking import in_words
 from selfmodel.comparators import SEGMENT_PREDICTION, SENSOR_SERIES
 from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis, UnsearchedFault
 from selfmodel.diagnosis.loss_functions import LossFunctions
+from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
 from selfmodel.diagnosis.significance import NEGLIGIBLE
 from selfmodel.diagnosis.unsearched import best_unsearched_fault
 from selfmodel.experiments.reality import draw_reality
@@ -24,7 +25,7 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
 from tests.conftest import random_controllers
-from tests.helpers.memory import MemoryJournal
+from tests.helpers.memory import in_memory
 
 PIECES = 60
 SMALL = dataclasses.replace(Settings().scaled(12), generations=2)
@@ -123,7 +124,7 @@ def trial(robot: Robot, truth: str, gait: Controller, stage: Stage, number: int)
     reality = draw_reality(robot, 3, 0.03, structure=False)
     physical = reality.robot(robot, parse(truth, robot.anatomy), stream=number)
     plan = TrialPlan(f"{number:02d}-{stage}", stage, gait, SMALL.steps, 0)
-    return MemoryJournal(robot).record(physical, plan)
+    return in_memory(robot)(physical, plan)
 
 
 def diagnosed(robot: Robot, truth: str, gait: Controller) -> Diagnosis:
@@ -152,7 +153,7 @@ def test_a_weak_failure_of_another_kind_is_unexplained_and_named_across_a_gap(
 
     assert (found.verdict == "unexplained") == (kind is not None)
     assert (found.unsearched.kind if found.unsearched else None) == kind
-    told = in_words({"diagnosis": as_values(found.ranked), **sureness(found)})
+    told = in_words({"diagnosis": ranking_to_list(found.ranked), **confidence_to_dict(found)})
     assert told.startswith(
         f"Unexplained: {found.unsearched.hypothesis}" if found.unsearched else "Expl"
     )

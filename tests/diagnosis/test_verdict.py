@@ -25,13 +25,13 @@ from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.requests import ClosedLoop
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import Behaviour, forward_displacement
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
 from tests.conftest import random_controllers
-from tests.helpers.memory import MemoryJournal
+from tests.helpers.comparators import Prepared, PreparedPieces
+from tests.helpers.memory import in_memory
 
 SMALL = dataclasses.replace(Settings().scaled(12), generations=2, steps=300)
 CASES = ROBOTS["quadruped"].cases
@@ -43,7 +43,7 @@ def trial(robot: Robot, truth: str, controller: Controller, stage: Stage = "afte
     """A trial of a robot with something wrong."""
     physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
     plan = TrialPlan(f"{stage}-{truth}-{hash(controller)}", stage, controller, SMALL.steps, 0)
-    return MemoryJournal(robot).record(physical, plan)
+    return in_memory(robot)(physical, plan)
 
 
 def diagnosed(
@@ -91,21 +91,22 @@ class HardOfHearing:
     """Takes a touch that is half felt for none, so that gains below a half are all the same."""
 
     name = "hard of hearing"
-    request = staticmethod(SEGMENT_PREDICTION.request)
 
-    def losses(self, simulated: Behaviour, trial: Trial) -> np.ndarray:
-        """Those of short predictions, of what is felt."""
+    def prepare(self, trial: Trial) -> PreparedPieces:
+        """Prepares short predictions, of what is felt."""
+        prepared = SEGMENT_PREDICTION.prepare(trial)
+        losses = lambda simulated: prepared.losses(self._felt(simulated))  # noqa: E731  # short
+        return PreparedPieces(
+            prepared.request, lambda simulated: losses(simulated).mean(axis=1), losses
+        )
+
+    def _felt(self, simulated: Behaviour) -> Behaviour:
         touch = [name.endswith("touch") for name in simulated.names.sensors]
         readings = simulated["sensors"].copy()
         readings[..., touch] = readings[..., touch] > 0.5
-        felt = Behaviour(
+        return Behaviour(
             simulated.names, simulated.time, {**simulated.signals, "sensors": readings}
         )
-        return SEGMENT_PREDICTION.losses(felt, trial)
-
-    def distances(self, simulated: Behaviour, trial: Trial) -> np.ndarray:
-        """Their means."""
-        return self.losses(simulated, trial).mean(axis=1)
 
 
 def test_faults_that_differ_by_a_degree_are_no_rivals(
@@ -178,22 +179,26 @@ class Coarse:
     ruler: float
     name: str = "coarse"
 
-    def request(self, _trial: Trial) -> ClosedLoop:
-        """Asks for the way of the root body."""
-        return ClosedLoop(record=("base_position",))
-
-    def distances(self, simulated: Behaviour, trial: Trial) -> np.ndarray:
-        """Counts rulers."""
-        return np.floor(np.abs(forward_displacement(simulated) - trial.displacement) / self.ruler)
+    def prepare(self, trial: Trial) -> Prepared:
+        """Prepares the displacement, in rulers."""
+        sound = FORWARD_DISPLACEMENT.prepare(trial)
+        return Prepared(
+            sound.request, lambda simulated: np.floor(sound.distances(simulated) / self.ruler)
+        )
 
 
 @dataclasses.dataclass(frozen=True)
 class CoarseInPieces(Coarse):
     """The same of every one of five pieces."""
 
-    def losses(self, simulated: Behaviour, trial: Trial) -> np.ndarray:
-        """The same for each."""
-        return np.repeat(self.distances(simulated, trial)[:, np.newaxis], 5, axis=1)
+    def prepare(self, trial: Trial) -> PreparedPieces:
+        """Prepares the same five times."""
+        whole = super().prepare(trial)
+        return PreparedPieces(
+            whole.request,
+            whole.distances,
+            lambda simulated: np.repeat(whole.distances(simulated)[:, np.newaxis], 5, axis=1),
+        )
 
 
 @pytest.mark.parametrize(("make", "test"), [(Coarse, EQUAL), (CoarseInPieces, TEST)])

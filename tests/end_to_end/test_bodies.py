@@ -16,7 +16,8 @@ from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log
-from selfmodel.logs.frames import Kinematics, body_names
+from selfmodel.logs.kinematics import Kinematics, body_names
+from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.robots import robot_of
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.reality_gap import draw_gap
@@ -148,7 +149,7 @@ def test_a_log_holds_the_robot_and_its_trial(body: Robot, tmp_path: Path):
         body = suite_bodies.robot(body.name, "walk")
     samples = list(SimulatedRobot(body).run(plan_of(body, 20).controller, 20))
     path = tmp_path / "a.mcap"
-    write_trial(path, body, plan_of(body, 20), samples, settings=Settings())
+    write_trial(path, body, plan_of(body, 20), samples, TrialHeader(Settings()))
     log = read_log(path)
     again, logged = robot_of(log), collect(body.anatomy.names, samples)
 

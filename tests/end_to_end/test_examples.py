@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from selfmodel.diagnosis.comparator import Piecewise
+from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.comparator_contract import check_comparator
 from tests.helpers.command import SMALL, selfmodel
 from tests.helpers.gaits import batch, changed, gait, logged
@@ -33,7 +33,7 @@ def test_a_recovery_in_python_is_drawn_from_its_logs(tmp_path: Path):
     assert len(list((tmp_path / "run" / "trials").glob("*.mcap"))) == 5
 
 
-def heading_comparator() -> Piecewise:
+def heading_comparator() -> Comparator:
     """The example's comparator, imported as its user's own file would be."""
     spec = importlib.util.spec_from_file_location("heading", EXAMPLES / "heading_comparator.py")
     module = importlib.util.module_from_spec(spec)
@@ -59,7 +59,7 @@ def test_a_comparator_of_ones_own_keeps_the_contract():
     check_comparator(heading_comparator(), trial, runs)
     # A mean over 10 s of turning 0.1 rad/s apart.
     np.testing.assert_allclose(
-        heading_comparator().distances(runs, logged(left)), [0, 0.4995, 0.999], rtol=1e-6
+        heading_comparator().prepare(logged(left)).distances(runs), [0, 0.4995, 0.999], rtol=1e-6
     )
 
 

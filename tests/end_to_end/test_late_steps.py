@@ -14,6 +14,7 @@ from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log
+from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.robots import robot_of
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.environment_robot import EnvironmentRobot
@@ -97,9 +98,9 @@ def test_what_moves_as_the_model_says_is_predicted_although_steps_were_late(
     trial: Trial, comparator: object
 ):
     def distance(judged: Trial) -> float:
-        asked = comparator.request(judged)
+        asked = comparator.prepare(judged).request
         outcome = Simulator(QUADRUPED, 1).predict([INTACT], asked).behaviour
-        return float(comparator.distances(outcome, judged)[0])
+        return float(comparator.prepare(judged).distances(outcome)[0])
 
     if comparator is SEGMENT_PREDICTION:
         assert distance(trial) < 1e-20
@@ -112,15 +113,17 @@ def test_a_log_with_late_and_lost_steps_fits_the_robot_as_it_was_and_no_fault(tm
     driver = played_back(NAMES.motors, random_motion(QUADRUPED, STEPS))
     plan = TrialPlan("00", "after", driver, STEPS, 0)
     path = tmp_path / "trial.mcap"
-    write_trial(path, QUADRUPED, plan, physical.run(driver, STEPS), timed=True, settings=Settings())
+    write_trial(
+        path, QUADRUPED, plan, physical.run(driver, STEPS), TrialHeader(Settings(), timed=True)
+    )
     log = read_log(path)
     self_model = robot_of(log)
     texts = ("intact", "break:front_left_knee", "jam:back_right_shoulder")
     hypotheses = [parse(text, self_model.anatomy) for text in texts]
 
-    asked = SEGMENT_PREDICTION.request(log.trial)
+    asked = SEGMENT_PREDICTION.prepare(log.trial).request
     predicted = Simulator(self_model, 1).predict(hypotheses, asked).behaviour
-    intact, *others = SEGMENT_PREDICTION.distances(predicted, log.trial)
+    intact, *others = SEGMENT_PREDICTION.prepare(log.trial).distances(predicted)
     assert log.timing is not None
     assert np.flatnonzero(log.timing.missing).tolist() == [90]
     assert np.flatnonzero(log.timing.late).tolist() == list(LATE)
@@ -156,8 +159,8 @@ def test_positions_are_not_averaged_across_a_step_that_was_late(trial: Trial):
 def test_a_trial_of_nothing_but_late_steps_is_refused(trial: Trial):
     late = np.ones(STEPS, dtype=bool)
     hurried = replace(trial, behaviour=replace(trial.behaviour, late=late))
-    with pytest.raises(InputError, match="needs 4 or more stretches of 12 steps in which none was"):
-        SEGMENT_PREDICTION.request(hurried)
+    with pytest.raises(InputError, match="needs 4 or more segments of 12 steps in which none was"):
+        SEGMENT_PREDICTION.prepare(hurried)
 
 
 def test_late_fits_the_steps(trial: Trial):

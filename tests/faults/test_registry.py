@@ -22,7 +22,7 @@ from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import TrialPlan
 from tests.conftest import random_controllers
 from tests.helpers.command import selfmodel
-from tests.helpers.memory import MemoryJournal
+from tests.helpers.memory import in_memory
 
 SMALL = dataclasses.replace(Settings().scaled(12), generations=2, steps=300)
 ANGLES = (KINDS["break"], KINDS["jam-angle"])
@@ -104,9 +104,9 @@ def test_a_joint_that_turns_out_to_be_jammed_at_0_is_found_among_angles_trial_af
     quadruped: Robot,
 ):
     hidden = parse("jam:front_left_shoulder", quadruped.anatomy)
-    journal, physical = MemoryJournal(quadruped), SimulatedRobot(quadruped, hidden)
+    run_trial, physical = in_memory(quadruped), SimulatedRobot(quadruped, hidden)
     trials = [
-        journal.record(physical, TrialPlan(f"{number:02d}-after", "after", gait, SMALL.steps, 0))
+        run_trial(physical, TrialPlan(f"{number:02d}-after", "after", gait, SMALL.steps, 0))
         for number, gait in enumerate(random_controllers(quadruped, 4)[1:])
     ]
     search = DiagnosticSearch(Simulator(quadruped, 1), SEGMENT_PREDICTION, SMALL, ANGLES)

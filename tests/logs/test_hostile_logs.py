@@ -132,8 +132,8 @@ def message(data: bytes = b"") -> bytes:
         (TRIAL, {"stage": "../../etc/passwd"}, "stage must be one of"),
         (RESULT, {"steps": "9" * 5000}, "its record selfmodel.result is wrong"),
         (RESULT, {"steps": "-1"}, "after -1 of 120 steps"),
-        (RESULT, {"displacement": "nan"}, "says nan m of displacement"),
-        (RESULT, {"displacement": "1e999"}, "says inf m of displacement"),
+        (RESULT, {"displacement": "nan"}, "displacement is nan m in its result"),
+        (RESULT, {"displacement": "1e999"}, "displacement is inf m in its result"),
     ],
 )
 def test_what_a_record_may_not_say_is_refused(
@@ -288,6 +288,6 @@ def test_names_are_harmless_in_a_terminal_and_as_paths(log: Path):
         result = CliRunner().invoke(app, [command, str(log)])
         assert result.exit_code == 0
         assert all(char.isprintable() or char == "\n" for char in result.output)
-    with pytest.raises(InputError, match="is sound"):
+    with pytest.raises(InputError, match="is valid"):
         salvage(log, log.with_name("new.mcap"))
     assert [path.name for path in log.parent.iterdir()] == ["trial.mcap"]

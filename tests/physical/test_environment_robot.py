@@ -10,14 +10,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT
-from selfmodel.comparators.arithmetic import command_errors
+from selfmodel.comparators.command_errors import command_errors
 from selfmodel.controllers.command_source import make_batch
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError, TrialError
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log
-from selfmodel.logs.journal import open_journal
+from selfmodel.logs.journal import create_journal
+from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.physical.environment_robot import EnvironmentRobot
 from selfmodel.physical.interface import PhysicalRobot, TimedRobot
 from selfmodel.physical.simulated_robot import SimulatedRobot
@@ -234,12 +235,10 @@ def test_a_step_is_late_exactly_where_its_time_is_off_by_more_than_the_tolerance
         assert moment.elapsed == now - 7.0
 
 
-def test_a_recovery_s_journal_keeps_the_clock_of_a_robot_that_has_one(tmp_path: Path):
-    journal = open_journal(tmp_path / "run", QUADRUPED, Settings(), {})
+def test_the_log_of_a_recovery_s_trial_has_the_timing_of_a_robot_with_a_clock(tmp_path: Path):
+    run_trial = TrialRunner(tmp_path, QUADRUPED, Settings())
     bench = Bench({5: 2 * TIMESTEP, 8: None})
-    trial = journal.record(
-        bench_robot(bench), TrialPlan("00-before", "before", CONTROLLER, STEPS, 0)
-    )
+    trial = run_trial(bench_robot(bench), TrialPlan("00-before", "before", CONTROLLER, STEPS, 0))
     timing = read_log(trial.path).timing
 
     assert timing is not None
@@ -256,12 +255,14 @@ def test_a_recovery_is_the_same_through_environments(tmp_path: Path):
     settings = replace(Settings(generations=1).scaled(6), steps=80, trials=1)
 
     def recovery(folder: str, healthy: PhysicalRobot, damaged: PhysicalRobot) -> Recovery:
+        journal = create_journal(tmp_path / folder, QUADRUPED.anatomy)
         return recover(
             healthy=healthy,
             damaged=damaged,
             simulator=Simulator(QUADRUPED, 2),
             comparator=FORWARD_DISPLACEMENT,
-            journal=open_journal(tmp_path / folder, QUADRUPED, settings, {}),
+            run_trial=TrialRunner(journal.trials, QUADRUPED, settings),
+            journal=journal,
             settings=settings,
             seed=0,
             on_event=lambda _event: None,

@@ -11,6 +11,7 @@ import pytest
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError, TrialError
 from selfmodel.logs import read_log
+from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.verify import verify
 from selfmodel.logs.writer import TrialWriter, write_trial
 from selfmodel.physical.environment_robot import EnvironmentRobot
@@ -157,7 +158,7 @@ def test_a_writer_that_fails_stops_the_robot_before_it_closes_the_log(tmp_path: 
     plan = TrialPlan("trial", "single", CONTROLLER, STEPS, 0)
     with pytest.raises(InputError, match="step 9 of 30 is due"):
         write_trial(
-            tmp_path / "trial.mcap", QUADRUPED, plan, samples(), timed=True, settings=Settings()
+            tmp_path / "trial.mcap", QUADRUPED, plan, samples(), TrialHeader(Settings(), timed=True)
         )
     assert bench.done[-1] == "stop"
     assert read_log(tmp_path / "trial.mcap").status == "stopped"

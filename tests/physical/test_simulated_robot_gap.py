@@ -12,14 +12,16 @@ from selfmodel.controllers.playback import played_back
 from selfmodel.faults.build import build
 from selfmodel.faults.notation import parse
 from selfmodel.logs import LogError, read_gap, read_log, read_truth
+from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import write_trial
-from selfmodel.physical.measurement_noise import FULL_SCALE, NoisyMeasurement
+from selfmodel.physical.measurement_noise import NoisyMeasurement
 from selfmodel.physical.reality_gap import Gap, draw_gap
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import SIGNALS, Behaviour, collect
+from selfmodel.trials.signal_scales import MEASUREMENT_FULL_SCALES
 from selfmodel.trials.trial import TrialPlan
 from tests.conftest import random_controllers, random_motion
 from tests.helpers.command import SMALL, selfmodel
@@ -129,7 +131,7 @@ def test_logged_signals_have_noise_of_their_full_scale(quadruped: Robot):
             error = turns.as_rotvec()
         else:
             error = rows - clean
-        scale = half if signal == "joint_positions" else FULL_SCALE[signal]
+        scale = half if signal == "joint_positions" else MEASUREMENT_FULL_SCALES[signal]
         np.testing.assert_allclose(error.std(axis=0), level * scale, rtol=0.06)
 
 
@@ -199,9 +201,7 @@ def test_the_log_hides_the_gap_where_only_scoring_looks(quadruped: Robot, tmp_pa
             quadruped,
             plan,
             samples,
-            settings=Settings(),
-            hidden="intact",
-            gap=text,
+            TrialHeader(Settings(), hidden="intact", gap=text),
         )
     assert read_gap(tmp_path / "told.mcap") == gap.as_values()
     assert read_gap(tmp_path / "other.mcap") == {}

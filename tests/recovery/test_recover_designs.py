@@ -19,7 +19,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from tests.conftest import random_controllers, random_cpgs
-from tests.helpers.memory import MemoryJournal
+from tests.helpers.memory import MemoryJournal, in_memory
 
 FEW = dataclasses.replace(Settings(generations=2, steps=60, trials=2).scaled(8), kept=4)
 
@@ -40,7 +40,8 @@ def evolved(robot: Robot, kind: str, next_trial: str = "repair") -> Recovery:
         damaged=SimulatedRobot(robot, parse("break:back_left_knee", robot.anatomy)),
         simulator=Simulator(robot, 1),
         comparator=FORWARD_DISPLACEMENT,
-        journal=MemoryJournal(robot),
+        run_trial=in_memory(robot),
+        journal=MemoryJournal(),
         settings=FEW,
         seed=0,
         on_event=lambda _event: None,

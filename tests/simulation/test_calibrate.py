@@ -176,7 +176,7 @@ def test_a_trial_that_lacks_part_of_the_state_is_refused_by_what_it_lacks():
     (whole,) = trials(QUADRUPED, 1)
     numb = lacking(whole, (*BASE, "base_angular_velocity"))
     expected = (
-        r"0\.mcap: calibration needs stretches of 16 steps or more, none of them late, with "
+        r"0\.mcap: calibration needs segments of 16 steps or more, none of them late, with "
         r"joint_positions, .* and the log never has base_angular_velocity: leave this log out"
     )
     with pytest.raises(InputError, match=expected):

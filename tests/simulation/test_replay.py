@@ -10,6 +10,7 @@ from selfmodel.controllers.playback import Playback
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log
+from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.robots import robot_of
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.simulated_robot import SimulatedRobot
@@ -31,7 +32,7 @@ def logged(folder: Path, robot: Robot, truth: str, driver: CommandSource) -> Pat
     plan = TrialPlan("trial", "single", driver, STEPS, 0)
     samples = SimulatedRobot(robot, parse(truth, robot.anatomy)).run(driver, STEPS)
     path = folder / "trial.mcap"
-    return write_trial(path, robot, plan, samples, settings=Settings())
+    return write_trial(path, robot, plan, samples, TrialHeader(Settings()))
 
 
 @pytest.mark.parametrize("name", sorted(ROBOTS))

@@ -58,7 +58,7 @@ def _damage(path: Path, error: Exception, steps: int) -> dict[str, Any]:
 
 
 def _as_object(path: Path, found: "Info") -> dict[str, Any]:
-    from selfmodel.logs.info import hides_truth  # noqa: PLC0415  # with the other work
+    from selfmodel.logs.info import has_truth  # noqa: PLC0415  # with the other work
 
     trial = found.log.trial
     displacement = trial.displacement
@@ -85,7 +85,7 @@ def _as_object(path: Path, found: "Info") -> dict[str, Any]:
         "records": list(found.records),
         "observed": {signal: round(share, 6) for signal, share in found.observed.items()},
         "clock": _clock(found.log),
-        "truth": "hidden" if hides_truth(found) else "unknown",
+        "truth": "hidden" if has_truth(found) else "unknown",
         "source": dict(found.source),
     }
 

@@ -13,7 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.evolution import Generation
-from selfmodel.recovery.events import Event, Question, SearchBegins
+from selfmodel.recovery.events import DiscriminatingTrial, Event, SearchBegins
 from selfmodel.simulation.calibrate import Calibration
 from selfmodel.trials.trial import Trial
 
@@ -60,7 +60,7 @@ class _Lines:
                     f"delay {event.parameters.delay} "
                     f"{'step' if event.parameters.delay == 1 else 'steps'}"
                 )
-            case Question():
+            case DiscriminatingTrial():
                 apart = ", ".join(map(str, event.hypotheses))
                 self._say(f"the next trial is to tell apart: {apart}")
             case Trial():

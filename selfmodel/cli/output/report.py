@@ -7,7 +7,8 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from selfmodel.cli.output.ranking import as_values, in_words, ranking_table, sureness
+from selfmodel.cli.output.ranking import in_words, ranking_table
+from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
 from selfmodel.experiments.experiment import Experiment, Outcome
 from selfmodel.experiments.fitting import calibration_values
 from selfmodel.robot.designs import network_for
@@ -75,8 +76,8 @@ def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
             }
             for trial, tried in zip(recovery.trials, recovery.tried, strict=True)
         ],
-        "diagnosis": as_values(recovery.diagnosis.ranked),
-        **sureness(recovery.diagnosis),
+        "diagnosis": ranking_to_list(recovery.diagnosis.ranked),
+        **confidence_to_dict(recovery.diagnosis),
         "calibration": calibration_values(recovery.calibration),
         "correct": outcome.correct,
         "displacement": {

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 from selfmodel.errors import InputError
-from selfmodel.logs.files import read_bounded
+from selfmodel.files import read_file
 
 LARGEST = 16 * 2**20
 """Bytes that a diagnosis in a file may have."""
@@ -20,7 +20,7 @@ def diagnosed(path: Path) -> str:
     Raises:
         InputError: The file cannot be read as one of them.
     """
-    data = read_bounded(path, "a diagnosis as JSON", LARGEST)
+    data = read_file(path, "a diagnosis as JSON", LARGEST)
     try:
         found = json.loads(data)
         ranked = found[-1]["ranked"] if isinstance(found, list) else found["diagnosis"]

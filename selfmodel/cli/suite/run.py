@@ -49,7 +49,7 @@ def run(
         ),
     ] = "displacement",
     controller: ControllerKind = "network",
-    comparator: ComparatorName = DEFAULT,
+    comparator: ComparatorName = DEFAULT.name,
     steps: Annotated[
         int | None,
         typer.Option(

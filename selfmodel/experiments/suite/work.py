@@ -17,7 +17,7 @@ from selfmodel.experiments.suite.rows import Row, as_objects
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.neuron import silent_neurons
 from selfmodel.faults.notation import parse
-from selfmodel.logs.atomic import put
+from selfmodel.logs.atomic import write_atomic
 from selfmodel.logs.controllers import controller_bytes
 from selfmodel.recovery.events import Event
 from selfmodel.recovery.fitness import Score
@@ -64,7 +64,7 @@ def _evolve(job: Job, _part: str, run: Path) -> Any:  # noqa: ANN401  # JSON
         score=plugins.score(said["score"], said["body"], entry),
     )
     found = repair(INTACT, (), repair_stream(job.seed, 0), _ignore)
-    put(run.parent / f"{job.key}.npz", controller_bytes(found))
+    write_atomic(run.parent / f"{job.key}.npz", controller_bytes(found))
     return {"evaluations": repair.evaluations}
 
 

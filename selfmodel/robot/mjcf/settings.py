@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.robot.mjcf.files import read_file
+from selfmodel.files import read_file
 
 LARGEST = 2**16
 """Bytes that the file of settings may have."""

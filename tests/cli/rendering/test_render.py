@@ -23,6 +23,7 @@ from selfmodel.cli.rendering.sticks import draw, draw_ground, lines_of, plane_of
 from selfmodel.errors import InputError, WorkError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
+from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot
@@ -47,7 +48,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory, quadruped: Robot) -> Path:
     (controller,) = random_controllers(quadruped, 1, seed=3)
     plan = TrialPlan("trial", "single", controller, STEPS, 0)
     samples = SimulatedRobot(quadruped, parse(DAMAGE, quadruped.anatomy)).run(controller, STEPS)
-    write_trial(folder / "a.mcap", quadruped, plan, samples, settings=Settings())
+    write_trial(folder / "a.mcap", quadruped, plan, samples, TrialHeader(Settings()))
     return folder
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from selfmodel.comparators import COMPARATORS, DEFAULT
+from selfmodel.comparators import DEFAULT
 from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.faults.hypothesis import Hypothesis
@@ -102,7 +102,7 @@ def test_the_right_fault_is_found_in_an_imported_trial(
     trial = read_log(log).trial
     diagnose = DiagnosticSearch(
         Simulator(quadruped, threads=2),
-        COMPARATORS[DEFAULT],
+        DEFAULT,
         Settings(generations=12).scaled(50),
     )
     diagnosis = diagnose([trial], [], np.random.default_rng(0), lambda _: None)

@@ -7,6 +7,7 @@ import numpy as np
 from selfmodel.controllers.controller import Controller
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.logs import read_log
+from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.designs import cpg_for
@@ -40,7 +41,7 @@ def test_a_trial_of_a_robot_without_any_sensor_is_logged_and_read(tmp_path: Path
         robot,
         TrialPlan("trial", "single", driver, 20, 0),
         SimulatedRobot(robot).run(driver, 20),
-        settings=Settings(),
+        TrialHeader(Settings()),
     )
     read = read_log(path).trial.behaviour
 
