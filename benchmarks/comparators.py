@@ -18,9 +18,9 @@ from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.comparator import Comparator, PiecewiseTrial
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.evidence import simulate
-from selfmodel.diagnosis.genome import VALUES, decode
 from selfmodel.experiments.ablation.bank import gait
 from selfmodel.experiments.reality import draw_reality
+from selfmodel.faults.hypothesis_space import GENE_VALUES, HypothesisSpace
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.robot.robot import Robot
@@ -145,8 +145,9 @@ def _share(known: Known, comparator: Comparator, threads: int, settings: Setting
 
 def _share_once(known: Known, comparator: Comparator, threads: int, settings: Settings) -> Facts:
     children = settings.population - settings.survivors
-    genomes = np.random.default_rng(0).random((children, VALUES * settings.genes))
-    hypotheses = [decode(genome, known.model.anatomy, PAPER_KINDS) for genome in genomes]
+    genomes = np.random.default_rng(0).random((children, GENE_VALUES * settings.genes))
+    space = HypothesisSpace(known.model.anatomy, PAPER_KINDS)
+    hypotheses = [space.decode(genome) for genome in genomes]
     simulator = Simulator(known.model, threads)
     trial = known.failed[CASES[0]]
     start = perf_counter()

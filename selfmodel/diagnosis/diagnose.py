@@ -1,4 +1,4 @@
-"""The diagnostic EA: evolves hypotheses that explain all trials."""
+"""The diagnostic search: an EA over hypotheses, local refinement, and the verdict."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -9,46 +9,45 @@ from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, UnsearchedFault, Verdict
 from selfmodel.diagnosis.evidence import Evidence
-from selfmodel.diagnosis.genome import VALUES, decode, encode
 from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
 from selfmodel.diagnosis.model_error import any_fault_is_model_error
 from selfmodel.diagnosis.refine import refined
-from selfmodel.diagnosis.severity import coarse_candidates
 from selfmodel.diagnosis.significance import TEST, exceeds_healthy_loss, is_better
 from selfmodel.diagnosis.surrogate import Surrogate, own_surrogate, surrogate_of
 from selfmodel.diagnosis.undetectable import undetectable_faults
 from selfmodel.diagnosis.unsearched import best_unsearched_fault
 from selfmodel.evolution import Evolution, GenerationCallback, evolve
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.hypothesis_space import GENE_VALUES, HypothesisSpace
 from selfmodel.faults.kind import FaultKind
-from selfmodel.faults.registry import PAPER_KINDS, applicable_kinds
+from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Trial
 
-KNOWN = 2
-"""Of what the EA found closest, how much is refined."""
+REFINEMENT_STARTS = 2
+"""Hypotheses from the EA that the refinement starts from, best first."""
 
-EQUAL = "equal distances"
-"""The test of a comparator that gives one number for a trial."""
+EQUAL_DISTANCES = "equal distances"
+"""Name of the test for a comparator with one distance per trial."""
 
 
 class DiagnosticSearch:
-    """Evolves hypotheses against logged trials; it remembers every distance.
+    """Evolves hypotheses against logged trials; every distance is cached.
 
-    Fitness is minus the sum of the distances over all trials. Source: the paper, section III.
-    Where the comparator judges in pieces, what the EA found is refined: see ``refine``.
+    Fitness is minus the sum of the distances over all trials. Source: the paper, section III. For
+    a comparator with losses per segment or window, the best hypotheses are refined; see ``refine``.
 
     Args:
         simulator: The self-model.
-        comparator: Says what to simulate and how far it is from a trial.
-        settings: The numbers of the search.
-        kinds: What is considered, as far as it can strike the robot; see ``considered``.
-        intact: Trials of the robot with nothing wrong, which show how well the self-model
-            predicts when it is right; without any, no verdict can be ``unexplained``.
+        comparator: Distance between simulations and a trial.
+        settings: Parameters of the EA.
+        kinds: Fault kinds to search, as far as they apply to the robot; see ``HypothesisSpace.of``.
+        intact: Trials of the healthy robot, which measure the loss of a correct model; without
+            any, no verdict is ``unexplained``.
 
     Raises:
-        InputError: None of the kinds can strike the robot.
+        InputError: No kind applies to the robot, or a kind is not searchable.
     """
 
     def __init__(
@@ -60,9 +59,8 @@ class DiagnosticSearch:
         *,
         intact: Sequence[Trial] = (),
     ) -> None:
-        self._anatomy = simulator.robot.anatomy
         self._settings = settings
-        self._kinds = applicable_kinds(kinds, self._anatomy)
+        self._space = HypothesisSpace.of(kinds, simulator.robot.anatomy)
         self._intact = tuple(intact)
         self.evidence = Evidence(simulator, comparator)
         self._own_surrogate = own_surrogate(comparator, simulator)
@@ -76,13 +74,13 @@ class DiagnosticSearch:
         rng: np.random.Generator,
         on_generation: GenerationCallback,
     ) -> Diagnosis:
-        """Returns the hypotheses that explain the trials best.
+        """Returns the diagnosis of some trials.
 
         Args:
-            trials: At least one.
-            seeds: Hypotheses to start from, beside random ones.
-            rng: Every random choice comes from it.
-            on_generation: Is told of every generation.
+            trials: At least one trial.
+            seeds: Hypotheses of the initial population, in addition to random ones.
+            rng: Source of all random numbers.
+            on_generation: Callback, called after each generation.
         """
         surrogate = surrogate_of(self.evidence, self._own_surrogate, trials)
         is_piecewise = self.evidence.is_piecewise(trials)
@@ -92,34 +90,32 @@ class DiagnosticSearch:
         # only the tests below compare with the trials are never ranked.
         ranked: set[Hypothesis] = set() if is_piecewise else set(found)
         if is_piecewise:
-            best = self._refined(found[:KNOWN], looks, ranked)
+            best = self._refined(found[:REFINEMENT_STARTS], looks, ranked)
         ranked |= {best, INTACT}
         self._proposed |= ranked
         judged = list(ranked)
         totals = dict(zip(judged, map(float, self.evidence.distances(judged, trials)), strict=True))
         others = [one for one in _ranked(totals) if one != best]
         indistinguishable = self._indistinguishable(best, others, looks, is_piecewise=is_piecewise)
-        better = best_unsearched_fault(best, self._kinds, self._anatomy, looks)
-        besides = (
-            undetectable_faults(best, self._kinds, self._anatomy, looks) if is_piecewise else []
-        )
+        unsearched = best_unsearched_fault(best, self._space, looks)
+        undetectable = undetectable_faults(best, self._space, looks) if is_piecewise else []
         kept = self._settings.kept
         return Diagnosis(
             ranked=tuple(Candidate(one, totals[one]) for one in [best, *others][:kept]),
             trials=len(trials),
             intact_distance=totals[INTACT],
             indistinguishable=indistinguishable[:kept],
-            verdict=self._verdict(best, indistinguishable, better, looks),
-            test=TEST if is_piecewise else EQUAL,
-            unsearched=better,
-            undetectable=tuple(besides[:kept]),
+            verdict=self._verdict(best, indistinguishable, unsearched, looks),
+            test=TEST if is_piecewise else EQUAL_DISTANCES,
+            unsearched=unsearched,
+            undetectable=tuple(undetectable[:kept]),
         )
 
     def check(self, trials: Sequence[Trial]) -> None:
-        """Checks that the comparator can judge all trials, before any search.
+        """Checks that the comparator accepts all trials, before any search.
 
         Raises:
-            InputError: It cannot; the sentence names every trial that it cannot judge, and why.
+            InputError: The comparator rejects a trial; the message names every such trial, and why.
         """
         self.evidence.check([*self._intact, *trials])
         surrogate = surrogate_of(self.evidence, self._own_surrogate, trials)
@@ -137,22 +133,22 @@ class DiagnosticSearch:
         rng: np.random.Generator,
         on_generation: GenerationCallback,
     ) -> list[Hypothesis]:
-        """The hypotheses that the EA looked at, closest first."""
-        genes, anatomy = self._settings.genes, self._anatomy
+        """The hypotheses that the EA evaluated, smallest distance first."""
+        genes = self._settings.genes
         totals: dict[Hypothesis, float] = {}
 
         def fitness(genomes: FloatArray) -> FloatArray:
-            hypotheses = [decode(genome, anatomy, self._kinds) for genome in genomes]
+            hypotheses = [self._space.decode(genome) for genome in genomes]
             distances = surrogate.distances(hypotheses)
             totals.update(zip(hypotheses, map(float, distances), strict=True))
             return 0.0 - distances  # not -distances: a perfect fitness reads 0, not -0
 
         search = Evolution(
-            genes * VALUES,
+            genes * GENE_VALUES,
             np.random.Generator.random,
             self._settings,
             rng,
-            [encode(hypothesis, genes, anatomy, self._kinds) for hypothesis in seeds],
+            [self._space.encode(hypothesis, genes) for hypothesis in seeds],
         )
         evolve(search, fitness, on_generation)
         self.evaluations += search.evaluations
@@ -168,9 +164,9 @@ class DiagnosticSearch:
         known = [*self._intact, *trials]
         comparable = self.evidence.is_piecewise(trials) and self.evidence.uses_segments(known)
         return LossFunctions(
-            after=partial(self.evidence.losses, trials=trials),
-            screen=surrogate.losses,
-            before=partial(self.evidence.losses, trials=self._intact)
+            damaged=partial(self.evidence.losses, trials=trials),
+            surrogate=surrogate.losses,
+            healthy=partial(self.evidence.losses, trials=self._intact)
             if comparable and self._intact
             else None,
         )
@@ -187,14 +183,13 @@ class DiagnosticSearch:
         """
         return refined(
             known,
-            coarse_candidates(self._kinds, self._anatomy),
+            self._space,
             self._settings.genes,
             LossFunctions(
-                after=_recorded(looks.after, compared),
-                screen=_recorded(looks.screen, self._proposed),
-                before=looks.before,
+                damaged=_recorded(looks.damaged, compared),
+                surrogate=_recorded(looks.surrogate, self._proposed),
+                healthy=looks.healthy,
             ),
-            self._anatomy,
         )
 
     def _indistinguishable(
@@ -205,31 +200,31 @@ class DiagnosticSearch:
         *,
         is_piecewise: bool,
     ) -> tuple[Hypothesis, ...]:
-        """Those that cannot be told from the best, but for those that only say more of the same."""
-        said = _without_severities(best)
-        candidates = [other for other in others if not said <= _without_severities(other)]
-        mine, *theirs = looks.after([best, *candidates])
+        """Hypotheses not significantly worse than the best, without supersets of its faults."""
+        parts = _without_severities(best)
+        candidates = [other for other in others if not parts <= _without_severities(other)]
+        best_losses, *rows = looks.damaged([best, *candidates])
         if is_piecewise:
-            told = [is_better(mine, losses) for losses in theirs]
+            distinct = [is_better(best_losses, row) for row in rows]
         else:
-            told = [bool(losses.sum() != mine.sum()) for losses in theirs]
-        untold = [other for other, apart in zip(candidates, told, strict=True) if not apart]
+            distinct = [bool(row.sum() != best_losses.sum()) for row in rows]
+        indistinct = [one for one, apart in zip(candidates, distinct, strict=True) if not apart]
         return tuple(
-            one for one in untold if not any_fault_is_model_error(one, looks, self._anatomy)
+            one for one in indistinct if not any_fault_is_model_error(one, looks, self._space)
         )
 
     def _verdict(
         self,
         best: Hypothesis,
         indistinguishable: Sequence[Hypothesis],
-        better: UnsearchedFault | None,
+        unsearched: UnsearchedFault | None,
         looks: LossFunctions,
     ) -> Verdict:
-        if better is not None:
+        if unsearched is not None:
             return "unexplained"
         if self._intact:
-            usual = self.evidence.losses([INTACT], self._intact)[0]
-            if exceeds_healthy_loss(looks.after([best])[0], usual):
+            healthy = self.evidence.losses([INTACT], self._intact)[0]
+            if exceeds_healthy_loss(looks.damaged([best])[0], healthy):
                 return "unexplained"
         return "ambiguous" if indistinguishable else "explained"
 
@@ -249,4 +244,4 @@ def _without_severities(hypothesis: Hypothesis) -> set[tuple[FaultKind, str]]:
 
 
 def _ranked(totals: dict[Hypothesis, float]) -> list[Hypothesis]:
-    return sorted(totals, key=lambda known: (totals[known], len(known), known))
+    return sorted(totals, key=lambda one: (totals[one], len(one), one))

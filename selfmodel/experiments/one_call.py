@@ -17,7 +17,7 @@ from selfmodel.experiments.robots import is_model, robot_entry
 from selfmodel.faults import KINDS, PAPER_KINDS, FaultKind
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
-from selfmodel.faults.registry import known
+from selfmodel.faults.registry import notation_kinds
 from selfmodel.logs import physical_trial
 from selfmodel.logs.journal import create_journal
 from selfmodel.logs.records import TrialHeader
@@ -288,7 +288,7 @@ def recover(
     """
     count = thread_count(threads)
     chosen = settings or Settings()
-    journal = create_journal(Path(folder), robot.anatomy, known(kinds))
+    journal = create_journal(Path(folder), robot.anatomy, notation_kinds(kinds))
     return loop.recover(
         healthy=healthy,
         damaged=damaged,

@@ -5,7 +5,6 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from selfmodel.errors import InputError
-from selfmodel.faults.table_one import cases_of
 from selfmodel.files import read_file
 from selfmodel.robot.mjcf.adaptation import adapt
 from selfmodel.robot.mjcf.load import load_mjcf
@@ -32,7 +31,7 @@ def robot_entry(name: str, settings: Iterable[str] = ()) -> Entry:
     given = tuple(settings)
     if is_model(name):
         made = load_mjcf(Path(name), _settings(name, given))
-        return Entry(robot=lambda: made, cases=cases_of(made.anatomy), suite={})
+        return Entry(robot=lambda: made)
     if given:
         raise InputError(f"--set {given[0]} is for a robot's MJCF: {name!r} has all that it needs")
     # Nothing is drawn here, and dm_control would look for what to draw with.

@@ -10,8 +10,9 @@ from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
-from selfmodel.faults.registry import PAPER_KINDS, applicable_kinds
+from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery.database import Database, Journal, RunTrial
 from selfmodel.recovery.events import Event, SearchBegins
@@ -136,7 +137,7 @@ def recover(
         database = database.with_trial(trial)
         on_event(trial)
 
-    applicable_kinds(kinds, simulator.robot.anatomy)  # before any physical trial
+    HypothesisSpace.of(kinds, simulator.robot.anatomy)  # before any physical trial
     if gait is None:
         gait = evolve_controller(INTACT)
     act(healthy, "before", INTACT, gait)

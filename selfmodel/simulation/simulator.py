@@ -106,7 +106,11 @@ class Simulator:
     def _on_felt_ground(
         self, embodiment: Embodiment, hypothesis: Hypothesis, observed: Behaviour
     ) -> Embodiment:
-        ways = [(fault.kind.feel, fault) for fault in hypothesis.faults if fault.kind.feel]
+        ways = [
+            (fault.kind.adapt_to_contacts, fault)
+            for fault in hypothesis.faults
+            if fault.kind.adapt_to_contacts
+        ]
         if not ways:
             return embodiment
         own = copy.deepcopy(embodiment)  # the other is remembered

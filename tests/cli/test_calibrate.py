@@ -119,7 +119,7 @@ def test_a_table_says_each_factor_and_how_sure_it_is(folder: Path):
     assert "motor front_left_shoulder" in done.stdout
     assert "± 15.0 %" in done.stdout
     assert "delay, control steps: 0 (0 before)" in done.stdout
-    assert "it is left as it was" in done.stdout
+    assert "it is written unchanged" in done.stdout
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,8 @@
-"""Promises of ``selfmodel suite``: what it lists, and runs that go on where they were stopped."""
+"""``selfmodel suite``: the list of bodies, and studies that continue where they stopped."""
 
 import csv
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -29,6 +30,12 @@ from tests.helpers.command import SMALL, selfmodel
 from tests.robot.mjcf.awkward import CUBE
 
 ROOT = Path(__file__).parents[2]
+
+
+def studies(test: Callable[..., None]) -> Callable[..., None]:
+    """Marks a test that runs a study, in worker processes."""
+    return pytest.mark.process(pytest.mark.search(pytest.mark.bodies(test)))
+
 
 TINY = (*SMALL, "--steps", "60", "--trials", "1", "--workers", "1")
 
@@ -79,6 +86,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict, list[st
     return folder, json.loads(done.stdout), arguments
 
 
+@pytest.mark.bodies
 def test_every_domain_is_listed_with_its_parts_and_cases(tmp_path: Path):
     done = selfmodel("suite", "list", "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
@@ -93,6 +101,7 @@ def test_every_domain_is_listed_with_its_parts_and_cases(tmp_path: Path):
     assert "8" not in walker["cases"]
 
 
+@studies
 def test_ours_and_the_suites_and_ones_own_fail_and_recover_side_by_side(
     study: tuple[Path, dict, list[str]],
 ):
@@ -115,6 +124,7 @@ def test_ours_and_the_suites_and_ones_own_fail_and_recover_side_by_side(
         assert [row["truth"] for row in csv.DictReader(file)] == [row["truth"] for row in rows]
 
 
+@studies
 def test_the_same_command_again_does_nothing_and_says_the_same(
     study: tuple[Path, dict, list[str]],
 ):
@@ -127,6 +137,7 @@ def test_the_same_command_again_does_nothing_and_says_the_same(
     assert {path: path.stat().st_mtime_ns for path in folder.rglob("*.mcap")} == logs
 
 
+@studies
 def test_one_more_seed_is_added_to_what_is_there(study: tuple[Path, dict, list[str]]):
     folder, told, arguments = study
     more = [*arguments, "--seeds", "2"]
@@ -140,6 +151,7 @@ def test_one_more_seed_is_added_to_what_is_there(study: tuple[Path, dict, list[s
     assert [row for row in rows if row["seed"] == 0] == told["rows"]
 
 
+@studies
 def test_a_study_that_was_made_otherwise_is_not_mixed_with_another(
     study: tuple[Path, dict, list[str]],
 ):
@@ -171,6 +183,7 @@ def test_a_body_that_is_another_by_now_is_not_run_into_its_study(
     assert after.parameters != before.parameters
 
 
+@studies
 def test_the_score_may_be_the_tasks_own_rewards(tmp_path: Path):
     arguments = ["suite", "run", "--domains", "suite-walker", "--tasks", "stand", "--cases", "3"]
     done = selfmodel(*arguments, *TINY, "--score", "return", "--out", "out", "--json", cwd=tmp_path)
@@ -241,6 +254,7 @@ def put_gaits(study: Study) -> None:
         path.write_bytes(b"a gait")
 
 
+@pytest.mark.process
 def test_a_gait_that_was_lost_is_told_of_and_not_passed_over(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

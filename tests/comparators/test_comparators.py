@@ -10,7 +10,7 @@ from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.comparator_contract import check_comparator, shown
 from selfmodel.diagnosis.evidence import Evidence, simulate
-from selfmodel.diagnosis.significance import NEGLIGIBLE
+from selfmodel.diagnosis.significance import NEGLIGIBLE_LOSS
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
@@ -70,7 +70,7 @@ def test_a_comparator_keeps_its_contract(name: str, robot: Robot, logged_and_sim
         assert distances[0] == 0
     # No member of an ensemble is the robot, and a base that is carried on drifts.
     elif isinstance(request, Segments) and "base_position" in request.states:
-        assert distances[0] < NEGLIGIBLE
+        assert distances[0] < NEGLIGIBLE_LOSS
     assert comparator.name == name
     assert isinstance(comparator, Comparator)
 

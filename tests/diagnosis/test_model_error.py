@@ -15,6 +15,7 @@ from selfmodel.diagnosis.model_error import any_fault_is_model_error, is_model_e
 from selfmodel.experiments.reality import draw_reality
 from selfmodel.faults import FRICTION
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.robot.robot import Robot
@@ -40,14 +41,15 @@ def test_a_fault_that_alone_would_have_helped_before_mends(quadruped: Robot):
     anatomy = quadruped.anatomy
     both, knee = (parse(text, anatomy) for text in (f"{KNEE}+{SLIPPERY}", KNEE))
     slippery = parse(SLIPPERY, anatomy)
+    space = HypothesisSpace(anatomy, PAPER_KINDS)
     after = of(quadruped, {str(both): 0.5, KNEE: 0.7, SLIPPERY: 0.8})
-    looks = LossFunctions(after, after, of(quadruped, {SLIPPERY: 0.8, KNEE: 2.0}))
+    losses = LossFunctions(after, after, of(quadruped, {SLIPPERY: 0.8, KNEE: 2.0}))
 
-    assert is_model_error(both, knee, looks, anatomy)
-    assert not is_model_error(both, slippery, looks, anatomy)
-    assert any_fault_is_model_error(both, looks, anatomy)
-    assert not any_fault_is_model_error(knee, looks, anatomy)
-    assert not any_fault_is_model_error(INTACT, looks, anatomy)
+    assert is_model_error(both, knee, losses, space)
+    assert not is_model_error(both, slippery, losses, space)
+    assert any_fault_is_model_error(both, losses, space)
+    assert not any_fault_is_model_error(knee, losses, space)
+    assert not any_fault_is_model_error(INTACT, losses, space)
 
 
 def never(_: Sequence[Hypothesis]) -> np.ndarray:
@@ -57,13 +59,17 @@ def never(_: Sequence[Hypothesis]) -> np.ndarray:
 def test_where_nothing_from_before_can_be_compared_nothing_mends(quadruped: Robot):
     knee = parse(KNEE, quadruped.anatomy)
 
-    assert not is_model_error(knee, INTACT, LossFunctions(never, never, None), quadruped.anatomy)
+    space = HypothesisSpace(quadruped.anatomy, PAPER_KINDS)
+
+    assert not is_model_error(knee, INTACT, LossFunctions(never, never, None), space)
 
 
 def test_of_what_would_have_done_harm_nothing_else_is_asked(quadruped: Robot):
-    looks = LossFunctions(never, never, of(quadruped, {KNEE: 2.0}))
+    losses = LossFunctions(never, never, of(quadruped, {KNEE: 2.0}))
 
-    assert not is_model_error(parse(KNEE, quadruped.anatomy), INTACT, looks, quadruped.anatomy)
+    space = HypothesisSpace(quadruped.anatomy, PAPER_KINDS)
+
+    assert not is_model_error(parse(KNEE, quadruped.anatomy), INTACT, losses, space)
 
 
 def trial(robot: Robot, truth: str, gait: Controller, stage: Stage, number: int) -> Trial:

@@ -7,6 +7,7 @@ the truth has is worth as much as its effect is large.
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -17,12 +18,14 @@ from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
 from selfmodel.diagnosis.refine import refined
 from selfmodel.diagnosis.significance import is_better
 from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
+from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import Fault
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.tasks import ROBOTS
 
 ANATOMY = ROBOTS["quadruped"].robot().anatomy
+SPACE = HypothesisSpace(ANATOMY, PAPER_KINDS)
 FAULTS = tuple(fault for kind in PAPER_KINDS for fault in kind.candidates(ANATOMY))
 PIECES = 400
 MOST = 4
@@ -71,6 +74,18 @@ def centred(rng: np.random.Generator) -> np.ndarray:
     return noise - noise.mean()
 
 
+@dataclass(frozen=True)
+class Proposing(HypothesisSpace):
+    """A space with candidates of the test's own, in an order of its own."""
+
+    faults: tuple[Fault, ...] = ()
+
+    @property
+    def coarse_candidates(self) -> tuple[Fault, ...]:
+        """The candidates of the test."""
+        return self.faults
+
+
 def find(
     losses: Losses,
     *known: Hypothesis,
@@ -78,7 +93,8 @@ def find(
     most: int = MOST,
     before: Losses | None = None,
 ) -> Hypothesis:
-    return refined(known, faults, most, LossFunctions(losses, losses, before), ANATOMY)
+    space = Proposing(ANATOMY, PAPER_KINDS, tuple(faults))
+    return refined(known, space, most, LossFunctions(losses, losses, before))
 
 
 @pytest.mark.parametrize(
@@ -339,10 +355,10 @@ def test_the_screen_says_what_is_looked_at_and_the_losses_what_is_found():
     def screen(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
         return of(hypotheses)[:, ::3] + 1.0
 
-    assert refined([], FAULTS, MOST, LossFunctions(losses, screen, None), ANATOMY) == truth
+    assert refined([], SPACE, MOST, LossFunctions(losses, screen, None)) == truth
     few = len(looked_at)
     looked_at.clear()
-    assert refined([], FAULTS, MOST, LossFunctions(losses, losses, None), ANATOMY) == truth
+    assert refined([], SPACE, MOST, LossFunctions(losses, losses, None)) == truth
     assert few < len(looked_at) / 2
 
 
@@ -354,7 +370,7 @@ def test_a_screen_that_prefers_what_is_wrong_does_not_decide():
     losses = counted({"intact": 1.5, one: 1.0, right: 0.1}, otherwise=2.0)
     screen = counted({"intact": 1.5, one: 1.0, right: 0.5, wrong: 0.1}, otherwise=2.0)
 
-    assert refined([], FAULTS, MOST, LossFunctions(losses, screen, None), ANATOMY) == said(right)
+    assert refined([], SPACE, MOST, LossFunctions(losses, screen, None)) == said(right)
 
 
 def test_a_fault_that_would_have_helped_as_much_before_only_mends_the_model():

@@ -11,6 +11,7 @@ from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
 from selfmodel.diagnosis.undetectable import undetectable_faults
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import ALL_KINDS, PAPER_KINDS
 from selfmodel.robot.robot import Robot
@@ -36,7 +37,7 @@ TOUCH, KNEE = "sensor:front_left_touch", "break:front_left_knee"
 def test_what_makes_no_difference_is_unseen_and_what_makes_one_is_not(quadruped: Robot):
     losses = of(quadruped, {"intact": 1.0, TOUCH: 1.0, KNEE: 0.5}, otherwise=2.0)
     found = undetectable_faults(
-        INTACT, PAPER_KINDS, quadruped.anatomy, LossFunctions(losses, losses, None)
+        INTACT, HypothesisSpace(quadruped.anatomy, PAPER_KINDS), LossFunctions(losses, losses, None)
     )
 
     assert [str(one) for one in found] == [TOUCH]
@@ -47,7 +48,9 @@ def test_what_diverges_is_ruled_out(quadruped: Robot):
 
     assert (
         undetectable_faults(
-            INTACT, PAPER_KINDS, quadruped.anatomy, LossFunctions(losses, losses, None)
+            INTACT,
+            HypothesisSpace(quadruped.anatomy, PAPER_KINDS),
+            LossFunctions(losses, losses, None),
         )
         == []
     )
@@ -58,7 +61,9 @@ def test_beside_what_diverges_nothing_is_unseen(quadruped: Robot):
 
     assert (
         undetectable_faults(
-            INTACT, PAPER_KINDS, quadruped.anatomy, LossFunctions(losses, losses, None)
+            INTACT,
+            HypothesisSpace(quadruped.anatomy, PAPER_KINDS),
+            LossFunctions(losses, losses, None),
         )
         == []
     )
@@ -74,7 +79,7 @@ def test_the_closest_comes_first_and_each_says_one_fault_more(quadruped: Robot):
     }
     losses = of(quadruped, means, otherwise=2.0)
     found = undetectable_faults(
-        best, PAPER_KINDS, quadruped.anatomy, LossFunctions(losses, losses, None)
+        best, HypothesisSpace(quadruped.anatomy, PAPER_KINDS), LossFunctions(losses, losses, None)
     )
 
     assert [str(one) for one in found] == [
@@ -93,7 +98,9 @@ def test_only_what_the_screen_cannot_tell_is_looked_at_closely(quadruped: Robot)
 
     assert (
         undetectable_faults(
-            INTACT, PAPER_KINDS, quadruped.anatomy, LossFunctions(losses, screen, None)
+            INTACT,
+            HypothesisSpace(quadruped.anatomy, PAPER_KINDS),
+            LossFunctions(losses, screen, None),
         )
         == []
     )
@@ -103,7 +110,7 @@ def test_only_what_the_screen_cannot_tell_is_looked_at_closely(quadruped: Robot)
 def test_faults_of_degree_are_left_out(quadruped: Robot):
     same = of(quadruped, {}, otherwise=1.0)
     found = undetectable_faults(
-        INTACT, ALL_KINDS, quadruped.anatomy, LossFunctions(same, same, None)
+        INTACT, HypothesisSpace(quadruped.anatomy, ALL_KINDS), LossFunctions(same, same, None)
     )
 
     assert {fault.kind for one in found for fault in one.faults} == set(PAPER_KINDS)

@@ -13,11 +13,12 @@ from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis, UnsearchedFault
 from selfmodel.diagnosis.loss_functions import LossFunctions
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
-from selfmodel.diagnosis.significance import NEGLIGIBLE
+from selfmodel.diagnosis.significance import NEGLIGIBLE_LOSS
 from selfmodel.diagnosis.unsearched import best_unsearched_fault
 from selfmodel.experiments.reality import draw_reality
 from selfmodel.faults import ROUGHNESS
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import ALL_KINDS, PAPER_KINDS
 from selfmodel.robot.robot import Robot
@@ -43,7 +44,9 @@ def of(robot: Robot, means: Mapping[str, float]) -> Callable[[Sequence[Hypothesi
 def test_what_explains_more_is_returned(quadruped: Robot):
     after = of(quadruped, {"wind=12": 0.8, "crosswind=12": 0.9})
     found = best_unsearched_fault(
-        INTACT, PAPER_KINDS, quadruped.anatomy, LossFunctions(after, after, of(quadruped, {}))
+        INTACT,
+        HypothesisSpace(quadruped.anatomy, PAPER_KINDS),
+        LossFunctions(after, after, of(quadruped, {})),
     )
 
     assert found == UnsearchedFault(parse("wind=12", quadruped.anatomy), "wind")
@@ -52,7 +55,7 @@ def test_what_explains_more_is_returned(quadruped: Robot):
 def test_what_helped_before_as_well_mends_the_model_and_is_no_change(quadruped: Robot):
     after, before = (of(quadruped, {"wind=12": mean}) for mean in (0.8, 0.79))
     found = best_unsearched_fault(
-        INTACT, PAPER_KINDS, quadruped.anatomy, LossFunctions(after, after, before)
+        INTACT, HypothesisSpace(quadruped.anatomy, PAPER_KINDS), LossFunctions(after, after, before)
     )
 
     assert found is None
@@ -63,17 +66,22 @@ def never(_: Sequence[Hypothesis]) -> np.ndarray:
 
 
 def test_where_nothing_from_before_can_be_compared_nothing_is_simulated(quadruped: Robot):
-    looks = LossFunctions(never, never, None)
+    losses = LossFunctions(never, never, None)
 
-    assert best_unsearched_fault(INTACT, PAPER_KINDS, quadruped.anatomy, looks) is None
+    assert (
+        best_unsearched_fault(INTACT, HypothesisSpace(quadruped.anatomy, PAPER_KINDS), losses)
+        is None
+    )
 
 
 def test_where_nothing_is_left_to_explain_nothing_is_simulated(quadruped: Robot):
     def perfect(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
-        return np.full((len(hypotheses), PIECES), NEGLIGIBLE)
+        return np.full((len(hypotheses), PIECES), NEGLIGIBLE_LOSS)
 
     found = best_unsearched_fault(
-        INTACT, PAPER_KINDS, quadruped.anatomy, LossFunctions(perfect, never, never)
+        INTACT,
+        HypothesisSpace(quadruped.anatomy, PAPER_KINDS),
+        LossFunctions(perfect, never, never),
     )
 
     assert found is None
@@ -85,7 +93,10 @@ def test_a_best_hypothesis_that_diverges_is_not_compared(quadruped: Robot):
 
     losses = LossFunctions(diverged, diverged, of(quadruped, {}))
 
-    assert best_unsearched_fault(INTACT, PAPER_KINDS, quadruped.anatomy, losses) is None
+    assert (
+        best_unsearched_fault(INTACT, HypothesisSpace(quadruped.anatomy, PAPER_KINDS), losses)
+        is None
+    )
 
 
 def test_only_what_was_not_considered_is_asked_about_and_nothing_that_reshapes(quadruped: Robot):
@@ -98,7 +109,7 @@ def test_only_what_was_not_considered_is_asked_about_and_nothing_that_reshapes(q
     best = parse("sensor:back_left_angle", quadruped.anatomy)
     flat = of(quadruped, {})
     found = best_unsearched_fault(
-        best, PAPER_KINDS, quadruped.anatomy, LossFunctions(flat, screen, flat)
+        best, HypothesisSpace(quadruped.anatomy, PAPER_KINDS), LossFunctions(flat, screen, flat)
     )
     kinds = {fault.kind for one in asked - {best} for fault in one.faults}
 
@@ -114,7 +125,9 @@ def test_with_all_kinds_considered_nothing_is_outside(quadruped: Robot):
     flat = of(quadruped, {})
 
     assert (
-        best_unsearched_fault(INTACT, ALL_KINDS, quadruped.anatomy, LossFunctions(flat, flat, flat))
+        best_unsearched_fault(
+            INTACT, HypothesisSpace(quadruped.anatomy, ALL_KINDS), LossFunctions(flat, flat, flat)
+        )
         is None
     )
 

@@ -13,7 +13,7 @@ import pytest
 from selfmodel.comparators import FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
 from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.comparator import Comparator
-from selfmodel.diagnosis.diagnose import EQUAL, DiagnosticSearch
+from selfmodel.diagnosis.diagnose import EQUAL_DISTANCES, DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.diagnosis.significance import TEST
 from selfmodel.faults import BROKEN, FRICTION, JAMMED
@@ -201,7 +201,7 @@ class CoarseInPieces(Coarse):
         )
 
 
-@pytest.mark.parametrize(("make", "test"), [(Coarse, EQUAL), (CoarseInPieces, TEST)])
+@pytest.mark.parametrize(("make", "test"), [(Coarse, EQUAL_DISTANCES), (CoarseInPieces, TEST)])
 def test_hypotheses_that_no_trial_tells_apart_are_rivals(
     quadruped: Robot, gait: Controller, make: Callable[[float], Comparator], test: str
 ):

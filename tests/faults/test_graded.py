@@ -11,7 +11,13 @@ from selfmodel.errors import InputError
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
-from selfmodel.faults.terrain import BUMP, CELL, FLAT, HALF_EXTENT, unit_heights
+from selfmodel.faults.terrain import (
+    CELL_SIZE,
+    CELLS_PER_BUMP,
+    FLAT_RADIUS,
+    HALF_EXTENT,
+    unit_heights,
+)
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
 from selfmodel.simulation.simulator import Simulator
@@ -201,7 +207,7 @@ def test_rough_terrain_rises_and_falls_as_far_as_it_says(robot: Robot):
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     down, hit = np.array([0.0, 0.0, -1.0]), np.zeros(1, np.int32)
-    columns, rows = (range(-9 * BUMP, 9 * BUMP, 2) for _ in range(2))
+    columns, rows = (range(-9 * CELLS_PER_BUMP, 9 * CELLS_PER_BUMP, 2) for _ in range(2))
 
     def height(x: float, y: float) -> float:
         start = np.array([x + 1e-6, y + 2e-6, 2.0])  # on an edge, a ray slips between triangles
@@ -210,10 +216,12 @@ def test_rough_terrain_rises_and_falls_as_far_as_it_says(robot: Robot):
         return 2.0 - float(below)
 
     told = 0.04 * unit_heights(0)
-    middle = [round(half / CELL) for half in HALF_EXTENT]
-    seen = {(c, r): height(c * CELL, r * CELL) for c in columns for r in rows}
+    middle = [round(half / CELL_SIZE) for half in HALF_EXTENT]
+    seen = {(c, r): height(c * CELL_SIZE, r * CELL_SIZE) for c in columns for r in rows}
     for (column, row), found in seen.items():
-        if math.hypot(column * CELL, row * CELL) > 1.5:  # above the robot the ray meets it
+        if (
+            math.hypot(column * CELL_SIZE, row * CELL_SIZE) > 1.5
+        ):  # above the robot the ray meets it
             assert found == pytest.approx(told[middle[1] + row, middle[0] + column], abs=1e-5)
     assert 0.03 < max(seen.values()) <= 0.04
     assert -0.04 <= min(seen.values()) < -0.03
@@ -222,7 +230,7 @@ def test_rough_terrain_rises_and_falls_as_far_as_it_says(robot: Robot):
 def test_no_robot_starts_inside_rough_terrain(robot: Robot):
     heights = unit_heights(0)
     middle = np.array(heights.shape) // 2
-    flat = int(FLAT / CELL / math.sqrt(2))
+    flat = int(FLAT_RADIUS / CELL_SIZE / math.sqrt(2))
     start = heights[
         middle[0] - flat : middle[0] + flat + 1, middle[1] - flat : middle[1] + flat + 1
     ]
@@ -253,7 +261,7 @@ def test_a_world_without_level_ground_cannot_become_rough():
     mjcf = """<mujoco><worldbody><body><freejoint/><geom size="0.1"/></body></worldbody></mujoco>"""
     robot = Robot("ball", mjcf, 0.002)
 
-    with pytest.raises(InputError, match="takes the place of a plane"):
+    with pytest.raises(InputError, match="replaces a ground plane"):
         built(robot, "roughness=0.02")
 
 

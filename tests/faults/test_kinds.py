@@ -17,7 +17,7 @@ from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
 from selfmodel.faults.notation import parse
-from selfmodel.faults.registry import ALL_KINDS, KINDS, PAPER_KINDS, known
+from selfmodel.faults.registry import ALL_KINDS, KINDS, PAPER_KINDS, notation_kinds
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
@@ -111,17 +111,20 @@ GRADED = FaultKind(
     ("change", "said"),
     [
         ({"name": "two words"}, "needs a name without spaces"),
-        ({"keyword": "a:b"}, "needs a word without spaces"),
+        ({"keyword": "a:b"}, "needs a keyword without spaces"),
         ({"parts": lambda _anatomy: ()}, "nothing can be proposed"),
         ({"levels": uniform_levels()}, "nothing can be proposed"),
         ({"levels": uniform_levels(3.0)}, "not between 0 and 2"),
-        ({"severity_bounds": None}, "the kind no degrees"),
-        ({"special": {1.0: None}}, "alone it means intact"),
-        ({"keyword": "friction"}, "is read back as friction=1.0"),
+        ({"severity_bounds": None}, "its kind has no severity_bounds"),
+        ({"degenerates_to": {1.0: None}}, "its canonical form is intact"),
+        ({"keyword": "friction"}, "is parsed as friction=1.0"),
         ({"absorbs": lambda _fault, _other, _anatomy: True}, "absorbs itself"),
         ({"apply": nothing}, "changes nothing about a robot"),
         ({"apply": heavier_each_time}, "does not make the same robot every time"),
-        ({"feel": lambda _own, _fault, points: points.fill(0)}, "changes the points"),
+        (
+            {"adapt_to_contacts": lambda _own, _fault, points: points.fill(0)},
+            "changes the contact points",
+        ),
     ],
 )
 def test_the_contract_kit_sees_each_way_to_break_it(change: dict, said: str, quadruped: Robot):
@@ -174,7 +177,7 @@ OTHER_JAM = dataclasses.replace(GRADED, name="jam", keyword="cling")
 
 
 def test_notation_names_a_third_party_s_kind_where_it_is_considered(quadruped: Robot):
-    said = parse("break:front_left_knee+payload=2.5", quadruped.anatomy, known([PAYLOAD]))
+    said = parse("break:front_left_knee+payload=2.5", quadruped.anatomy, notation_kinds([PAYLOAD]))
 
     assert str(said) == "break:front_left_knee+payload=2.5"
     torso = build(quadruped, said).model.body("torso")

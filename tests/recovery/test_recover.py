@@ -13,10 +13,11 @@ from numpy.random import Generator
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.diagnosis import Diagnosis
-from selfmodel.diagnosis.genome import encode
 from selfmodel.evolution import Draw, Evolution, Generation
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.notation import parse
+from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.logs import read_truth, reader
 from selfmodel.logs.contents import Contents
 from selfmodel.logs.journal import FolderJournal, create_journal
@@ -232,9 +233,9 @@ def test_every_search_starts_from_what_the_database_holds(
     outcome = recovery(quadruped, truth, Simulator(quadruped, 2), events)
     diagnoses = [event for event in events if isinstance(event, Diagnosis)]
     genomes = [trial.plan.controller.genome.tobytes() for trial in outcome.trials]
+    space = HypothesisSpace(quadruped.anatomy, PAPER_KINDS)
     encoded = [
-        [encode(c.hypothesis, BUDGET.genes, quadruped.anatomy).tobytes() for c in d.ranked]
-        for d in diagnoses
+        [space.encode(c.hypothesis, BUDGET.genes).tobytes() for c in d.ranked] for d in diagnoses
     ]
 
     def newest_first(count: int) -> list[bytes]:

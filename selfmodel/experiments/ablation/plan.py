@@ -14,9 +14,10 @@ from selfmodel.errors import InputError, unknown_name
 from selfmodel.experiments import plugins, robots
 from selfmodel.experiments.grid import Job, check_shared
 from selfmodel.experiments.keys import check_keys, key_of
+from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.notation import parse
-from selfmodel.faults.registry import PAPER_KINDS, applicable_kinds, known
+from selfmodel.faults.registry import PAPER_KINDS, notation_kinds
 from selfmodel.physical.reality_gap import WIDEST
 from selfmodel.settings import Settings
 
@@ -205,7 +206,7 @@ def _failures(ablation: Ablation, robot: str) -> list[tuple[int | None, str]]:
 
 def _named(ablation: Ablation) -> tuple[FaultKind, ...]:
     """What notation may name: also a third party's kinds, where they are considered."""
-    return known(plugins.kinds(ablation.kinds))
+    return notation_kinds(plugins.kinds(ablation.kinds))
 
 
 def model_digest(robot: str) -> str:
@@ -221,7 +222,7 @@ def _check_names(ablation: Ablation) -> None:
             if case not in entry.cases:
                 raise unknown_name(f"case of {robot}", str(case), map(str, entry.cases))
         anatomy = entry.robot().anatomy
-        applicable_kinds(plugins.kinds(ablation.kinds), anatomy)
+        HypothesisSpace.of(plugins.kinds(ablation.kinds), anatomy)
         for damage in ablation.damages:
             parse(damage, anatomy, _named(ablation))
     for comparator in ablation.comparators:

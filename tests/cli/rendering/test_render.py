@@ -32,7 +32,7 @@ from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import SIGNALS, Behaviour
 from selfmodel.trials.trial import TrialPlan
 from tests.conftest import random_controllers
-from tests.helpers.command import selfmodel
+from tests.helpers.command import selfmodel, selfmodel_process
 from tests.helpers.opengl import WORKS, draws
 
 STEPS = 31
@@ -64,11 +64,12 @@ def film(robot: Robot, text: str, frames: int = 2, unseen: slice = slice(0)) -> 
     return film_of(robot, hypothesis, [("logged: $x_1", seen), ("model", seen)], moments)
 
 
+@pytest.mark.process
 def test_a_strip_is_drawn_whatever_there_is_of_opengl(folder: Path, tmp_path: Path):
     """Even where the library that MuJoCo is told to take would end any program."""
     out = tmp_path / "strip.png"
     arguments = ("render", "a.mcap", "-o", str(out), "--hypothesis", DAMAGE, "--pictures", "3")
-    done = selfmodel(*arguments, "--json", cwd=folder, MUJOCO_GL="nothing-like-it")
+    done = selfmodel_process(*arguments, "--json", cwd=folder, MUJOCO_GL="nothing-like-it")
     told = json.loads(done.stdout)
 
     assert (done.returncode, done.stderr) == (0, "")
@@ -82,12 +83,14 @@ def test_a_strip_is_drawn_whatever_there_is_of_opengl(folder: Path, tmp_path: Pa
 
 @pytest.mark.opengl
 @draws
+@pytest.mark.process
+@pytest.mark.opengl
 def test_a_film_is_drawn_by_mujoco_with_what_works_of_itself(folder: Path, tmp_path: Path):
     frames = {}
     for text in ("intact", DAMAGE):
         out = tmp_path / f"{len(frames)}.gif"
         arguments = ("render", "a.mcap", "-o", str(out), "--hypothesis", text, "--json")
-        done = selfmodel(*arguments, cwd=folder, MUJOCO_GL="")
+        done = selfmodel_process(*arguments, cwd=folder, MUJOCO_GL="")
         assert (done.returncode, done.stderr) == (0, "")
         assert json.loads(done.stdout)["gl"] == WORKS
         with Image.open(out) as image:
@@ -99,6 +102,7 @@ def test_a_film_is_drawn_by_mujoco_with_what_works_of_itself(folder: Path, tmp_p
     assert np.abs(frames["intact"] - frames[DAMAGE]).max() > 50  # the limb is pale
 
 
+@pytest.mark.process
 def test_where_nothing_draws_a_sentence_says_what_to_do(folder: Path):
     done = selfmodel("render", "a.mcap", cwd=folder, MUJOCO_GL="disable")
 
