@@ -14,13 +14,6 @@ from hypothesis import settings
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import ROBOTS
 from tests.helpers.command import SMALL, selfmodel
-from tests.helpers.drivers import (  # noqa: F401  # until every test imports from the helpers
-    random_controllers,
-    random_cpgs,
-    random_motion,
-    random_of,
-)
-from tests.helpers.hostile import exploding, lacking  # noqa: F401  # as above
 
 settings.register_profile("full", deadline=None)  # a busy machine is no bug
 settings.register_profile("fast", deadline=None, max_examples=20)

@@ -19,8 +19,9 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.requests import ClosedLoop
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.conftest import exploding, random_controllers
 from tests.helpers.comparators import Prepared
+from tests.helpers.drivers import random_controllers
+from tests.helpers.hostile import exploding
 from tests.helpers.memory import in_memory
 
 SMALL = dataclasses.replace(Settings().scaled(20), generations=5, steps=200)

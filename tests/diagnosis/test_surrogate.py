@@ -14,8 +14,8 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour, collect
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.conftest import random_controllers
 from tests.helpers.comparators import PreparedPieces
+from tests.helpers.drivers import random_controllers
 from tests.helpers.gaits import changed
 
 SMALL = dataclasses.replace(Settings().scaled(4), generations=1)

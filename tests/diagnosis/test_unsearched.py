@@ -25,7 +25,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 from tests.helpers.memory import in_memory
 
 PIECES = 60

@@ -29,8 +29,8 @@ from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import Behaviour, forward_displacement
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
-from tests.conftest import random_controllers
 from tests.helpers.comparators import Prepared, PreparedPieces
+from tests.helpers.drivers import random_controllers
 from tests.helpers.memory import in_memory
 
 SMALL = dataclasses.replace(Settings().scaled(12), generations=2, steps=300)

@@ -35,8 +35,8 @@ from selfmodel.trials.behaviour import SIGNALS, Behaviour, collect
 from selfmodel.trials.rotation import rotation_between
 from selfmodel.trials.state_estimation import BASE, STATE
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.conftest import lacking
 from tests.helpers.bodies import BODIES, EVERY_BODY, swinging, swung
+from tests.helpers.hostile import lacking
 from tests.logs.conftest import plan_of
 
 STEPS, HORIZON = 50, 10

@@ -25,8 +25,8 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import TrialPlan
-from tests.conftest import random_controllers
 from tests.helpers.command import selfmodel
+from tests.helpers.drivers import random_controllers
 from tests.helpers.memory import in_memory
 
 SMALL = dataclasses.replace(Settings().scaled(12), generations=2, steps=300)

@@ -23,8 +23,8 @@ from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import SIGNALS, Behaviour, collect
 from selfmodel.trials.signal_scales import MEASUREMENT_FULL_SCALES
 from selfmodel.trials.trial import TrialPlan
-from tests.conftest import random_controllers, random_motion
 from tests.helpers.command import SMALL, selfmodel
+from tests.helpers.drivers import random_controllers, random_motion
 
 STEPS = 60
 

@@ -32,7 +32,7 @@ from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.trials.behaviour import Sample, Signal
 from selfmodel.trials.trial import Stage, Trial
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 from tests.helpers.memory import MemoryJournal, in_memory
 
 TINY = dataclasses.replace(Settings().scaled(6), generations=2, steps=60)

@@ -17,7 +17,8 @@ from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import SIGNALS, Signal, collect
 from selfmodel.trials.state_estimation import BASE
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.conftest import lacking, random_motion
+from tests.helpers.drivers import random_motion
+from tests.helpers.hostile import lacking
 
 STEPS = 400
 QUADRUPED = ROBOTS["quadruped"].robot()

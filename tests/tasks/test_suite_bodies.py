@@ -14,7 +14,7 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS, entry, load, suite_bodies
 from selfmodel.trials.behaviour import SIGNALS, Behaviour, collect
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 
 STEPS = 60
 FIRST = [

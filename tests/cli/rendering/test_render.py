@@ -31,8 +31,8 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import SIGNALS, Behaviour
 from selfmodel.trials.trial import TrialPlan
-from tests.conftest import random_controllers
 from tests.helpers.command import selfmodel, selfmodel_process
+from tests.helpers.drivers import random_controllers
 from tests.helpers.opengl import WORKS, draws
 
 STEPS = 31

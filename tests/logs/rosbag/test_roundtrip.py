@@ -23,7 +23,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour, collect
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 from tests.logs.rosbag.driver import mapping, record
 
 STEPS = 400
