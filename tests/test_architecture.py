@@ -3,6 +3,7 @@
 import ast
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,7 @@ FOLDERS |= {name: f"selfmodel.{name}" for name in ("comparators", "logs")}
 ADDED = ("selfmodel.tasks", "selfmodel.comparators", "selfmodel.logs")
 
 
+@cache
 def modules() -> dict[str, Path]:
     """Every module of the package and its file."""
     found = {}
@@ -25,6 +27,7 @@ def modules() -> dict[str, Path]:
     return found
 
 
+@cache
 def imports(path: Path) -> set[str]:
     """The names that a file imports, at its top or anywhere inside."""
     names = set()
@@ -64,6 +67,7 @@ def room(module: str) -> str | None:
     return name if name in ROOMS else None
 
 
+@cache
 def imported_modules(module: str) -> set[str]:
     """The modules of the package that a module imports, those under TYPE_CHECKING too."""
     known = modules()
