@@ -54,7 +54,7 @@ ROOMS = (
 )
 """The rooms, in the order in which data flows: each may import itself and the rooms before it."""
 
-VOCABULARY = ("arrays", "errors", "files", "settings", "evolution")
+VOCABULARY = ("arrays", "errors", "files", "settings", "evolution", "version")
 """The files beside the rooms, which every room may import."""
 
 

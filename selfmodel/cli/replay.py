@@ -15,8 +15,7 @@ from selfmodel.cli.output.tables import show
 from selfmodel.experiments import plugins, trial_logs
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.logs import TrialLog
-from selfmodel.simulation.replay import Replay
-from selfmodel.simulation.replay import replay as simulate
+from selfmodel.simulation.replay import Replay, replay as simulate
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.threads import thread_count
 from selfmodel.trials.behaviour import SIGNALS, Signal

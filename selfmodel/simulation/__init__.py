@@ -1,1 +1,27 @@
 """The self-model in motion: rollouts, short predictions, calibration, replay."""
+
+from typing import TYPE_CHECKING
+
+import lazy_loader
+
+if TYPE_CHECKING:
+    from selfmodel.simulation.outcome import (
+        SimulationResult as SimulationResult,
+        SimulationStats as SimulationStats,
+    )
+    from selfmodel.simulation.requests import (
+        ClosedLoop as ClosedLoop,
+        Ensemble as Ensemble,
+        Request as Request,
+        Segments as Segments,
+    )
+    from selfmodel.simulation.simulator import Simulator as Simulator
+else:
+    __getattr__, __dir__, __all__ = lazy_loader.attach(
+        __name__,
+        submod_attrs={
+            "outcome": ["SimulationResult", "SimulationStats"],
+            "requests": ["ClosedLoop", "Ensemble", "Request", "Segments"],
+            "simulator": ["Simulator"],
+        },
+    )

@@ -1,4 +1,4 @@
-"""Promises about what only mends the self-model: it is no fault, and no rival lives by it."""
+"""Tests of model error: it is no fault, and no indistinguishable hypothesis depends on it."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -31,7 +31,7 @@ SLIPPERY, KNEE = "friction=0.2", "break:front_left_knee"
 
 
 def of(robot: Robot, means: Mapping[str, float]) -> Losses:
-    """Losses with some scatter: of most hypotheses a mean of 1, of those named another."""
+    """Losses with scatter: mean 1, but for the named hypotheses."""
     scatter = 0.01 * np.random.default_rng(0).normal(size=PIECES)
     known = {parse(text, robot.anatomy): mean for text, mean in means.items()}
     return lambda hypotheses: np.array([known.get(one, 1.0) * (1 + scatter) for one in hypotheses])
@@ -73,7 +73,7 @@ def test_of_what_would_have_done_harm_nothing_else_is_asked(quadruped: Robot):
 
 
 def trial(robot: Robot, truth: str, gait: Controller, stage: Stage, number: int) -> Trial:
-    """A trial across a small gap, on ground that is slippery before the failure and after."""
+    """A trial across a small reality gap, on slippery ground before and after the failure."""
     reality = draw_reality(robot, 3, 0.02, structure=False)
     hidden = parse("+".join({truth, SLIPPERY} - {"intact"}), robot.anatomy)
     plan = TrialPlan(f"{number:02d}-{stage}", stage, gait, SMALL.steps, 0)

@@ -10,8 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from selfmodel.errors import InputError
 from selfmodel.experiments.grid import GridBegins, Job, PartEnds, difference, finished, run_grid

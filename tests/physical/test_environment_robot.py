@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.comparators.command_errors import command_errors

@@ -6,8 +6,7 @@ import json
 import mujoco
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from selfmodel.errors import InputError
 from selfmodel.faults.build import apply_faults

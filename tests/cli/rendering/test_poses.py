@@ -1,9 +1,8 @@
-"""Promises of poses: what was observed stands, and what was not is as it was seen last."""
+"""Poses from observations; a missing one is the last before it."""
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from hypothesis.extra import numpy as arrays
 
 from selfmodel.cli.rendering.poses import POSE, Poses, poses_of
