@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from selfmodel.diagnosis.diagnosis import Diagnosis
-from selfmodel.diagnosis.serialization import diagnosis_from_dict, diagnosis_to_dict
+from selfmodel.diagnosis.serialization import diagnosis_from_dict
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
@@ -48,7 +48,7 @@ class FolderJournal:
             LogWriteError: The disk is full, or failed.
         """
         earlier = _read_diagnoses(self.folder, self.space)
-        values = [diagnosis_to_dict(each) for each in (*earlier, diagnosis)]
+        values = [each.to_dict() for each in (*earlier, diagnosis)]
         text = json.dumps(values, indent=1, allow_nan=False)
         replace_file(self.folder / DIAGNOSES, text.encode())
 
