@@ -17,8 +17,8 @@ from selfmodel.settings import Settings
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import Sample, Signal
 from selfmodel.trials.trial import Stage, TrialPlan
-from tests.conftest import random_motion
 from tests.helpers.command import selfmodel
+from tests.helpers.drivers import random_motion
 
 STEPS = 150
 SETTINGS = Settings(generations=2).scaled(8)

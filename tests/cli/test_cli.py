@@ -16,8 +16,8 @@ from selfmodel.errors import TrialError
 from selfmodel.logs import read_log, save_controller
 from selfmodel.logs.journal import read_database
 from selfmodel.robot.robot import Robot
-from tests.conftest import random_controllers
 from tests.helpers.command import DIAGNOSIS, SMALL, Done, selfmodel, selfmodel_process
+from tests.helpers.drivers import random_controllers
 
 ROOT = Path(__file__).parents[2]
 

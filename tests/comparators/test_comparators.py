@@ -19,8 +19,8 @@ from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segment
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import SIGNALS, Behaviour, Signal
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.conftest import random_controllers
 from tests.helpers.comparators import Prepared, PreparedPieces
+from tests.helpers.drivers import random_controllers
 
 Both = tuple[Trial, Behaviour]
 

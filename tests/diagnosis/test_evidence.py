@@ -25,8 +25,9 @@ from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segment
 from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.trials.behaviour import Behaviour, Signal
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.conftest import exploding, random_controllers
 from tests.helpers.comparators import Prepared, PreparedPieces
+from tests.helpers.drivers import random_controllers
+from tests.helpers.hostile import exploding
 from tests.helpers.memory import in_memory
 
 STEPS = 60

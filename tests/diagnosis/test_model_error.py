@@ -22,7 +22,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 from tests.helpers.memory import in_memory
 
 PIECES = 60
@@ -93,6 +93,7 @@ def diagnosed(robot: Robot, truth: str, *, looks_back: bool) -> Diagnosis:
     return search(after, [], np.random.default_rng(0), lambda _: None)
 
 
+@pytest.mark.search
 @pytest.mark.parametrize("truth", ["intact", "jam:front_left_knee"])
 def test_ground_that_always_was_slippery_is_no_change_nor_part_of_a_rival(
     quadruped: Robot, truth: str

@@ -25,7 +25,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 from tests.helpers.memory import in_memory
 
 PIECES = 60
@@ -153,7 +153,11 @@ def diagnosed(robot: Robot, truth: str, gait: Controller) -> Diagnosis:
 
 @pytest.mark.parametrize(
     ("truth", "kind"),
-    [("wind=30", "wind"), ("sensor:back_left_angle=gain0.3", "sensor-gain"), ("intact", None)],
+    [
+        ("wind=30", "wind"),
+        pytest.param("sensor:back_left_angle=gain0.3", "sensor-gain", marks=pytest.mark.search),
+        pytest.param("intact", None, marks=pytest.mark.search),
+    ],
 )
 def test_a_weak_failure_of_another_kind_is_unexplained_and_named_across_a_gap(
     quadruped: Robot, truth: str, kind: str | None
@@ -170,6 +174,7 @@ def test_a_weak_failure_of_another_kind_is_unexplained_and_named_across_a_gap(
     assert all(fault.kind in PAPER_KINDS for one in found.ranked for fault in one.hypothesis.faults)
 
 
+@pytest.mark.search
 def test_comparators_of_whole_trials_ask_for_nothing_outside(quadruped: Robot):
     gait = random_controllers(quadruped, 5)[2]
     search = DiagnosticSearch(

@@ -15,7 +15,7 @@ from selfmodel.faults.notation import parse
 from selfmodel.robot.anatomy import Joint
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import ROBOTS
-from tests.conftest import random_motion
+from tests.helpers.drivers import random_motion
 
 STEPS = 100
 TOLERANCE = 1e-7

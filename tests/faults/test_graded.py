@@ -21,8 +21,8 @@ from selfmodel.faults.terrain import (
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
 from selfmodel.simulation.simulator import Simulator
-from tests.conftest import random_controllers, random_motion
 from tests.faults.test_build import assert_same_paths, follow
+from tests.helpers.drivers import random_controllers, random_motion
 
 STEPS = 100
 

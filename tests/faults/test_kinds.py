@@ -22,7 +22,7 @@ from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
-from tests.conftest import random_motion
+from tests.helpers.drivers import random_motion
 
 
 def example(name: str) -> ModuleType:

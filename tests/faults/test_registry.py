@@ -25,8 +25,8 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import TrialPlan
-from tests.conftest import random_controllers
 from tests.helpers.command import selfmodel
+from tests.helpers.drivers import random_controllers
 from tests.helpers.memory import in_memory
 
 SMALL = dataclasses.replace(Settings().scaled(12), generations=2, steps=300)
@@ -104,6 +104,7 @@ def test_a_recovery_of_a_robot_with_nothing_to_strike_is_refused_before_any_tria
     assert list(tmp_path.rglob("*.mcap*")) == []
 
 
+@pytest.mark.search
 def test_a_joint_that_turns_out_to_be_jammed_at_0_is_found_among_angles_trial_after_trial(
     quadruped: Robot,
 ):

@@ -30,7 +30,6 @@ from selfmodel.tasks import load
 from selfmodel.tasks.walking import motion_capture
 from selfmodel.trials.behaviour import SIGNALS, collect
 from selfmodel.trials.trial import TrialPlan
-from tests.conftest import random_controllers
 from tests.helpers.bench import (
     CONTROLLER,
     NAMES,
@@ -43,6 +42,7 @@ from tests.helpers.bench import (
     logged,
     observation,
 )
+from tests.helpers.drivers import random_controllers
 
 
 @pytest.mark.parametrize("text", ["intact", "break:{0}", "sensor:{1}+friction=0.5"])

@@ -23,7 +23,7 @@ from selfmodel.recovery.random_streams import gap_stream
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 
 QUADRUPED = ROBOTS["quadruped"].robot()
 DRAWS = 400

@@ -23,7 +23,7 @@ from selfmodel.physical.structural_mismatch import (
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import SIGNALS, collect
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 
 QUADRUPED = ROBOTS["quadruped"].robot()
 

@@ -28,7 +28,7 @@ from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.trials.behaviour import Behaviour, Names, Signal
 from selfmodel.trials.signal_scales import DISAGREEMENT_SCALES
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 
 NAMES = Names(sensors=("touch",), motors=("motor",), hinges=("hinge",))
 UP = np.array([0.0, 0.0, 1.0])

@@ -30,7 +30,7 @@ from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.trials.behaviour import Behaviour, Signal
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 
 SMALL = dataclasses.replace(Settings().scaled(12), steps=150)
 

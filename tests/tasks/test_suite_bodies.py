@@ -14,10 +14,15 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS, entry, load, suite_bodies
 from selfmodel.trials.behaviour import SIGNALS, Behaviour, collect
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 
 STEPS = 60
-FIRST = [(domain, tasks[0]) for domain, tasks in suite_bodies.DOMAINS.items()]
+FIRST = [
+    pytest.param(
+        *(domain, tasks[0]), marks=() if domain in ("walker", "hopper") else pytest.mark.bodies
+    )
+    for domain, tasks in suite_bodies.DOMAINS.items()
+]
 TOUCHING = ("dog",)
 """Domains whose reward depends on contact forces, which are those of another physics step."""
 

@@ -295,6 +295,7 @@ os._exit(0)  # skips OpenGL's cleanup at exit, whose order is undefined
 """
 
 
+@pytest.mark.opengl
 @draws
 @every_task
 def test_the_viewer_shows_a_damaged_robot_in_a_window_of_ours(domain: str, task: str):

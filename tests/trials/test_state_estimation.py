@@ -14,7 +14,7 @@ from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS, entry
 from selfmodel.trials.behaviour import SIGNALS, Behaviour, Signal
 from selfmodel.trials.state_estimation import IMU, JOINTS, STATE, estimated_states
-from tests.conftest import random_controllers, random_motion
+from tests.helpers.drivers import random_controllers, random_motion
 
 QUADRUPED = ROBOTS["quadruped"].robot()
 REACH = {"joint_positions": 3, "base_position": 6}

@@ -12,7 +12,7 @@ from selfmodel.robot.state_access import signal_fields
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import Behaviour, Signal
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 
 STEPS = 12
 

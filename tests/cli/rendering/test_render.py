@@ -31,8 +31,8 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import SIGNALS, Behaviour
 from selfmodel.trials.trial import TrialPlan
-from tests.conftest import random_controllers
 from tests.helpers.command import selfmodel, selfmodel_process
+from tests.helpers.drivers import random_controllers
 from tests.helpers.opengl import WORKS, draws
 
 STEPS = 31
@@ -81,6 +81,7 @@ def test_a_strip_is_drawn_whatever_there_is_of_opengl(folder: Path, tmp_path: Pa
     assert [p.name for p in tmp_path.iterdir()] == ["strip.png"]
 
 
+@pytest.mark.opengl
 @draws
 @pytest.mark.process
 @pytest.mark.opengl
@@ -157,6 +158,7 @@ def test_what_cannot_be_drawn_is_refused_in_a_sentence(
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.opengl
 def test_the_best_of_a_diagnosis_is_drawn(folder: Path, tmp_path: Path):
     (tmp_path / "result.json").write_text(
         json.dumps({"diagnosis": [{"hypothesis": DAMAGE}, {"hypothesis": "intact"}]})

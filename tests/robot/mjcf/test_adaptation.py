@@ -15,7 +15,7 @@ from selfmodel.robot.mjcf.adaptation import adapt
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings, parse_setting, read_settings
 from selfmodel.simulation.simulator import Simulator
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 from tests.robot.mjcf.awkward import GROUND, LEGS, MOTORS, TORSO, mjcf
 from tests.robot.mjcf.samples import SAMPLES
 

@@ -15,7 +15,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ALL_TASKS, ROBOTS
 from selfmodel.trials.behaviour import forward_displacement
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 
 STANDING_DRIFT = 0.05
 """Maximum drift of a standing robot in one run, m."""
