@@ -16,7 +16,7 @@ from selfmodel.experiments import trial_logs
 from selfmodel.logs.files import as_write_error, create_partial, publish, refuse_existing
 from selfmodel.robot.parameters import factor_names
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.calibrate import calibrate as fit_to
+from selfmodel.simulation.calibration import calibrate as fit_to
 from selfmodel.simulation.threads import thread_count
 
 

@@ -15,9 +15,9 @@ from selfmodel.cli.output.tables import show
 from selfmodel.experiments import plugins, trial_logs
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.logs import TrialLog
-from selfmodel.simulation.replay import Replay, replay as simulate
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.threads import thread_count
+from selfmodel.simulation.trial_replay import Replay, replay as simulate
 from selfmodel.trials.behaviour import SIGNALS, Signal
 
 TOLERANCE = 1e-6
@@ -72,7 +72,7 @@ def replay(
         "first_divergence_step": found.first_divergence_step,
         "rms": {signal: _finite(found.rms(signal)) for signal in SIGNALS},
         "tolerance": tolerance,
-        "diverged": found.broke_down,
+        "diverged": found.diverged,
         "mujoco": {"logged": logged, "running": mujoco.__version__},
     }
     if out is not None:
@@ -104,7 +104,7 @@ def _print(result: dict[str, Any], log: TrialLog, found: Replay) -> None:
         typer.echo(
             f"The log was imported, and resampled: differences below {TOLERANCE:g} count as equal."
         )
-    if found.broke_down:
+    if found.diverged:
         typer.echo("The simulation diverged: with this hypothesis the model is unstable.")
     if found.identical:
         typer.echo("identical: every observed number equals the simulated one, to the bit.")

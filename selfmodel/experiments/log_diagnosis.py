@@ -12,7 +12,7 @@ from selfmodel.experiments.fitting import fitted
 from selfmodel.faults.kind import FaultKind
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.calibrate import Calibration
+from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.threads import thread_count
 from selfmodel.trials.trial import Trial

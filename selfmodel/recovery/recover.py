@@ -22,7 +22,7 @@ from selfmodel.recovery.random_streams import choice_stream, diagnosis_stream, r
 from selfmodel.recovery.repair import RepairSearch
 from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
-from selfmodel.simulation.calibrate import Calibration
+from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
 

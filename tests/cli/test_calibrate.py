@@ -1,4 +1,4 @@
-"""Promises of `selfmodel calibrate`: a model that other commands take, or a sentence that helps."""
+"""``selfmodel calibrate``: the model that it writes, and the inputs that it refuses."""
 
 import json
 from pathlib import Path

@@ -27,7 +27,7 @@ from selfmodel.robot.anatomy import Joint
 from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.calibrate import prediction_error
+from selfmodel.simulation.calibration import prediction_error
 from selfmodel.simulation.requests import Past, Segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import suite_bodies, walking

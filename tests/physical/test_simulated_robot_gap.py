@@ -15,7 +15,7 @@ from selfmodel.logs import LogError, read_gap, read_log, read_truth
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.measurement_noise import NoisyMeasurement
-from selfmodel.physical.reality_gap import Gap, draw_gap
+from selfmodel.physical.reality_gap import RealityGap, draw_gap
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
@@ -29,7 +29,7 @@ from tests.helpers.drivers import random_controllers, random_motion
 STEPS = 60
 
 
-def drawn(robot: Robot, level: float, seed: int = 0) -> Gap:
+def drawn(robot: Robot, level: float, seed: int = 0) -> RealityGap:
     return draw_gap(robot, level, np.random.default_rng(seed))
 
 
@@ -189,7 +189,7 @@ def test_the_log_hides_the_gap_where_only_scoring_looks(quadruped: Robot, tmp_pa
     plan = TrialPlan("trial", "single", controller, STEPS, 0)
     samples = list(SimulatedRobot(quadruped, gap=gap).run(controller, STEPS))
     texts = {
-        "told": json.dumps(gap.as_values()),
+        "told": json.dumps(gap.as_dict()),
         "other": "{}",
         "not": None,
         "bad": "[1",
@@ -203,7 +203,7 @@ def test_the_log_hides_the_gap_where_only_scoring_looks(quadruped: Robot, tmp_pa
             samples,
             TrialHeader(Settings(), hidden="intact", gap=text),
         )
-    assert read_gap(tmp_path / "told.mcap") == gap.as_values()
+    assert read_gap(tmp_path / "told.mcap") == gap.as_dict()
     assert read_gap(tmp_path / "other.mcap") == {}
     assert read_gap(tmp_path / "not.mcap") is None
     for name in ("bad", "list"):

@@ -15,7 +15,7 @@ from selfmodel.cli.output.plain import counted
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.evolution import Generation
 from selfmodel.recovery.events import DiscriminatingTrial, Event, SearchBegins
-from selfmodel.simulation.calibrate import Calibration
+from selfmodel.simulation.calibration import Calibration
 from selfmodel.trials.trial import Trial
 
 

@@ -11,7 +11,7 @@ from selfmodel.errors import InputError, WorkError
 from selfmodel.logs.errors import LogWriteError
 from selfmodel.logs.files import refuse_existing, replace_file
 from selfmodel.logs.reader import TrialLog
-from selfmodel.simulation.replay import Replay
+from selfmodel.simulation.trial_replay import Replay
 from selfmodel.trials.behaviour import Signal
 
 FORMATS = ("png", "svg", "pdf")

@@ -22,9 +22,9 @@ from selfmodel.logs import TrialLog
 from selfmodel.logs.errors import LogWriteError
 from selfmodel.logs.files import replace_file
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.replay import replay
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.threads import thread_count
+from selfmodel.simulation.trial_replay import replay
 
 
 def draw_trial(
@@ -101,14 +101,14 @@ def _filmed(
             f"{held} of {counted(len(film.time), 'picture')} lack an observation: the last one "
             f"is drawn, and marked"
         )
-    if found.broke_down:
+    if found.diverged:
         notes.append("the simulation diverged: with this hypothesis the model is unstable")
     return film, {
         "hypothesis": str(assumed),
         "steps": logged.steps,
         "missing": list(film.missing),
         "held": held,
-        "diverged": found.broke_down,
+        "diverged": found.diverged,
         "notes": notes,
     }
 

@@ -17,7 +17,7 @@ from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS, notation_kinds
-from selfmodel.physical.reality_gap import WIDEST
+from selfmodel.physical.reality_gap import MAX_GAP_LEVEL
 from selfmodel.settings import Settings
 from selfmodel.version import __version__
 
@@ -121,8 +121,10 @@ def check(ablation: Ablation) -> None:
         raise InputError("an ablation needs at least one case or one damage, got neither")
     _check_names(ablation)
     for gap in ablation.gaps:
-        if not 0 <= gap <= WIDEST:
-            raise InputError(f"a gap is a number from 0 to {WIDEST}, such as 0.05, got {gap}")
+        if not 0 <= gap <= MAX_GAP_LEVEL:
+            raise InputError(
+                f"a gap is a number from 0 to {MAX_GAP_LEVEL}, such as 0.05, got {gap}"
+            )
     _check_trials(ablation)
     check_shared(ablation.folder, _shared(ablation), "an ablation")
 

@@ -14,7 +14,7 @@ from selfmodel.experiments.keys import check_keys, key_of
 from selfmodel.faults.neuron import silent_neurons
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
-from selfmodel.physical.reality_gap import WIDEST
+from selfmodel.physical.reality_gap import MAX_GAP_LEVEL
 from selfmodel.settings import Settings
 from selfmodel.tasks import Entry
 from selfmodel.version import __version__
@@ -82,8 +82,10 @@ def check(study: Study) -> None:
         entry = robots.robot_entry(body)
         plugins.design(study.controller, entry.robot(), study.neurons)
         plugins.score(study.score, body, entry)
-    if not 0 <= study.gap <= WIDEST:
-        raise InputError(f"a gap is a number from 0 to {WIDEST}, such as 0.05, got {study.gap}")
+    if not 0 <= study.gap <= MAX_GAP_LEVEL:
+        raise InputError(
+            f"a gap is a number from 0 to {MAX_GAP_LEVEL}, such as 0.05, got {study.gap}"
+        )
     known = known_cases(study.bodies)
     for case in study.cases:
         if case not in known:

@@ -1,4 +1,4 @@
-"""Promises of poses: what was observed stands, and what was not is as it was seen last."""
+"""Poses from observations; a missing one is the last before it."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Promises of ``selfmodel render``: pictures of a trial from its log, on any machine."""
+"""``selfmodel render``: pictures of a trial from its log, on any machine."""
 
 import json
 import os
@@ -193,7 +193,7 @@ def test_a_diagnosis_is_read_or_refused(text: str, best: str | None, tmp_path: P
 def test_what_is_lost_is_dotted_and_what_is_jammed_red(robot: Robot):
     broken, jammed = robot.anatomy.joints[0], robot.anatomy.joints[-2]
     drawn = film(robot, f"break:{broken.name}+jam:{jammed.name}=0.1")
-    names = {robot.model.body(body).name for body in drawn.lost}
+    names = {robot.model.body(body).name for body in drawn.detached}
     axes = Figure().add_subplot()
     lines = lines_of(drawn, _standing(drawn), np.zeros(3), plane_of(drawn))
     draw(axes, drawn, lines, held=False)

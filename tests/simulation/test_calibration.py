@@ -12,7 +12,13 @@ from selfmodel.physical.reality_gap import draw_gap
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.parameters import Parameters, factor_names, nominal, with_parameters
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.calibrate import BOUND, PRIOR, Calibration, calibrate, prediction_error
+from selfmodel.simulation.calibration import (
+    MAX_LOG_FACTOR,
+    PRIOR_DEVIATION,
+    Calibration,
+    calibrate,
+    prediction_error,
+)
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import SIGNALS, Signal, collect
 from selfmodel.trials.state_estimation import BASE
@@ -62,8 +68,8 @@ def test_with_a_weak_prior_the_factors_of_a_robot_without_noise_are_found(
     monkeypatch: pytest.MonkeyPatch,
 ):
     """As calibration is set, the prior keeps factors near nominal, for the sake of noisy logs."""
-    monkeypatch.setattr("selfmodel.simulation.calibrate.SHARE", 0.005)
-    monkeypatch.setattr("selfmodel.simulation.calibrate.ITERATIONS", 20)
+    monkeypatch.setattr("selfmodel.simulation.calibration.PRIOR_WEIGHT", 0.005)
+    monkeypatch.setattr("selfmodel.simulation.calibration.MAX_ITERATIONS", 20)
     found = calibrate(QUADRUPED, trials(with_parameters(QUADRUPED, TRUE)), threads=2)
     off = np.abs(np.log(found.parameters.factors) - np.log(TRUE.factors))
 
@@ -92,7 +98,7 @@ def test_a_model_that_is_exact_is_left_as_it_is_to_the_bit(robot: Robot):
 
     assert found.robot is robot
     assert found.parameters == nominal(robot)
-    assert set(found.deviations) == {PRIOR}
+    assert set(found.deviations) == {PRIOR_DEVIATION}
 
 
 @pytest.mark.search
@@ -111,9 +117,9 @@ def test_under_noise_factors_stay_near_nominal_and_within_bounds():
     found = calibrate(QUADRUPED, [trial(QUADRUPED, physical, 0)], threads=1)
 
     assert found.parameters.delay == gap.delay
-    assert np.abs(np.log(found.parameters.factors)).max() <= BOUND
+    assert np.abs(np.log(found.parameters.factors)).max() <= MAX_LOG_FACTOR
     assert found.error < found.error_before
-    assert ((found.deviations > 0) & (found.deviations <= PRIOR)).all()
+    assert ((found.deviations > 0) & (found.deviations <= PRIOR_DEVIATION)).all()
 
 
 @pytest.mark.search
@@ -126,15 +132,15 @@ def test_what_the_trials_do_not_show_is_as_uncertain_as_before_them_however_many
     several = [trial(adrift, SimulatedRobot(adrift, gap=gap, stream=k), k) for k in range(3)]
     found = [calibrate(adrift, several[:count], threads=1).deviations for count in (1, 3)]
 
-    np.testing.assert_allclose([each[friction] for each in found], PRIOR, rtol=1e-3)
-    assert all((np.delete(each, friction) < PRIOR).all() for each in found)
+    np.testing.assert_allclose([each[friction] for each in found], PRIOR_DEVIATION, rtol=1e-3)
+    assert all((np.delete(each, friction) < PRIOR_DEVIATION).all() for each in found)
 
 
 def test_what_the_trials_show_is_less_uncertain_than_before_them():
     motors = slice(factor_names(QUADRUPED).index("damping") + 1, None)
 
-    assert (fitted().deviations[motors] < 0.7 * PRIOR).all()
-    assert (fitted().deviations > 0.2 * PRIOR).all()
+    assert (fitted().deviations[motors] < 0.7 * PRIOR_DEVIATION).all()
+    assert (fitted().deviations > 0.2 * PRIOR_DEVIATION).all()
 
 
 @pytest.mark.search
@@ -151,14 +157,14 @@ def test_a_robot_that_nobody_sees_is_calibrated_from_what_it_has_on_board():
     assert after < 0.75 * before
     # It knows no more of the factors than one that is seen.
     assert np.median(found.deviations / fitted().deviations) > 0.7
-    assert (found.deviations < PRIOR).all()
+    assert (found.deviations < PRIOR_DEVIATION).all()
 
 
 def test_an_exact_model_of_a_robot_that_nobody_sees_is_left_as_it_is(robot: Robot):
     found = calibrate(robot, [lacking(one, BASE) for one in trials(robot, 1)], threads=1)
 
     assert found.robot is robot
-    assert set(found.deviations) == {PRIOR}
+    assert set(found.deviations) == {PRIOR_DEVIATION}
 
 
 @pytest.mark.search
@@ -194,7 +200,7 @@ def test_a_trial_with_no_stretch_of_all_of_it_is_refused():
 
 
 def test_no_trials_are_refused():
-    with pytest.raises(InputError, match="at least one trial of the intact robot, got none"):
+    with pytest.raises(InputError, match="at least one trial of the healthy robot, got none"):
         calibrate(QUADRUPED, [], 1)
 
 
