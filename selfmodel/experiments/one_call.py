@@ -40,6 +40,10 @@ from selfmodel.simulation.trial_replay import Replay
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
 
 
+def _kinds(kinds: str | Sequence[FaultKind]) -> Sequence[FaultKind]:
+    return plugins.kinds(kinds) if isinstance(kinds, str) else kinds
+
+
 def _ignore(_event: object) -> None:
     """The callback of a caller that gives none."""
 
@@ -202,7 +206,7 @@ def diagnose(
     healthy: Sequence[TrialSource] = (),
     robot: Robot | None = None,
     comparator: str | Comparator = DEFAULT,
-    kinds: Sequence[FaultKind] = PAPER_KINDS,
+    kinds: str | Sequence[FaultKind] = PAPER_KINDS,
     settings: Settings | None = None,
     calibrate: bool = True,
     seed: int | None = None,
@@ -219,7 +223,7 @@ def diagnose(
             them, and the verdict compares with them.
         robot: The nominal robot; None for the model in the logs.
         comparator: A comparator, its name, or ``package.module:object``.
-        kinds: Fault kinds to search.
+        kinds: Fault kinds to search, or their names separated by commas.
         settings: Parameters of the search; None for those in the first log.
         calibrate: Whether the self-model is fitted to the healthy trials.
         seed: Seed of all random numbers; None for that of the first trial.
@@ -236,7 +240,7 @@ def diagnose(
         healthy,
         robot=robot,
         comparator=judge,
-        kinds=kinds,
+        kinds=_kinds(kinds),
         settings=settings,
         seed=seed,
         calibrate=calibrate,
@@ -254,7 +258,7 @@ def recover(
     folder: str | Path,
     *,
     comparator: str | Comparator = DEFAULT,
-    kinds: Sequence[FaultKind] = PAPER_KINDS,
+    kinds: str | Sequence[FaultKind] = PAPER_KINDS,
     settings: Settings | None = None,
     design: str | Design = "network",
     calibrate: bool = True,
@@ -273,7 +277,7 @@ def recover(
         robot: The nominal robot, from which the self-model is made.
         folder: Folder of the run, new or empty: every trial's log and every diagnosis.
         comparator: A comparator, its name, or ``package.module:object``.
-        kinds: Fault kinds to search.
+        kinds: Fault kinds to search, or their names separated by commas.
         settings: Parameters of the recovery; the paper's by default.
         design: Name of a controller design, such as ``network`` or ``cpg``, or a design.
         calibrate: Whether the self-model is fitted to the trial before the failure.
@@ -287,8 +291,8 @@ def recover(
         TrialError: A physical robot could not finish a trial.
     """
     count = thread_count(threads)
-    chosen = settings or Settings()
-    journal = create_journal(Path(folder), robot.anatomy, kinds)
+    chosen, searched = settings or Settings(), _kinds(kinds)
+    journal = create_journal(Path(folder), robot.anatomy, searched)
     return loop.recover(
         healthy=healthy,
         damaged=damaged,
@@ -300,7 +304,7 @@ def recover(
         seed=seed,
         on_event=on_event,
         design=plugins.design(design, robot) if isinstance(design, str) else design,
-        kinds=kinds,
+        kinds=searched,
         calibrate=partial(fitted, robot, threads=count) if calibrate else None,
         next_trial=next_trial,
     )

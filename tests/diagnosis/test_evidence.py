@@ -198,6 +198,7 @@ def test_the_distance_is_the_sum_over_the_trials_of_the_mean_over_the_pieces(
     assert not np.array_equal(losses[0], losses[1]) or isinstance(comparator, Plain)
 
 
+@pytest.mark.search
 def test_a_diagnosis_simulates_nothing_twice_and_ranks_nothing_that_is_not_considered(
     quadruped: Robot,
 ):

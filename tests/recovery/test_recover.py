@@ -363,6 +363,7 @@ def test_the_way_to_choose_is_asked_before_each_trial_and_obeyed(quadruped: Robo
     assert not [e for e in events if isinstance(e, SearchBegins) and e.kind == "repair"][1:]
 
 
+@pytest.mark.search
 def test_trials_that_tell_apart_differ_from_the_one_before_and_are_the_same_at_any_threads(
     quadruped: Robot,
 ):
