@@ -33,8 +33,7 @@ from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation import calibrate as calibration
-from selfmodel.simulation import replay as replays
+from selfmodel.simulation import calibration, trial_replay
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.threads import thread_count
@@ -193,7 +192,9 @@ def replay(
         tolerance: Largest difference of two numbers that count as equal, in their unit.
         threads: Threads of the physics; 0 for all processors.
     """
-    return replays.replay(trial, hypothesis, Simulator(robot, thread_count(threads)), tolerance)
+    return trial_replay.replay(
+        trial, hypothesis, Simulator(robot, thread_count(threads)), tolerance
+    )
 
 
 def diagnose(
