@@ -31,8 +31,7 @@ from selfmodel.cli.options import (
 from selfmodel.cli.output import grid_display
 from selfmodel.cli.output.tables import show
 from selfmodel.comparators import COMPARATORS
-from selfmodel.experiments.ablation import Ablation, Results, write_results
-from selfmodel.experiments.ablation import ablate as run
+from selfmodel.experiments.ablation import Ablation, Results, ablate as run, write_results
 from selfmodel.experiments.ablation.results import as_object
 from selfmodel.experiments.ablation.scores import Score
 from selfmodel.experiments.confidence_intervals import Interval

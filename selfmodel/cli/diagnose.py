@@ -27,15 +27,13 @@ from selfmodel.cli.output.plain import counted, plain
 from selfmodel.cli.output.ranking import in_words, ranking_table
 from selfmodel.comparators import DEFAULT
 from selfmodel.controllers.playback import Playback
-from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
 from selfmodel.experiments import plugins, trial_logs
-from selfmodel.experiments.fitting import calibration_values, fitted
+from selfmodel.experiments.fitting import calibration_values
+from selfmodel.experiments.log_diagnosis import by_stage, set_up_diagnosis
 from selfmodel.logs import TrialLog
 from selfmodel.recovery.explain import diagnose_trials
 from selfmodel.settings import Settings
-from selfmodel.simulation.simulator import Simulator
-from selfmodel.simulation.threads import thread_count
 
 
 def diagnose(
@@ -61,34 +59,40 @@ def diagnose(
     considered = plugins.kinds(kinds)
     logs = trial_logs.logs(files)
     model = trial_logs.robot_of_logs(logs, robot)
-    used = _since_the_failure(logs)
+    failed, healthy = by_stage([log.trial for log in logs])
+    used = [log for log in logs if log.trial in failed]
     first = used[0]
-    chosen = first.trial.plan.seed if seed is None else seed
-    intact = [log.trial for log in logs if log not in used]
-    fit = fitted(model, intact, thread_count(threads)) if calibrate and intact else None
-    simulator = Simulator(fit.robot if fit else model, thread_count(threads))
-    settings = _settings(first.settings, population, generations)
-    search = DiagnosticSearch(simulator, judge, settings, considered, intact=intact)
+    found = set_up_diagnosis(
+        failed,
+        healthy,
+        robot=model,
+        comparator=judge,
+        kinds=considered,
+        settings=_settings(first.settings, population, generations),
+        seed=seed,
+        calibrate=calibrate,
+        threads=threads,
+    )
     for note in _notes(used):
         typer.echo(f"note: {note}", err=True)
     with display() as on_event:
-        if fit:
-            on_event(fit)
-        diagnosis = diagnose_trials([log.trial for log in used], search, chosen, on_event)
+        if found.calibration is not None:
+            on_event(found.calibration)
+        diagnosis = diagnose_trials(found.damaged, found.search, found.seed, on_event)
     result = {
         "robot": model.name,
         "comparator": judge.name,
         "kinds": [kind.name for kind in considered],
-        "seed": chosen,
+        "seed": found.seed,
         "settings_from": first.trial.path,
         "logs": [log.trial.path for log in used],
         "played_back": [log.trial.path for log in used if _is_played_back(log)],
-        "intact": [trial.path for trial in intact],
-        "calibration": calibration_values(fit),
+        "intact": [trial.path for trial in found.healthy],
+        "calibration": calibration_values(found.calibration),
         "diagnosis": ranking_to_list(diagnosis.ranked),
         **confidence_to_dict(diagnosis),
-        "evaluations": search.evaluations,
-        "distinct_hypotheses": search.distinct_hypotheses,
+        "evaluations": found.search.evaluations,
+        "distinct_hypotheses": found.search.distinct_hypotheses,
         "seconds": perf_counter() - start,
     }
     if as_json:
@@ -131,10 +135,6 @@ def _notes(logs: list[TrialLog]) -> list[str]:
             f"the logs have different seeds: without --seed, that of {first.trial.path} is used"
         )
     return notes
-
-
-def _since_the_failure(logs: list[TrialLog]) -> list[TrialLog]:
-    return [log for log in logs if log.trial.plan.stage != "before"] or logs
 
 
 def _print(result: dict[str, Any]) -> None:

@@ -17,8 +17,7 @@ from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.logs import TrialLog
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.threads import thread_count
-from selfmodel.simulation.trial_replay import Replay
-from selfmodel.simulation.trial_replay import replay as simulate
+from selfmodel.simulation.trial_replay import Replay, replay as simulate
 from selfmodel.trials.behaviour import SIGNALS, Signal
 
 TOLERANCE = 1e-6

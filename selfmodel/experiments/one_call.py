@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from selfmodel.comparators import SEGMENT_PREDICTION
+from selfmodel.comparators import DEFAULT
 from selfmodel.controllers.command_source import CommandSource
 from selfmodel.controllers.controller import Controller, Design
 from selfmodel.diagnosis.comparator import Comparator
@@ -17,7 +17,6 @@ from selfmodel.experiments.robots import is_model, robot_entry
 from selfmodel.faults import KINDS, PAPER_KINDS, FaultKind
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
-from selfmodel.faults.registry import notation_kinds
 from selfmodel.logs import physical_trial
 from selfmodel.logs.journal import create_journal
 from selfmodel.logs.records import TrialHeader
@@ -202,7 +201,7 @@ def diagnose(
     *,
     healthy: Sequence[TrialSource] = (),
     robot: Robot | None = None,
-    comparator: str | Comparator = SEGMENT_PREDICTION,
+    comparator: str | Comparator = DEFAULT,
     kinds: Sequence[FaultKind] = PAPER_KINDS,
     settings: Settings | None = None,
     calibrate: bool = True,
@@ -254,7 +253,7 @@ def recover(
     robot: Robot,
     folder: str | Path,
     *,
-    comparator: str | Comparator = SEGMENT_PREDICTION,
+    comparator: str | Comparator = DEFAULT,
     kinds: Sequence[FaultKind] = PAPER_KINDS,
     settings: Settings | None = None,
     design: str | Design = "network",
@@ -289,7 +288,7 @@ def recover(
     """
     count = thread_count(threads)
     chosen = settings or Settings()
-    journal = create_journal(Path(folder), robot.anatomy, notation_kinds(kinds))
+    journal = create_journal(Path(folder), robot.anatomy, kinds)
     return loop.recover(
         healthy=healthy,
         damaged=damaged,

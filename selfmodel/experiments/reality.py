@@ -53,8 +53,7 @@ def simulated_robot(
         >>> import selfmodel
         >>> robot = selfmodel.load_robot("quadruped")
         >>> damaged = selfmodel.parse_hypothesis("break:front_left_knee", robot)
-        >>> selfmodel.simulated_robot(robot, damaged, gap=0.05)
-        <SimulatedRobot quadruped: break:front_left_knee, gap 0.05>
+        >>> physical = selfmodel.simulated_robot(robot, damaged, gap=0.05)
 
     Args:
         robot: The nominal robot.

@@ -1,4 +1,4 @@
-"""Promises of `selfmodel calibrate`: a model that other commands take, or a sentence that helps."""
+"""``selfmodel calibrate``: the model that it writes, and the inputs that it refuses."""
 
 import json
 from pathlib import Path
@@ -17,8 +17,8 @@ from selfmodel.settings import Settings
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import Sample, Signal
 from selfmodel.trials.trial import Stage, TrialPlan
-from tests.conftest import random_motion
 from tests.helpers.command import selfmodel
+from tests.helpers.drivers import random_motion
 
 STEPS = 150
 SETTINGS = Settings(generations=2).scaled(8)

@@ -16,8 +16,8 @@ from selfmodel.errors import TrialError
 from selfmodel.logs import read_log, save_controller
 from selfmodel.logs.journal import read_database
 from selfmodel.robot.robot import Robot
-from tests.conftest import random_controllers
 from tests.helpers.command import DIAGNOSIS, SMALL, Done, selfmodel, selfmodel_process
+from tests.helpers.drivers import random_controllers
 
 ROOT = Path(__file__).parents[2]
 
@@ -285,12 +285,16 @@ def test_a_comparator_from_elsewhere_plugs_in(steps: str, tmp_path: Path):
     (tmp_path / "mine.py").write_text(
         "from selfmodel.trials.behaviour import forward_displacement\n"
         "from selfmodel.simulation.requests import ClosedLoop\n"
+        "class Prepared:\n"
+        "    request = ClosedLoop(record=('base_position',))\n"
+        "    def __init__(self, trial):\n"
+        "        self.displacement = trial.displacement\n"
+        "    def distances(self, simulated):\n"
+        "        return (forward_displacement(simulated) - self.displacement) ** 2\n"
         "class Squared:\n"
         "    name = 'squared'\n"
-        "    def request(self, trial):\n"
-        "        return ClosedLoop(record=('base_position',))\n"
-        "    def distances(self, simulated, trial):\n"
-        "        return (forward_displacement(simulated) - trial.displacement) ** 2\n"
+        "    def prepare(self, trial):\n"
+        "        return Prepared(trial)\n"
         "squared = Squared()\n",
         encoding="utf-8",
     )

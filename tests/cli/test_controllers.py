@@ -1,4 +1,4 @@
-"""Promises of ``--controller`` and ``--neurons``: what is evolved, and what the logs say of it."""
+"""``--controller`` and ``--neurons``: the design that is evolved, and its logs."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Promises of ``--kinds``: a diagnosis proposes what is considered, and nothing else."""
+"""``--kinds``: a diagnosis searches the given fault kinds and no others."""
 
 import json
 import os

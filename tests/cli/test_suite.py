@@ -10,10 +10,10 @@ import pytest
 from typer.testing import CliRunner
 
 from selfmodel.cli import app
+from selfmodel.cli.suite import run
 from selfmodel.comparators import DEFAULT
 from selfmodel.errors import InputError
 from selfmodel.experiments.grid import Job, run_grid
-from selfmodel.experiments.suite import work
 from selfmodel.experiments.suite.bodies import DOMAINS, bodies
 from selfmodel.experiments.suite.plan import (
     Study,
@@ -25,6 +25,7 @@ from selfmodel.experiments.suite.plan import (
 )
 from selfmodel.experiments.suite.rows import Row, summarise
 from selfmodel.experiments.suite.work import run_study
+from selfmodel.logs import load_controller, read_gap
 from selfmodel.settings import Settings
 from tests.helpers.command import SMALL, selfmodel
 from tests.robot.mjcf.awkward import CUBE
@@ -204,6 +205,9 @@ REFUSED = [
     ({"score": "beauty"}, "unknown score 'beauty'"),
     ({"comparator": "no-such"}, "unknown comparator"),
     ({"controller": "brain"}, "unknown kind of controller"),
+    ({"kinds": "brek"}, "unknown kind 'brek'"),
+    ({"gap": 0.7}, "a gap is a number from 0 to 0.5"),
+    ({"controller": "cpg", "neurons": 4}, "--neurons 4 is of a network"),
     ({"bodies": ["biped.xml", "other/biped.xml"]}, "would be called alike"),
 ]
 
@@ -226,7 +230,7 @@ def test_what_cannot_be_run_is_refused_before_anything_is(
 
 def test_all_cases_are_those_that_the_bodies_have(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     asked: list[Study] = []
-    monkeypatch.setattr(work, "run_study", lambda study, **_: asked.append(study) or ())
+    monkeypatch.setattr(run, "run_study", lambda study, **_: asked.append(study) or ())
     arguments = ["suite", "run", "--domains", "hopper,swimmer", "--out", str(tmp_path)]
     told = CliRunner().invoke(app, arguments)
 
@@ -246,11 +250,56 @@ def test_oscillators_have_no_neurons_that_could_be_silent(tmp_path: Path):
     assert [job.parameters["case"] for job in recovery_jobs(oscillating)] == [9]
 
 
+def test_a_share_has_every_nth_gait_and_its_recoveries(tmp_path: Path):
+    study = replace(STUDY, bodies=["quadruped"], cases=[9], seeds=range(3), folder=tmp_path)
+    put_gaits(study)
+
+    assert [job.seed for job in gait_jobs(study, (2, 2))] == [1]
+    assert [job.seed for job in recovery_jobs(study, (1, 2))] == [0, 2]
+
+
+def test_an_option_is_a_parameter_of_a_study_only_if_it_is_not_the_default(tmp_path: Path):
+    study = replace(STUDY, bodies=["quadruped"], cases=[9], folder=tmp_path)
+    put_gaits(study)
+    (plain,), (other,) = recovery_jobs(study), recovery_jobs(replace(study, gap=0.1, kinds="all"))
+    (gait,), (larger,) = gait_jobs(study), gait_jobs(replace(study, neurons=5))
+
+    shared = plain.parameters["shared"]
+    assert set(shared) == {"selfmodel", "settings", "score", "controller", "comparator"}
+    assert other.parameters["shared"] == {**shared, "gap": 0.1, "kinds": "all"}
+    assert larger.parameters == {**gait.parameters, "neurons": 5}
+
+
+@studies
+def test_a_study_has_a_gap_a_size_of_network_and_kinds_of_faults(tmp_path: Path):
+    arguments = ["suite", "run", "--domains", "quadruped", "--case", "2", *TINY, "--neurons", "5"]
+    arguments += [
+        "--gap",
+        "0.05",
+        "--structure",
+        "--kinds",
+        "break,jam",
+        "--only",
+        "1/1",
+        "--out",
+        "out",
+    ]
+    done = selfmodel(*arguments, "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+
+    assert told["failures"] == []
+    (gait,) = (tmp_path / "out" / "gaits").glob("*.npz")
+    assert load_controller(gait).design.hidden == 5
+    (log,) = (tmp_path / "out" / "runs").rglob("01-after.mcap")
+    assert read_gap(log)["structure"] is not None
+
+
 def put_gaits(study: Study) -> None:
     """Something in the place of each gait."""
     for job in gait_jobs(study):
         path = gait_path(study.folder, job.key)
-        path.parent.mkdir(parents=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(b"a gait")
 
 

@@ -11,7 +11,7 @@ from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state_access import signal_fields
 from selfmodel.tasks import ROBOTS
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 
 JOINTS = [
     (name, joint.name)

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.comparators.command_errors import command_errors
@@ -31,7 +30,6 @@ from selfmodel.tasks import load
 from selfmodel.tasks.walking import motion_capture
 from selfmodel.trials.behaviour import SIGNALS, collect
 from selfmodel.trials.trial import TrialPlan
-from tests.conftest import random_controllers
 from tests.helpers.bench import (
     CONTROLLER,
     NAMES,
@@ -44,6 +42,7 @@ from tests.helpers.bench import (
     logged,
     observation,
 )
+from tests.helpers.drivers import random_controllers
 
 
 @pytest.mark.parametrize("text", ["intact", "break:{0}", "sensor:{1}+friction=0.5"])

@@ -6,8 +6,7 @@ import json
 import mujoco
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from selfmodel.errors import InputError
 from selfmodel.faults.build import apply_faults
@@ -24,7 +23,7 @@ from selfmodel.recovery.random_streams import gap_stream
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 
 QUADRUPED = ROBOTS["quadruped"].robot()
 DRAWS = 400

@@ -6,8 +6,7 @@ import json
 import mujoco
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from selfmodel.faults.notation import parse
 from selfmodel.physical.reality_gap import draw_gap
@@ -24,7 +23,7 @@ from selfmodel.physical.structural_mismatch import (
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import SIGNALS, collect
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 
 QUADRUPED = ROBOTS["quadruped"].robot()
 

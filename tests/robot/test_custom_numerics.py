@@ -20,7 +20,7 @@ from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.trial_replay import replay
 from selfmodel.trials.behaviour import SIGNALS
 from selfmodel.trials.trial import TrialPlan
-from tests.conftest import random_controllers, random_of
+from tests.helpers.drivers import random_controllers, random_of
 
 
 def of_0_1(robot: Robot, hidden: str) -> Robot:

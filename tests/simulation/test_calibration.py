@@ -23,7 +23,8 @@ from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import SIGNALS, Signal, collect
 from selfmodel.trials.state_estimation import BASE
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.conftest import lacking, random_motion
+from tests.helpers.drivers import random_motion
+from tests.helpers.hostile import lacking
 
 STEPS = 400
 QUADRUPED = ROBOTS["quadruped"].robot()
@@ -62,6 +63,7 @@ def test_the_factors_go_from_nominal_towards_the_truth():
     assert np.linalg.norm(found - true) < 0.9 * np.linalg.norm(true)
 
 
+@pytest.mark.search
 def test_with_a_weak_prior_the_factors_of_a_robot_without_noise_are_found(
     monkeypatch: pytest.MonkeyPatch,
 ):
@@ -99,6 +101,7 @@ def test_a_model_that_is_exact_is_left_as_it_is_to_the_bit(robot: Robot):
     assert set(found.deviations) == {PRIOR_DEVIATION}
 
 
+@pytest.mark.search
 def test_the_number_of_threads_does_not_matter():
     again = calibrate(QUADRUPED, trials(with_parameters(QUADRUPED, TRUE)), threads=3)
 
@@ -107,6 +110,7 @@ def test_the_number_of_threads_does_not_matter():
     assert again.deviations.tobytes() == fitted().deviations.tobytes()
 
 
+@pytest.mark.search
 def test_under_noise_factors_stay_near_nominal_and_within_bounds():
     gap = draw_gap(QUADRUPED, 0.1, np.random.default_rng(1))
     physical = SimulatedRobot(QUADRUPED, gap=gap)
@@ -118,6 +122,7 @@ def test_under_noise_factors_stay_near_nominal_and_within_bounds():
     assert ((found.deviations > 0) & (found.deviations <= PRIOR_DEVIATION)).all()
 
 
+@pytest.mark.search
 def test_what_the_trials_do_not_show_is_as_uncertain_as_before_them_however_many_they_are():
     """A robot that floats shows nothing of the ground's friction."""
     mjcf = QUADRUPED.mjcf.replace("<option ", '<option gravity="0 0 0" ', 1)
@@ -138,6 +143,7 @@ def test_what_the_trials_show_is_less_uncertain_than_before_them():
     assert (fitted().deviations > 0.2 * PRIOR_DEVIATION).all()
 
 
+@pytest.mark.search
 def test_a_robot_that_nobody_sees_is_calibrated_from_what_it_has_on_board():
     real = with_parameters(QUADRUPED, TRUE)
     seen = [trial(real, SimulatedRobot(real), 7)]
@@ -161,6 +167,7 @@ def test_an_exact_model_of_a_robot_that_nobody_sees_is_left_as_it_is(robot: Robo
     assert set(found.deviations) == {PRIOR_DEVIATION}
 
 
+@pytest.mark.search
 def test_trials_in_which_the_base_was_seen_and_others_are_fitted_to_together():
     real = with_parameters(QUADRUPED, TRUE)
     one, other = trials(real)

@@ -25,7 +25,8 @@ from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import SIGNALS, Behaviour, Signal, collect
 from selfmodel.trials.rotation import rotation_between
 from selfmodel.trials.state_estimation import ONBOARD, STATE
-from tests.conftest import exploding, random_motion
+from tests.helpers.drivers import random_motion
+from tests.helpers.hostile import exploding
 
 HORIZON, STEPS = 12, 100
 RECORD: tuple[Signal, ...] = (*STATE, "sensors")

@@ -22,7 +22,7 @@ from selfmodel.simulation.trial_replay import replay
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import SIGNALS, Behaviour
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.conftest import random_controllers, random_cpgs, random_of
+from tests.helpers.drivers import random_controllers, random_cpgs, random_of
 
 STEPS = 1000
 

@@ -8,15 +8,21 @@ import typer
 from selfmodel.cli import inputs
 from selfmodel.cli.options import (
     CONTROLLER,
+    DEFAULT_KINDS,
     STUDY,
     Cases,
     ComparatorName,
     ControllerKind,
     FirstSeed,
+    GapLevel,
     Generations,
     Json,
+    KindNames,
+    Neurons,
+    Only,
     Population,
     Seeds,
+    Structural,
     StudyFolder,
     Trials,
     Workers,
@@ -61,6 +67,9 @@ def run(
     cases: Cases = "all",
     seeds: Seeds = 1,
     seed: FirstSeed = 0,
+    only: Only = "1/1",
+    gap: GapLevel = 0.0,
+    structure: Structural = False,
     score: Annotated[
         str,
         typer.Option(
@@ -70,7 +79,9 @@ def run(
         ),
     ] = "displacement",
     controller: ControllerKind = "network",
+    neurons: Neurons = None,
     comparator: ComparatorName = DEFAULT.name,
+    kinds: KindNames = DEFAULT_KINDS,
     steps: Annotated[
         int | None,
         typer.Option(
@@ -106,9 +117,17 @@ def run(
         score=score,
         controller=controller,
         comparator=comparator,
+        kinds=kinds,
+        gap=gap,
+        structure=structure,
+        neurons=neurons,
     )
+    share = inputs.share("--only", only)
     failed = grid_display.run_shown(
-        lambda on_event: run_study(study, workers=thread_count(workers), on_event=on_event), out
+        lambda on_event: run_study(
+            study, workers=thread_count(workers), on_event=on_event, only=share
+        ),
+        out,
     )
     results = write_results(out)
     if as_json:

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from selfmodel import __version__
 from selfmodel.controllers.controller import Controller
 from selfmodel.experiments import robots, trial_logs
 from selfmodel.experiments.ablation.plan import Ablation, Cell, model_digest
@@ -19,6 +18,7 @@ from selfmodel.recovery.random_streams import repair_stream
 from selfmodel.recovery.repair import RepairSearch
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.version import __version__
 
 OF_DIAGNOSIS = ("trials", "genes", "kept")
 """Settings that no gait depends on."""

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from selfmodel import __version__
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.experiments import plugins, robots
 from selfmodel.experiments.grid import Job, check_shared
@@ -20,6 +19,7 @@ from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS, notation_kinds
 from selfmodel.physical.reality_gap import MAX_GAP_LEVEL
 from selfmodel.settings import Settings
+from selfmodel.version import __version__
 
 NEXT_TRIAL = ("bank", "repair", "disagreement")
 """How the controllers of the trials are chosen: gaits from the bank, the same for every comparator;

@@ -1,4 +1,4 @@
-"""Promises of ``selfmodel render``: pictures of a trial from its log, on any machine."""
+"""``selfmodel render``: pictures of a trial from its log, on any machine."""
 
 import json
 import os
@@ -31,8 +31,8 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import SIGNALS, Behaviour
 from selfmodel.trials.trial import TrialPlan
-from tests.conftest import random_controllers
 from tests.helpers.command import selfmodel, selfmodel_process
+from tests.helpers.drivers import random_controllers
 from tests.helpers.opengl import WORKS, draws
 
 STEPS = 31
@@ -81,6 +81,7 @@ def test_a_strip_is_drawn_whatever_there_is_of_opengl(folder: Path, tmp_path: Pa
     assert [p.name for p in tmp_path.iterdir()] == ["strip.png"]
 
 
+@pytest.mark.opengl
 @draws
 @pytest.mark.process
 @pytest.mark.opengl
@@ -157,6 +158,7 @@ def test_what_cannot_be_drawn_is_refused_in_a_sentence(
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.opengl
 def test_the_best_of_a_diagnosis_is_drawn(folder: Path, tmp_path: Path):
     (tmp_path / "result.json").write_text(
         json.dumps({"diagnosis": [{"hypothesis": DAMAGE}, {"hypothesis": "intact"}]})
@@ -191,7 +193,7 @@ def test_a_diagnosis_is_read_or_refused(text: str, best: str | None, tmp_path: P
 def test_what_is_lost_is_dotted_and_what_is_jammed_red(robot: Robot):
     broken, jammed = robot.anatomy.joints[0], robot.anatomy.joints[-2]
     drawn = film(robot, f"break:{broken.name}+jam:{jammed.name}=0.1")
-    names = {robot.model.body(body).name for body in drawn.lost}
+    names = {robot.model.body(body).name for body in drawn.detached}
     axes = Figure().add_subplot()
     lines = lines_of(drawn, _standing(drawn), np.zeros(3), plane_of(drawn))
     draw(axes, drawn, lines, held=False)

@@ -26,7 +26,7 @@ from selfmodel.tasks.walking import motion_capture
 from selfmodel.trials.behaviour import SIGNALS, Behaviour, collect
 from selfmodel.trials.state_estimation import estimated_states
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.conftest import random_motion
+from tests.helpers.drivers import random_motion
 
 QUADRUPED = ROBOTS["quadruped"].robot()
 NAMES = QUADRUPED.anatomy.names

@@ -23,8 +23,8 @@ from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import SIGNALS, Behaviour, collect
 from selfmodel.trials.signal_scales import MEASUREMENT_FULL_SCALES
 from selfmodel.trials.trial import TrialPlan
-from tests.conftest import random_controllers, random_motion
 from tests.helpers.command import SMALL, selfmodel
+from tests.helpers.drivers import random_controllers, random_motion
 
 STEPS = 60
 
@@ -217,6 +217,7 @@ def test_the_log_hides_the_gap_where_only_scoring_looks(quadruped: Robot, tmp_pa
         assert "delay" not in repr(log)
 
 
+@pytest.mark.process
 def test_a_trial_across_a_gap_from_the_command_line(tmp_path: Path):
     def trial(name: str, *options: str) -> dict:
         done = selfmodel(
@@ -258,6 +259,7 @@ def test_a_level_out_of_range_is_refused_by_the_command_line(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.search
 def test_a_recovery_across_a_gap_is_of_one_robot_whose_trials_all_differ(tmp_path: Path):
     done = selfmodel(
         "recover", "quadruped", "--damage", "intact", *SMALL, "--trials", "1", "--gap", "0.1",
