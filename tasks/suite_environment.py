@@ -20,7 +20,7 @@ from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.mjcf.mujoco_errors import told_by_mujoco
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
-from selfmodel.robot.state_access import present, signal_fields, writer
+from selfmodel.robot.state_access import current_value, signal_fields, state_writer
 from selfmodel.simulation.activations import activations_of
 from selfmodel.trials.behaviour import SIGNALS, Behaviour, Sample, Signal
 
@@ -102,7 +102,7 @@ class _Stepped:
         seen: OrderedDict[str, FloatArray | float] = OrderedDict(sensors=readings[0])
         for signal in SIGNALS:
             if signal not in ("sensors", "commands"):
-                seen[signal] = present(self._places[signal], data)
+                seen[signal] = current_value(self._places[signal], data)
         seen["time"] = physics.time()
         return seen
 
@@ -147,7 +147,7 @@ def _sum(robot: Robot, physics: Any, task: Any, behaviour: Behaviour, run: int) 
     model, data, commands = physics.model, physics.data, behaviour["commands"][run]
     fields = {"qpos": np.zeros((len(commands), model.nq))}
     fields["qvel"] = np.zeros((len(commands), model.nv))
-    writer(robot, fields.__getitem__)({signal: behaviour[signal][run] for signal in STATE})
+    state_writer(robot, fields.__getitem__)({signal: behaviour[signal][run] for signal in STATE})
     activations = activations_of(robot, commands)
     total = 0.0
     for k in range(1, len(commands)):

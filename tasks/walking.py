@@ -17,7 +17,7 @@ from selfmodel.faults.notation import parse
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
-from selfmodel.robot.state_access import present, signal_fields
+from selfmodel.robot.state_access import current_value, signal_fields
 from selfmodel.trials.behaviour import Signal
 
 
@@ -131,7 +131,7 @@ class Walk(base.Task):
 
     def observe(self, physics: mujoco.Physics, signal: Signal) -> FloatArray:
         """Returns a signal of the physics' state, ``(width,)``."""
-        return present(self._places[signal], physics.data)
+        return current_value(self._places[signal], physics.data)
 
     def _forward(self, physics: mujoco.Physics) -> float:
         """Where the root body is along the world's x axis, m."""

@@ -6,7 +6,7 @@ import numpy as np
 from selfmodel.physical.measurement_noise import turned
 from selfmodel.robot.embodiment import WELD_ARMATURE
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state_access import fields_of, present, signal_fields, writer
+from selfmodel.robot.state_access import bind_data, current_value, signal_fields, state_writer
 
 ANGLES = 0.2
 """Standard deviation of the joint angles at the start, rad, at a level of 1."""
@@ -30,7 +30,7 @@ def randomize_initial_pose(
         level: The gap's.
         rng: Where the pose is drawn from.
     """
-    where, write = signal_fields(robot, model), writer(robot, fields_of(data), model)
+    where, write = signal_fields(robot, model), state_writer(robot, bind_data(data), model)
     deepest = _depth(robot, model, data)
     angles = level * ANGLES * rng.standard_normal(len(robot.anatomy.hinges))
     for name, angle in zip(robot.anatomy.hinges, angles, strict=True):
@@ -40,11 +40,11 @@ def randomize_initial_pose(
         moved = data.qpos[hinge.qposadr[0]] + angle
         data.qpos[hinge.qposadr[0]] = np.clip(moved, *hinge.range) if hinge.limited[0] else moved
     tilt = np.append(level * TILT * rng.standard_normal(2), 0.0)
-    base = turned(present(where["base_orientation"], data), tilt)
+    base = turned(current_value(where["base_orientation"], data), tilt)
     write({"base_orientation": base[np.newaxis]})
     # Contact forces start within the skin: no deeper than in the reference pose, nothing kicks.
     lift = [0.0, 0.0, max(0.0, _depth(robot, model, data) - deepest)]
-    write({"base_position": (present(where["base_position"], data) + lift)[np.newaxis]})
+    write({"base_position": (current_value(where["base_position"], data) + lift)[np.newaxis]})
 
 
 def _depth(robot: Robot, model: mujoco.MjModel, data: mujoco.MjData) -> float:

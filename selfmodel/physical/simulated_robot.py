@@ -20,7 +20,7 @@ from selfmodel.physical.structural_mismatch import Structure, add_structure
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
-from selfmodel.robot.state_access import fields_of, signal_fields
+from selfmodel.robot.state_access import bind_data, signal_fields
 from selfmodel.trials.behaviour import SIGNALS, Sample
 
 OWN_SEED = 1
@@ -108,7 +108,7 @@ class SimulatedRobot:
         underway = deque(np.zeros((delay, model.nu)))
         # What is logged as commanded is what the controller said, not what the motors have got.
         where = signal_fields(robot, model)
-        live = {signal: place.reader(fields_of(data)) for signal, place in where.items()}
+        live = {signal: place.reader(bind_data(data)) for signal, place in where.items()}
         live |= {"sensors": lambda: brain.readings, "commands": lambda: commands}
         for k in range(steps):
             senses.read(data.sensordata[np.newaxis], data.qpos[np.newaxis], brain.readings)

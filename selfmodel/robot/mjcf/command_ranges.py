@@ -3,7 +3,7 @@
 import mujoco
 
 from selfmodel.errors import InputError
-from selfmodel.robot.actuator_ranges import command_ranges, says_its_range
+from selfmodel.robot.actuator_ranges import command_ranges, has_command_range
 from selfmodel.robot.mjcf.document import Document
 from selfmodel.robot.mjcf.mujoco_errors import compiled
 from selfmodel.robot.mjcf.settings import MjcfSettings
@@ -23,7 +23,7 @@ def add_command_ranges(document: Document, model: mujoco.MjModel, settings: Mjcf
     if settings.ctrlrange is not None:
         ends = f"{settings.ctrlrange[0]!r} {settings.ctrlrange[1]!r}"
         for motor, element in enumerate(document.children("actuator")):
-            if not says_its_range(model, motor):
+            if not has_command_range(model, motor):
                 element.set("ctrlrange", ends)
                 element.set("ctrllimited", "true")
     try:

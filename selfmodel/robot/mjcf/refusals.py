@@ -5,7 +5,7 @@ import numpy as np
 
 from selfmodel.errors import InputError
 from selfmodel.robot.anatomy_reader import driven_joints
-from selfmodel.robot.floating_base import find_root, joints_of
+from selfmodel.robot.floating_base import find_root_body, joints_of_body
 from selfmodel.robot.mjcf.mujoco_errors import told_by_mujoco
 from selfmodel.robot.model_checks import check_model
 from selfmodel.robot.transmission import motor_joints
@@ -38,7 +38,7 @@ def refuse_unusable(model: mujoco.MjModel) -> None:
             "its limbs motors in <actuator>"
         )
     try:
-        root = find_root(model, driven)
+        root = find_root_body(model, driven)
         check_model(model, root)
     except ValueError as error:
         raise InputError(str(error)) from error
@@ -63,7 +63,7 @@ def _refuse_trees(model: mujoco.MjModel) -> None:
 
 
 def _refuse_driven_root(model: mujoco.MjModel, root: int) -> None:
-    own = joints_of(model, root)
+    own = joints_of_body(model, root)
     for motor in range(model.nu):
         for joint in motor_joints(model, motor).intersection(own):
             raise InputError(
