@@ -79,7 +79,7 @@ def _slacken(model: mujoco.MjModel, tendon: int) -> None:
 
 
 def _disable_pairs(model: mujoco.MjModel, body: int) -> None:
-    """Disables the explicit contact pairs of a body: contype and conaffinity do not apply to them."""
+    """Disables the explicit contact pairs of a body, which contype does not affect."""
     for geoms in (model.pair_geom1, model.pair_geom2):
         pairs = model.geom_bodyid[geoms] == body
         model.pair_margin[pairs] = NO_CONTACT_MARGIN

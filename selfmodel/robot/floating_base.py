@@ -120,8 +120,8 @@ def find_root_body(model: mujoco.MjModel, driven: frozenset[int]) -> int:
         )
     if not floating:
         raise ValueError(
-            "expected a root body with a free joint, or with slide joints and then at most one "
-            "hinge that no motor moves, got none (its base is fixed): give the root body a "
+            "the model needs a root body with a free joint, or with slide joints and then at most "
+            "one hinge that no motor moves, and has none (its base is fixed): give the root body a "
             "<freejoint/>"
         )
     return floating[0]
