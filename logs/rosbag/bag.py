@@ -1,4 +1,4 @@
-"""A bag in any of its forms: a folder, one file, split files, packed or not."""
+"""Opens a bag of any form: a folder, one file or split files, compressed or not."""
 
 import hashlib
 import re
@@ -32,10 +32,10 @@ class Topic:
     """A topic of a bag.
 
     Attributes:
-        name: Such as ``/joint_states``.
-        type: Such as ``sensor_msgs/msg/JointState``; "" if the bag does not say.
-        encoding: ``cdr``, or what cannot be read.
-        count: How many messages it has.
+        name: Name of the topic, such as ``/joint_states``.
+        type: Message type, such as ``sensor_msgs/msg/JointState``; "" if the bag has none.
+        encoding: Encoding of the messages; only ``cdr`` can be read.
+        count: Number of messages.
     """
 
     name: str
@@ -46,11 +46,11 @@ class Topic:
 
 @dataclass(frozen=True)
 class Source:
-    """A file of a bag, as it was found.
+    """A file of a bag.
 
     Attributes:
-        name: Its name within the bag.
-        sha256: Of its bytes, in hexadecimal: recorders write no checksums of their own.
+        name: File name.
+        sha256: Hexadecimal SHA-256 of the file; recorders write no checksums.
     """
 
     name: str
@@ -59,13 +59,13 @@ class Source:
 
 @dataclass(frozen=True)
 class Bag:
-    """A recording whose files have all been read once, and are whole.
+    """A recording whose files have been read once and are complete.
 
     Attributes:
-        path: As the user gave it.
-        topics: By name.
-        sources: Its files, in order.
-        files: Where they can be read: unpacked, where they were packed.
+        path: Path of the bag, as given by the user.
+        topics: Topics by name.
+        sources: Files of the bag, in order.
+        files: Path of the decompressed file, and path of the file itself, of each source.
     """
 
     path: Path
@@ -76,34 +76,39 @@ class Bag:
     def messages(self, wanted: Collection[str]) -> Iterator[tuple[str, int, bytes]]:
         """Yields topic, log time in ns and bytes of each message on some topics, file by file.
 
-        Nothing is decoded, so topics that nobody asks for may hold anything.
+        Messages are not decoded, so other topics may have any type.
+
+        Args:
+            wanted: Names of the topics.
 
         Raises:
-            LogError: A file has been damaged meanwhile, or a message cannot be unpacked.
+            LogError: A file has been damaged since it was opened, or a message cannot be
+                decompressed.
         """
         for file, name in self.files:
             for item in _read(file, name):
                 if isinstance(item, Stored) and item.topic in wanted:
-                    yield item.topic, item.time, _unpacked(item, name)
+                    yield item.topic, item.time, _decompressed(item, name)
 
 
 @contextmanager
 def open_bag(path: Path) -> Iterator[Bag]:
-    """Gives a bag; what had to be unpacked is removed at the end.
+    """Opens a bag; decompressed files are removed at the end.
 
     Args:
-        path: The folder of a bag, with its ``metadata.yaml`` or without, or one of its files.
+        path: Folder of the bag, with or without a ``metadata.yaml``, or one of its files.
 
     Raises:
         LogError: A file is damaged, missing, or no recording.
-        InputError: There is no such bag, or it cannot be read.
+        InputError: The bag does not exist or cannot be read.
     """
-    with TemporaryDirectory(prefix="selfmodel-") as folder, _explained(path):
+    with TemporaryDirectory(prefix="selfmodel-") as folder, _read_errors_as_input_errors(path):
         names = _files(path)
         if not names:
             raise InputError(f"{path}: expected a bag, got a folder without one: {EXPECTED}")
         files = [
-            (_ready(name, Path(folder) / str(number)), name) for number, name in enumerate(names)
+            (_decompressed_file(name, Path(folder) / str(number)), name)
+            for number, name in enumerate(names)
         ]
         yield Bag(
             path,
@@ -114,7 +119,8 @@ def open_bag(path: Path) -> Iterator[Bag]:
 
 
 @contextmanager
-def _explained(path: Path) -> Iterator[None]:
+def _read_errors_as_input_errors(path: Path) -> Iterator[None]:
+    """Converts an ``OSError`` of a file within the bag to ``InputError``."""
     try:
         yield
     except OSError as failure:
@@ -130,7 +136,7 @@ def _within(filename: object, path: Path) -> bool:
 
 
 def _files(path: Path) -> list[Path]:
-    """The storage files of a bag, in order."""
+    """Returns the storage files of a bag, in order."""
     if not path.is_dir():
         check_regular(path, "a bag")
         return [path]
@@ -151,14 +157,14 @@ _STORAGE = re.compile(r"\.(mcap|db3)(\.zstd)?$")
 
 
 def _natural(path: Path) -> list[tuple[int, str]]:
-    """Sorts ``bag_2`` before ``bag_10``."""
+    """Returns a sort key with numbers by value: ``bag_2`` before ``bag_10``."""
     return [(int(part) if part.isdecimal() else 0, part) for part in re.split(r"(\d+)", path.name)]
 
 
 def _listed(path: Path) -> list[str]:
-    """The files that ``metadata.yaml`` lists; of older versions, with the folder before them."""
+    """Returns the file names in ``metadata.yaml``, without the folders of older versions."""
     try:
-        # The base loader makes everything a text, so no value can fail to be what it claims.
+        # The base loader returns all scalars as text, so no value fails to convert.
         data: Any = YAML(typ="base", pure=True).load(read_bounded(path, METADATA, 2**20))
         listed = data["rosbag2_bagfile_information"]["relative_file_paths"]
     except (YAMLError, ValueError, KeyError, TypeError, RecursionError) as failure:
@@ -171,26 +177,26 @@ def _listed(path: Path) -> list[str]:
     return [PurePath(name).name for name in listed]
 
 
-def _ready(name: Path, place: Path) -> Path:
-    """Returns a file that can be read: itself, or what it holds, unpacked to ``place``."""
-    if not _begins(name, ZSTD_MAGIC):
+def _decompressed_file(name: Path, target: Path) -> Path:
+    """Returns the file itself, or ``target`` with its decompressed content."""
+    if not _begins_with(name, ZSTD_MAGIC):
         return name
     try:
-        unzstd_file(name, place)
+        unzstd_file(name, target)
     except (BombError, zstandard.ZstdError) as failure:
         raise CorruptError(name, f"it cannot be unpacked: {failure}", advice=AGAIN) from failure
-    return place
+    return target
 
 
-def _begins(path: Path, magic: bytes) -> bool:
+def _begins_with(path: Path, magic: bytes) -> bool:
     with path.open("rb") as file:
         return file.read(len(magic)) == magic
 
 
 def _read(file: Path, name: Path) -> Iterator[Announced | Stored]:
-    if _begins(file, SQLITE_MAGIC):
+    if _begins_with(file, SQLITE_MAGIC):
         return read_sqlite(file, name)
-    if _begins(file, MAGIC):
+    if _begins_with(file, MAGIC):
         return read_mcap(file, name)
     raise NotMcapError(name, "this is no rosbag2 recording", advice=EXPECTED)
 
@@ -201,13 +207,13 @@ def _topics(files: list[tuple[Path, Path]]) -> dict[str, Topic]:
     for file, name in files:
         for item in _read(file, name):
             if isinstance(item, Announced):
-                kinds.setdefault(item.topic, {})[_full(item.type), item.encoding] = None
+                kinds.setdefault(item.topic, {})[_full_type(item.type), item.encoding] = None
             else:
                 counts[item.topic] = counts.get(item.topic, 0) + 1
     return {
         topic: Topic(
             topic,
-            # A topic of two types fits no role, and says why.
+            # A topic of several types fits no role; error messages list them.
             " and ".join(dict.fromkeys(kind for kind, _ in found)),
             " and ".join(dict.fromkeys(encoding for _, encoding in found)),
             counts.get(topic, 0),
@@ -216,13 +222,13 @@ def _topics(files: list[tuple[Path, Path]]) -> dict[str, Topic]:
     }
 
 
-def _full(kind: str) -> str:
-    """Old recordings leave out the middle of ``sensor_msgs/msg/JointState``."""
+def _full_type(kind: str) -> str:
+    """Returns ``sensor_msgs/msg/JointState`` for ``sensor_msgs/JointState`` of old recordings."""
     package, slash, name = kind.partition("/")
     return f"{package}/msg/{name}" if slash and "/" not in name else kind
 
 
-def _unpacked(item: Stored, name: Path) -> bytes:
+def _decompressed(item: Stored, name: Path) -> bytes:
     if not item.payload.startswith(ZSTD_MAGIC):
         return item.payload
     try:

@@ -1,4 +1,4 @@
-"""A mapping held against robot and bag: complaints name its line, and what there is instead."""
+"""Checks of a mapping against a robot and a bag; errors have the line and the valid names."""
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
@@ -26,36 +26,36 @@ TYPES: Mapping[RoleKind, tuple[str, ...]] = MappingProxyType(
         "touch": (WRENCH, *NUMBERS, ARRAY),
     }
 )
-"""The types of message that can play each role."""
+"""Message types that each role accepts."""
 
 
 def check_names(
     mapping: BagMapping, hinges: Sequence[str], motors: Sequence[str], touches: Sequence[str]
 ) -> None:
-    """Checks that a mapping names the parts of the robot, and none else.
+    """Checks that a mapping lists all hinges and motors of a robot, and no unknown parts.
 
     Args:
-        mapping: What to check.
-        hinges: The robot's hinges: each must be mapped.
-        motors: Its motors: each must be mapped.
-        touches: Its touch sensors: each may be.
+        mapping: The mapping.
+        hinges: Hinges of the robot, all required.
+        motors: Motors of the robot, all required.
+        touches: Touch sensors of the robot, all optional.
 
     Raises:
-        InputError: It names a part that there is not, or leaves out one.
+        InputError: A part in the mapping is unknown, or a required part is missing.
     """
     document = mapping.document
-    for angles, what, known in (
+    for angles, kind, known in (
         (mapping.joints, "hinge", hinges),
         (mapping.commands, "motor", motors),
     ):
         path = (angles.role, "names")
         for name in angles.links:
             if name not in known:
-                raise document.unknown((*path, name), f"{what} of the robot", name, known)
+                raise document.unknown((*path, name), f"{kind} of the robot", name, known)
         if missing := [name for name in known if name not in angles.links]:
             raise document.error(
                 path,
-                f"[{'.'.join(path)}] must list every {what} of the robot, and lacks "
+                f"[{'.'.join(path)}] must list every {kind} of the robot, and lacks "
                 f"{', '.join(missing)}: add a line for each",
             )
     for name in mapping.touch:
@@ -64,15 +64,15 @@ def check_names(
 
 
 def fitting(bag: Bag, kind: RoleKind) -> list[str]:
-    """Returns the topics of a bag that can play a role."""
+    """Returns the names of the topics of a bag whose type a role accepts."""
     return [topic.name for topic in bag.topics.values() if topic.type in TYPES[kind]]
 
 
 def check_topics(mapping: BagMapping, bag: Bag) -> None:
-    """Checks that each topic of a mapping is there, of a type that fits, and has messages.
+    """Checks that each topic of a mapping exists, has an accepted type, and has messages.
 
     Raises:
-        InputError: It does not hold.
+        InputError: A topic fails a check.
     """
     for role in mapping.roles:
         path, known = (*role.path, "topic"), fitting(bag, role.kind)
@@ -92,11 +92,11 @@ def check_topics(mapping: BagMapping, bag: Bag) -> None:
             raise mapping.document.error(
                 path, f"expected messages on {topic.name}, got none: name another topic"
             )
-        _check_columns_are_named(mapping, role, topic.type)
+        _check_column_names(mapping, role, topic.type)
 
 
-def _check_columns_are_named(mapping: BagMapping, role: Role, kind: str) -> None:
-    """A Float64MultiArray has numbers without names; other types have no use for an order."""
+def _check_column_names(mapping: BagMapping, role: Role, kind: str) -> None:
+    """Checks that ``order`` or ``index`` is given for Float64MultiArray, and for no other type."""
     if role.kind == "commands":
         key, given = "order", bool(mapping.commands.order)
     elif role.kind == "touch":
@@ -107,7 +107,7 @@ def _check_columns_are_named(mapping: BagMapping, role: Role, kind: str) -> None
         raise mapping.document.error(
             role.path,
             f"{role.topic} has numbers without names ({ARRAY}): add {key} to [{role.name}], to "
-            f"say which is which",
+            f"name them",
         )
     if kind != ARRAY and given:
         raise mapping.document.error(
@@ -117,10 +117,10 @@ def _check_columns_are_named(mapping: BagMapping, role: Role, kind: str) -> None
 
 
 def check_columns(mapping: BagMapping, series: Mapping[str, Series]) -> None:
-    """Checks that each name of a mapping is told of on its topic.
+    """Checks that the messages of each topic contain the names of the mapping.
 
     Raises:
-        InputError: It is not.
+        InputError: A name is missing in the messages.
     """
     order = mapping.commands.order
     width = len(series[mapping.commands.topic].columns)

@@ -1,4 +1,4 @@
-"""When each message was measured: by its own stamp, or else by when it was received."""
+"""Measurement times of messages: their header stamps, or else their log times."""
 
 from dataclasses import dataclass
 
@@ -7,11 +7,11 @@ import numpy as np
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.logs.rosbag.series import Column, IntArray, Series
 
-APART = 60.0
-"""Seconds: stamps further than that from the log times are of another clock."""
+MAX_LATENCY = 60.0
+"""Largest difference between stamps and log times of the same clock, s."""
 
-BEYOND = 1e12
-"""No measurement of a robot is larger than this, in any unit; and its square is still finite."""
+MAX_MEASUREMENT = 1e12
+"""Largest valid measurement, in any unit; its square is finite."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,10 +19,10 @@ class Clocked:
     """The times of a topic's messages.
 
     Attributes:
-        times: ``(n,)`` ns.
-        usable: ``(n,)``: False for a single stamp that is far from all others.
-        fallbacks: For how many messages the log time stands in for a stamp.
-        latency: ``(k,)`` s, from stamp to log, of the messages that have a usable stamp.
+        times: Measurement times, ``(n,)`` ns.
+        usable: Whether the time is valid, ``(n,)``; False for stamps far from their log time.
+        fallbacks: Number of messages without a stamp, whose log time is used.
+        latency: Log time minus stamp of the messages with a valid stamp, ``(k,)`` s.
     """
 
     times: IntArray
@@ -32,16 +32,16 @@ class Clocked:
 
 
 class ClocksApartError(ValueError):
-    """The stamps of a topic and its log times are of different clocks."""
+    """The stamps and the log times of a topic are from different clocks."""
 
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """What is known of one thing over time.
+    """Samples of one quantity over time.
 
     Attributes:
-        times: ``(m,)`` ns, strictly increasing.
-        values: ``(m, width)``, finite.
+        times: Times, ``(m,)`` ns, strictly increasing.
+        values: Values, ``(m, width)``, finite.
     """
 
     times: IntArray
@@ -53,45 +53,46 @@ def clocked(series: Series, clock: str) -> Clocked:
 
     Args:
         series: The messages.
-        clock: ``header``: by stamps, where there are any; ``log``: by log times alone.
+        clock: ``header`` for stamps, with log times for messages without one; ``log`` for log
+            times only.
 
     Raises:
-        ClocksApartError: Stamps and log times differ by more than ``APART``.
+        ClocksApartError: Stamps and log times differ by more than ``MAX_LATENCY``.
     """
     stamped = series.stamps > 0
     latency = (series.logged - series.stamps)[stamped] / 1e9
     everything = np.ones(len(stamped), dtype=bool)
-    apart = float(np.median(latency)) if len(latency) else 0.0
+    difference = float(np.median(latency)) if len(latency) else 0.0
     if clock == "log":
-        told = latency if abs(apart) <= APART else latency[:0]
-        return Clocked(series.logged, everything, 0, told)
-    if abs(apart) > APART:
+        valid = latency if abs(difference) <= MAX_LATENCY else latency[:0]
+        return Clocked(series.logged, everything, 0, valid)
+    if abs(difference) > MAX_LATENCY:
         raise ClocksApartError(
             f"the stamps on {series.topic.name} and the times at which it was recorded are "
-            f"{abs(apart):.0f} s apart (median), so they are of different clocks"
+            f"{abs(difference):.0f} s apart (median), so they are of different clocks"
         )
     usable = everything.copy()
-    usable[stamped] = np.abs(latency) <= APART
+    usable[stamped] = np.abs(latency) <= MAX_LATENCY
     return Clocked(
         times=np.where(stamped, series.stamps, series.logged),
         usable=usable,
         fallbacks=int(np.sum(~stamped)),
-        latency=latency[np.abs(latency) <= APART],
+        latency=latency[np.abs(latency) <= MAX_LATENCY],
     )
 
 
 def track(clock: Clocked, column: Column, wanted: slice) -> Track:
-    """Returns some of a column's numbers over time: sorted, each time once, all of them known.
+    """Returns the track of some numbers of a column: sorted, with unique times and valid values.
 
-    What is NaN, infinite or ``BEYOND`` is not known.
+    Values that are not finite, or above ``MAX_MEASUREMENT``, are dropped.
 
     Args:
         clock: The times of the topic.
-        column: What the topic says.
-        wanted: Which of the numbers.
+        column: The column of the topic.
+        wanted: Columns of the numbers.
     """
     times, values = clock.times[column.index], column.values[:, wanted]
-    known = clock.usable[column.index] & (np.abs(values) <= BEYOND).all(axis=1)
-    # unique() keeps the first of equal times, in the order of the recording.
-    times, first = np.unique(times[known], return_index=True)
-    return Track(times, values[known][first])
+    valid = clock.usable[column.index] & (np.abs(values) <= MAX_MEASUREMENT).all(axis=1)
+    # numpy.unique keeps the first of equal times, in the order of the recording.
+    times, first = np.unique(times[valid], return_index=True)
+    return Track(times, values[valid][first])

@@ -1,4 +1,4 @@
-"""The import of a recording: a bag, a mapping and a robot make a behaviour, and its quality."""
+"""Imports a trial from a bag, given a mapping and a robot."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -32,21 +32,21 @@ from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import SIGNALS, Behaviour, Sample, Signal
 from selfmodel.trials.trial import TrialPlan
 
-LONGEST = 1_000_000
-"""Control steps that an import may have: one wrong stamp must not fill the memory."""
+MAX_STEPS = 1_000_000
+"""Largest number of control steps of an import: one wrong stamp must not fill the memory."""
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """What a bag says of one trial.
+    """A trial that was imported from a bag.
 
     Attributes:
-        behaviour: At the control steps; NaN is what was not observed.
-        qualities: By topic.
-        sources: The files it is from.
-        clock: What the times go by.
-        origin: When the trial starts, ns since 1970.
-        notes: What a user should know, a sentence each.
+        behaviour: Signals at the control steps; values that were not observed are NaN.
+        qualities: Quality of the recording by topic.
+        sources: Files of the bag.
+        clock: Clock of the times, ``header`` or ``log``.
+        origin: Start of the trial, ns since 1970.
+        notes: Remarks on the recording for the user, one sentence each.
     """
 
     behaviour: Behaviour
@@ -58,14 +58,14 @@ class Recording:
 
     @property
     def valid(self) -> dict[str, float]:
-        """The share of each signal that was observed."""
+        """Fraction of observed values per signal."""
         return {
             signal: float(np.mean(np.isfinite(values)))
             for signal, values in self.behaviour.signals.items()
         }
 
     def facts(self) -> dict[str, str]:
-        """Returns what the log says of its origin; lists and records are JSON."""
+        """Returns the metadata of the import for the log, as text; lists and records are JSON."""
         topics = {topic: found.facts() for topic, found in self.qualities.items()}
         sources = {source.name: source.sha256 for source in self.sources}
         return {
@@ -79,16 +79,16 @@ class Recording:
 
 
 def import_bag(path: Path, mapping: BagMapping, robot: Robot) -> Recording:
-    """Returns what a bag says of one trial of a robot.
+    """Returns the trial of a robot in a bag.
 
     Args:
-        path: The bag: a folder or a file.
-        mapping: Which topic plays which role.
-        robot: The one that the mapping names.
+        path: The bag, a folder or a file.
+        mapping: Mapping from the robot's parts to topics.
+        robot: The robot that the mapping names.
 
     Raises:
         LogError: The bag is damaged.
-        InputError: The bag cannot be read, or the mapping fits it or the robot not.
+        InputError: The bag cannot be read, or the mapping does not fit the bag or the robot.
     """
     anatomy = robot.anatomy
     touches = [sensor.name for sensor in anatomy.sensors if sensor.kind == "touch"]
@@ -122,11 +122,11 @@ def write_recording(
     """Writes a recording as a trial's log.
 
     Args:
-        path: The log's name; it must not exist.
-        robot: The robot as its model describes it.
-        recording: What the bag says.
-        mapping: How it was read; the log keeps its text.
-        controller: What drove the robot; without it, the recorded commands are what drives.
+        path: Path of the log, which must not exist.
+        robot: The robot.
+        recording: The imported trial.
+        mapping: Mapping of the import, whose text is written into the log.
+        controller: Controller of the robot; None for a playback of the recorded commands.
 
     Raises:
         InputError: The file exists, or the controller does not fit the robot.
@@ -157,16 +157,16 @@ def _clocks(mapping: BagMapping, series: Mapping[str, Series]) -> dict[str, Cloc
 
 
 def _steps(mapping: BagMapping, tracks: Tracks, timestep: float) -> Steps:
-    """The control steps at which every role has data."""
+    """Returns the control steps at which every role has data."""
     needed = required(mapping, tracks)
     for role, part, track in needed:
         if not len(track.times):
             raise mapping.document.error(
                 (*role.path, "topic"),
-                f"{role.topic} says nothing that is a number about {part}: name another topic",
+                f"{role.topic} has no finite numbers for {part}: name another topic",
             )
     first = max(int(track.times[0]) for _, _, track in needed)
-    # The last command stands, so commands end no trial.
+    # The last command is held, so commands do not end a trial.
     last = min(int(track.times[-1]) for role, _, track in needed if role.kind != "commands")
     origin = first + round(mapping.start * 1e9)
     period = timestep * 1e9
@@ -179,9 +179,9 @@ def _steps(mapping: BagMapping, tracks: Tracks, timestep: float) -> Steps:
             f"{mapping.start:g} s after that begins and {max(asked, 2)} steps of {timestep:g} s: "
             f"ask for less, or leave out the role that has the least data",
         )
-    if not 2 <= asked <= LONGEST:
+    if not 2 <= asked <= MAX_STEPS:
         raise mapping.document.error(
-            ("duration",), f"a trial has 2 to {LONGEST} steps, got {asked}: set another duration"
+            ("duration",), f"a trial has 2 to {MAX_STEPS} steps, got {asked}: set another duration"
         )
     return Steps(origin, np.rint(np.arange(asked) * period).astype(np.int64))
 

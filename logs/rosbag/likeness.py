@@ -1,4 +1,4 @@
-"""Which joint of a bag is meant by which of the model, when two people have named them."""
+"""Matches the names of a bag with the names of a model by similarity."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -6,16 +6,16 @@ from dataclasses import dataclass
 from difflib import SequenceMatcher
 from types import MappingProxyType
 
-SURE = 0.75
-"""Names that are so alike, of at most 1, mean the same, if no other comes near."""
+CERTAIN_SIMILARITY = 0.75
+"""Least similarity, from 0 to 1, of a certain match."""
 
-ALIKE = 0.3
-"""Names less alike than this are not even a guess."""
+MIN_SIMILARITY = 0.3
+"""Least similarity of a match."""
 
-NEAR = 0.1
-"""A second name that is less than this behind the best makes it a guess."""
+CERTAIN_LEAD = 0.1
+"""Least lead in similarity over the second-best name of a certain match."""
 
-_WORDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+_SYNONYMS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         **dict.fromkeys(("fl", "lf"), ("front", "left")),
         **dict.fromkeys(("fr", "rf"), ("front", "right")),
@@ -32,58 +32,61 @@ _WORDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         **dict.fromkeys(("kfe", "calf", "shank", "tibia", "lower"), ("knee",)),
         "haa": ("hip",),
         **dict.fromkeys(("foot", "ft", "contact", "force", "wrench", "sole"), ("touch",)),
-        # What says nothing about which joint it is.
+        # Words that identify no joint.
         **dict.fromkeys(("joint", "motor", "servo", "actuator", "link", "position"), ()),
     }
 )
 
 
 _SIDES = (frozenset({"front", "middle", "back"}), frozenset({"left", "right"}))
-"""Two of one of these are never the same, however alike the rest is."""
+"""Mutually exclusive words: names with different ones never match."""
 
 
 @dataclass(frozen=True)
-class Guess:
-    """A name of the bag for one of the model.
+class NameMatch:
+    """A match of a name of the model.
 
     Attributes:
-        name: Which.
-        sure: Whether it is more than a guess.
+        name: Name in the bag.
+        sure: Whether the match is certain.
     """
 
     name: str
     sure: bool
 
 
-def matched(wanted: Sequence[str], offered: Sequence[str]) -> dict[str, Guess]:
-    """Returns for each wanted name the offered one that is most like it, each used once.
+def matched(wanted: Sequence[str], offered: Sequence[str]) -> dict[str, NameMatch]:
+    """Returns a one-to-one match of names by similarity, the most similar pairs first.
 
-    Order, case and the usual abbreviations do not matter: ``FL_calf_joint`` is much like
+    Word order, case and common abbreviations do not matter: ``FL_calf_joint`` is similar to
     ``front_left_knee``.
 
     Args:
-        wanted: The model's names.
-        offered: The bag's names.
+        wanted: Names of the model.
+        offered: Names in the bag.
 
     Returns:
-        By the wanted name; names that nothing is like are left out.
+        Matches by the model's name; names without a similar one are omitted.
     """
     scores = {(ours, theirs): likeness(ours, theirs) for ours in wanted for theirs in offered}
-    found: dict[str, Guess] = {}
+    found: dict[str, NameMatch] = {}
     used: set[str] = set()
     for (ours, theirs), score in sorted(scores.items(), key=lambda item: -item[1]):
-        if score < ALIKE or ours in found or theirs in used:
+        if score < MIN_SIMILARITY or ours in found or theirs in used:
             continue
-        rivals = [
+        competing = [
             other for pair, other in scores.items() if (pair[0] == ours) != (pair[1] == theirs)
         ]
-        found[ours] = Guess(theirs, score >= SURE and score - max(rivals, default=0.0) >= NEAR)
+        found[ours] = NameMatch(
+            theirs,
+            score >= CERTAIN_SIMILARITY and score - max(competing, default=0.0) >= CERTAIN_LEAD,
+        )
         used.add(theirs)
     return found
 
 
 def likeness(ours: str, theirs: str) -> float:
-    """Returns how alike two names are: 0, nothing in common, to 1, the same words or initials."""
+    """Returns the similarity of two names: 0 without common words, 1 for same words or initials."""
     if "".join(word[0] for word in _parts(ours)) == theirs.lower():
         return 1.0
     first, second = _words(ours), _words(theirs)
@@ -96,9 +99,9 @@ def likeness(ours: str, theirs: str) -> float:
 
 
 def _words(name: str) -> frozenset[str]:
-    return frozenset(word for part in _parts(name) for word in _WORDS.get(part, (part,)))
+    return frozenset(word for part in _parts(name) for word in _SYNONYMS.get(part, (part,)))
 
 
 def _parts(name: str) -> list[str]:
-    """``FLKnee_2`` is ``fl``, ``knee`` and ``2``."""
+    """Returns the parts of a name: ``fl``, ``knee`` and ``2`` of ``FLKnee_2``."""
     return [part.lower() for part in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", name)]

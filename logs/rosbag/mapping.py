@@ -1,4 +1,4 @@
-"""The mapping: which topic of a bag plays which role for which part of a robot."""
+"""Mapping from the parts of a robot to the topics of a bag."""
 
 import math
 from collections.abc import Mapping
@@ -12,10 +12,10 @@ from selfmodel.trials.trial import Stage
 ANGLES: Mapping[str, float] = MappingProxyType({"rad": 1.0, "deg": math.pi / 180})
 LENGTHS: Mapping[str, float] = MappingProxyType({"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0})
 FORCES = ("N", "kN", "raw")
-"""A touch sensor's threshold has the unit of its topic, so none of these needs converting."""
+"""Units of a touch threshold; it has the unit of its topic, so no unit is converted."""
 
 UNKNOWN = "?"
-"""What a suggested mapping has in the place of a name that is still to be filled in."""
+"""Placeholder in a suggested mapping for a name that the user must fill in."""
 
 RoleKind = Literal["joints", "commands", "base", "imu", "touch"]
 
@@ -25,12 +25,12 @@ FRAMES = ("start", "recorded")
 
 @dataclass(frozen=True)
 class Link:
-    """How a part of the model is told of in the bag: its angle = sign x recorded + offset.
+    """Conversion of a recorded angle: angle = sign x recorded + offset.
 
     Attributes:
-        name: What the bag calls it.
+        name: Name of the part in the bag.
         sign: 1 or -1.
-        offset: Radians.
+        offset: Offset, rad.
     """
 
     name: str
@@ -40,14 +40,14 @@ class Link:
 
 @dataclass(frozen=True)
 class Angles:
-    """A topic that tells angles: of the joints, or those that are commanded.
+    """A topic of measured joint angles, or of commanded angles.
 
     Attributes:
         role: ``joints`` or ``commands``.
-        topic: Which.
-        scale: Radians in its unit.
-        links: By the model's hinge or motor.
-        order: Names of the columns of a Float64MultiArray; empty for other types.
+        topic: Name of the topic.
+        scale: Unit of the topic, rad.
+        links: Conversions by the model's hinge or motor.
+        order: Names of the numbers of a Float64MultiArray; empty for other types.
     """
 
     role: Literal["joints", "commands"]
@@ -59,12 +59,13 @@ class Angles:
 
 @dataclass(frozen=True)
 class Base:
-    """The topic that tells where the root body is.
+    """A topic of the pose of the base.
 
     Attributes:
-        topic: Which.
-        frame: ``start``: the trial begins at x = y = 0 heading along +x; or ``recorded``.
-        scale: Metres in its unit.
+        topic: Name of the topic.
+        frame: Frame of the imported pose: ``start``, in which the trial starts at x = y = 0 and
+            heads along +x, or ``recorded``.
+        scale: Unit of the topic, m.
     """
 
     topic: str
@@ -74,12 +75,12 @@ class Base:
 
 @dataclass(frozen=True)
 class Touch:
-    """A topic that tells of one touch sensor.
+    """A topic of one touch sensor.
 
     Attributes:
-        topic: Which.
-        column: Which number of a Float64MultiArray; "" for other types.
-        threshold: The sensor reads 1 above this.
+        topic: Name of the topic.
+        column: Index of the number in a Float64MultiArray, as text; "" for other types.
+        threshold: Upper bound of the values with the reading 0, in the unit of the topic.
     """
 
     topic: str
@@ -89,12 +90,12 @@ class Touch:
 
 @dataclass(frozen=True)
 class Role:
-    """A role that a topic plays.
+    """A role of a topic.
 
     Attributes:
-        kind: Which.
-        path: Its table in the mapping.
-        topic: Who plays it.
+        kind: Kind of the role.
+        path: Keys of its table in the mapping.
+        topic: Name of the topic.
     """
 
     kind: RoleKind
@@ -103,28 +104,28 @@ class Role:
 
     @property
     def name(self) -> str:
-        """What reports call it, such as ``touch.front_left_touch``."""
+        """Name of the role in reports, such as ``touch.front_left_touch``."""
         return ".".join(self.path)
 
 
 @dataclass(frozen=True)
 class BagMapping:
-    """A mapping as it was written, checked against itself.
+    """A mapping of a bag, consistent in itself.
 
     Attributes:
-        document: Its text; complaints name its lines.
-        robot: A robot's name, or an MJCF file.
-        control_timestep: Seconds; given with an MJCF file only.
-        controller: What drove the robot: a file.
-        stage: Where in a story the trial stands: ``before`` where nothing was wrong.
-        clock: ``header`` or ``log``.
-        start: Seconds after the first moment at which every role has data.
-        duration: Seconds; None for as long as every role has data.
-        joints: The hinges.
-        commands: The motors.
-        base: The root body's motion.
-        imu: The topic of an Imu.
-        touch: By the robot's touch sensor.
+        document: Text of the mapping, with the lines of its keys for error messages.
+        robot: Name of a robot, or path of an MJCF file.
+        control_timestep: Control time step, s; given with an MJCF file only.
+        controller: Path of the controller's file; None if the controller is unknown.
+        stage: Stage of the trial, such as ``before`` for a healthy robot.
+        clock: Clock of the times, ``header`` or ``log``.
+        start: Start of the trial after the first time at which every role has data, s.
+        duration: Duration, s; None for as long as every role has data.
+        joints: Topic of the joint angles.
+        commands: Topic of the commands.
+        base: Topic of the base's pose, or None.
+        imu: Name of the Imu topic, or None.
+        touch: Topics by the robot's touch sensor.
     """
 
     document: Document
@@ -143,7 +144,7 @@ class BagMapping:
 
     @property
     def roles(self) -> tuple[Role, ...]:
-        """Every role that a topic plays."""
+        """All roles of the mapping."""
         found = [
             Role("joints", ("joints",), self.joints.topic),
             Role("commands", ("commands",), self.commands.topic),

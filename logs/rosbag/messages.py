@@ -1,4 +1,4 @@
-"""The messages that can play a role, each read into names and rows of numbers."""
+"""Message types that can be imported, each decoded into names and rows of numbers."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -25,16 +25,16 @@ WRENCH = "geometry_msgs/msg/WrenchStamped"
 NUMBERS = ("std_msgs/msg/Float64", "std_msgs/msg/Float32", "std_msgs/msg/Bool")
 
 Rows = tuple[tuple[str, ...], FloatArray]
-"""The names that a message tells of, and a row of numbers for each, ``(names, width)``."""
+"""Names in a message, and a row of numbers per name, ``(names, width)``."""
 
 
 @dataclass(frozen=True)
-class FaultKind:
-    """A type of message that can be read.
+class MessageType:
+    """A message type that can be imported.
 
     Attributes:
-        stamped: Whether it has a header, and so says when it was measured.
-        rows: Reads a decoded one.
+        stamped: Whether messages have a header with the time of measurement.
+        rows: Function from a decoded message to its rows.
     """
 
     stamped: bool
@@ -42,25 +42,25 @@ class FaultKind:
 
 
 class RefusedError(ValueError):
-    """A message contradicts itself; it is counted and left out, and the rest is good."""
+    """A message is inconsistent; the import counts and drops the message."""
 
 
 class UndecodableError(ValueError):
-    """The bytes of a message are not what its type says."""
+    """The bytes of a message do not decode as its type."""
 
 
 def read_message(payload: bytes, kind: str) -> tuple[int, Rows]:
     """Returns the time stamp of a message, ns (0 if it has none), and its rows.
 
     Args:
-        payload: CDR.
-        kind: Its type, one of ``KINDS``.
+        payload: The message in CDR.
+        kind: Message type, one of ``KINDS``.
 
     Raises:
-        RefusedError: It contradicts itself.
-        UndecodableError: It is damaged.
+        RefusedError: The message is inconsistent.
+        UndecodableError: The message is damaged.
     """
-    from rosbags.serde import SerdeError  # noqa: PLC0415 - takes a while
+    from rosbags.serde import SerdeError  # noqa: PLC0415  # slow to import
 
     try:
         message: Any = _types().deserialize_cdr(payload, kind)
@@ -76,8 +76,8 @@ def read_message(payload: bytes, kind: str) -> tuple[int, Rows]:
 
 @cache
 def _types() -> "Typestore":
-    """The standard types. Those in KINDS are alike in every ROS 2, so the bag's are not needed."""
-    from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415 - takes a while
+    """Returns the standard types; those in ``KINDS`` are the same in every ROS 2 distribution."""
+    from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415  # slow to import
 
     return get_typestore(Stores.ROS2_HUMBLE)
 
@@ -131,12 +131,12 @@ def _pose_stamped(message: "ros.geometry_msgs__msg__PoseStamped") -> Rows:
 
 
 def _imu(message: "ros.sensor_msgs__msg__Imu") -> Rows:
-    # REP 145: a first covariance of -1 says that there is no such measurement.
-    known = message.orientation_covariance[0] != -1
-    turning = message.angular_velocity_covariance[0] != -1
+    # REP 145: a first covariance of -1 marks a quantity that is not measured.
+    has_orientation = message.orientation_covariance[0] != -1
+    has_velocity = message.angular_velocity_covariance[0] != -1
     row = [
-        *(_wxyz(message.orientation) if known else [np.nan] * 4),
-        *(_xyz(message.angular_velocity) if turning else [np.nan] * 3),
+        *(_wxyz(message.orientation) if has_orientation else [np.nan] * 4),
+        *(_xyz(message.angular_velocity) if has_velocity else [np.nan] * 3),
     ]
     return ("",), np.array([row])
 
@@ -153,22 +153,22 @@ def _wxyz(quaternion: "ros.geometry_msgs__msg__Quaternion") -> list[float]:
     return [quaternion.w, quaternion.x, quaternion.y, quaternion.z]
 
 
-KINDS: Mapping[str, FaultKind] = MappingProxyType(
+KINDS: Mapping[str, MessageType] = MappingProxyType(
     {
-        JOINT_STATE: FaultKind(stamped=True, rows=_joint_state),
-        TRAJECTORY: FaultKind(stamped=True, rows=_trajectory),
-        ARRAY: FaultKind(stamped=False, rows=_array),
-        ODOMETRY: FaultKind(stamped=True, rows=_odometry),
-        POSE: FaultKind(stamped=True, rows=_pose_stamped),
-        IMU: FaultKind(stamped=True, rows=_imu),
-        WRENCH: FaultKind(stamped=True, rows=_wrench),
-        **dict.fromkeys(NUMBERS, FaultKind(stamped=False, rows=_number)),
+        JOINT_STATE: MessageType(stamped=True, rows=_joint_state),
+        TRAJECTORY: MessageType(stamped=True, rows=_trajectory),
+        ARRAY: MessageType(stamped=False, rows=_array),
+        ODOMETRY: MessageType(stamped=True, rows=_odometry),
+        POSE: MessageType(stamped=True, rows=_pose_stamped),
+        IMU: MessageType(stamped=True, rows=_imu),
+        WRENCH: MessageType(stamped=True, rows=_wrench),
+        **dict.fromkeys(NUMBERS, MessageType(stamped=False, rows=_number)),
     }
 )
-"""Every type that can be read.
+"""Message types that can be imported, by name.
 
-Widths: JointState 3 (position, velocity, effort), those of commands 1, Odometry and PoseStamped 13
-(position, orientation w x y z, linear and angular velocity in the child's frame), Imu 7
-(orientation w x y z, angular velocity), touch 1. What a message does not tell is NaN. The columns
-of a Float64MultiArray are called by their numbers.
+Widths of the rows: JointState 3 (position, velocity, effort), command types 1, Odometry and
+PoseStamped 13 (position, orientation w x y z, linear and angular velocity in the child's frame),
+Imu 7 (orientation w x y z, angular velocity), touch types 1. Quantities that a message does not
+contain are NaN. The names of the numbers of a Float64MultiArray are their indices.
 """

@@ -1,4 +1,4 @@
-"""What a user should know of an import before trusting a diagnosis made from it."""
+"""Remarks on an imported trial that affect the reliability of a diagnosis."""
 
 from collections.abc import Iterator, Mapping
 
@@ -9,17 +9,17 @@ from selfmodel.logs.rosbag.quality import Quality
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Behaviour
 
-APART = 0.1
-"""A joint that starts further than this from the model's start pose is told of, rad."""
+MAX_INITIAL_DIFFERENCE = 0.1
+"""Largest difference of a joint angle from the model's initial pose without a remark, rad."""
 
-LISTED = 5
-"""So many gaps of a topic are told of one by one."""
+MAX_LISTED_GAPS = 5
+"""Largest number of gaps of a topic in a remark."""
 
 
 def notes(
     mapping: BagMapping, behaviour: Behaviour, qualities: Mapping[str, Quality], robot: Robot
 ) -> tuple[str, ...]:
-    """Returns the sentences, the weightiest first."""
+    """Returns the remarks, the most important first, one sentence each."""
     return (
         *_pose(behaviour, robot),
         *_travel(behaviour),
@@ -32,11 +32,11 @@ def notes(
 
 def _pose(behaviour: Behaviour, robot: Robot) -> Iterator[str]:
     start = [robot.model.joint(name).qpos0[0] for name in behaviour.names.hinges]
-    apart = np.abs(behaviour["joint_positions"][0] - start)
+    differences = np.abs(behaviour["joint_positions"][0] - start)
     far = [
         f"{name} {difference:.2f}"
-        for name, difference in zip(behaviour.names.hinges, apart, strict=True)
-        if difference > APART
+        for name, difference in zip(behaviour.names.hinges, differences, strict=True)
+        if difference > MAX_INITIAL_DIFFERENCE
     ]
     if far:
         yield (
@@ -72,16 +72,18 @@ def _gaps(behaviour: Behaviour, qualities: Mapping[str, Quality]) -> Iterator[st
     end = float(behaviour.time[-1])
     for topic, found in qualities.items():
         within = [gap for gap in found.gaps if gap.start < end and gap.start + gap.length > 0]
-        if not within or found.roles == ("commands",):  # a command stands until the next
+        if not within or found.roles == ("commands",):  # a command is held until the next
             continue
-        told = [f"{gap.length * 1e3:.0f} ms at {gap.start:.3f} s" for gap in within[:LISTED]]
-        if len(within) > LISTED:
-            told.append(f"{len(within) - LISTED} more")
+        listed = [
+            f"{gap.length * 1e3:.0f} ms at {gap.start:.3f} s" for gap in within[:MAX_LISTED_GAPS]
+        ]
+        if len(within) > MAX_LISTED_GAPS:
+            listed.append(f"{len(within) - MAX_LISTED_GAPS} more")
         rows = sum(
             int(np.sum((behaviour.time > gap.start) & (behaviour.time < gap.start + gap.length)))
             for gap in within
         )
-        yield f"{topic}: silent for {', '.join(told)}; rows marked as not observed: {rows}"
+        yield f"{topic}: silent for {', '.join(listed)}; rows marked as not observed: {rows}"
 
 
 def _left_out(qualities: Mapping[str, Quality]) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""How well a topic was recorded: rate, jitter, gaps, latency, and what was left out."""
+"""Quality of a topic's recording: rate, jitter, gaps, latency, and dropped messages."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -7,20 +7,21 @@ from typing import Any
 import numpy as np
 
 from selfmodel.logs.rosbag.clock import Clocked
-from selfmodel.logs.rosbag.resample import REACH
+from selfmodel.logs.rosbag.resample import MAX_PERIOD_RATIO
 from selfmodel.logs.rosbag.series import Series
 
-LISTED = 100
-"""So many gaps of a topic are recorded one by one."""
+MAX_LISTED_GAPS = 100
+"""Largest number of gaps of a topic in the metadata of a log."""
 
 
 @dataclass(frozen=True)
 class Gap:
-    """A time in which a topic was silent for more than ``REACH`` of its usual periods.
+    """A period between messages of more than ``MAX_PERIOD_RATIO`` median periods.
 
     Attributes:
-        start: Seconds from the start of the trial to the last message before; may be negative.
-        length: Seconds until the next message.
+        start: Time of the last message before the gap, s from the start of the trial; may be
+            negative.
+        length: Time until the next message, s.
     """
 
     start: float
@@ -29,23 +30,23 @@ class Gap:
 
 @dataclass(frozen=True)
 class Quality:
-    """What is to be known of a topic's recording.
+    """Quality of a topic's recording.
 
     Attributes:
-        roles: Which roles it plays.
-        type: The type of its messages.
-        messages: How many it has.
-        rate: Messages a second, from the usual (median) period; None for fewer than two.
-        jitter: Standard deviation of the period without the gaps, s; None for fewer than two.
-        longest: The longest period, s; None for fewer than two.
-        gaps: In order.
-        latency: Median of log time minus stamp, s; None where there are no stamps.
-        latency_max: The largest, s.
-        fallbacks: Messages that go by log time because they have no stamp.
-        strays: Messages left out because their stamp is far from all others.
-        repeated: Messages left out because another has the same stamp.
-        reordered: Messages that came after one with a later stamp; they are put in their place.
-        refused: Messages left out because they contradict themselves, by the reason.
+        roles: Names of the topic's roles.
+        type: Message type.
+        messages: Number of messages.
+        rate: Reciprocal of the median period, Hz; None for fewer than two messages.
+        jitter: Standard deviation of the period without gaps, s; None for fewer than two messages.
+        longest: Longest period, s; None for fewer than two messages.
+        gaps: Gaps, in order.
+        latency: Median of log time minus stamp, s; None without stamps.
+        latency_max: Maximum of log time minus stamp, s; None without stamps.
+        fallbacks: Number of messages without a stamp, whose log time is used.
+        strays: Number of messages dropped because their stamp is far from their log time.
+        repeated: Number of messages dropped because their stamp is repeated.
+        reordered: Number of messages after one with a later stamp, which are sorted.
+        refused: Number of messages dropped as inconsistent, by reason.
     """
 
     roles: tuple[str, ...]
@@ -64,9 +65,9 @@ class Quality:
     refused: Mapping[str, int]
 
     def facts(self) -> dict[str, Any]:
-        """Returns all that as plain values, with the first ``LISTED`` gaps."""
+        """Returns the quality as plain values, with the first ``MAX_LISTED_GAPS`` gaps."""
         longest = max((gap.length for gap in self.gaps), default=0.0)
-        where = [[gap.start, gap.length] for gap in self.gaps[:LISTED]]
+        where = [[gap.start, gap.length] for gap in self.gaps[:MAX_LISTED_GAPS]]
         gaps = {"count": len(self.gaps), "longest": longest, "where": where}
         return asdict(self) | {"gaps": gaps}
 
@@ -75,31 +76,31 @@ def quality(series: Series, clock: Clocked, origin: int, roles: tuple[str, ...])
     """Returns the quality of a topic.
 
     Args:
-        series: Its messages.
-        clock: Their times.
-        origin: When the trial starts, ns.
-        roles: Which roles it plays.
+        series: Messages of the topic.
+        clock: Times of the messages.
+        origin: Start of the trial, ns since 1970.
+        roles: Names of the topic's roles.
     """
-    told = clock.times[clock.usable]
-    times = np.unique(told)
+    recorded = clock.times[clock.usable]
+    times = np.unique(recorded)
     periods = np.diff(times) / 1e9
-    usual = float(np.median(periods)) if len(periods) else None
-    silent = periods > REACH * usual if usual is not None else np.zeros(0, dtype=bool)
+    median = float(np.median(periods)) if len(periods) else None
+    is_gap = periods > MAX_PERIOD_RATIO * median if median is not None else np.zeros(0, dtype=bool)
     return Quality(
         roles=roles,
         type=series.topic.type,
         messages=series.topic.count,
-        rate=None if usual is None else 1 / usual,
-        jitter=float(np.std(periods[~silent])) if len(periods) else None,
+        rate=None if median is None else 1 / median,
+        jitter=float(np.std(periods[~is_gap])) if len(periods) else None,
         longest=float(periods.max()) if len(periods) else None,
         gaps=tuple(
-            Gap(float(times[k] - origin) / 1e9, float(periods[k])) for k in np.flatnonzero(silent)
+            Gap(float(times[k] - origin) / 1e9, float(periods[k])) for k in np.flatnonzero(is_gap)
         ),
         latency=float(np.median(clock.latency)) if len(clock.latency) else None,
         latency_max=float(clock.latency.max()) if len(clock.latency) else None,
         fallbacks=clock.fallbacks,
         strays=int(np.sum(~clock.usable)),
-        repeated=len(told) - len(times),
-        reordered=int(np.sum(told < np.maximum.accumulate(told))) if len(told) else 0,
+        repeated=len(recorded) - len(times),
+        reordered=int(np.sum(recorded < np.maximum.accumulate(recorded))) if len(recorded) else 0,
         refused=dict(series.refused),
     )

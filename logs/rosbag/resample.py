@@ -1,36 +1,36 @@
-"""From irregular samples to the control steps, without inventing any.
+"""Interpolation of irregular samples at the control steps.
 
-Times are in one unit, whichever. A result is NaN wherever the samples do not bear it out.
+All times are in the same unit. Results are NaN outside the samples and in gaps between them.
 """
 
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 
-REACH = 1.5
-"""Samples further apart than so many usual periods have a gap between them."""
+MAX_PERIOD_RATIO = 1.5
+"""Largest period between two samples without a gap, in median periods."""
 
 
 def reach(times: FloatArray) -> float:
-    """Returns how far apart two samples of a series may be, and still bear out what is between.
+    """Returns the largest period between two samples across which values are interpolated.
 
     Args:
-        times: ``(m,)``, increasing.
+        times: Sample times, ``(m,)``, increasing.
     """
-    return REACH * float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+    return MAX_PERIOD_RATIO * float(np.median(np.diff(times))) if len(times) > 1 else 0.0
 
 
 def linear(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -> FloatArray:
-    """Returns values interpolated between the samples before and after.
+    """Returns linearly interpolated values.
 
     Args:
-        times: ``(m,)``, strictly increasing.
-        values: ``(m, width)``.
-        at: ``(steps,)``.
-        limit: See ``reach``.
+        times: Sample times, ``(m,)``, strictly increasing.
+        values: Sample values, ``(m, width)``.
+        at: Times of the control steps, ``(steps,)``.
+        limit: Largest period across which values are interpolated; see ``reach``.
 
     Returns:
-        ``(steps, width)``; a sample's own value at its own time.
+        ``(steps, width)``; the exact sample at the time of a sample.
     """
     before, after, share, valid = _bracket(times, at, limit)
     result = np.full((len(at), values.shape[1]), np.nan)
@@ -40,60 +40,60 @@ def linear(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) 
 
 
 def angles(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -> FloatArray:
-    """Returns angles interpolated the short way round; see ``linear``.
+    """Returns linearly interpolated angles, across wrap-arounds; see ``linear``.
 
     Args:
-        times: ``(m,)``, strictly increasing.
-        values: ``(m, width)`` rad, of which a jump by more than pi is a turn counted anew.
-        at: ``(steps,)``.
-        limit: See ``reach``.
+        times: Sample times, ``(m,)``, strictly increasing.
+        values: Sample values, ``(m, width)`` rad; a jump by more than pi is a wrap-around.
+        at: Times of the control steps, ``(steps,)``.
+        limit: Largest period across which values are interpolated; see ``reach``.
     """
     return linear(times, np.unwrap(values, axis=0), at, limit)
 
 
 def slerp(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -> FloatArray:
-    """Returns orientations interpolated along the shortest arc.
+    """Returns spherically interpolated orientations, along the shortest arc.
 
     Args:
-        times: ``(m,)``, strictly increasing.
-        values: ``(m, 4)`` unit quaternions, of which each means the same as its negative.
-        at: ``(steps,)``.
-        limit: See ``reach``.
+        times: Sample times, ``(m,)``, strictly increasing.
+        values: Unit quaternions, ``(m, 4)``; a quaternion and its negative are equivalent.
+        at: Times of the control steps, ``(steps,)``.
+        limit: Largest period across which values are interpolated; see ``reach``.
 
     Returns:
-        ``(steps, 4)`` unit quaternions.
+        Unit quaternions, ``(steps, 4)``.
     """
     before, after, share, valid = _bracket(times, at, limit)
     result = np.full((len(at), 4), np.nan)
     low, high = values[before[valid]], values[after[valid]]
     cosine = np.sum(low * high, axis=1, keepdims=True)
     high = np.where(cosine < 0, -high, high)
-    # The angle from both chords: exact for small angles, where that of a cosine is not.
+    # Half the angle from both chords: accurate for small angles, unlike the arc cosine.
     half = np.arctan2(
         np.linalg.norm(high - low, axis=1, keepdims=True),
         np.linalg.norm(high + low, axis=1, keepdims=True),
     )
-    part = share[valid, np.newaxis]
-    # sin(x)/sin(a) as sinc, which has its limit at 0.
+    fraction = share[valid, np.newaxis]
+    # sin(x)/sin(a) by sinc, which is finite at a = 0.
     sine = np.sinc(2 * half / np.pi)
-    turned = (
-        (1 - part) * np.sinc((1 - part) * 2 * half / np.pi) * low
-        + part * np.sinc(part * 2 * half / np.pi) * high
+    interpolated = (
+        (1 - fraction) * np.sinc((1 - fraction) * 2 * half / np.pi) * low
+        + fraction * np.sinc(fraction * 2 * half / np.pi) * high
     ) / sine
-    result[valid] = turned / np.linalg.norm(turned, axis=1, keepdims=True)
+    result[valid] = interpolated / np.linalg.norm(interpolated, axis=1, keepdims=True)
     return result
 
 
 def hold(
     times: FloatArray, values: FloatArray, at: FloatArray, limit: float = np.inf
 ) -> FloatArray:
-    """Returns the last value that was given.
+    """Returns the last sample before each time (zero-order hold).
 
     Args:
-        times: ``(m,)``, strictly increasing.
-        values: ``(m, width)``.
-        at: ``(steps,)``.
-        limit: How old it may be; a command stands until the next one, a measurement does not.
+        times: Sample times, ``(m,)``, strictly increasing.
+        values: Sample values, ``(m, width)``.
+        at: Times of the control steps, ``(steps,)``.
+        limit: Largest age of a sample; infinite for commands, finite for measurements.
 
     Returns:
         ``(steps, width)``.
@@ -109,10 +109,10 @@ def hold(
 def _bracket(
     times: FloatArray, at: FloatArray, limit: float
 ) -> tuple[IndexArray, IndexArray, FloatArray, BoolArray]:
-    """The samples before and after each time, how far it is between them, and if that is valid."""
+    """Returns the samples before and after each time, the fraction between them, and validity."""
     if not len(times):
-        nowhere = np.zeros(len(at), dtype=np.intp)
-        return nowhere, nowhere, np.zeros(len(at)), np.zeros(len(at), dtype=bool)
+        indices = np.zeros(len(at), dtype=np.intp)
+        return indices, indices, np.zeros(len(at)), np.zeros(len(at), dtype=bool)
     last = len(times) - 1
     before = np.searchsorted(times, at, side="right") - 1
     inside = before >= 0

@@ -1,4 +1,4 @@
-"""The messages of topics, gathered into columns of numbers by name."""
+"""Messages of topics as columns of numbers, by name."""
 
 from collections import Counter
 from collections.abc import Collection, Mapping
@@ -17,11 +17,11 @@ IntArray = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """What a topic says of one name.
+    """Numbers of one name on a topic.
 
     Attributes:
-        index: ``(m,)``: which messages speak of it.
-        values: ``(m, width)``: what they say; see ``KINDS``.
+        index: Indices of the messages with that name, ``(m,)``.
+        values: Rows of these messages, ``(m, width)``; see ``KINDS``.
     """
 
     index: IndexArray
@@ -30,14 +30,15 @@ class Column:
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """What was said on a topic.
+    """The messages of a topic.
 
     Attributes:
-        topic: Which.
-        stamps: ``(n,)`` ns, when each message says it was measured; 0 where it does not say.
-        logged: ``(n,)`` ns, when it was received.
-        columns: By the names in the messages, of which each message may have others.
-        refused: How many messages were left out, by the reason.
+        topic: The topic.
+        stamps: Measurement time in the header of each message, ``(n,)`` ns; 0 for messages
+            without a header.
+        logged: Time of reception of each message, ``(n,)`` ns.
+        columns: Columns by the names in the messages; the names may differ between messages.
+        refused: Number of dropped messages, by reason.
     """
 
     topic: Topic
@@ -48,14 +49,14 @@ class Series:
 
 
 def read_series(bag: Bag, wanted: Collection[str]) -> dict[str, Series]:
-    """Returns what was said on some topics of a bag, reading it once.
+    """Returns the messages of some topics of a bag, read in one pass.
 
     Args:
         bag: The recording.
-        wanted: Names of topics it has, of types in ``KINDS``.
+        wanted: Names of topics of the bag, of types in ``KINDS``.
 
     Raises:
-        LogError: A message is damaged, or encoded in an unknown way.
+        LogError: A message is damaged, or its encoding is not CDR.
     """
     for name in wanted:
         if bag.topics[name].encoding != "cdr":
@@ -64,26 +65,28 @@ def read_series(bag: Bag, wanted: Collection[str]) -> dict[str, Series]:
                 f"expected messages in cdr on {name}, got {bag.topics[name].encoding!r}",
                 advice="record it with an RMW that uses DDS",
             )
-    gathered = {name: _Gathered() for name in wanted}
+    builders = {name: _SeriesBuilder() for name in wanted}
     for name, time, payload in bag.messages(wanted):
         try:
             stamp, rows = read_message(payload, bag.topics[name].type)
         except RefusedError as refused:
-            gathered[name].refused[str(refused)] += 1
+            builders[name].refused[str(refused)] += 1
         except UndecodableError as failure:
             raise CorruptError(
                 bag.path, f"a message on {name} is damaged: {failure}", advice="record it again"
             ) from failure
         else:
-            gathered[name].add(stamp, time, rows)
-    return {name: found.series(bag.topics[name]) for name, found in gathered.items()}
+            builders[name].add(stamp, time, rows)
+    return {name: found.series(bag.topics[name]) for name, found in builders.items()}
 
 
 @dataclass
-class _Gathered:
+class _SeriesBuilder:
+    """Collects the messages of a topic one by one."""
+
     stamps: list[int] = field(default_factory=list)
     logged: list[int] = field(default_factory=list)
-    # By the names in a message: nearly always those of the one before.
+    # Keyed by the names in a message, which rarely change between messages.
     layouts: dict[tuple[str, ...], tuple[list[int], list[FloatArray]]] = field(default_factory=dict)
     refused: Counter[str] = field(default_factory=Counter)
 

@@ -1,4 +1,4 @@
-"""From tracks to the signals of a behaviour at the control steps."""
+"""Signals of a behaviour at the control steps, interpolated from tracks."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -9,13 +9,15 @@ from selfmodel.arrays import FloatArray
 from selfmodel.logs.rosbag.clock import Track
 from selfmodel.logs.rosbag.resample import angles, hold, linear, reach, slerp
 from selfmodel.logs.rosbag.series import IntArray
+from selfmodel.logs.rosbag.start_frame import heading_removal, rotate_world
 from selfmodel.logs.rosbag.tracks import Tracks
-from selfmodel.logs.rosbag.turning import rotated, turned, unyaw
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Signal
+from selfmodel.trials.rotation import rotated
 
 Interpolation = Callable[[FloatArray, FloatArray, FloatArray, float], FloatArray]
+"""Function from sample times, values, query times and the largest gap to values; see ``linear``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,8 +25,8 @@ class Steps:
     """The control steps of a trial.
 
     Attributes:
-        origin: When the first one is, ns.
-        at: ``(steps,)`` ns after that.
+        origin: Time of the first step, ns since 1970.
+        at: Times of the steps from the origin, ``(steps,)`` ns.
     """
 
     origin: int
@@ -32,9 +34,9 @@ class Steps:
 
 
 def joint_signals(tracks: Tracks, robot: Robot, steps: Steps) -> dict[Signal, FloatArray]:
-    """Returns what is known of the hinges.
+    """Returns the joint signals.
 
-    Only one without limits can go round: what jumps elsewhere did not turn a whole turn.
+    Angles are unwrapped for unlimited hinges only, because a limited hinge makes no full turn.
     """
     anatomy, model = robot.anatomy, robot.model
     positions = [
@@ -49,20 +51,20 @@ def joint_signals(tracks: Tracks, robot: Robot, steps: Steps) -> dict[Signal, Fl
 
 
 def command_signals(tracks: Tracks, anatomy: Anatomy, steps: Steps) -> dict[Signal, FloatArray]:
-    """Returns the commands: one stands until the next, however long that takes."""
-    return {"commands": _columns(tracks.commands, anatomy.motors, steps, _standing)}
+    """Returns the commands; a command is held until the next one."""
+    return {"commands": _columns(tracks.commands, anatomy.motors, steps, _held_command)}
 
 
 def sensor_signals(
     tracks: Tracks, anatomy: Anatomy, steps: Steps, joint_positions: FloatArray
 ) -> dict[Signal, FloatArray]:
-    """Returns what the robot's sensors would have read.
+    """Returns the normalised sensor readings of the robot.
 
     Args:
-        tracks: Those of touch are read.
-        anatomy: The robot's sensors.
+        tracks: Tracks with those of the touch sensors.
+        anatomy: The robot's parts.
         steps: The control steps.
-        joint_positions: ``(steps, hinges)`` rad: what the angle sensors measure.
+        joint_positions: Angles that the angle sensors measure, ``(steps, hinges)`` rad.
     """
     readings = np.full((len(steps.at), len(anatomy.sensors)), np.nan)
     for column, sensor in enumerate(anatomy.sensors):
@@ -75,27 +77,28 @@ def sensor_signals(
 
 
 def base_signals(tracks: Tracks, steps: Steps, *, from_start: bool) -> dict[Signal, FloatArray]:
-    """Returns what is known of the root body.
+    """Returns the signals of the base.
 
     Args:
-        tracks: Those of the base are read.
+        tracks: Tracks with those of the base.
         steps: The control steps.
-        from_start: Whether the trial begins at x = y = 0 heading along +x.
+        from_start: Whether the signals are relative to the first step: the base then starts at
+            x = y = 0 and heads along +x.
 
     Raises:
-        ValueError: It should, but where it begins or heads is not known.
+        ValueError: ``from_start``, and the pose at the first step was not observed.
     """
     position = _wide(_at(tracks.base_position, steps, linear), 3)
     orientation = _wide(_at(tracks.base_orientation, steps, slerp), 4)
     velocity = _wide(_at(tracks.base_linear_velocity, steps, linear), 3)
     if from_start:
-        told = [(tracks.base_position, position), (tracks.base_orientation, orientation)]
-        if any(len(track.times) and np.isnan(rows[0]).any() for track, rows in told):
-            raise ValueError("where the base is at the start of the trial is not known")
+        recorded = [(tracks.base_position, position), (tracks.base_orientation, orientation)]
+        if any(len(track.times) and np.isnan(rows[0]).any() for track, rows in recorded):
+            raise ValueError("the pose of the base at the start of the trial is not known")
         if len(tracks.base_orientation.times):
-            by = unyaw(orientation[0])
-            orientation = turned(orientation, by)
-            position = rotated(position - position[0] * [1, 1, 0], by[np.newaxis])
+            rotation = heading_removal(orientation[0])
+            orientation = rotate_world(orientation, rotation)
+            position = rotated(position - position[0] * [1, 1, 0], rotation[np.newaxis])
         else:
             position = position - position[0] * [1, 1, 0]
     return {
@@ -113,7 +116,7 @@ def _columns(
 
 
 def _at(track: Track, steps: Steps, method: Interpolation) -> FloatArray:
-    # Nanoseconds since the start are whole numbers to float64 too, for a hundred days.
+    # float64 represents nanoseconds since the start exactly for a hundred days.
     times = (track.times - steps.origin).astype(np.float64)
     at = steps.at.astype(np.float64)
     if not len(times):
@@ -121,11 +124,13 @@ def _at(track: Track, steps: Steps, method: Interpolation) -> FloatArray:
     return method(times, track.values, at, reach(times))
 
 
-def _standing(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -> FloatArray:
+def _held_command(
+    times: FloatArray, values: FloatArray, at: FloatArray, limit: float
+) -> FloatArray:
     del limit
     return hold(times, values, at)
 
 
 def _wide(values: FloatArray, width: int) -> FloatArray:
-    """A track without samples has one column, whatever it would have told."""
+    """Returns values of a fixed width: a track without samples has one column, of NaN."""
     return values if values.shape[1] == width else np.full((len(values), width), np.nan)

@@ -1,19 +1,19 @@
-"""What a bag's file holds, whatever its form: topics that are announced, messages as bytes."""
+"""Records of a bag file of any storage: announced topics, and messages as bytes."""
 
 from dataclasses import dataclass
 
-LATEST = 2**62
-"""Log times that a bag may have end here, ns: the year 2116, and sums still fit 64 bits."""
+MAX_LOG_TIME = 2**62
+"""Upper bound of log times, ns since 1970: the year 2116; sums of two times fit 64 bits."""
 
 
 @dataclass(frozen=True)
 class Announced:
-    """A topic that a file says it has.
+    """A topic that a file declares.
 
     Attributes:
-        topic: Its name, as it stands in the file.
-        type: The type of its messages, as it stands in the file.
-        encoding: How they are encoded: ``cdr`` is the one that can be read.
+        topic: Name of the topic.
+        type: Message type, as written in the file.
+        encoding: Encoding of the messages; only ``cdr`` can be read.
     """
 
     topic: str
@@ -23,12 +23,12 @@ class Announced:
 
 @dataclass(frozen=True)
 class Stored:
-    """A message as it stands in a file.
+    """A message of a file, not decoded.
 
     Attributes:
-        topic: Where it was published.
-        time: When it was received, ns.
-        payload: Its bytes, possibly packed with zstd.
+        topic: Name of the topic.
+        time: Time of reception, ns since 1970.
+        payload: Bytes of the message, possibly compressed with zstd.
     """
 
     topic: str
@@ -37,15 +37,15 @@ class Stored:
 
 
 class DamageError(ValueError):
-    """What stands in a file cannot be."""
+    """The content of a file is invalid."""
 
 
 def checked_time(time: object) -> int:
-    """Returns a log time that can be reckoned with, ns.
+    """Returns a validated log time, ns.
 
     Raises:
-        DamageError: It is not one.
+        DamageError: The time is no whole number from 0 to ``MAX_LOG_TIME``.
     """
-    if not isinstance(time, int) or not 0 <= time < LATEST:
+    if not isinstance(time, int) or not 0 <= time < MAX_LOG_TIME:
         raise DamageError(f"a message has the log time {time!r} ns")
     return time

@@ -1,8 +1,8 @@
-"""The MCAP file of a bag, read in one pass from its start.
+"""Reads the MCAP file of a bag, in one pass from its start.
 
-Recorders write neither checksums nor, with some presets, an index, and the file may be one of a
-split recording. So nothing is required that a log of ours must have; what checks there are, are
-made: the checksums that are not 0, and the count of messages.
+Recorders write neither checksums nor, with some presets, an index, and the file may be a part of a
+split recording. So the requirements on a trial log do not apply. The checks are those that the file
+allows: the checksums other than 0, and the count of messages.
 """
 
 import struct
@@ -24,28 +24,28 @@ ADVICE = "record it again, or recover what is whole with `mcap recover`"
 
 _FAILURES = (
     McapError,
-    ValueError,  # checksums, texts that are none, and what is found out here
+    ValueError,  # checksums, invalid UTF-8, and DamageError
     RuntimeError,  # lz4
     struct.error,
     zstandard.ZstdError,
     MemoryError,
     OverflowError,
 )
-"""Everything that the library and its decompressors raise over damaged bytes."""
+"""Exceptions of the library and its decompressors for damaged bytes."""
 
 
 def read_mcap(path: Path, name: Path) -> Iterator[Announced | Stored]:
-    """Yields what a file holds, in its order.
+    """Yields the topics and messages of a file, in the order of the file.
 
-    A caller knows that the file is whole when the iteration ends without an exception.
+    The file is complete if the iteration ends without an exception.
 
     Args:
         path: The file.
-        name: What errors call it: its name before it was unpacked.
+        name: Path in error messages: that of the file before decompression.
 
     Raises:
         LogError: The file is damaged or ends too early.
-        OSError: It cannot be read.
+        OSError: The file cannot be read.
     """
     count = 0
     try:
@@ -54,7 +54,7 @@ def read_mcap(path: Path, name: Path) -> Iterator[Announced | Stored]:
                 count += isinstance(item, Stored)
                 yield item
     except _FAILURES as failure:
-        raise _explained(name, failure, f"{count} messages before that can be read") from failure
+        raise _as_log_error(name, failure, f"{count} messages before that can be read") from failure
 
 
 def _items(file: IO[bytes]) -> Iterator[Announced | Stored]:
@@ -71,7 +71,7 @@ def _items(file: IO[bytes]) -> Iterator[Announced | Stored]:
         elif isinstance(record, Schema):
             schemas[record.id] = record.name
         elif isinstance(record, Channel):
-            kind = schemas.get(record.schema_id, "")  # 0: it has none
+            kind = schemas.get(record.schema_id, "")  # 0: no schema
             topics[record.id] = record.topic
             yield Announced(record.topic, kind, record.message_encoding)
         elif isinstance(record, Statistics):
@@ -102,12 +102,12 @@ def _unpacked(chunk: Chunk) -> Chunk:
     return chunk
 
 
-def _explained(name: Path, failure: Exception, good: str) -> LogError:
+def _as_log_error(name: Path, failure: Exception, good: str) -> LogError:
     if isinstance(failure, InvalidMagic):
         return NotMcapError(
             name, "its first or last bytes are not those of MCAP", good=good, advice=ADVICE
         )
     if isinstance(failure, (EndOfFile, struct.error)):
         return TruncatedError(name, "the file ends too early", good=good, advice=ADVICE)
-    what = f"the file is damaged: {failure or type(failure).__name__}"
-    return CorruptError(name, what, good=good, advice=ADVICE)
+    reason = f"the file is damaged: {failure or type(failure).__name__}"
+    return CorruptError(name, reason, good=good, advice=ADVICE)

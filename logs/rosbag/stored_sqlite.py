@@ -1,4 +1,4 @@
-"""The SQLite file of a bag (``.db3``), as ROS 2 wrote them by default up to Humble."""
+"""Reads the SQLite file of a bag (``.db3``), the default of ROS 2 up to Humble."""
 
 import shlex
 import sqlite3
@@ -14,11 +14,11 @@ SQLITE_MAGIC = b"SQLite format 3\x00"
 
 
 def read_sqlite(path: Path, name: Path) -> Iterator[Announced | Stored]:
-    """Yields what a file holds: the topics, then the messages in the order of their recording.
+    """Yields the topics of a file, then its messages in the order of the recording.
 
     Args:
-        path: The file; it is not written to.
-        name: What errors call it: its name before it was unpacked.
+        path: The file, which is read only.
+        name: Path in error messages: that of the file before decompression.
 
     Raises:
         CorruptError: The file is damaged, or no rosbag2 recording.
@@ -40,32 +40,32 @@ def read_sqlite(path: Path, name: Path) -> Iterator[Announced | Stored]:
 
 _FAILURES = (
     sqlite3.Error,
-    ValueError,  # texts that are none, and what is found out here
+    ValueError,  # invalid UTF-8, and DamageError
     OverflowError,
     MemoryError,
 )
-"""Everything that comes of damaged bytes."""
+"""Exceptions for damaged bytes."""
 
 
 def _refuse_unfinished(path: Path, name: Path) -> None:
-    """Refuses a file beside which lies what SQLite has not written into it yet.
+    """Checks that SQLite has written all of a recording into its file.
 
     Raises:
-        IncompleteError: There is such a file.
+        IncompleteError: There is a write-ahead log or a rollback journal that is not empty.
     """
     for suffix in ("-wal", "-journal"):
-        beside = path.with_name(path.name + suffix)
-        if beside.is_file() and beside.stat().st_size:
+        pending = path.with_name(path.name + suffix)
+        if pending.is_file() and pending.stat().st_size:
             raise IncompleteError(
                 name,
-                f"its recorder did not close it: {beside.name} holds what is not in it yet",
-                advice=f"bring them together with `sqlite3 {shlex.quote(str(path))} "
+                f"its recorder did not close it: {pending.name} has data that is not in it yet",
+                advice=f"merge them with `sqlite3 {shlex.quote(str(path))} "
                 f"'PRAGMA wal_checkpoint(TRUNCATE)'`",
             )
 
 
 def _items(path: Path) -> Iterator[Announced | Stored]:
-    # Immutable: a bag on a read-only disk has no place for SQLite's lock files.
+    # Immutable: SQLite cannot create lock files on a read-only disk.
     address = f"{path.resolve().as_uri()}?mode=ro&immutable=1"
     with closing(sqlite3.connect(address, uri=True)) as database:
         database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST)
@@ -76,7 +76,7 @@ def _items(path: Path) -> Iterator[Announced | Stored]:
             "SELECT id, name, type, serialization_format FROM topics ORDER BY id"
         ):
             if not all(isinstance(text, str) for text in (topic, kind, encoding)):
-                raise DamageError(f"topic {number!r} is described by what is no text")
+                raise DamageError(f"topic {number!r} has a description that is no text")
             topics[number] = topic
             yield Announced(topic, kind, encoding)
         for number, time, payload in database.execute(
@@ -88,7 +88,7 @@ def _items(path: Path) -> Iterator[Announced | Stored]:
 
 
 def _check(database: sqlite3.Connection) -> None:
-    """Refuses what is no recording; a view under a table's name could compute for ever."""
+    """Checks that both tables exist and are no views, which could compute without end."""
     tables = {
         name
         for name, sql in database.execute("SELECT name, sql FROM sqlite_master WHERE type='table'")

@@ -1,13 +1,13 @@
-"""A mapping to start from, drawn from a bag and a robot.
+"""Suggests a mapping for a bag and a robot.
 
-What is uncertain is marked: ``CHECK`` is a guess that may be right, ``CHANGE`` must be filled in.
+Comments mark uncertain entries: ``CHECK`` marks a guess, ``CHANGE`` an entry to fill in.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
 
 from selfmodel.logs.rosbag.bag import Bag, Topic
 from selfmodel.logs.rosbag.checks import TYPES
-from selfmodel.logs.rosbag.likeness import Guess, matched
+from selfmodel.logs.rosbag.likeness import NameMatch, matched
 from selfmodel.logs.rosbag.mapping import UNKNOWN, RoleKind
 from selfmodel.logs.rosbag.messages import ARRAY, JOINT_STATE, NUMBERS, ODOMETRY, WRENCH
 from selfmodel.logs.rosbag.series import Series, read_series
@@ -17,19 +17,19 @@ _COMMANDED = ("command", "cmd", "target", "desired", "setpoint", "goal", "refere
 
 
 def suggest(bag: Bag, robot: Robot, name: str, *, with_timestep: bool) -> str:
-    """Returns a mapping as TOML.
+    """Returns a suggested mapping as TOML.
 
     Args:
         bag: The recording.
-        robot: Whose trial it is.
-        name: What the mapping is to call the robot: its name, or its MJCF file.
-        with_timestep: Whether the mapping must say the control time step.
+        robot: The robot of the trial.
+        name: Robot in the mapping: its name, or its MJCF file.
+        with_timestep: Whether the mapping contains the control time step.
 
     Raises:
         LogError: A message of the bag is damaged.
     """
     hinges, motors = robot.anatomy.hinges, robot.anatomy.motors
-    joints, commands = _able(bag, "joints"), _able(bag, "commands")
+    joints, commands = _accepted_topics(bag, "joints"), _accepted_topics(bag, "commands")
     series = read_series(bag, {topic.name for topic in (*joints, *commands)})
     joints = [topic for topic in joints if not _is_command(topic)]
     joints.sort(key=lambda topic: -_fit(series[topic.name], hinges))
@@ -62,14 +62,14 @@ def suggest(bag: Bag, robot: Robot, name: str, *, with_timestep: bool) -> str:
     return "\n".join(lines).rstrip() + "\n"
 
 
-def _able(bag: Bag, kind: RoleKind) -> list[Topic]:
-    """The topics that can play a role, those of its first type first."""
-    able = [
+def _accepted_topics(bag: Bag, kind: RoleKind) -> list[Topic]:
+    """Returns the topics that a role accepts, sorted by the role's preference of types."""
+    accepted = [
         topic
         for topic in bag.topics.values()
         if topic.type in TYPES[kind] and topic.encoding == "cdr" and topic.count
     ]
-    return sorted(able, key=lambda topic: TYPES[kind].index(topic.type))
+    return sorted(accepted, key=lambda topic: TYPES[kind].index(topic.type))
 
 
 def _is_command(topic: Topic) -> bool:
@@ -77,7 +77,7 @@ def _is_command(topic: Topic) -> bool:
 
 
 def _fit(series: Series, parts: Sequence[str]) -> int:
-    """How many parts of the robot a topic seems to tell of."""
+    """Returns the number of the robot's parts whose names match names on a topic."""
     if series.topic.type == ARRAY:
         return len(parts) if len(series.columns) == len(parts) else 0
     return len(matched(parts, list(series.columns)))
@@ -94,14 +94,14 @@ def _angles(
     parts: Sequence[str],
     order: tuple[str, ...],
 ) -> Iterator[str]:
-    """The table of the joints or of the commands.
+    """Yields the lines of the table of the joints or commands.
 
     Args:
-        table: Its name.
-        topics: Those that can play the role, the likeliest first.
-        series: What they say.
-        parts: The hinges or motors of the robot.
-        order: What the columns of a Float64MultiArray may be, in order.
+        table: Name of the table.
+        topics: Topics that the role accepts, the most likely first.
+        series: Messages by topic.
+        parts: Hinges or motors of the robot.
+        order: Likely names of the numbers of a Float64MultiArray, in order.
     """
     yield f"[{table}]"
     yield _topic(topics)
@@ -111,7 +111,7 @@ def _angles(
         offered = _names(series, topics[:1])
         if topics[0].type == ARRAY:
             offered = _order(len(offered), order)
-            yield f"order = [{', '.join(map(_quoted, offered))}]  # CHECK: the bag does not say it"
+            yield f"order = [{', '.join(map(_quoted, offered))}]  # CHECK: the bag has no order"
     yield f"[{table}.names]  # each may also be {{ name = ..., sign = -1, offset = 0.1 }}"
     found = matched(parts, offered)
     for part in parts:
@@ -122,7 +122,7 @@ def _order(width: int, order: tuple[str, ...]) -> tuple[str, ...]:
     return order if len(order) == width else tuple(f"column_{k}" for k in range(width))
 
 
-def _link(guess: Guess | None, offered: Sequence[str]) -> str:
+def _link(guess: NameMatch | None, offered: Sequence[str]) -> str:
     if guess is None:
         known = ", ".join("".join(map(_escaped, name)) for name in offered) or "nothing"
         return f'"{UNKNOWN}"  # CHANGE: the bag has {known}'
@@ -137,9 +137,9 @@ def _topic(topics: Sequence[Topic]) -> str:
 
 
 def _base(bag: Bag) -> Iterator[str]:
-    topics = _able(bag, "base")
+    topics = _accepted_topics(bag, "base")
     if not topics:
-        yield "# No topic tells where the robot is: no displacement can be known."
+        yield "# No topic has the pose of the base: the trial has no displacement."
         yield ""
         return
     yield "[base]"
@@ -147,12 +147,12 @@ def _base(bag: Bag) -> Iterator[str]:
     yield 'frame = "start"'
     yield 'unit = "m"'
     if topics[0].type != ODOMETRY:
-        yield "# It tells no velocities, and none are derived."
+        yield "# It has no velocities, and none are derived."
     yield ""
 
 
 def _imu(bag: Bag) -> Iterator[str]:
-    if topics := _able(bag, "imu"):
+    if topics := _accepted_topics(bag, "imu"):
         yield "[imu]  # CHECK: its axes must be those of the root body"
         yield _topic(topics)
         yield ""
@@ -160,24 +160,26 @@ def _imu(bag: Bag) -> Iterator[str]:
 
 def _touches(bag: Bag, sensors: Sequence[str]) -> Iterator[str]:
     topics = {
-        topic.name: topic for topic in _able(bag, "touch") if topic.type in (WRENCH, *NUMBERS)
+        topic.name: topic
+        for topic in _accepted_topics(bag, "touch")
+        if topic.type in (WRENCH, *NUMBERS)
     }
     found = matched(sensors, list(topics))
     for sensor in sensors:
         if sensor not in found:
-            yield f"# No topic is like {sensor}: it counts as not observed."
+            yield f"# No topic is similar to {sensor}: it is not observed."
             continue
         topic = topics[found[sensor].name]
         unsure = "" if found[sensor].sure else "  # CHECK: not sure"
         yield f"[touch.{_key(sensor)}]"
         yield f"topic = {_quoted(topic.name)}{unsure}"
         if not topic.type.endswith("Bool"):
-            yield "threshold = 5.0  # CHECK: it reads 1 above this"
+            yield "threshold = 5.0  # CHECK: the reading is 1 above this"
         yield ""
 
 
 def _quoted(text: str) -> str:
-    """A text as TOML has it: names in a bag may hold anything."""
+    """Returns a text as a TOML string: names in a bag may have any character."""
     return f'"{"".join(map(_escaped, text))}"'
 
 

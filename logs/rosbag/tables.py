@@ -1,4 +1,4 @@
-"""TOML read strictly, where every complaint names the line that it is about."""
+"""Strict TOML reader whose errors contain the line of the entry."""
 
 import re
 import tomllib
@@ -11,7 +11,7 @@ from selfmodel.errors import InputError, unknown_name
 Name = TypeVar("Name", bound=str)
 
 Keys = tuple[str, ...]
-"""The names of the tables, and of the key, that lead to an entry."""
+"""Path of an entry: the names of its tables, then its key."""
 
 _KEY = r"""(?:[A-Za-z0-9_-]+|"(?:[^"\\]|\\.)*"|'[^']*')"""
 _KEYS = rf"{_KEY}(?:\s*\.\s*{_KEY})*"
@@ -21,12 +21,12 @@ _ENTRY = re.compile(rf"\s*({_KEYS})\s*=")
 
 @dataclass(frozen=True)
 class Document:
-    """A TOML text, and where in it things stand.
+    """A TOML text with the lines of its entries.
 
     Attributes:
-        name: What errors call it.
-        text: All of it.
-        lines: The line of each key and table, from 1; keys of inline tables are left out.
+        name: Name of the text in error messages.
+        text: The text.
+        lines: Line of each key and table, from 1; keys of inline tables are not included.
     """
 
     name: str
@@ -34,13 +34,13 @@ class Document:
     lines: Mapping[Keys, int]
 
     def error(self, path: Keys, sentence: str, item: str = "") -> InputError:
-        """Returns an error that names the line of what it is about.
+        """Returns an error that contains the line of an entry.
 
         Args:
-            path: The table's and the key's names; of one that has no line of its own, the line
-                of what contains it is named.
-            sentence: What was expected, what came, and how to mend it.
-            item: A text in a list under that key, which may stand some lines below.
+            path: Path of the entry; an entry without a line of its own has the line of the
+                smallest entry that contains it.
+            sentence: Sentence with the expected value, the given value and the remedy.
+            item: Text in a list of the entry, which may be some lines below.
         """
         known = next((path[:n] for n in range(len(path), 0, -1) if path[:n] in self.lines), ())
         line = self.lines.get(known, 1)
@@ -50,17 +50,17 @@ class Document:
         return InputError(f"{self.name}:{line}: {sentence}")
 
     def unknown(
-        self, path: Keys, what: str, name: str, known: Iterable[str], item: str = ""
+        self, path: Keys, kind: str, name: str, known: Iterable[str], item: str = ""
     ) -> InputError:
-        """Returns the error for a name that is none of ``known``; see ``error``."""
-        return self.error(path, str(unknown_name(what, name, known)), item)
+        """Returns the error for a name that is not in ``known``; see ``error``."""
+        return self.error(path, str(unknown_name(kind, name, known)), item)
 
 
 def parse_document(text: str, name: str) -> tuple[Document, dict[str, Any]]:
     """Returns a TOML text as a document and as its tables.
 
     Raises:
-        InputError: It is no TOML, or says something twice.
+        InputError: The text is no TOML, or has an entry twice.
     """
     document = Document(name, text, _lines(text))
     try:
@@ -70,11 +70,11 @@ def parse_document(text: str, name: str) -> tuple[Document, dict[str, Any]]:
         found = re.search(r" \(at line (\d+), column \d+\)", reason)
         line = int(found[1]) if found else max(1, text.count("\n"))
         reason = reason.replace(found[0] if found else "", "")
-        raise InputError(f"{name}:{line}: {_explained(reason, text, line)}") from failure
+        raise InputError(f"{name}:{line}: {_described_error(reason, text, line)}") from failure
 
 
-def _explained(reason: str, text: str, line: int) -> str:
-    entry = _ENTRY.match(text.split("\n")[line - 1])  # not splitlines: TOML knows this end only
+def _described_error(reason: str, text: str, line: int) -> str:
+    entry = _ENTRY.match(text.split("\n")[line - 1])  # not splitlines: TOML ends lines with \n only
     if reason == "Cannot overwrite a value" and entry:
         return f"{entry[1]} is listed twice: expected each name once, remove one of the two"
     if reason.startswith(("Cannot declare", "Cannot mutate")):
@@ -101,12 +101,12 @@ def _names(keys: str) -> Keys:
 
 
 class Table:
-    """A table whose entries are taken one by one; what nobody takes is an error.
+    """A TOML table whose entries are removed one by one; entries that are left are errors.
 
     Args:
-        document: Where it stands.
-        path: Its name there.
-        entries: What it holds.
+        document: Document of the table.
+        path: Path of the table.
+        entries: Entries of the table.
     """
 
     def __init__(self, document: Document, path: Keys, entries: Mapping[str, Any]) -> None:
@@ -116,10 +116,10 @@ class Table:
         self._known: list[str] = []
 
     def text(self, key: str, default: str | None = None) -> str:
-        """Takes a text.
+        """Removes and returns a text.
 
         Raises:
-            InputError: This, and the other methods: it is missing, or no text.
+            InputError: The entry is missing, or has another type; also in the other methods.
         """
         value = self._take(key, default)
         if not isinstance(value, str):
@@ -127,7 +127,7 @@ class Table:
         return value
 
     def choice(self, key: str, known: Iterable[Name], default: Name | None = None) -> Name:
-        """Takes a text that is one of ``known``."""
+        """Removes and returns a text that is one of ``known``."""
         value = self.text(key, default)
         names = list(known)
         if value not in names:
@@ -135,15 +135,15 @@ class Table:
         return names[names.index(value)]
 
     def number(self, key: str, default: float | None = None) -> float:
-        """Takes a finite number."""
+        """Removes and returns a finite number."""
         value = self._take(key, default)
-        # A bool is an int to Python; infinity and nan are floats to TOML.
+        # bool is a subclass of int; TOML floats include inf and nan.
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < 1e15:
             raise self._wrong(key, "a number", value)
         return float(value)
 
     def texts(self, key: str) -> tuple[str, ...]:
-        """Takes a list of texts, of which none comes twice."""
+        """Removes and returns a list of different texts."""
         value = self._take(key, None)
         if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
             raise self._wrong(key, "a list of texts", value)
@@ -154,32 +154,32 @@ class Table:
         return tuple(value)
 
     def table(self, key: str) -> "Table":
-        """Takes a table."""
+        """Removes and returns a table."""
         value = self._take(key, None)
         if not isinstance(value, dict):
             raise self._wrong(key, "a table", value)
         return Table(self.document, (*self.path, key), value)
 
     def value(self, key: str) -> object:
-        """Takes whatever it is."""
+        """Removes and returns an entry of any type."""
         return self._take(key, None)
 
     def has(self, key: str) -> bool:
-        """Says whether there is an entry that has not been taken."""
+        """Returns whether the table still has an entry."""
         if key not in self._known:
             self._known.append(key)
         return key in self._entries
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """The names of the entries that have not been taken."""
+        """Keys of the entries that are left."""
         return tuple(self._entries)
 
     def done(self) -> None:
-        """Ends the taking.
+        """Checks that no entry is left.
 
         Raises:
-            InputError: There is an entry that nobody took.
+            InputError: An entry is left: its key is unknown.
         """
         for key in self._entries:
             where = f"[{'.'.join(self.path)}]" if self.path else "the mapping"
