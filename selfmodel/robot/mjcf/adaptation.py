@@ -14,7 +14,6 @@ from selfmodel.files import read_file
 from selfmodel.robot.mjcf.command_ranges import add_command_ranges
 from selfmodel.robot.mjcf.document import Document, read_document
 from selfmodel.robot.mjcf.expand import check_loggable, expand
-from selfmodel.files import read_file
 from selfmodel.robot.mjcf.files import Folder, InMemory
 from selfmodel.robot.mjcf.forward import turn_forward
 from selfmodel.robot.mjcf.ground import add_ground
