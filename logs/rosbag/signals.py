@@ -13,7 +13,7 @@ from selfmodel.logs.rosbag.tracks import Tracks
 from selfmodel.logs.rosbag.turning import rotated, turned, unyaw
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.behaviour import Signal
+from selfmodel.trials.signals import Signal
 
 Interpolation = Callable[[FloatArray, FloatArray, FloatArray, float], FloatArray]
 
