@@ -24,7 +24,7 @@ from selfmodel.logs.unpack import ZSTD_MAGIC, BombError, unzstd, unzstd_file
 
 METADATA = "metadata.yaml"
 EXPECTED = "give a bag's folder, or its .mcap or .db3"
-AGAIN = "record it again, or unpack it by its own tool to see what is whole"
+AGAIN = "record it again, or decompress it with its own tool to recover complete messages"
 
 
 @dataclass(frozen=True)
@@ -147,8 +147,8 @@ def _files(path: Path) -> list[Path]:
     if missing := [file.name for file in files if not file.is_file()]:
         raise CorruptError(
             path,
-            f"its {METADATA} lists {', '.join(missing)}, which is not there",
-            advice=f"add it, or remove {METADATA} to read the files that are there",
+            f"its {METADATA} lists {', '.join(missing)}, which is missing",
+            advice=f"add it, or remove {METADATA} to read the files that exist",
         )
     return files
 

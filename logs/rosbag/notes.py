@@ -40,7 +40,7 @@ def _pose(behaviour: Behaviour, robot: Robot) -> Iterator[str]:
     ]
     if far:
         yield (
-            f"at the start these joints are far from the model's start pose, from which every "
+            f"at the start these joints are far from the model's initial pose, in which every "
             f"simulation begins (rad): {', '.join(far)}"
         )
 
@@ -48,23 +48,23 @@ def _pose(behaviour: Behaviour, robot: Robot) -> Iterator[str]:
 def _travel(behaviour: Behaviour) -> Iterator[str]:
     x = behaviour["base_position"][:, 0]
     if np.isnan(x).all():
-        yield "where the base was is not known, so this trial says nothing of displacement"
+        yield "the position of the base was not observed, so the trial has no displacement"
     elif np.isnan(x[[0, -1]]).any():
         yield (
-            "where the base was at the start or at the end is not known, so the trial has no "
-            "displacement: set another start or duration"
+            "the position of the base was not observed at the start or at the end, so the trial "
+            "has no displacement: set another start or duration"
         )
 
 
 def _clock(mapping: BagMapping, qualities: Mapping[str, Quality]) -> Iterator[str]:
     if mapping.clock == "log":
-        yield 'all times are log times, as clock = "log" says: latency is part of them'
+        yield 'all times are log times, because of clock = "log": they include the latency'
         return
     for topic, found in qualities.items():
         if found.fallbacks:
             yield (
                 f"{topic}: {found.fallbacks} of {found.messages} messages have no time stamp and "
-                f"go by log time, latency included"
+                f"get their log time, which includes the latency"
             )
 
 
@@ -90,7 +90,7 @@ def _left_out(qualities: Mapping[str, Quality]) -> Iterator[str]:
     for topic, found in qualities.items():
         reasons = [f"{count} {reason}" for reason, count in found.refused.items()]
         if found.repeated:
-            reasons.append(f"{found.repeated} with a stamp that another has")
+            reasons.append(f"{found.repeated} with a repeated stamp")
         if found.strays:
             reasons.append(f"{found.strays} with a stamp far from its log time")
         if reasons:

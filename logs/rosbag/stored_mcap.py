@@ -20,7 +20,7 @@ from selfmodel.logs.framing import unpack_chunk
 from selfmodel.logs.rosbag.stored import Announced, DamageError, Stored, checked_time
 from selfmodel.logs.unpack import LARGEST
 
-ADVICE = "record it again, or recover what is whole with `mcap recover`"
+ADVICE = "record it again, or recover the complete messages with `mcap recover`"
 
 _FAILURES = (
     McapError,

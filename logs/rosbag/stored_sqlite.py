@@ -34,7 +34,7 @@ def read_sqlite(path: Path, name: Path) -> Iterator[Announced | Stored]:
             name,
             f"the file is damaged or no rosbag2 recording: {failure}",
             good=f"{count} messages before that can be read",
-            advice="record it again, or recover what is whole with `sqlite3 FILE .recover`",
+            advice="record it again, or recover the complete messages with `sqlite3 FILE .recover`",
         ) from failure
 
 

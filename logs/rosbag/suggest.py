@@ -45,9 +45,9 @@ def suggest(bag: Bag, robot: Robot, name: str, *, with_timestep: bool) -> str:
             f"# s; CHECK: how often the robot is commanded"
         )
     lines += [
-        '# controller = "gait.npz"  # what drove the robot, if it is known',
-        '# stage = "before"  # recorded while nothing was wrong with the robot',
-        'clock = "header"  # or "log", where the time stamps are of another clock',
+        '# controller = "gait.npz"  # the controller of the robot, if it is known',
+        '# stage = "before"  # of a healthy robot',
+        'clock = "header"  # or "log", if the time stamps are of another clock',
         "# start = 0.0      # s after the first moment at which every role has data",
         "# duration = 10.0  # s",
         "",
@@ -131,7 +131,7 @@ def _link(guess: NameMatch | None, offered: Sequence[str]) -> str:
 
 def _topic(topics: Sequence[Topic]) -> str:
     if not topics:
-        return f'topic = "{UNKNOWN}"  # CHANGE: the bag has none of a type that fits'
+        return f'topic = "{UNKNOWN}"  # CHANGE: the bag has no topic of an accepted type'
     others = ", ".join("".join(map(_escaped, topic.name)) for topic in topics[1:])
     return f"topic = {_quoted(topics[0].name)}" + (f"  # CHECK: or {others}" if others else "")
 

@@ -136,7 +136,9 @@ def test_other_writers_of_mcap_are_read(
 def test_genuine_recordings_are_read_or_refused(path: Path, biped: Robot):
     assert read_all(path)
     with open_bag(path) as bag:
-        assert "CHANGE: the bag has none" in suggest(bag, biped, "b.xml", with_timestep=True)
+        assert "CHANGE: the bag has no topic of an accepted type" in suggest(
+            bag, biped, "b.xml", with_timestep=True
+        )
     with pytest.raises(InputError, match=r"MAP\.toml:5: unknown topic of the bag"):
         imported(path, biped)
 
@@ -203,7 +205,7 @@ def test_damage_is_called_by_its_name(bag: Path, tmp_path: Path):
     with pytest.raises(NotMcapError, match=r"no rosbag2 recording; give a bag's folder"):
         read_all(path)
     path.unlink()
-    with pytest.raises(CorruptError, match=r"lists bag\.mcap, which is not there"):
+    with pytest.raises(CorruptError, match=r"lists bag\.mcap, which is missing"):
         read_all(bag)
     (bag / "metadata.yaml").unlink()
     with pytest.raises(InputError, match="a folder without one"):

@@ -141,7 +141,7 @@ def test_the_command_suggests_imports_and_reports(driven: Path, tmp_path: Path):
     done = selfmodel(*arguments)
     assert done.returncode == 0, done.stderr
     assert max(map(len, done.stdout.partition("note:")[0].splitlines())) <= 80
-    assert "start pose" in done.stdout  # the suggestion knows no offsets
+    assert "initial pose" in done.stdout  # the suggestion knows no offsets
     again = selfmodel(*arguments)
     assert again.returncode == 2
     assert again.stderr == f"error: {log} exists, and is not overwritten: choose another name\n"
