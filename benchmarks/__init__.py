@@ -1,1 +1,1 @@
-"""Measurements of speed, memory and results; each says what it measures and how."""
+"""Measurements of speed, memory and results."""

@@ -1,8 +1,9 @@
-"""``make bench``: speed, memory and their growth, measured in one run and kept as JSON.
+"""``make bench``: speed, memory and their growth, measured in one run and written as JSON.
 
-Every figure is a median of at least five rounds, after one that warms up, but for diagnoses: each
-comparator makes one of every failure, in turns, and their seconds are added up. Ratios compare
-things that took turns in one process, with the same model, threads, starts and motor targets.
+Every figure is a median of at least five rounds after a warm-up round, except diagnoses: each
+comparator diagnoses every failure once, in turns, and the seconds are summed. Ratios compare
+variants that alternated in one process, with the same model, threads, initial poses and motor
+targets.
 """
 
 import json
@@ -22,13 +23,13 @@ from benchmarks.results import Facts
 from selfmodel.settings import Settings
 from selfmodel.tasks import ROBOTS, entry, suite_bodies
 
-# dm_control looks for a display as it is imported; nothing here is drawn.
+# dm_control searches for a display on import; nothing is drawn here.
 os.environ.setdefault("MUJOCO_GL", "disable")
 
 RESULTS = Path(__file__).with_name("results.json")
 POPULATION, STEPS = 100, 1000
 STEPS_OF_SUITE = 100
-"""For the bodies of dm_control's suite, some of which take a hundred times as long as ours."""
+"""Control steps for bodies of dm_control's suite; some cost a hundred times as much as ours."""
 
 
 def main() -> None:
@@ -65,7 +66,7 @@ def main() -> None:
 
 
 def of_suite(threads: int) -> list[Facts]:
-    """Returns the same of a body of each domain of dm_control's suite."""
+    """Returns the same ratio for a body of each domain of dm_control's suite."""
     robots = [
         entry(suite_bodies.name(domain, tasks[0])).robot()
         for domain, tasks in suite_bodies.DOMAINS.items()

@@ -1,6 +1,6 @@
 """How bodies recover, from the rows of studies that ``selfmodel suite run`` made.
 
-``python -m benchmarks.bodies FOLDER...`` prints the tables that ``docs/robots.md`` has, and draws
+``python -m benchmarks.bodies FOLDER...`` prints the tables of ``docs/results/bodies.md`` and draws
 ``docs/figures/bodies.png``.
 """
 

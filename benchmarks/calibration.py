@@ -1,8 +1,8 @@
-"""How much better a calibrated self-model predicts trials that it has not seen, and at what cost.
+"""Prediction error of calibrated self-models on held-out trials, and the cost of calibration.
 
-``python -m benchmarks.calibration [--bank DIR]`` prints a table and writes it down as
-``benchmarks/calibration.json``. With ``mujoco.sysid``'s packages (requirements-sysid.txt beside
-this file) it calibrates from the same trials too. Without ``--bank``, three gaits a robot are
+``python -m benchmarks.calibration [--bank DIR]`` prints a table and writes
+``benchmarks/calibration.json``. With the packages of ``mujoco.sysid`` (requirements-sysid.txt in
+this folder) it is fitted to the same trials too. Without ``--bank``, three gaits per robot are
 evolved first, in about two minutes.
 """
 
@@ -21,14 +21,14 @@ from benchmarks.onboard import without_base
 from selfmodel.controllers.controller import Controller
 from selfmodel.experiments.ablation.bank import gait
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.physical.reality_gap import Gap, draw_gap, perturbed
+from selfmodel.physical.reality_gap import RealityGap, draw_gap, perturbed_model
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.recovery.random_streams import gap_stream, repair_stream
 from selfmodel.recovery.repair import RepairSearch
 from selfmodel.robot.parameters import Parameters, with_model, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.calibrate import calibrate, prediction_error
+from selfmodel.simulation.calibration import calibrate, prediction_error
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import collect
@@ -36,9 +36,9 @@ from selfmodel.trials.trial import Trial, TrialPlan
 
 RESULTS = Path(__file__).with_suffix(".json")
 NO_NOISE = 1e-12
-"""A level at which the gap's noise and the jitter of the start are nothing."""
+"""Level of a gap with negligible measurement noise and initial noise."""
 SEEN, UNSEEN = 2, 2
-"""Trials that are calibrated from, and the number of the gait that is not."""
+"""Number of trials to fit; also the index of the held-out gait."""
 
 Facts = dict[str, Any]
 
@@ -78,7 +78,7 @@ Way = Callable[[Robot, Sequence[Trial]], tuple[Parameters, list[float]]]
 
 
 def _peer() -> dict[str, Way]:
-    """``mujoco.sysid``, where it is installed."""
+    """``mujoco.sysid``, if it is installed."""
     try:
         from benchmarks.sysid_peer import sysid_parameters  # noqa: PLC0415
     except ImportError as error:
@@ -88,9 +88,9 @@ def _peer() -> dict[str, Way]:
 
 
 def _compare(
-    robot: Robot, gaits: Sequence[Controller], gap: Gap, ways: dict[str, Way]
+    robot: Robot, gaits: Sequence[Controller], gap: RealityGap, ways: dict[str, Way]
 ) -> list[Facts]:
-    """A row a way, one of the nominal model, one of the physical robot's own model."""
+    """Returns a row per method, for the nominal model, and for the physical robot's own model."""
     noisy = SimulatedRobot(robot, gap=gap)
     trials = [_trial(robot, noisy, gaits[number]) for number in range(SEEN)]
     quiet = SimulatedRobot(robot, gap=dataclasses.replace(gap, level=NO_NOISE))
@@ -120,14 +120,16 @@ def _compare(
                 **_against_truth(robot, gap, found, deviations),
             )
         )
-    true = with_model(robot, perturbed(robot.model, gap), gap.delay)
+    true = with_model(robot, perturbed_model(robot.model, gap), gap.delay)
     return [*rows, row("the robot's own model", true)]
 
 
-def _against_truth(robot: Robot, gap: Gap, found: Parameters, deviations: Sequence[float]) -> Facts:
-    """How far the logarithms of the factors are from the truth, all and over their deviations.
+def _against_truth(
+    robot: Robot, gap: RealityGap, found: Parameters, deviations: Sequence[float]
+) -> Facts:
+    """Returns the errors of the factors' logarithms, and the errors divided by their deviations.
 
-    The limbs differ by a factor each, so there is no true one: their mass is left out.
+    Each limb has its own factor, so no common one is true: the limbs' mass is left out.
     """
     motors = [gap.motors[name] for name in robot.anatomy.motors]
     true = np.array([gap.mass[robot.root], np.nan, gap.friction, gap.damping, *motors])

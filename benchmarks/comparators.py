@@ -1,6 +1,6 @@
-"""What comparing costs beside simulating, and a diagnosis by each comparator beside the paper's.
+"""Cost of comparators relative to physics, and of diagnoses relative to the paper's comparator.
 
-Run by itself (``python -m benchmarks.comparators``) it prints what ``make bench`` keeps of it.
+``python -m benchmarks.comparators`` prints the same results as ``make bench``.
 """
 
 import json
@@ -15,17 +15,17 @@ import numpy as np
 from benchmarks.results import Facts
 from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT
 from selfmodel.controllers.controller import Controller
-from selfmodel.diagnosis.comparator import Comparator, Piecewise
+from selfmodel.diagnosis.comparator import Comparator, PiecewiseTrial
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.evidence import simulate
-from selfmodel.diagnosis.genome import VALUES, decode
 from selfmodel.experiments.ablation.bank import gait
 from selfmodel.experiments.reality import draw_reality
+from selfmodel.faults.hypothesis_space import GENE_VALUES, HypothesisSpace
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.calibrate import calibrate
+from selfmodel.simulation.calibration import calibrate
 from selfmodel.simulation.requests import Ensemble
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
@@ -36,27 +36,27 @@ if TYPE_CHECKING:
     from selfmodel.evolution import Generation
 
 ROUNDS = 5
-"""Rounds in which arithmetic is compared with physics; the medians are kept."""
+"""Rounds of arithmetic and physics; the result is the median."""
 
 SHARE = 0.25
-"""The goal: the most that a comparator's arithmetic may take of the physics that it needs."""
+"""Goal: largest ratio of a comparator's arithmetic to its physics."""
 
 TIMES = 3.0
-"""The goal: the most that a diagnosis may take of one by forward displacement, once for every
-member where a comparator asks for an ensemble."""
+"""Goal: largest ratio of a diagnosis to one by forward displacement; times the number of members
+for a comparator that requests an ensemble."""
 
 CASES = range(1, 10)
-"""The failures that are diagnosed. How much there is to refine depends on what has failed."""
+"""Cases to diagnose. The cost of refinement depends on the failure."""
 
 GAP = 0.05
-"""The gap of the robot that fails: without one, a diagnosis has less to weigh."""
+"""Reality gap of the robot: without one, a diagnosis has fewer hypotheses to compare."""
 
 BANK = Path(__file__).parent / "bank"
 HEALTHY_TRIALS = 2
 
 
 class Known(NamedTuple):
-    """What is known of a robot: its calibrated model, healthy trials, and one of each failure."""
+    """A robot's calibrated model, its healthy trials, and one trial per failure."""
 
     model: Robot
     intact: list[Trial]
@@ -64,20 +64,18 @@ class Known(NamedTuple):
 
 
 def measure(threads: int, settings: Settings) -> list[Facts]:
-    """Returns what each comparator costs on each robot.
+    """Returns the cost of each comparator on each robot.
 
     Args:
         threads: Threads that MuJoCo steps on.
-        settings: The paper's, or smaller ones to see that this works.
+        settings: The paper's, or smaller ones for a test.
 
     Returns:
-        A row a robot and comparator. ``arithmetic_over_physics``: seconds of its request and its
+        A row per robot and comparator. ``arithmetic_over_physics``: seconds of its request and its
         distances over those of the physics, for one generation's children. ``search_seconds``:
-        diagnostic EAs against one trial each, one for every failure. ``diagnosis_seconds``: the
-        same and what follows, where a comparator that judges in pieces has its result refined by
-        more hypotheses, and weighs them against how well the healthy robot was predicted.
-        ``of_single_diagnoses``: the ratio to forward displacement, failure by failure;
-        ``within_goals`` if it is for every one.
+        diagnostic EAs, one per failure, on one trial each. ``diagnosis_seconds``: the same with
+        refinement and verdict. ``of_single_diagnoses``: the ratio to forward displacement per
+        failure. ``within_goals``: whether every ratio reaches its goal.
     """
     return [row for name in ROBOTS for row in _of_robot(name, threads, settings)]
 
@@ -86,7 +84,7 @@ def _of_robot(name: str, threads: int, settings: Settings) -> list[Facts]:
     known = _known(name, threads, settings)
     shares = {one.name: _share(known, one, threads, settings) for one in COMPARATORS.values()}
     costs: dict[str, list[Facts]] = {one: [] for one in COMPARATORS}
-    for trial in known.failed.values():  # the comparators take turns
+    for trial in known.failed.values():  # the comparators alternate
         for one, comparator in COMPARATORS.items():
             costs[one].append(_diagnosis(known, trial, comparator, threads, settings))
     usual = costs[FORWARD_DISPLACEMENT.name]
@@ -138,28 +136,29 @@ def _known(name: str, threads: int, settings: Settings) -> Known:
 
 
 def _share(known: Known, comparator: Comparator, threads: int, settings: Settings) -> Facts:
-    """Seconds of a comparator's arithmetic, and of the physics, for one generation's children."""
+    """Returns seconds of a comparator's arithmetic and physics, for one generation's children."""
     rounds = [_share_once(known, comparator, threads, settings) for _ in range(ROUNDS + 1)][1:]
-    request = comparator.request(known.failed[CASES[0]])
+    request = comparator.prepare(known.failed[CASES[0]]).request
     members = request.members if isinstance(request, Ensemble) else 1
     return {"members": members} | {key: median(one[key] for one in rounds) for key in rounds[0]}
 
 
 def _share_once(known: Known, comparator: Comparator, threads: int, settings: Settings) -> Facts:
     children = settings.population - settings.survivors
-    genomes = np.random.default_rng(0).random((children, VALUES * settings.genes))
-    hypotheses = [decode(genome, known.model.anatomy, PAPER_KINDS) for genome in genomes]
+    genomes = np.random.default_rng(0).random((children, GENE_VALUES * settings.genes))
+    space = HypothesisSpace(known.model.anatomy, PAPER_KINDS)
+    hypotheses = [space.decode(genome) for genome in genomes]
     simulator = Simulator(known.model, threads)
     trial = known.failed[CASES[0]]
     start = perf_counter()
-    request = comparator.request(trial)
+    prepared = comparator.prepare(trial)
     asked = perf_counter() - start
-    simulated = simulate(simulator, request, trial, hypotheses).behaviour
+    simulated = simulate(simulator, prepared.request, trial, hypotheses).behaviour
     start = perf_counter()
-    if isinstance(comparator, Piecewise):
-        comparator.losses(simulated, trial)
+    if isinstance(prepared, PiecewiseTrial):
+        prepared.losses(simulated)
     else:
-        comparator.distances(simulated, trial)
+        prepared.distances(simulated)
     return {
         "arithmetic_seconds": asked + perf_counter() - start,
         "physics_seconds": simulator.stats.physics_seconds,
@@ -169,7 +168,7 @@ def _share_once(known: Known, comparator: Comparator, threads: int, settings: Se
 def _diagnosis(
     known: Known, trial: Trial, comparator: Comparator, threads: int, settings: Settings
 ) -> Facts:
-    """Seconds of one diagnosis and of its search, and how much they looked at."""
+    """Returns seconds of a diagnosis and of its search, and the number of evaluated hypotheses."""
     simulator = Simulator(known.model, threads)
     diagnose = DiagnosticSearch(simulator, comparator, settings, intact=known.intact)
     generations: list[Generation] = []

@@ -1,6 +1,7 @@
-"""How well degrees of faults and environments are found, from the rows of an ablation.
+"""Accuracy of diagnosed severities and environments, from the rows of a study.
 
-``python -m benchmarks.degrees FOLDER`` prints the tables that ``docs/comparators.md`` has;
+``python -m benchmarks.degrees FOLDER`` prints the tables of
+``docs/results/faults-and-environments.md``;
 ``selfmodel ablate --damages ... --out FOLDER`` makes the rows.
 """
 
@@ -18,20 +19,20 @@ from selfmodel.faults.notation import parse
 from selfmodel.tasks import ROBOTS
 
 ROUGHNESSES = (0.0, 0.02, 0.04)
-"""The classes of roughness, m: a degree is of the nearest."""
+"""Classes of roughness, m; a severity belongs to the nearest."""
 
 
 @dataclass(frozen=True)
 class Found:
-    """How a diagnosis compares with the truth.
+    """Comparison of a diagnosis with the truth.
 
     Attributes:
-        truth: In notation.
-        trials: Trials that it explains.
-        named: Whether it names the same faults and environments, whatever their degrees.
-        near: Whether it does, and every degree is as near as it is asked to be.
-        side: Whether it says rightly whether the robot, its world, both or nothing changed.
-        verdict: What it says of itself.
+        truth: True hypothesis in notation.
+        trials: Number of explained trials.
+        named: Whether faults and environments are the same, at any severity.
+        near: Whether, in addition, every severity is within its tolerance.
+        side: Whether the diagnosis is right that robot, environment, both or nothing changed.
+        verdict: Verdict of the diagnosis.
     """
 
     truth: str
@@ -43,7 +44,7 @@ class Found:
 
 
 def main() -> None:
-    """Prints a table a number of trials."""
+    """Prints a table per number of trials."""
     rows = _rows(Path(sys.argv[1]))
     for trials in sorted({row.trials for row in rows}):
         mine = [row for row in rows if row.trials == trials]
@@ -57,7 +58,7 @@ def main() -> None:
 
 
 def compared(best: Hypothesis, truth: Hypothesis) -> tuple[bool, bool, bool]:
-    """Returns whether faults are named, whether degrees are near too, and ``Found.side``."""
+    """Returns ``Found.named``, ``Found.near`` and ``Found.side``."""
     mine, theirs = _by_place(best.faults), _by_place(truth.faults)
     named = mine.keys() == theirs.keys()
     near = named and all(_near(mine[place], fault) for place, fault in theirs.items())

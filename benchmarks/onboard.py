@@ -1,10 +1,10 @@
-"""Diagnoses of a robot whose base nobody ever saw, from the logs of an ablation.
+"""Diagnoses without base position and linear velocity, from the logs of a study.
 
-``python -m benchmarks.onboard FOLDER --out OUT`` takes the trials of the ablation in ``FOLDER``,
-forgets the base's position and linear velocity in all of them, those before the failure too,
-calibrates and diagnoses from what is left, and writes ``OUT/results.csv`` and the rest of what an
-ablation has. Called again it goes on where it was stopped. In an ablation itself every comparator
-has the same calibrated self-model, fitted to all that was logged of the healthy robot.
+``python -m benchmarks.onboard FOLDER --out OUT`` removes the base's position and linear
+velocity from all trials of the study in ``FOLDER``, healthy ones included, calibrates and diagnoses
+from the rest, and writes ``OUT/results.csv`` and the other files of a study. Called again, it
+resumes. In the study itself every comparator has the same calibrated self-model, fitted to all
+signals of the healthy robot.
 """
 
 import argparse
@@ -23,7 +23,7 @@ from selfmodel.experiments.ablation.run_one import diagnosed, setting_of
 from selfmodel.experiments.ablation.scores import Score
 from selfmodel.experiments.grid import GridBegins, Job, PartEnds, finished, run_grid
 from selfmodel.logs.reader import read_log
-from selfmodel.simulation.calibrate import calibrate
+from selfmodel.simulation.calibration import calibrate
 from selfmodel.trials.state_estimation import BASE
 from selfmodel.trials.trial import Trial
 
@@ -57,7 +57,7 @@ def main() -> None:
 
 
 def without_base(trial: Trial) -> Trial:
-    """Returns the trial as it would be known if nobody had seen where the base was."""
+    """Returns the trial without the base's position and linear velocity."""
     run = trial.behaviour
     forgotten = {signal: np.full_like(run[signal], np.nan) for signal in BASE}
     behaviour = dataclasses.replace(run, signals={**run.signals, **forgotten})
@@ -65,7 +65,7 @@ def without_base(trial: Trial) -> Trial:
 
 
 def table(scores: Sequence[Score]) -> str:
-    """Returns how many diagnoses are right, as Markdown."""
+    """Returns the number of right diagnoses as Markdown."""
     gaps = sorted({score.gap for score in scores})
     lines = [
         f"| robot | trials | {' | '.join(f'gap {gap:g}' for gap in gaps)} |",

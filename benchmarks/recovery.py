@@ -1,7 +1,7 @@
-"""Where the time of one recovery goes, and how much memory it takes.
+"""Time shares and peak memory of one recovery.
 
-Run by itself (``python -m benchmarks.recovery``) it measures one recovery in this process and
-prints one JSON object; ``measure`` does that several times in processes of their own.
+``python -m benchmarks.recovery`` measures one recovery in this process and prints one JSON object;
+``measure`` repeats this in separate processes.
 """
 
 import json
@@ -19,10 +19,11 @@ from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.controllers.command_source import CommandSource
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.faults.notation import parse
-from selfmodel.logs.journal import open_journal
+from selfmodel.logs.journal import create_journal
+from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.physical.simulated_robot import SimulatedRobot
-from selfmodel.recovery.database import Database, Journal
+from selfmodel.recovery.database import Journal, RunTrial
 from selfmodel.recovery.recover import recover
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
@@ -34,7 +35,7 @@ ROUNDS = 5
 
 
 class TimedRobot:
-    """A physical robot, and the seconds that its own simulation took."""
+    """A physical robot that measures the seconds of its simulation."""
 
     def __init__(self, robot: PhysicalRobot) -> None:
         self._robot = robot
@@ -52,12 +53,16 @@ class TimedRobot:
             yield sample
 
 
-class TimedJournal:
-    """A journal, and the seconds that writing and reading took, without those of the robots."""
+class TimedLogs:
+    """Logs and journal of a recovery, with the seconds of writing and reading them.
 
-    def __init__(self, journal: Journal, robots: tuple[TimedRobot, ...]) -> None:
-        self._journal = journal
-        self._robots = robots
+    The seconds exclude those of the physical robots.
+    """
+
+    def __init__(
+        self, run_trial: RunTrial, journal: Journal, robots: tuple[TimedRobot, ...]
+    ) -> None:
+        self._run_trial, self._journal, self._robots = run_trial, journal, robots
         self._seconds = 0.0
 
     @property
@@ -65,25 +70,18 @@ class TimedJournal:
         """Seconds so far."""
         return self._seconds - sum(robot.seconds for robot in self._robots)
 
-    def record(self, physical: PhysicalRobot, plan: TrialPlan) -> Trial:
+    def run_trial(self, physical: PhysicalRobot, plan: TrialPlan) -> Trial:
         """Runs and logs a trial."""
         start = perf_counter()
-        trial = self._journal.record(physical, plan)
+        trial = self._run_trial(physical, plan)
         self._seconds += perf_counter() - start
         return trial
 
-    def note(self, diagnosis: Diagnosis) -> None:
-        """Keeps a diagnosis."""
+    def add(self, diagnosis: Diagnosis) -> None:
+        """Stores a diagnosis."""
         start = perf_counter()
-        self._journal.note(diagnosis)
+        self._journal.add(diagnosis)
         self._seconds += perf_counter() - start
-
-    def read(self) -> Database:
-        """Reads everything back."""
-        start = perf_counter()
-        database = self._journal.read()
-        self._seconds += perf_counter() - start
-        return database
 
 
 def measure() -> dict[str, float]:
@@ -105,13 +103,15 @@ def measure_once() -> dict[str, float]:
     healthy = TimedRobot(SimulatedRobot(robot))
     damaged = TimedRobot(SimulatedRobot(robot, parse(entry.cases[1], robot.anatomy)))
     with tempfile.TemporaryDirectory() as folder:
-        journal = open_journal(Path(folder) / "run", robot, settings, {})
-        timed = TimedJournal(journal, (healthy, damaged))
+        journal = create_journal(Path(folder) / "run", robot.anatomy)
+        run_trial = TrialRunner(journal.trials, robot, settings)
+        timed = TimedLogs(run_trial, journal, (healthy, damaged))
         recover(
             healthy=healthy,
             damaged=damaged,
             simulator=simulator,
             comparator=FORWARD_DISPLACEMENT,
+            run_trial=timed.run_trial,
             journal=timed,
             settings=settings,
             seed=0,

@@ -1,4 +1,4 @@
-"""Writes docs/results.md and its data, docs/results.jsonl, from the runs of ``table_one``."""
+"""Writes docs/results/table-one.md and docs/results.jsonl from the runs of ``table_one``."""
 
 import json
 from pathlib import Path
@@ -6,39 +6,40 @@ from statistics import median
 from typing import Any
 
 Facts = dict[str, Any]
-"""Plain values by name, as JSON keeps them."""
+"""JSON values by name."""
 
-RESULTS = Path("docs/results.md")
+RESULTS = Path("docs/results/table-one.md")
+DATA = Path("docs/results.jsonl")
 
-HEAD = """# Results: Table I of the paper, on both robots
+HEAD = """# Table I of the paper, on both robots
 
-Made by `make results` (`python -m benchmarks.table_one`), which runs what has not been run yet and
-writes this page. Forward-displacement comparator, the paper's budget (population 100, 30
-generations, 1,000 control steps, 3 trials after the failing one), no reality gap. One thread a
-run, as many runs at once as there are processors, and the seconds are those of such a run,
-without evolving the gait that the robot walks with before it fails (see the last table). The data,
-a line a gait and a line a run, is in [results.jsonl](results.jsonl).
+Written by `make results` (`python -m benchmarks.table_one`), which runs the missing runs and
+rewrites this page. Comparator `forward-displacement`, the paper's budget (population 100, 30
+generations, 1,000 control steps, 3 trials after the failing one), no reality gap. One thread per
+run, as many runs at once as processors; the seconds are those of such a run, without the evolution
+of the gait before the failure (last table). The data, one line per gait and one per run, is in
+[results.jsonl](../results.jsonl).
 
-Of the ten hypotheses ranked, the best counts. A compound is found when the search happens upon it:
-with one number a trial, a half-right hypothesis is no closer than a wrong one. The silent neuron of
-case 10 is none of the hypotheses, and is never correct. A recovery above 1 is a controller that
-walks better than the gait it began with: three more searches had that gait to start from.
+Of the ten hypotheses ranked, the best counts. A compound is found only if the search reaches it:
+with one number per trial, a partly right hypothesis is no closer than a wrong one. The silent
+neuron of case 10 is in no hypothesis, so its diagnosis is never correct. A recovery above 1 is a
+controller that walks better than the initial gait: three more searches started from that gait.
 
 *before*, *after*, *recovered*: forward displacement in m before the failure, with the same
 controller after it, and of the best of the three recovery trials. *correct*: the best hypothesis is
-the truth, or behaves like it to the bit under every logged controller. *distinct*: distinct
-hypotheses that were simulated.
+the truth, or behaves like it to the bit under every logged controller. *distinct*: number of
+distinct hypotheses that were simulated.
 """
 
-GAITS = """The paper's budget, one gait a seed. *torso*: its lowest and highest height over all \
+GAITS = """The paper's budget, one gait per seed. *torso*: its lowest and highest height over all \
 seeds, over its standing height; *deepest*: the deepest penetration of any contact; both at every \
-physics step. *walking* counts the gaits whose torso stays above the ground and below twice its \
-height, with no contact deeper than 1 cm.
+physics step. *walking* counts the gaits with a torso above the ground and below twice its \
+standing height, and no contact deeper than 1 cm.
 
-The robots have a soft skin of 1 cm (`margin` in the MJCF): contact forces begin before the shapes \
-meet, and depth is counted from the shapes. Without it, feet that strike the ground at 2 to 3 m/s \
-sink by more than 1 cm in the one physics step before there is a contact. The gaits are fast trots \
-and shuffles more than calm walks: the feet touch down four to fourteen times a second.
+The robots have a contact margin of 1 cm (`margin` in the MJCF): contact forces begin before the \
+shapes meet, and depth is counted from the shapes. Without it, feet that hit the ground at 2 to \
+3 m/s penetrate by more than 1 cm in the one physics step before there is a contact. The gaits are \
+fast trots and shuffles more than calm walks: the feet touch down four to fourteen times a second.
 """
 
 
@@ -46,19 +47,19 @@ def write_results(walks: list[Facts], runs: list[Facts]) -> None:
     """Writes the page.
 
     Args:
-        walks: What ``table_one.evolve_gait`` returns, for each robot and seed.
-        runs: What ``table_one.recover_once`` returns.
+        walks: Results of ``table_one.evolve_gait``, one per robot and seed.
+        runs: Results of ``table_one.recover_once``.
     """
     robots = list(dict.fromkeys(walk["robot"] for walk in walks))
     parts = [HEAD]
     for robot in robots:
         parts += [f"\n## {robot.capitalize()}, all ten cases, seed 0\n", _table_one(robot, runs)]
     parts += ["\n## How often the diagnosis is correct, by case\n", _by_case(runs)]
-    parts += ["\n## The repair EA on the intact robots\n", _gaits(robots, walks)]
+    parts += ["\n## The repair EA on the healthy robots\n", _gaits(robots, walks)]
     RESULTS.write_text("\n".join(parts), encoding="utf-8")
     rows = [json.dumps({key: run[key] for key in run if key != "trials"}) for run in runs]
     rows = [*map(json.dumps, walks), *rows]
-    RESULTS.with_suffix(".jsonl").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    DATA.write_text("\n".join(rows) + "\n", encoding="utf-8")
 
 
 def _table_one(robot: str, runs: list[Facts]) -> str:
@@ -89,7 +90,7 @@ def _short(number: float) -> str:
 
 def _by_case(runs: list[Facts]) -> str:
     rows = [
-        ("The quadruped, one run a seed; *÷ before* is recovered over before, over the seeds.\n"),
+        ("The quadruped, one run per seed; *÷ before* is recovered over before, over the seeds.\n"),
         "| case | truth | correct | median ÷ before | lowest | highest | diverged simulations |",
         "|---|---|---:|---:|---:|---:|---:|",
     ]

@@ -1,7 +1,7 @@
-"""Every single fault, recorded as a robot's driver would, imported and diagnosed again.
+"""Diagnoses of every single fault, recorded as by a robot's driver, imported and diagnosed.
 
 Run with ``python -m benchmarks.round_trip``; it takes five minutes on two cores, and prints the
-table that ``docs/real-robots.md`` has.
+table of ``docs/results/import.md``.
 """
 
 import os
@@ -14,6 +14,7 @@ from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.logs import TrialLog, read_log
+from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.robots import robot_of
 from selfmodel.logs.rosbag.importer import import_bag, write_recording
 from selfmodel.logs.rosbag.mapping_file import parse_mapping
@@ -48,7 +49,7 @@ def main() -> None:
 
 
 def single_faults(robot: Robot) -> list[Hypothesis]:
-    """Returns every hypothesis of one fault that the paper's diagnosis may propose."""
+    """Returns every hypothesis of one fault of the paper's kinds."""
     anatomy = robot.anatomy
     return [
         canonical([fault], anatomy) for kind in PAPER_KINDS for fault in kind.candidates(anatomy)
@@ -60,7 +61,7 @@ def recorded(folder: Path, robot: Robot, truth: Hypothesis, gait: Controller) ->
     steps = SETTINGS.steps
     plan = TrialPlan("trial", "single", gait, steps, SEED)
     samples = SimulatedRobot(robot, truth).run(gait, steps)
-    exact = write_trial(folder / "exact.mcap", robot, plan, samples, settings=SETTINGS)
+    exact = write_trial(folder / "exact.mcap", robot, plan, samples, TrialHeader(SETTINGS))
     bag = driver.record(folder / "bag", robot, truth, gait, steps)
     mapping = parse_mapping(driver.mapping(robot, steps, None), "mapping")
     recording = import_bag(bag, mapping, robot)
@@ -72,7 +73,7 @@ def recorded(folder: Path, robot: Robot, truth: Hypothesis, gait: Controller) ->
 
 
 def judged(log: TrialLog, truth: Hypothesis) -> str:
-    """Returns what the diagnosis of a log says, and how far the truth is from it."""
+    """Returns the best hypothesis for a log, and the distance of the truth."""
     simulator = Simulator(robot_of(log), os.cpu_count() or 1)
     search = DiagnosticSearch(simulator, FORWARD_DISPLACEMENT, log.settings)
     best = diagnose_trials([log.trial], search, SEED, lambda _: None).best

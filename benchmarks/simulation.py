@@ -1,4 +1,4 @@
-"""What a closed-loop simulation costs beside the physics that it cannot do without."""
+"""Cost of closed-loop simulation relative to its physics."""
 
 from collections.abc import Callable
 from statistics import median
@@ -18,14 +18,14 @@ from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Run, Simulator
 
 ROUNDS = 7
-"""Rounds of every comparison; its parts take turns, and the medians are compared."""
+"""Rounds of every comparison; its variants alternate, and the medians are compared."""
 
 LOOPED = 5
-"""How many of a batch's runs the loop over an environment makes: they cost it the same each."""
+"""Runs of the loop over an environment; its cost per run is constant."""
 
 
 def runs(robot: Robot, count: int) -> list[Run]:
-    """Returns runs of an intact robot with random controllers."""
+    """Returns runs of the healthy robot with random controllers."""
     network = network_for(robot)
     genomes = draw_genomes(np.random.default_rng(0), (count, network.weights))
     return [(INTACT, Controller(network, genome)) for genome in genomes]
@@ -34,7 +34,7 @@ def runs(robot: Robot, count: int) -> list[Run]:
 def closed_loop_over_rollout(robot: Robot, count: int, steps: int, threads: int) -> Facts:
     """Compares closed-loop steps per second with those of open-loop ``mujoco.rollout``.
 
-    The same model, threads, starts and motor targets: what the closed loop commanded, replayed.
+    Both have the same model, threads and initial poses, and the closed loop's motor targets.
     """
     batch = runs(robot, count)
     recorded = Simulator(robot, threads).run(batch, steps, ["commands"]).behaviour["commands"]
@@ -78,7 +78,7 @@ def closed_loop_over_environment(robot: Robot, count: int, steps: int, threads: 
 
 
 def growth(robots: list[Robot], threads: int) -> list[Facts]:
-    """Returns how the cost grows with population, steps and joints."""
+    """Returns the cost by population, steps and joints."""
     cells = [(robot, 100, 500) for robot in robots]
     cells += [(robots[0], count, 500) for count in (10, 25, 50, 200, 400)]
     cells += [(robots[0], 100, steps) for steps in (250, 1000, 2000)]
@@ -109,7 +109,7 @@ def _start(robot: Robot, count: int) -> np.ndarray:
 
 
 def _in_turns(*works: Callable[[], object], rounds: int = ROUNDS) -> list[float]:
-    """Returns the median wall seconds of each work, done in turns after a round of warm-up."""
+    """Returns the median wall seconds per function, alternating after a warm-up round."""
     seconds: list[list[float]] = [[] for _ in works]
     for turn in range(rounds + 1):
         for work, taken in zip(works, seconds, strict=True):

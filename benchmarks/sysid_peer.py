@@ -1,8 +1,8 @@
-"""The same calibration as ``mujoco.sysid`` does it: same segments, parameters, bounds and scales.
+"""Calibration by ``mujoco.sysid``, with the same segments, parameters, bounds and scales.
 
-``mujoco.sysid`` knows no delay of the commands, so each delay is tried around it, as ``calibrate``
-does. Its solver, stopping rule and finite differences are its own defaults; it has no prior, and
-large errors count by their square.
+``mujoco.sysid`` has no command delay, so each delay is tried around it, as in ``calibrate``. Its
+solver, stopping rule and finite differences are its defaults; it has no prior, and large errors
+count squared.
 """
 
 import io
@@ -19,15 +19,17 @@ from selfmodel.arrays import FloatArray
 from selfmodel.robot.parameters import Parameters, edited_model, factor_names, from_factors
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state_access import signal_fields, state_writer
-from selfmodel.simulation.calibrate import BOUND, DELAYS, SCALES
-from selfmodel.simulation.calibration_segments import HORIZON, LEAD, SEGMENTS
+from selfmodel.simulation.calibration import CANDIDATE_DELAYS, MAX_LOG_FACTOR
+from selfmodel.simulation.calibration_segments import HORIZON, MAX_SEGMENTS
+from selfmodel.simulation.requests import LEAD
 from selfmodel.trials.behaviour import Signal
 from selfmodel.trials.signal_difference import difference
+from selfmodel.trials.signal_scales import CALIBRATION_ERROR_SCALES
 from selfmodel.trials.state_estimation import STATE, estimated_states
 from selfmodel.trials.trial import Trial
 
 Theirs = Any
-"""What mujoco.sysid makes or asks for."""
+"""Object or argument of mujoco.sysid, which has no types."""
 
 # Imported so, because it says that it is typed, and MuJoCo itself is not.
 sysid: Theirs = import_module("mujoco.sysid")
@@ -36,11 +38,11 @@ States = dict[Signal, FloatArray]
 
 
 def sysid_parameters(robot: Robot, trials: Sequence[Trial]) -> Parameters:
-    """Returns what ``mujoco.sysid`` makes of trials of the intact robot, on one thread."""
-    logging.set_verbosity(logging.ERROR)  # it misses the sensors, which are not compared
+    """Returns the fit of ``mujoco.sysid`` to trials of the healthy robot, on one thread."""
+    logging.set_verbosity(logging.ERROR)  # it warns of missing sensors, which are not compared
     names = factor_names(robot)
     parameters = sysid.ParameterDict(
-        {name: sysid.Parameter(name, 0.0, -BOUND, BOUND) for name in names}
+        {name: sysid.Parameter(name, 0.0, -MAX_LOG_FACTOR, MAX_LOG_FACTOR) for name in names}
     )
 
     def residual_at(delay: int) -> Theirs:
@@ -56,14 +58,14 @@ def sysid_parameters(robot: Robot, trials: Sequence[Trial]) -> Parameters:
         residuals, _, _ = residual_at(delay)(np.zeros(len(names)), parameters)
         return float(np.sum(np.square(np.concatenate(residuals))))
 
-    delay = min(DELAYS, key=cost)
-    progress = io.StringIO()  # it has no way to be silent
+    delay = min(CANDIDATE_DELAYS, key=cost)
+    progress = io.StringIO()  # it has no option to be silent
     found, _ = sysid.optimize(parameters, residual_at(delay), verbose=False, output=progress)
     return from_factors(np.exp(found.as_vector()), delay)
 
 
 def _builder(robot: Robot) -> Theirs:
-    """Builds models from logarithms; it is asked for the same one once a segment."""
+    """Builds models from logarithms; called once per segment with the same ones."""
 
     @lru_cache(64)
     def build(row: tuple[float, ...]) -> mujoco.MjModel:
@@ -73,13 +75,13 @@ def _builder(robot: Robot) -> Theirs:
 
 
 def _sequences(robot: Robot, trials: Sequence[Trial], delay: int) -> Theirs:
-    """Every segment as a sequence of its own: from a logged state, under the delayed commands."""
+    """Returns every segment as a sequence: from a logged state, under the delayed commands."""
     states, controls, observed = [], [], []
     for trial in trials:
         estimated = estimated_states(trial.behaviour)
         vectors = _vectors(robot, estimated)
         last = trial.behaviour.steps - 1 - HORIZON
-        for k in np.unique(np.linspace(LEAD, last, SEGMENTS).round().astype(int)):
+        for k in np.unique(np.linspace(LEAD, last, MAX_SEGMENTS).round().astype(int)):
             commands = trial.behaviour["commands"][k - delay : k - delay + HORIZON]
             # A last row that sysid drops.
             rows = np.concatenate([np.repeat(commands, robot.substeps, axis=0), commands[-1:]])
@@ -108,7 +110,7 @@ def _sequences(robot: Robot, trials: Sequence[Trial], delay: int) -> Theirs:
 
 
 def _vectors(robot: Robot, states: Theirs) -> FloatArray:
-    """The state as MuJoCo orders it, ``(steps, nq + nv)``."""
+    """Returns the state in MuJoCo's order, ``(steps, nq + nv)``."""
     model, steps = robot.model, len(states[STATE[0]])
     fields = {"qpos": np.zeros((steps, model.nq)), "qvel": np.zeros((steps, model.nv))}
     state_writer(robot, fields.__getitem__)(states)
@@ -116,7 +118,7 @@ def _vectors(robot: Robot, states: Theirs) -> FloatArray:
 
 
 class _Residual:
-    """The errors of a segment in units of ``SCALES``, as sysid asks for them."""
+    """Returns the errors of a segment in units of ``CALIBRATION_ERROR_SCALES``."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
@@ -137,11 +139,14 @@ class _Residual:
         made = self._signals(state[substeps - 1 :: substeps, 1:])  # column 0 is the time
         seen = self._signals(observed.data)
         rows = []
-        for signal, scale in SCALES.items():
+        for signal, scale in CALIBRATION_ERROR_SCALES.items():
             rows.append((difference(signal, made[signal], seen[signal]) / scale).ravel())
         return np.concatenate(rows), observed, observed
 
     def _signals(self, rows: FloatArray) -> States:
         nq = self._robot.model.nq
         fields = {"qpos": rows[:, :nq], "qvel": rows[:, nq:]}
-        return {signal: self._where[signal].reader(fields.__getitem__)() for signal in SCALES}
+        return {
+            signal: self._where[signal].reader(fields.__getitem__)()
+            for signal in CALIBRATION_ERROR_SCALES
+        }

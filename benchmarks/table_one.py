@@ -1,10 +1,9 @@
 """``make results``: Table I of the paper on both robots, and how often the diagnosis is right.
 
-Every run is kept in a folder of its own and is not run again when the command is, unless the robot,
-the settings or the version have changed since. Each uses one thread, and as many run at once as
-there are processors. Cost: a gait takes about 15 (quadruped)
-or 30 s (hexapod), the rest of a recovery three to four times that; it grows in proportion to
-seeds, cases, population, generations and steps.
+Every run has its own folder and is repeated only if the robot, the settings or the version changed.
+Each uses one thread, and as many run at once as there are processors. Cost: a gait takes about
+15 s (quadruped) or 30 s (hexapod), the rest of a recovery three to four times that; it is
+proportional to seeds, cases, population, generations and steps.
 """
 
 import argparse
@@ -22,7 +21,6 @@ import numpy as np
 
 from benchmarks.results import Facts, write_results
 from benchmarks.walking import walk
-from selfmodel import __version__
 from selfmodel.cli.output.report import facts
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.experiments.experiment import Experiment, run
@@ -34,14 +32,15 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
+from selfmodel.version import __version__
 
 SEEDS = range(10)
 TOLD_APART_BY_WAY = (1, 2, 3, 5, 6, 9)
-"""Cases that displacement alone should diagnose: they are run with every seed."""
+"""Cases that displacement alone should diagnose; they have a run per seed."""
 
 
 def main() -> None:
-    """Runs what has not been run yet, and writes docs/results.md."""
+    """Runs the missing runs and writes docs/results/table-one.md."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("runs/table_one"))
     parser.add_argument("--workers", type=int, default=os.cpu_count())
@@ -62,7 +61,7 @@ def main() -> None:
 
 
 def evolve_gait(name: str, seed: int, out: Path) -> Facts:
-    """Evolves the gait that a recovery with this seed starts with, and says how it walks."""
+    """Evolves the first gait of a recovery with this seed, and returns measures of its walk."""
     folder = out / "gaits" / f"{name}-seed{seed}"
     facts_file = folder / "facts.json"
     start, settings = perf_counter(), Settings()
@@ -91,7 +90,7 @@ def evolve_gait(name: str, seed: int, out: Path) -> Facts:
 
 
 def recover_once(name: str, case: int, seed: int, out: Path) -> Facts:
-    """Recovers a robot from one case, starting with the gait of that seed."""
+    """Recovers a robot from one case, starting with the gait of its seed."""
     folder = out / f"{name}-case{case:02d}-seed{seed}"
     facts_file = folder.with_suffix(".json")
     robot = ROBOTS[name].robot()
@@ -118,7 +117,7 @@ def recover_once(name: str, case: int, seed: int, out: Path) -> Facts:
 
 
 def _made_of(robot: Robot) -> str:
-    """What a result depends on, as a digest."""
+    """Returns the digest of everything that a result depends on."""
     settings = json.dumps(dataclasses.asdict(Settings()))
     return hashlib.sha256(f"{__version__} {settings} {robot.mjcf}".encode()).hexdigest()
 

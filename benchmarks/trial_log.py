@@ -1,4 +1,4 @@
-"""What it costs to log a trial and to read it back, beside the library's own writer and reader."""
+"""Cost of writing and reading a trial log, and of the MCAP library's own writer and reader."""
 
 import tempfile
 from collections.abc import Sequence
@@ -13,6 +13,7 @@ from mcap.writer import Writer
 from selfmodel.controllers.controller import Controller, draw_genomes
 from selfmodel.logs import read_log
 from selfmodel.logs.contents import read_contents
+from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import TrialWriter
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.designs import network_for
@@ -27,9 +28,9 @@ ROUNDS = 7
 def measure(robot: Robot) -> dict[str, float]:
     """Returns the medians for a trial of the paper's length, its samples made beforehand.
 
-    The library's writer gets the same messages, encoded already, and keeps its defaults: chunks of
-    1 MiB, nothing flushed, no checksum over the data. Its reader keeps its own: no checksum is
-    looked at, and no message decoded.
+    The library's writer receives the same encoded messages and has its defaults: chunks of 1 MiB,
+    no flush, no checksum of the data. Its reader has its defaults too: no checksum is compared,
+    and no message decoded.
     """
     settings = Settings()
     network = network_for(robot)
@@ -67,9 +68,9 @@ def measure(robot: Robot) -> dict[str, float]:
 
 
 def _write(path: Path, robot: Robot, plan: TrialPlan, samples: Sequence[Sample]) -> list[float]:
-    """Writes a trial; returns for how many seconds each step waited for the log."""
+    """Writes a trial; returns the seconds that each step waited for the log."""
     delays = []
-    with TrialWriter(path, robot, plan, settings=Settings()) as writer:
+    with TrialWriter(path, robot, plan, TrialHeader(Settings())) as writer:
         for sample in samples:
             start = perf_counter()
             writer.add(sample)
@@ -78,7 +79,7 @@ def _write(path: Path, robot: Robot, plan: TrialPlan, samples: Sequence[Sample])
 
 
 def _with_the_library(path: Path, plain: Path) -> tuple[float, float, int]:
-    """Seconds to write and to read the messages of a log with the library alone, and bytes."""
+    """Returns seconds to write and to read a log's messages with the library alone, and bytes."""
     every = read_contents(path).topics
     start = perf_counter()
     with plain.open("wb") as file:

@@ -1,4 +1,4 @@
-"""Whether a controller walks: how far, how high the torso goes, how deep the feet sink."""
+"""Measures of a walk: displacement, torso height, contact depth."""
 
 from dataclasses import dataclass
 
@@ -15,10 +15,10 @@ from selfmodel.robot.sensing import SensorReader
 
 @dataclass(frozen=True)
 class Walk:
-    """What a run of an intact robot looked like, at every physics step.
+    """Measures of a run of the healthy robot, over every physics step.
 
     Attributes:
-        displacement: How far it travelled forward, m.
+        displacement: Forward displacement, m.
         lowest: Least height of the root body over its standing height.
         highest: Greatest height of the root body over its standing height.
         deepest: Deepest penetration of any contact, m.
@@ -31,12 +31,12 @@ class Walk:
 
     @property
     def is_walking(self) -> bool:
-        """Whether the torso stays between the ground and twice its height, and feet on top."""
+        """Whether the torso stays between the ground and twice its height, contacts shallow."""
         return self.lowest > 0 and self.highest < 2 and self.deepest <= 0.01
 
 
 def walk(robot: Robot, controller: Controller, steps: int) -> Walk:
-    """Returns how a controller makes an intact robot walk."""
+    """Returns the measures of a controller's walk on the healthy robot."""
     embodiment = build(robot, INTACT)
     model, data = embodiment.model, mujoco.MjData(embodiment.model)
     mujoco.mj_forward(model, data)

@@ -1,4 +1,4 @@
-"""The comparators, by name."""
+"""The comparators of selfmodel, by name."""
 
 from collections.abc import Mapping
 
@@ -22,9 +22,10 @@ COMPARATORS: Mapping[str, Comparator] = {
         SEGMENT_PREDICTION_ONBOARD,
     )
 }
-"""Every comparator that comes with selfmodel."""
+"""All comparators of selfmodel, by name."""
 
-DEFAULT = SEGMENT_PREDICTION.name
+DEFAULT = SEGMENT_PREDICTION
+"""The comparator of a diagnosis if none is given."""
 
 __all__ = [
     "COMPARATORS",

@@ -1,4 +1,4 @@
-"""The paper's comparator: did the robot get as far as the simulation says?"""
+"""Difference of forward displacements: the paper's comparator."""
 
 from dataclasses import dataclass
 
@@ -10,37 +10,52 @@ from selfmodel.simulation.requests import ClosedLoop
 from selfmodel.trials.behaviour import Behaviour, forward_displacement
 from selfmodel.trials.trial import Trial
 
+REQUEST = ClosedLoop(record=("base_position",))
+
 
 @dataclass(frozen=True)
 class ForwardDisplacement:
-    """The absolute difference of the forward displacements, m.
+    """The absolute difference of forward displacements, m.
 
     Source: the paper, section III (fitness of the diagnostic EA).
 
-    Limits: one number says little about a whole run. Without a reality gap the true hypothesis is
-    at exactly 0, but compounds of failures are hard to search for, because a half-right hypothesis
-    need not be closer than a wrong one; with a gap, contact is chaotic and the number is mostly
-    chance.
+    Limits: one number contains little information about a run. Without a reality gap the true
+    hypothesis is at exactly 0, but compounds of failures are hard to search for, because a
+    half-right hypothesis need not be closer than a wrong one; with a gap, contact is chaotic and
+    the number is mostly chance.
     """
 
     name: str = "forward-displacement"
 
-    def request(self, trial: Trial) -> ClosedLoop:
-        """Returns that the path of the root body is all it looks at.
+    def prepare(self, trial: Trial) -> "PreparedDisplacement":
+        """Returns the displacement of the trial.
 
         Raises:
-            InputError: The trial does not say where the root body began or ended.
+            InputError: The base's position is unknown at the first or the last step.
         """
         if not np.isfinite(trial.displacement):
             raise InputError(
                 f"{trial.path}: {self.name} needs base_position at the first and the last step, "
                 f"and the log does not have it: leave this log out, or give another comparator"
             )
-        return ClosedLoop(record=("base_position",))
+        return PreparedDisplacement(trial.displacement)
 
-    def distances(self, simulated: Behaviour, trial: Trial) -> FloatArray:
+
+@dataclass(frozen=True)
+class PreparedDisplacement:
+    """A trial prepared for ``ForwardDisplacement``.
+
+    Attributes:
+        displacement: Forward displacement of the trial, m.
+        request: A closed-loop rollout that records ``base_position``.
+    """
+
+    displacement: float
+    request: ClosedLoop = REQUEST
+
+    def distances(self, simulated: Behaviour) -> FloatArray:
         """Returns the distance of each simulation, ``(n,)``, m."""
-        return np.abs(forward_displacement(simulated) - trial.displacement)
+        return np.abs(forward_displacement(simulated) - self.displacement)
 
 
 FORWARD_DISPLACEMENT = ForwardDisplacement()

@@ -1,4 +1,4 @@
-"""What a gait is like in each window of a run, in numbers that do not say when a stride begins."""
+"""Gait features of windows of a run, independent of when a stride begins."""
 
 from collections.abc import Mapping
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 
-GROUPS: Mapping[str, float] = {
+LARGE_DIFFERENCES: Mapping[str, float] = {
     "duty": 0.1,
     "sequence": 0.3,
     "phase": 0.3,
@@ -14,55 +14,59 @@ GROUPS: Mapping[str, float] = {
     "posture": 0.1,
     "excursion": 0.1,
 }
-"""The groups of features, and what counts as a large difference in each: a part of the time, a
-part of the transitions, coherency, Hz, and twice the unit of the column (radians, or readings)."""
+"""Difference that counts as large, per group of features.
 
-FASTEST = 8.0
-"""Motion above this is contact noise rather than gait, Hz."""
+The units are a part of the time, a part of the transitions, coherency, Hz, and for the last two the
+unit of the column (radians, or readings)."""
+
+MAX_FREQUENCY = 8.0
+"""Upper frequency of a gait, Hz; faster motion is contact noise."""
 STILL = 0.05
-"""Motion of less than this (standard deviation, in the column's unit) counts as stillness."""
-LEVEL = 0.5
-"""A reading above it is on: where a binary one changes, or an angle passes half of its range."""
-STEADY = 5
-"""Steps of which most must be on before a reading is taken to have come on: contact chatters."""
+"""Standard deviation below which a column counts as still, in its unit."""
+ON_LEVEL = 0.5
+"""Level above which a reading is on: where a binary reading changes, or half of an angle's range.
+"""
+ONSET_STEPS = 5
+"""Window of the majority filter on readings before onsets are found, steps: contact chatters."""
 
 
 class Gait:
-    """The features of many runs, cut into windows of equal length.
+    """Gait features of many runs, by windows of equal length.
 
     Source: Hildebrand (1965) for duty factor, phase and footfall sequence; see ``gait_pattern``.
 
     Args:
         values: ``(n, steps, columns)``, the readings first.
-        seen: ``(steps, columns)``: what is looked at; the rest may be anything, NaN included.
-        readings: How many of the columns are readings of the controller.
-        timestep: Seconds between two steps.
-        windows: How many windows; steps that are left over at the end are not looked at.
+        observed: Mask of the values to use, ``(steps, columns)``; other values may be NaN.
+        readings: Number of columns that are readings of the controller.
+        timestep: Control time step, s.
+        windows: Number of windows; steps that are left over at the end are ignored.
 
     Attributes:
-        duty: ``(n, windows, readings)``, part of the time that each is on.
-        sequence: ``(n, windows, readings²)``, how often one comes on next after another.
-        phase: ``(n, windows, pairs)``, complex: the coherency of every two columns.
-        rhythm: ``(n, windows, frequencies)``, the part of all power up to each frequency.
-        posture: ``(n, windows, columns)``, the mean.
-        excursion: ``(n, windows, columns)``, the standard deviation.
-        resolution: Hz between two frequencies.
+        duty: Part of the time that each reading is on, ``(n, windows, readings)``.
+        sequence: Frequency of each transition from an onset to the next, as a part of all,
+            ``(n, windows, readings²)``.
+        phase: Complex coherency of every two columns, ``(n, windows, pairs)``.
+        rhythm: Part of all power up to each frequency, ``(n, windows, frequencies)``.
+        posture: Mean of each column, ``(n, windows, columns)``.
+        excursion: Standard deviation of each column, ``(n, windows, columns)``.
+        resolution: Difference of neighbouring frequencies, Hz.
     """
 
     def __init__(
-        self, values: FloatArray, seen: BoolArray, readings: int, timestep: float, windows: int
+        self, values: FloatArray, observed: BoolArray, readings: int, timestep: float, windows: int
     ) -> None:
         runs, steps, columns = values.shape
         length = steps // windows
         whole = windows * length
-        seen = seen[:whole].reshape(windows, length, columns)
+        seen = observed[:whole].reshape(windows, length, columns)
         kept = np.zeros((runs, windows, length, columns))
         np.copyto(kept, values[:, :whole].reshape(kept.shape), where=seen)
-        # Without it, part of a stride at either end would tell when the strides begin.
+        # Without a taper, the parts of strides at both ends would depend on the time shift.
         taper = np.sin(np.pi * (np.arange(length) + 0.5) / length) ** 2
         share = np.where(seen.any(axis=1), taper @ seen, 1)
         self.posture = taper @ kept / share
-        on = kept[..., :readings] > LEVEL
+        on = kept[..., :readings] > ON_LEVEL
         self.duty = taper @ on / share[:, :readings]
         self.sequence = _sequence(on, taper)
         kept -= self.posture[:, :, np.newaxis]
@@ -70,14 +74,16 @@ class Gait:
             kept *= seen
         self.excursion = np.sqrt(taper @ np.square(kept) / share)
         self.resolution = 1 / (length * timestep)
-        self.phase, self.rhythm = _spectral(kept, taper, max(1, int(FASTEST / self.resolution)))
+        self.phase, self.rhythm = _spectral(
+            kept, taper, max(1, int(MAX_FREQUENCY / self.resolution))
+        )
 
 
 def differences(one: Gait, other: Gait) -> dict[str, FloatArray]:
-    """Returns how much two sets of gaits differ, by group, ``(n, windows, features)`` each.
+    """Returns the differences of two sets of gaits, by group, ``(n, windows, features)`` each.
 
-    A sequence and a rhythm are one feature: the part of the transitions that are different, and
-    how far in Hz the power would have to be moved.
+    A sequence and a rhythm are one feature each: the part of the transitions that differ, and the
+    earth mover's distance of the power spectra, Hz.
     """
     sequence = np.abs(one.sequence - other.sequence).sum(axis=-1, keepdims=True) / 2
     rhythm = np.abs(one.rhythm - other.rhythm).sum(axis=-1, keepdims=True) * one.resolution
@@ -91,21 +97,21 @@ def differences(one: Gait, other: Gait) -> dict[str, FloatArray]:
     }
 
 
-def observed(seen: BoolArray, readings: int) -> dict[str, BoolArray]:
-    """Returns which features anything is known of, by group, ``(windows, features)`` each.
+def observed_features(observed: BoolArray, readings: int) -> dict[str, BoolArray]:
+    """Returns a mask of the features with an observation, by group, ``(windows, features)`` each.
 
     Args:
-        seen: ``(windows, columns)``: whether a column was seen in a window.
-        readings: How many of the columns are readings.
+        observed: Mask of the columns with an observation in a window, ``(windows, columns)``.
+        readings: Number of columns that are readings.
     """
-    first, second = _pairs(seen.shape[1])
+    first, second = _pairs(observed.shape[1])
     return {
-        "duty": seen[:, :readings],
-        "sequence": np.asarray(seen[:, :readings].any(axis=1, keepdims=True)),
-        "phase": seen[:, first] & seen[:, second],
-        "rhythm": np.asarray(seen.any(axis=1, keepdims=True)),
-        "posture": seen,
-        "excursion": seen,
+        "duty": observed[:, :readings],
+        "sequence": np.asarray(observed[:, :readings].any(axis=1, keepdims=True)),
+        "phase": observed[:, first] & observed[:, second],
+        "rhythm": np.asarray(observed.any(axis=1, keepdims=True)),
+        "posture": observed,
+        "excursion": observed,
     }
 
 
@@ -115,15 +121,15 @@ def _pairs(columns: int) -> tuple[IndexArray, IndexArray]:
 
 
 def _sequence(on: BoolArray, taper: FloatArray) -> FloatArray:
-    """How often each reading comes on next after each other one, as a part of all transitions."""
+    """Returns the frequency of each transition between onsets, as a part of all transitions."""
     runs, windows, length, readings = on.shape
-    last = max(length - STEADY + 1, 0)
+    last = max(length - ONSET_STEPS + 1, 0)
     counted = np.zeros((runs, windows, last, readings), dtype=np.uint8)
-    for k in range(STEADY):
+    for k in range(ONSET_STEPS):
         counted += on[:, :, k : k + last]
-    most = counted > STEADY // 2
+    most = counted > ONSET_STEPS // 2
     onsets = (most[:, :, 1:] & ~most[:, :, :-1]).reshape(runs * windows, -1)
-    # In the order of time, and of columns where two come on at once.
+    # Ordered by time, then by column for simultaneous onsets.
     where, event = np.nonzero(onsets)
     moment, which = np.divmod(event, max(readings, 1))
     together = where[1:] == where[:-1]
@@ -133,20 +139,20 @@ def _sequence(on: BoolArray, taper: FloatArray) -> FloatArray:
         weights=taper[moment[1:]][together],
         minlength=runs * windows * readings**2,
     ).reshape(runs, windows, -1)
-    # One more than there were: a single transition is not yet a sequence.
+    # One added to the count: a single transition is not yet a sequence.
     return np.asarray(counts / (counts.sum(axis=-1, keepdims=True) + 1))
 
 
 def _spectral(
     centred: FloatArray, taper: FloatArray, frequencies: int
 ) -> tuple[FloatArray, FloatArray]:
-    """The coherency of every two columns, and the part of all power up to each frequency."""
+    """Returns the coherency of every two columns and the part of all power up to each frequency."""
     runs, windows, length, columns = centred.shape
     step = np.arange(length) + 0.5
     angle = 2 * np.pi * np.arange(1, frequencies + 1)[:, np.newaxis] * step / length
-    # By a product of matrices, because only the lowest of the frequencies are needed.
+    # A matrix product instead of an FFT, because only the lowest frequencies are needed.
     basis = np.concatenate([np.cos(angle), np.sin(angle)]) * taper
-    # So that the power over all frequencies is the variance.
+    # Normalised so that the power over all frequencies is the variance.
     basis *= np.sqrt(2 / (length * np.sum(taper**2)))
     parts = (basis @ centred).reshape(runs, windows, 2, frequencies, columns)
     lines = parts[:, :, 0] + 1j * parts[:, :, 1]
@@ -154,7 +160,7 @@ def _spectral(
     first, second = _pairs(columns)
     total = power.sum(axis=2) + STILL**2
     cross = (lines.swapaxes(-1, -2) @ lines.conj())[..., first, second]
-    # In C order, as everything else: the order in memory decides the order in which numpy adds.
+    # In C order, as all other features: the order in memory is the order in which numpy adds.
     phase = np.ascontiguousarray(cross / np.sqrt(total[..., first] * total[..., second]))
     moved = power.sum(axis=3)
     rhythm = moved.cumsum(axis=2) / (moved.sum(axis=2, keepdims=True) + STILL**2)

@@ -1,150 +1,175 @@
-"""How likely is the trial, if the robot differs from its model by as much as robots do?"""
+"""Likelihood of a trial under an ensemble of perturbed self-models."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.comparators.observed import observed_signals
+from selfmodel.comparators.windows import padded_windows
 from selfmodel.simulation.requests import Ensemble
 from selfmodel.trials.behaviour import Behaviour, Signal
 from selfmodel.trials.signal_difference import comparable
+from selfmodel.trials.signal_scales import ENSEMBLE_DEVIATION_FLOORS
 from selfmodel.trials.trial import Trial
 
 WINDOW = 25
-"""Control steps of a window; a window is a piece of the trial."""
-
-FLOORS: Mapping[Signal, float] = MappingProxyType(
-    {
-        "sensors": 0.1,
-        "joint_positions": 0.05,
-        "base_orientation": 0.1,
-        "base_linear_velocity": 0.1,
-    }
-)
-"""The deviation that members which all do the same still have, in the signal's unit: what no
-member is drawn with, such as the noise of the instruments."""
+"""Control steps of a window."""
 
 
 @dataclass(frozen=True)
 class NoisyTransfer:
-    """How unlikely the trial is under an ensemble of perturbed simulations of each hypothesis.
+    """How unlikely a trial is under an ensemble of perturbed simulations of each hypothesis.
 
     Each hypothesis is simulated with six self-models whose masses, friction, damping and motors
     were drawn at a reality gap of 0.05, the same six for every hypothesis (common random numbers).
-    The trial is cut into windows of 25 steps. In each, the mean and the standard deviation of
-    every column are taken, and the members say how they are distributed: were the robot one more
-    draw from a normal distribution of which six draws are known, it would follow a Student t about
-    their mean, with five degrees of freedom and a scale of sqrt(1 + 1/6) times their standard
-    deviation, to which the signal's floor is added in squares. The loss is by how much the log
-    likelihood of what the trial shows falls short of the highest that there is, that of members
-    that all did what the trial shows; it is averaged over the features of a signal, and over the
-    signals.
+    The trial is cut into windows of 25 steps. The features of a window are the mean and the
+    standard deviation of every column, and the members give a predictive distribution of each
+    feature: if the robot were one more draw from a normal distribution of which six draws are
+    known, it would follow a Student t about their mean, with five degrees of freedom and a scale
+    of sqrt(1 + 1/6) times their standard deviation, to which the signal's floor is added in
+    squares. The loss is the difference between the highest possible log likelihood, that of
+    members that all reproduce the trial, and the log likelihood of the trial; it is averaged over
+    the features of a signal, and over the signals.
 
-    So noise counts as noise: where the members themselves disagree, a difference from them says
-    little, and where they agree, much. That takes the place of a weight for early moments, and an
-    ensemble that would fit anything pays for its width. A base's orientation is compared as the
-    direction of gravity that it feels and the horizontal part of where it points. What was not
-    observed in the trial is not compared.
+    So noise counts as noise: where the members differ from each other, a difference from them
+    counts little, and where they agree, much. That replaces a decreasing weight of later moments,
+    and an ensemble that would fit any trial has a loss for its width. The base's orientation is
+    compared as the direction of gravity in the base's frame and the horizontal part of the forward
+    direction. Unobserved values of the trial are left out.
 
-    Source: the paper names noisy transfer as future work. That a simulation should be noisy about
-    what it gets wrong: Jakobi, Husbands and Harvey, "Noise and the reality gap" (ECAL 1995). That
-    it should know where it is to be trusted: Koos, Mouret and Doncieux, "The transferability
-    approach", IEEE Transactions on Evolutionary Computation 17 (2013). The t distribution is the
-    textbook's prediction of one more draw, such as in Gelman et al., "Bayesian Data Analysis".
-    Windows, features and floors are choices made here.
+    Source: the paper names noisy transfer as future work. Noise in what a simulation models badly:
+    Jakobi, Husbands and Harvey, "Noise and the reality gap" (ECAL 1995). Estimates of where a
+    simulation can be trusted: Koos, Mouret and Doncieux, "The transferability approach", IEEE
+    Transactions on Evolutionary Computation 17 (2013). The t distribution is the textbook's
+    prediction of one more draw, such as in Gelman et al., "Bayesian Data Analysis". Windows,
+    features and floors are choices made here.
 
-    Limits: the level of the gap is assumed, not measured: a robot that is further from its model
-    makes every hypothesis unlikely, and one that is closer is told apart less sharply than it could
-    be; as no member is the model itself, not even the truth is at 0 where there is no gap. Delay,
-    instruments and structure are not drawn. It costs as many simulations as there are members, six
-    for every one of the other comparators, and six tell a deviation only roughly. Beyond the moment
-    from which the members disagree, a trial says little. Features are judged as if they were
-    independent.
+    Limits: the level of the gap is assumed, not measured: a robot further from its model makes
+    every hypothesis unlikely, and with a robot closer to its model hypotheses are distinguished
+    less sharply than possible; as no member is the model itself, not even the true hypothesis is
+    at 0 without a gap. Delay, measurement noise and structure are not drawn. The cost is six
+    simulations per hypothesis, where other comparators need one, and six members estimate a
+    deviation only roughly. Beyond the moment from which the members differ, a trial contains
+    little information. Features are taken to be independent.
 
     Attributes:
-        name: What it is called.
+        name: The comparator's name.
         members: Simulations of each hypothesis.
-        level: The level of the reality gap that they are drawn from.
+        level: Level of the reality gap from which the members are drawn.
     """
 
     name: str = "noisy-transfer"
     members: int = 6
     level: float = 0.05
 
-    def request(self, trial: Trial) -> Ensemble:
-        """Returns the ensemble, and that it looks at those of its signals that the trial has.
+    def prepare(self, trial: Trial) -> "PreparedFeatures":
+        """Returns the features of the trial, for the observed ones of its signals.
 
         Raises:
-            InputError: The trial has none of them.
+            InputError: None of the signals was observed.
         """
-        return Ensemble(observed_signals(trial, FLOORS, self.name), self.members, self.level)
+        signals = observed_signals(trial, ENSEMBLE_DEVIATION_FLOORS, self.name)
+        features = {signal: _trial_features(signal, trial.behaviour[signal]) for signal in signals}
+        weight = np.zeros(-(-trial.behaviour.steps // WINDOW))
+        for found in features.values():
+            weight += found.weight.sum(axis=1)
+        return PreparedFeatures(Ensemble(signals, self.members, self.level), features, weight)
 
-    def distances(self, simulated: Behaviour, trial: Trial) -> FloatArray:
+
+@dataclass(frozen=True, eq=False)
+class TrialFeatures:
+    """The features of one signal of a trial.
+
+    Attributes:
+        observed: Mask of the observed values, ``(steps, columns)``.
+        values: Features of each window, ``(1, windows, 2 * columns)``.
+        weight: Weight of each feature, ``(windows, 2 * columns)``; 0 if unobserved.
+        floor: Deviation that is added to that of the members.
+    """
+
+    observed: BoolArray
+    values: FloatArray
+    weight: FloatArray
+    floor: float
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedFeatures:
+    """A trial prepared for ``NoisyTransfer``.
+
+    Attributes:
+        request: An ensemble that records the observed signals.
+        features: Features of each observed signal.
+        weight: Sum of the weights in each window, ``(windows,)``; 0 if nothing was observed.
+    """
+
+    request: Ensemble
+    features: Mapping[Signal, TrialFeatures]
+    weight: FloatArray
+
+    def distances(self, simulated: Behaviour) -> FloatArray:
         """Returns the mean loss of the windows, ``(n,)``."""
-        return np.asarray(self.losses(simulated, trial).mean(axis=1))
+        return np.asarray(self.losses(simulated).mean(axis=1))
 
-    def losses(self, simulated: Behaviour, trial: Trial) -> FloatArray:
-        """Returns the loss of each window of which anything was observed, ``(n, windows)``."""
-        signals = observed_signals(trial, FLOORS, self.name)
-        windows = -(-trial.behaviour.steps // WINDOW)
-        total = np.zeros((len(simulated[signals[0]]), windows))
-        judged = np.zeros(windows)
-        for signal in signals:
-            logged = comparable(signal, trial.behaviour[signal])
-            seen = np.isfinite(logged)
-            shown, floor = _features(logged[np.newaxis], seen), FLOORS[signal]
-            known = np.tile(_in_windows(seen).any(axis=1), 2) / (2 * seen.shape[1])
-            # One hypothesis at a time: its members fit in the cache, and none touches another.
-            for one, runs in enumerate(simulated[signal]):
-                difference = _features(comparable(signal, runs), seen) - shown
-                total[one] += (_shortfall(difference, floor) * known).sum(axis=1)
-            judged += known.sum(axis=1)
-        some = judged > 0
-        # In C order, because the order in memory decides the order in which a mean adds.
-        return np.ascontiguousarray(total[:, some] / judged[some])
+    def losses(self, simulated: Behaviour) -> FloatArray:
+        """Returns the loss of each window with an observation, ``(n, windows)``."""
+        total = np.zeros((len(simulated[self.request.record[0]]), len(self.weight)))
+        for signal, features in self.features.items():
+            # One hypothesis at a time: its members fit in the CPU cache, and no result depends on
+            # the other hypotheses.
+            for hypothesis, members in enumerate(simulated[signal]):
+                found = _features(comparable(signal, members), features.observed)
+                shortfall = _likelihood_shortfall(found - features.values, features.floor)
+                total[hypothesis] += (shortfall * features.weight).sum(axis=1)
+        some = self.weight > 0
+        # In C order: the order in memory is the order in which a mean adds.
+        return np.ascontiguousarray(total[:, some] / self.weight[some])
 
 
-def _features(values: FloatArray, seen: BoolArray) -> FloatArray:
-    """The mean and the standard deviation of each column in each window, where it was seen.
+def _trial_features(signal: Signal, values: FloatArray) -> TrialFeatures:
+    logged = comparable(signal, values)
+    observed = np.isfinite(logged)
+    windows = padded_windows(observed, WINDOW).any(axis=1)
+    return TrialFeatures(
+        observed=observed,
+        values=_features(logged[np.newaxis], observed),
+        weight=np.tile(windows, 2) / (2 * observed.shape[1]),
+        floor=ENSEMBLE_DEVIATION_FLOORS[signal],
+    )
+
+
+def _features(values: FloatArray, observed: BoolArray) -> FloatArray:
+    """Returns the mean and the standard deviation of each column's observed values, by window.
 
     Args:
-        values: ``(members, steps, columns)``; what was not seen may be anything, NaN included.
-        seen: ``(steps, columns)``.
+        values: ``(members, steps, columns)``; unobserved values may be NaN.
+        observed: ``(steps, columns)``.
 
     Returns:
-        ``(members, windows, 2 * columns)``; 0 where nothing was seen.
+        ``(members, windows, 2 * columns)``; 0 if nothing was observed.
     """
-    cut = _in_windows(np.where(seen, values, 0.0))
-    told = _in_windows(seen)
-    count = np.maximum(told.sum(axis=-2), 1)
-    mean = cut.sum(axis=-2) / count
-    cut -= mean[..., np.newaxis, :]
-    cut *= told
-    spread = np.sqrt(np.square(cut, out=cut).sum(axis=-2) / count)
+    windows = padded_windows(values, WINDOW, observed)
+    mask = padded_windows(observed, WINDOW)
+    count = np.maximum(mask.sum(axis=-2), 1)
+    mean = windows.sum(axis=-2) / count
+    windows -= mean[..., np.newaxis, :]
+    windows *= mask
+    spread = np.sqrt(np.square(windows, out=windows).sum(axis=-2) / count)
     return np.concatenate([mean, spread], axis=-1)
 
 
-def _in_windows(values: FloatArray | BoolArray) -> FloatArray:
-    """Cuts the steps into windows, ``(..., windows, WINDOW, columns)``, the last filled with 0."""
-    *before, steps, columns = values.shape
-    windows = -(-steps // WINDOW)
-    whole = np.zeros((*before, windows * WINDOW, columns))
-    whole[..., :steps, :] = values
-    return whole.reshape(*before, windows, WINDOW, columns)
-
-
-def _shortfall(difference: FloatArray, floor: float) -> FloatArray:
-    """By how much the log likelihood of each feature is below the highest.
+def _likelihood_shortfall(difference: FloatArray, floor: float) -> FloatArray:
+    """Returns the highest possible log likelihood of each feature less that of the trial.
 
     Args:
-        difference: Of the members from what the trial shows, ``(members, windows, features)``.
-        floor: The least deviation.
+        difference: Features of the members less those of the trial,
+            ``(members, windows, features)``.
+        floor: Deviation that is added to that of the members.
 
     Returns:
-        ``(windows, features)``, exactly 0 where no member differs.
+        ``(windows, features)``, exactly 0 if no member differs from the trial.
     """
     members = len(difference)
     freedom = max(members - 1, 1)

@@ -1,4 +1,4 @@
-"""What a trial shows of what a comparator would look at."""
+"""Signals of a comparator that a trial contains."""
 
 from collections.abc import Iterable
 
@@ -12,21 +12,21 @@ from selfmodel.trials.trial import Trial
 def observed_signals(
     trial: Trial, signals: Iterable[Signal], comparator: str
 ) -> tuple[Signal, ...]:
-    """Returns those of some signals of which the trial has anything.
+    """Returns the signals with at least one finite value in the trial.
 
     Args:
         trial: The logged trial.
-        signals: What the comparator would look at.
-        comparator: Its name, for the error.
+        signals: The signals that the comparator can use.
+        comparator: Name of the comparator, for the error.
 
     Raises:
-        InputError: The trial has none of them.
+        InputError: The trial has none of the signals.
     """
-    asked = tuple(signals)
-    found = tuple(signal for signal in asked if np.isfinite(trial.behaviour[signal]).any())
+    wanted = tuple(signals)
+    found = tuple(signal for signal in wanted if np.isfinite(trial.behaviour[signal]).any())
     if not found:
         raise InputError(
-            f"{trial.path}: {comparator} needs one at least of {', '.join(asked)}, and the log has "
-            f"none of them: leave this log out, or give another comparator"
+            f"{trial.path}: {comparator} needs one at least of {', '.join(wanted)}, and the log "
+            f"has none of them: leave this log out, or give another comparator"
         )
     return found

@@ -1,4 +1,4 @@
-"""What the paper's robots can sense, compared as time series."""
+"""Time series of the sensors of the paper's robots, and the final displacement."""
 
 from dataclasses import dataclass
 
@@ -6,60 +6,87 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.comparators.bounded import bounded
-from selfmodel.comparators.sensor_series import SensorSeries
+from selfmodel.comparators.sensor_series import PreparedSeries, SensorSeries
 from selfmodel.simulation.requests import ClosedLoop
 from selfmodel.trials.behaviour import Behaviour, forward_displacement
 from selfmodel.trials.trial import Trial
 
-SHARE = 0.2
-"""How much of the distance the displacement makes up."""
-FAR = 0.25
-"""A difference of displacements that is large, as a part of the displacement itself."""
-FLOOR = 0.1
-"""And at least this, m."""
+DISPLACEMENT_SHARE = 0.2
+"""Share of the displacement in the distance."""
+RELATIVE_ERROR = 0.25
+"""Difference of displacements that counts as large, as a part of the trial's displacement."""
+MIN_ERROR = 0.1
+"""Lower bound of the difference that counts as large, m."""
 READINGS = SensorSeries("paper-sensors", ("sensors",))
 
 
 @dataclass(frozen=True)
 class PaperSensors:
-    """``sensor-series`` on what the controller received, and the forward displacement at the end.
+    """``sensor-series`` on the controller's readings, and the final forward displacement.
 
     Source: the paper, section III: touch, joint angles and displacement are all that its robots
     measure.
 
-    Limits: those of ``sensor-series``; what no sensor of the controller sees (most knees have
-    none) shows only in how the robot moves on.
+    Limits: those of ``sensor-series``; a joint without a sensor of the controller (most knees)
+    shows only in its effect on the motion.
+
+    Attributes:
+        name: The comparator's name.
+        series: The comparator of the readings.
     """
 
     name: str = "paper-sensors"
     series: SensorSeries = READINGS
 
-    def request(self, trial: Trial) -> ClosedLoop:
-        """Returns that it looks at the controller's readings and at where the root body is.
+    def prepare(self, trial: Trial) -> "PreparedPaperSensors":
+        """Returns the readings and the displacement of the trial.
 
         Raises:
             InputError: The trial has no readings.
         """
-        return ClosedLoop(record=(*self.series.request(trial).record, "base_position"))
+        series = self.series.prepare(trial)
+        return PreparedPaperSensors(
+            series=series,
+            displacement=trial.displacement,
+            request=ClosedLoop(record=(*series.request.record, "base_position")),
+        )
 
-    def distances(self, simulated: Behaviour, trial: Trial) -> FloatArray:
+
+@dataclass(frozen=True, eq=False)
+class PreparedPaperSensors:
+    """A trial prepared for ``PaperSensors``.
+
+    Attributes:
+        series: The trial prepared for the comparison of the readings.
+        displacement: Forward displacement of the trial, m; NaN if unknown.
+        request: A closed-loop rollout that records the readings and ``base_position``.
+    """
+
+    series: PreparedSeries
+    displacement: float
+    request: ClosedLoop
+
+    def distances(self, simulated: Behaviour) -> FloatArray:
         """Returns the distance of each simulation, ``(n,)``, from 0 to 1."""
-        return np.asarray(self.losses(simulated, trial).mean(axis=1))
+        return np.asarray(self.losses(simulated).mean(axis=1))
 
-    def losses(self, simulated: Behaviour, trial: Trial) -> FloatArray:
-        """Returns the loss of each window, and of the displacement where the trial has it.
+    def losses(self, simulated: Behaviour) -> FloatArray:
+        """Returns the loss of each window, and of the displacement if the trial has one.
 
         Returns:
             ``(n, windows)`` or ``(n, windows + 1)``, weighted so that their mean is the distance.
         """
-        windows = self.series.losses(simulated, trial)
-        if not np.isfinite(trial.displacement):
+        windows = self.series.losses(simulated)
+        if not np.isfinite(self.displacement):
             return windows
         pieces = windows.shape[1] + 1
-        far = max(FAR * abs(trial.displacement), FLOOR)
-        end = bounded((forward_displacement(simulated) - trial.displacement) / far)
+        large = max(RELATIVE_ERROR * abs(self.displacement), MIN_ERROR)
+        end = bounded((forward_displacement(simulated) - self.displacement) / large)
         return np.column_stack(
-            [windows * ((1 - SHARE) * pieces / (pieces - 1)), end * (SHARE * pieces)]
+            [
+                windows * ((1 - DISPLACEMENT_SHARE) * pieces / (pieces - 1)),
+                end * (DISPLACEMENT_SHARE * pieces),
+            ]
         )
 
 

@@ -1,205 +1,222 @@
-"""From each of many logged states: how well are the next tenths of a second predicted?"""
+"""Error of short predictions from many logged states."""
 
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
-from types import MappingProxyType
 
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
-from selfmodel.comparators.arithmetic import command_errors, command_spans
-from selfmodel.comparators.trembling import trembling_loss
+from selfmodel.comparators.command_errors import command_errors, command_spans
+from selfmodel.comparators.sensor_noise_level import noise_level_loss
 from selfmodel.errors import InputError
-from selfmodel.simulation.requests import Past, Segments
+from selfmodel.simulation.requests import Segments, command_steps, cut_segments
 from selfmodel.trials.behaviour import Behaviour, Signal
 from selfmodel.trials.signal_difference import difference
+from selfmodel.trials.signal_scales import PREDICTION_ERROR_SCALES
 from selfmodel.trials.state_estimation import ONBOARD, STATE, estimated_states
 from selfmodel.trials.trial import Trial
 
-LEAD = 5
-"""Commands from before a segment that a model with a control delay may need."""
+MIN_SEGMENTS = 4
+"""Segments of a trial, at least."""
 
-FEWEST = 4
-"""Segments without which nothing can be said."""
-
-LOOKS = 4
-"""How many times within a segment prediction and log are compared, the last at its end."""
-
-SCALES: Mapping[Signal, float] = MappingProxyType(
-    {
-        "joint_positions": 0.1,
-        "joint_velocities": 3.0,
-        "base_position": 0.03,
-        "base_orientation": 0.1,
-        "base_linear_velocity": 0.3,
-        "base_angular_velocity": 1.0,
-        "sensors": 0.3,
-        "commands": 0.05,
-    }
-)
-"""By how much a prediction may be wrong until the error counts as large, in each signal's unit; of
-commands, for the paper's range, and as much more or less as a motor's own is wider or narrower."""
+COMPARISONS = 4
+"""Steps within a segment at which prediction and log are compared, evenly spread to its end."""
 
 CONTRADICTION = 3.0
-"""How much more it counts that a sensor which is predicted never to switch does."""
+"""Factor on the loss of a binary reading that changes although no change is ever predicted."""
 
 
 @dataclass(frozen=True)
 class SegmentPrediction:
-    """How badly short stretches of the trial are predicted, each from a state that was logged.
+    """The error of short predictions of the trial, each from a logged state.
 
-    A trial is cut into segments. Each begins with the logged state, goes on under the logged
-    commands, and is compared with the log several times on its way. An error e of a signal whose
-    scale is s counts ``log(1 + (e / s)^2)``, so that a chaotic moment cannot outweigh the rest; it
-    is averaged over the columns of a signal and summed over the signals. Beside the motion two
-    things are judged: the readings, against what the controller received, and the controller's
-    arithmetic, what it commanded against what its network makes of these readings.
+    A trial is cut into segments. Each begins in the logged state, continues under the logged
+    commands, and is compared with the log at four steps. An error e of a signal whose scale is s
+    has the loss ``log(1 + (e / s)^2)``, so that a chaotic moment cannot outweigh the rest; the loss
+    is averaged over the columns of a signal and summed over the signals. Two more terms are added
+    to that of the motion: the predicted readings, against what the controller received, and the
+    controller's arithmetic, the logged commands against the network's output for these readings.
 
     Source: prediction over a short horizon is multiple shooting (Bock & Plitt 1984) without the
-    fit. Its use here answers the paper's future work, section V: displacement says too little.
+    fit. Its use here answers the paper's future work, section V: displacement contains too little
+    information.
 
-    Limits: it needs the state, so encoders and the base's pose and velocity; ``segment-prediction-
-    onboard`` does without the base's position and linear velocity, and carries them on from one
-    segment to the next, which makes it less sharp. What acts slowly, such as a light wind, hardly
-    shows within an eighth of a second. The network is taken to be known: without one (a recording
-    of other software) its arithmetic is not judged. Nothing is judged across a step that was late
-    (``Behaviour.late``): what a command does in an eighth of a second, it does not in a quarter.
+    Limits: the state is required, so encoders and the base's pose and velocity.
+    ``segment-prediction-onboard`` requires neither the base's position nor its linear velocity, and
+    continues each segment from the base's predicted state at the end of the segment before, which
+    makes it less sharp. Slow effects, such as a light wind, hardly show within an eighth of a
+    second. The network is taken to be known: without one (a recording of other software) its
+    arithmetic is not compared. Segments with a late step (``Behaviour.late``) have no loss: the
+    effect of a command in a quarter of a second is not its effect in an eighth.
 
     Attributes:
-        name: What it is called.
-        state: The signals that a segment begins with and that are predicted.
+        name: The comparator's name.
+        state: Signals of the state in which a segment begins, which are also predicted.
         horizon: Control steps of a segment.
-        most: Segments at most; they lie evenly over the trial.
+        max_segments: Segments at most, evenly spread over the trial.
     """
 
     name: str
     state: tuple[Signal, ...] = STATE
     horizon: int = 12
-    most: int = 80
+    max_segments: int = 80
 
     @property
-    def screen(self) -> "SegmentPrediction":
-        """The same, of a third of the segments."""
-        return dataclasses.replace(self, most=max(self.most // 3, FEWEST))
+    def surrogate(self) -> "SegmentPrediction":
+        """The same comparator with a third of the segments."""
+        return dataclasses.replace(self, max_segments=max(self.max_segments // 3, MIN_SEGMENTS))
 
-    def request(self, trial: Trial) -> Segments:
-        """Returns the segments, and that all of their state and the readings are looked at.
+    def prepare(self, trial: Trial) -> "PreparedSegments":
+        """Returns the segments of the trial and everything that they are compared with.
 
         Raises:
             InputError: The trial is too short, or was not observed well enough.
         """
-        cut = _cut(self, trial)
-        commands = trial.behaviour["commands"]
-        rows = cut.starts[:, np.newaxis] + np.arange(-LEAD, self.horizon)
-        return Segments(
-            states={signal: cut.states[signal][cut.starts] for signal in self.state},
-            commands=np.where(rows[..., np.newaxis] < 0, 0.0, commands[np.maximum(rows, 0)]),
-            lead=LEAD,
-            record=(*self.state, "sensors"),
-            past=Past(commands, cut.starts),
+        behaviour, horizon = trial.behaviour, self.horizon
+        states = estimated_states(behaviour, self.state)
+        starts, steady = self._starts(trial, states)
+        compared = np.unique(np.linspace(0, horizon, COMPARISONS + 1).round().astype(int)[1:])
+        rows = starts[:, np.newaxis] + compared
+        return PreparedSegments(
+            request=cut_segments(behaviour, states, starts, horizon, (*self.state, "sensors")),
+            compared=compared,
+            states={signal: values[rows] for signal, values in states.items()},
+            steady=steady,
+            readings=_logged_readings(behaviour["sensors"], starts, horizon),
+            arithmetic=_arithmetic_loss(trial, starts, horizon),
         )
 
-    def losses(self, simulated: Behaviour, trial: Trial) -> FloatArray:
-        """Returns the loss of each segment in which no step was late, ``(n, segments)``."""
-        cut = _cut(self, trial)
-        looks = np.unique(np.linspace(0, self.horizon, LOOKS + 1).round().astype(int)[1:])
-        rows = cut.starts[:, np.newaxis] + looks
-        total = np.zeros(simulated["sensors"].shape[:2]) + cut.arithmetic
-        for signal in self.state:
-            logged, predicted = cut.states[signal][rows], simulated[signal][:, :, looks]
-            error = difference(signal, predicted, logged) / SCALES[signal]
-            total += _mean(np.log1p(np.square(error)))
-        total += _readings(simulated["sensors"], trial.behaviour["sensors"], cut)
-        return total if cut.steady.all() else np.ascontiguousarray(total[:, cut.steady])
-
-    def distances(self, simulated: Behaviour, trial: Trial) -> FloatArray:
-        """Returns the mean loss of the segments, ``(n,)``."""
-        return np.asarray(self.losses(simulated, trial).mean(axis=1))
+    def _starts(
+        self, trial: Trial, states: Mapping[Signal, FloatArray]
+    ) -> tuple[IndexArray, BoolArray]:
+        """Returns the steps at which segments begin, and a mask of those without a late step."""
+        behaviour, horizon = trial.behaviour, self.horizon
+        if behaviour.steps < MIN_SEGMENTS * horizon + 1:
+            raise InputError(
+                f"{trial.path}: {self.name} needs {MIN_SEGMENTS * horizon + 1} steps or more, "
+                f"and the trial has {behaviour.steps}: leave this log out"
+            )
+        count = min(self.max_segments, (behaviour.steps - 1) // horizon)
+        starts = np.linspace(0, behaviour.steps - 1 - horizon, count).round().astype(np.intp)
+        known: dict[Signal, BoolArray] = {
+            signal: np.asarray(np.isfinite(states[signal][starts]).all(axis=1))
+            for signal in self.state
+        }
+        known["commands"] = _all_finite(behaviour["commands"], starts, horizon)
+        usable = np.asarray(np.logical_and.reduce(list(known.values())))
+        steady = _all_finite(behaviour.steady_commands, starts, horizon)
+        if np.sum(usable & steady) < MIN_SEGMENTS:
+            if usable.sum() >= MIN_SEGMENTS:
+                raise InputError(
+                    f"{trial.path}: {self.name} needs {MIN_SEGMENTS} or more segments of {horizon} "
+                    f"steps in which none was late, and the log does not have them: have the robot "
+                    f"keep its control time step, or leave this log out"
+                )
+            lacking = [signal for signal, steps in known.items() if steps.sum() < MIN_SEGMENTS]
+            raise InputError(
+                f"{trial.path}: {self.name} needs {', '.join(lacking or self.state)} at "
+                f"{MIN_SEGMENTS} or more of {count} moments of the trial, and the log does not "
+                f"have it: give a comparator that needs less (docs/how-it-works.md lists what each "
+                f"needs), or leave this log out"
+            )
+        return starts[usable], steady[usable]
 
 
 @dataclass(frozen=True, eq=False)
-class _Cut:
-    """What does not depend on the hypothesis: the state, the segments, the arithmetic's loss.
+class LoggedReadings:
+    """The readings of the controller in the segments of a trial.
 
-    Segments with a step that was late are predicted, for those after them may go on from their end,
-    and are not judged: only the steady ones are.
+    Attributes:
+        values: Readings, ``(segments, horizon + 1, sensors)``; NaN if unknown.
+        binary: Mask of the sensors whose readings in the whole trial are 0 or 1, ``(sensors,)``.
+        mid_trial: Mask of the segments that begin after the start of the trial, ``(segments,)``.
     """
 
+    values: FloatArray
+    binary: BoolArray
+    mid_trial: BoolArray
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedSegments:
+    """A trial prepared for ``SegmentPrediction``.
+
+    Segments with a late step are predicted, because later segments may continue from their end, and
+    have no loss.
+
+    Attributes:
+        request: The segments; the state and the readings are recorded.
+        compared: Steps within a segment at which the state is compared, ``(comparisons,)``.
+        states: Logged state at these steps, ``(segments, comparisons, width)`` for each signal.
+        steady: Mask of the segments without a late step, ``(segments,)``.
+        readings: The logged readings.
+        arithmetic: Loss of the controller's arithmetic, ``(segments,)``.
+    """
+
+    request: Segments
+    compared: IndexArray
     states: Mapping[Signal, FloatArray]
-    starts: IndexArray
     steady: BoolArray
+    readings: LoggedReadings
     arithmetic: FloatArray
 
+    def distances(self, simulated: Behaviour) -> FloatArray:
+        """Returns the mean loss of the segments, ``(n,)``."""
+        return np.asarray(self.losses(simulated).mean(axis=1))
 
-@lru_cache(maxsize=64)  # a trial is judged once a generation
-def _cut(comparator: SegmentPrediction, trial: Trial) -> _Cut:
-    behaviour, horizon = trial.behaviour, comparator.horizon
-    states = estimated_states(behaviour, comparator.state)
-    if behaviour.steps < FEWEST * horizon + 1:
-        raise InputError(
-            f"{trial.path}: {comparator.name} needs {FEWEST * horizon + 1} steps or more, "
-            f"and the trial has {behaviour.steps}: leave this log out"
-        )
-    count = min(comparator.most, (behaviour.steps - 1) // horizon)
-    starts = np.linspace(0, behaviour.steps - 1 - horizon, count).round().astype(np.intp)
-    known: dict[Signal, BoolArray] = {
-        signal: np.asarray(np.isfinite(states[signal][starts]).all(axis=1))
-        for signal in comparator.state
-    }
-    known["commands"] = _known_all_along(behaviour["commands"], starts, horizon)
-    usable = np.asarray(np.logical_and.reduce(list(known.values())))
-    steady = _known_all_along(behaviour.steady_commands, starts, horizon)
-    if np.sum(usable & steady) < FEWEST:
-        if usable.sum() >= FEWEST:
-            raise InputError(
-                f"{trial.path}: {comparator.name} needs {FEWEST} or more stretches of {horizon} "
-                f"steps in which none was late, and the log does not have them: have the robot "
-                f"keep its control time step, or leave this log out"
-            )
-        lacking = [signal for signal, moments in known.items() if moments.sum() < FEWEST]
-        raise InputError(
-            f"{trial.path}: {comparator.name} needs {', '.join(lacking or comparator.state)} at "
-            f"{FEWEST} or more of {count} moments of the trial, and the log does not have it: give "
-            f"a comparator that needs less (docs/how-it-works.md lists what each needs), or leave "
-            f"this log out"
-        )
-    starts, steady = starts[usable], steady[usable]
-    wrong = command_errors(trial) / (SCALES["commands"] * command_spans(trial))
-    rows = starts[:, np.newaxis] + np.arange(1, horizon + 1)
-    return _Cut(states, starts, steady, _mean(np.log1p(np.square(wrong[rows]))))
+    def losses(self, simulated: Behaviour) -> FloatArray:
+        """Returns the loss of each segment without a late step, ``(n, segments)``."""
+        total = np.zeros(simulated["sensors"].shape[:2]) + self.arithmetic
+        for signal, logged in self.states.items():
+            predicted = simulated[signal][:, :, self.compared]
+            error = difference(signal, predicted, logged) / PREDICTION_ERROR_SCALES[signal]
+            total += _finite_mean(np.log1p(np.square(error)))
+        total += _readings_loss(simulated["sensors"], self.readings, self.steady)
+        return total if self.steady.all() else np.ascontiguousarray(total[:, self.steady])
 
 
-def _known_all_along(commands: FloatArray, starts: IndexArray, horizon: int) -> BoolArray:
-    rows = np.maximum(starts[:, np.newaxis] + np.arange(-LEAD, horizon), 0)
+def _all_finite(commands: FloatArray, starts: IndexArray, horizon: int) -> BoolArray:
+    """Returns a mask of the segments whose commands are all finite, ``(segments,)``."""
+    rows = np.maximum(command_steps(starts, horizon), 0)
     return np.asarray(np.isfinite(commands[rows]).all(axis=(1, 2)))
 
 
-def _readings(predicted: FloatArray, logged: FloatArray, cut: _Cut) -> FloatArray:
-    """How badly the readings are predicted, ``(n, segments)``.
+def _arithmetic_loss(trial: Trial, starts: IndexArray, horizon: int) -> FloatArray:
+    """Returns the loss of the logged commands against the controller's, ``(segments,)``."""
+    scale = PREDICTION_ERROR_SCALES["commands"] * command_spans(trial)
+    errors = command_errors(trial) / scale
+    rows = starts[:, np.newaxis] + np.arange(1, horizon + 1)
+    return _finite_mean(np.log1p(np.square(errors[rows])))
 
-    The first row of a segment follows from the state alone: there an angle's reading is sure, and
-    a touch is not, because millimetres decide. Only at the start of the trial the robot stands.
-    How much a sensor trembles, only all segments together tell; it counts in each of them.
-    """
-    starts = cut.starts
-    rows = starts[:, np.newaxis] + np.arange(predicted.shape[2])
-    told = logged[rows]
+
+def _logged_readings(logged: FloatArray, starts: IndexArray, horizon: int) -> LoggedReadings:
     binary = np.isin(logged, (0.0, 1.0)) | np.isnan(logged)
+    rows = starts[:, np.newaxis] + np.arange(horizon + 1)
+    return LoggedReadings(logged[rows], np.asarray(binary.all(axis=0)), starts > 0)
+
+
+def _readings_loss(predicted: FloatArray, logged: LoggedReadings, steady: BoolArray) -> FloatArray:
+    """Returns the loss of the predicted readings, ``(n, segments)``.
+
+    The first row of a segment follows from the state alone. There an angle is certain, and a touch
+    is not, because millimetres decide, except at the start of the trial, in the initial pose. The
+    noise level of a sensor is estimated from all segments together, and added to each.
+    """
     predicts_binary = np.isin(predicted, (0.0, 1.0)).all(axis=(1, 2))
-    switches = np.asarray(binary.all(axis=0) & predicts_binary)
+    switches = np.asarray(logged.binary & predicts_binary)
     never = np.asarray(switches & ~predicted.any(axis=(1, 2)))
-    graded = np.log1p(np.square((predicted - told) / SCALES["sensors"]))
-    switched = np.abs(predicted - told) * np.where(never, CONTRADICTION, 1.0)[:, None, None]
-    switched[:, starts > 0, 0] = 0.0
-    each = _mean(np.where(switches[:, None, None], switched, graded))
-    noise = trembling_loss(predicted[:, cut.steady], told[cut.steady], ~switches)
-    return each + noise[:, np.newaxis]
+    errors = predicted - logged.values
+    graded = np.log1p(np.square(errors / PREDICTION_ERROR_SCALES["sensors"]))
+    switched = np.abs(errors) * np.where(never, CONTRADICTION, 1.0)[:, None, None]
+    switched[:, logged.mid_trial, 0] = 0.0
+    losses = _finite_mean(np.where(switches[:, None, None], switched, graded))
+    noise = noise_level_loss(predicted[:, steady], logged.values[steady], ~switches)
+    return losses + noise[:, np.newaxis]
 
 
-def _mean(values: FloatArray) -> FloatArray:
-    """The mean over the last two axes of what was observed; 0 where nothing was."""
+def _finite_mean(values: FloatArray) -> FloatArray:
+    """Returns the mean of the finite values over the last two axes; 0 if there are none."""
     known = np.isfinite(values)
     if known.all():
         return np.asarray(values.mean(axis=(-2, -1)))

@@ -1,4 +1,4 @@
-"""Runs a trial of a robot behind a TCP socket, 50 times a second: a driver to begin yours with.
+"""Example driver: a trial of a robot behind a TCP socket, at 50 control steps a second.
 
 Usage: python examples/drive_a_robot.py HOST PORT TRIAL.mcap
 """
@@ -15,6 +15,7 @@ import numpy as np
 
 from selfmodel.controllers.controller import Controller, draw_genomes
 from selfmodel.errors import InputError, TrialError, describe
+from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.environment_robot import EnvironmentRobot
 from selfmodel.physical.safety_limits import joint_limits, tilt_limit
@@ -29,18 +30,18 @@ OBSERVED: tuple[Signal, ...] = (
     *("sensors", "joint_positions", "joint_velocities", "base_position", "base_orientation"),
     *("base_linear_velocity", "base_angular_velocity"),
 )
-"""What the robot tells of itself, as float64 numbers in this order."""
+"""Signals of an observation, as float64 numbers in this order."""
 
 START, STOP = 0, -1
-"""Numbers of messages with a meaning of their own; the targets of step k have the number k."""
+"""Reserved message numbers; the targets of step k have the number k."""
 
 SILENCE = 0.1
-"""Seconds after which an observation is given up."""
+"""Seconds without an answer after which an observation is missing."""
 
 
 # The driver begins here: the docs show it.
 class SocketRobot(dm_env.Environment):
-    """Sends numbered targets, and waits for what was observed once the robot had followed them."""
+    """Sends numbered targets and waits for the observation with the same number."""
 
     def __init__(self, address: tuple[str, int], robot: Robot) -> None:
         self._address, self._motors = address, len(robot.anatomy.motors)
@@ -49,13 +50,13 @@ class SocketRobot(dm_env.Environment):
         self._observed = struct.Struct(f"<q{sum(self._widths.values())}d")
 
     def reset(self) -> dm_env.TimeStep:
-        """Has the robot take its start pose, at rest."""
+        """Moves the robot to its initial pose, at rest."""
         self._link = socket.create_connection(self._address, timeout=1.0)
         self._number, self._heard = START, b""
         return dm_env.restart(self._exchange(np.zeros(self._motors), silence=10.0))
 
     def step(self, action: np.ndarray) -> dm_env.TimeStep:
-        """Gives the targets of a control time step, which the robot's own clock ends."""
+        """Sends the targets of a control step; the robot's own clock times its end."""
         self._number += 1
         return dm_env.transition(0.0, self._exchange(action, silence=SILENCE))
 
@@ -64,7 +65,7 @@ class SocketRobot(dm_env.Environment):
         self._link.sendall(self._targets.pack(self._number, *targets))
         until = time.monotonic() + silence
         number = None
-        while number != self._number:  # what comes too late for its step is passed over
+        while number != self._number:  # an answer to an earlier step is skipped
             while len(self._heard) < self._observed.size:
                 self._link.settimeout(max(until - time.monotonic(), 1e-3))
                 if not (heard := self._link.recv(4096)):
@@ -76,18 +77,18 @@ class SocketRobot(dm_env.Environment):
         return dict(zip(OBSERVED, np.split(np.array(values), ends[:-1]), strict=True))
 
     def stop(self) -> None:
-        """Has the robot stand, by a connection of its own: the other may be what failed."""
+        """Stops the robot, on a new connection: the old one may have failed."""
         with socket.create_connection(self._address, timeout=1.0) as link:
             link.sendall(self._targets.pack(STOP, *np.zeros(self._motors)))
-            if not link.recv(1):  # it says when it has heard
+            if not link.recv(1):  # acknowledgement
                 raise ConnectionError("the robot hung up")
 
     def action_spec(self) -> dm_env.specs.Array:
-        """Returns what ``step`` takes: each motor's target, rad."""
+        """Returns the spec of an action: motor targets, rad."""
         return dm_env.specs.Array((self._motors,), np.float64)
 
     def observation_spec(self) -> dict[str, dm_env.specs.Array]:
-        """Returns what ``reset`` and ``step`` observe."""
+        """Returns the specs of an observation."""
         widths = self._widths.items()
         return {name: dm_env.specs.Array((width,), np.float64) for name, width in widths}
 
@@ -96,7 +97,7 @@ class SocketRobot(dm_env.Environment):
 
 
 def main(host: str, port: int, path: Path) -> None:
-    """Runs five seconds of a random controller, and logs them."""
+    """Logs a trial of five seconds with a random controller."""
     robot = dataclasses.replace(ROBOTS["quadruped"].robot(), control_timestep=0.02)
     network = network_for(robot)
     genome = draw_genomes(np.random.default_rng(0), (network.weights,))
@@ -107,7 +108,7 @@ def main(host: str, port: int, path: Path) -> None:
     )
     samples = physical.run(plan.controller, plan.steps)
     try:
-        write_trial(path, robot, plan, samples, timed=True, settings=Settings())
+        write_trial(path, robot, plan, samples, TrialHeader(Settings(), timed=True))
     except InputError as error:
         sys.exit(describe(error))
     except TrialError as error:

@@ -1,10 +1,10 @@
-"""A comparator of your own: does the robot turn as the simulation says?
+"""A comparator of your own: the difference of headings.
 
 Usage, from this folder:
 selfmodel recover quadruped --case 2 --comparator heading_comparator:HEADING
 
-Its distance is a mean over the steps of the trial, so it says its losses too (that is optional),
-and two hypotheses can be told apart by a paired test.
+Its distance is a mean over the steps of the trial, so the prepared trial has losses too (they are
+optional), which make a paired test between two hypotheses possible.
 """
 
 from dataclasses import dataclass
@@ -17,6 +17,8 @@ from selfmodel.simulation.requests import ClosedLoop
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.trial import Trial
 
+REQUEST = ClosedLoop(record=("base_orientation",))
+
 
 @dataclass(frozen=True)
 class Heading:
@@ -24,33 +26,50 @@ class Heading:
 
     name: str = "heading"
 
-    def request(self, trial: Trial) -> ClosedLoop:
-        """Returns that the orientation of the root body is all it looks at."""
-        if not self._seen(trial).any():
+    def prepare(self, trial: Trial) -> "PreparedHeading":
+        """Returns the heading of the trial.
+
+        Raises:
+            InputError: The base's orientation was not observed.
+        """
+        orientation = trial.behaviour["base_orientation"]
+        observed = np.asarray(np.isfinite(orientation).all(axis=-1))
+        if not observed.any():
             raise InputError(
                 f"{trial.path}: {self.name} needs base_orientation, and the log does not have it: "
                 f"leave this log out, or give another comparator"
             )
-        return ClosedLoop(record=("base_orientation",))
+        return PreparedHeading(observed, forward(orientation[observed]))
 
-    def distances(self, simulated: Behaviour, trial: Trial) -> FloatArray:
+
+@dataclass(frozen=True, eq=False)
+class PreparedHeading:
+    """A trial prepared for ``Heading``.
+
+    Attributes:
+        observed: Mask of the observed steps, ``(steps,)``.
+        logged: Forward direction at the observed steps, x and y.
+        request: A closed-loop rollout that records the base's orientation.
+    """
+
+    observed: BoolArray
+    logged: tuple[FloatArray, FloatArray]
+    request: ClosedLoop = REQUEST
+
+    def distances(self, simulated: Behaviour) -> FloatArray:
         """Returns the distance of each simulation, ``(n,)``, rad."""
-        return np.asarray(self.losses(simulated, trial).mean(axis=1))
+        return np.asarray(self.losses(simulated).mean(axis=1))
 
-    def losses(self, simulated: Behaviour, trial: Trial) -> FloatArray:
-        """Returns the loss of each step that was observed, ``(n, steps)``, rad."""
-        seen = self._seen(trial)
-        x, y = forward(np.compress(seen, simulated["base_orientation"], axis=1))
-        along, across = forward(trial.behaviour["base_orientation"][seen])
+    def losses(self, simulated: Behaviour) -> FloatArray:
+        """Returns the loss of each observed step, ``(n, steps)``, rad."""
+        x, y = forward(np.compress(self.observed, simulated["base_orientation"], axis=1))
+        along, across = self.logged
         # Exactly 0 between equal headings, and never more than half a turn.
         return np.abs(np.arctan2(x * across - y * along, x * along + y * across))
 
-    def _seen(self, trial: Trial) -> BoolArray:
-        return np.asarray(np.isfinite(trial.behaviour["base_orientation"]).all(axis=-1))
-
 
 def forward(quaternions: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Returns x and y, in the world, of where bodies point that w x y z quaternions turned."""
+    """Returns x and y of the forward direction, in the world frame, of w x y z quaternions."""
     w, x, y, z = np.moveaxis(quaternions, -1, 0)
     return 1 - 2 * (y * y + z * z), 2 * (x * y + w * z)
 

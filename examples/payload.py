@@ -28,6 +28,6 @@ PAYLOAD = FaultKind(
     apply=load,
     severity_bounds=uniform_bounds(-2.0, 10.0),
     levels=uniform_levels(-2.0, -1.0, -0.5, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0),
-    special={0.0: None},
+    degenerates_to={0.0: None},
     unit="kg",
 )

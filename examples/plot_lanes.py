@@ -18,7 +18,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.cli.rendering.film import evenly, film_of
 from selfmodel.faults.notation import parse
 from selfmodel.logs import TrialLog, read_log
-from selfmodel.logs.robots import the_robot_of
+from selfmodel.logs.robots import common_robot
 
 WIDTH, HEIGHT = 1280, 560
 LANE = 1.15
@@ -57,7 +57,7 @@ def _rendered(
     lanes: list[tuple[TrialLog, str]], colours: list[tuple[float, float, float]]
 ) -> np.ndarray:
     """The picture of all lanes in one scene, ``(height, width, 3)``."""
-    robot = the_robot_of([log for log, _ in lanes])
+    robot = common_robot([log for log, _ in lanes])
     floor = mujoco.MjModel.from_xml_string(
         f"""<mujoco><visual><global offwidth="{WIDTH}" offheight="{HEIGHT}" fovy="14"/>
         <headlight ambient=".45 .45 .45" diffuse=".35 .35 .35" specular="0 0 0"/></visual>
@@ -82,7 +82,7 @@ def _rendered(
             model = film.model
             model.geom_rgba[:] = (*colour, 1.0)
             model.geom_rgba[model.geom_bodyid == 0, 3] = 0.0
-            model.geom_rgba[np.isin(model.geom_bodyid, list(film.lost)), 3] = 0.0
+            model.geom_rgba[np.isin(model.geom_bodyid, list(film.detached)), 3] = 0.0
             model.site_rgba[:, 3] = 0.0
             for qpos in film.shots[0].qpos:
                 _add(renderer.scene, model, qpos + _offset(model.nq, (1 - row) * LANE))

@@ -1,4 +1,4 @@
-"""Draws how far a robot went in each trial of a recovery, from the logs alone.
+"""Plots forward displacement over time in each trial of a recovery, from its logs.
 
 Usage: python examples/plot_recovery.py RUN_FOLDER FIGURE.png
 """

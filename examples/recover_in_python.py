@@ -8,7 +8,8 @@ from pathlib import Path
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.faults.notation import parse
-from selfmodel.logs.journal import open_journal
+from selfmodel.logs.journal import create_journal
+from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.recovery.recover import recover
 from selfmodel.settings import Settings
@@ -21,12 +22,14 @@ def main(folder: Path) -> None:
     robot = ROBOTS["quadruped"].robot()
     truth = parse("break:back_left_shoulder", robot.anatomy)
     settings = Settings(generations=5).scaled(20)
+    journal = create_journal(folder, robot.anatomy)
     recovery = recover(
         healthy=SimulatedRobot(robot),  # anything with a `run` like PhysicalRobot's will do
         damaged=SimulatedRobot(robot, truth),
         simulator=Simulator(robot, threads=2),
         comparator=FORWARD_DISPLACEMENT,
-        journal=open_journal(folder, robot, settings, hidden={}),
+        run_trial=TrialRunner(journal.trials, robot, settings),
+        journal=journal,
         settings=settings,
         seed=0,
         on_event=lambda _event: None,

@@ -1,7 +1,7 @@
-"""The trial log: one MCAP file of ROS 2 messages a physical trial, written safely, read strictly.
+"""Trial logs: one MCAP file of ROS 2 messages per physical trial, written safely, read strictly.
 
-What is named here reads logs, and works without MuJoCo. Writing is in ``selfmodel.logs.writer``,
-a run's folder in ``selfmodel.logs.journal``.
+The names of this module read logs without MuJoCo. ``selfmodel.logs.physical_trial`` runs and logs a
+trial, ``selfmodel.logs.writer`` writes a log, ``selfmodel.logs.journal`` a run's folder.
 """
 
 from selfmodel.logs.controllers import load_controller, save_controller

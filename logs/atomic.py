@@ -1,4 +1,4 @@
-"""Files that hold what they held before, or all that was written: never a half."""
+"""Atomic writes: a file holds its old content or all of its new content."""
 
 import fcntl
 import os
@@ -8,18 +8,18 @@ from pathlib import Path
 from typing import IO
 
 
-def part_of(path: Path) -> Path:
-    """Returns the name that a file has until it is whole."""
+def partial_path(path: Path) -> Path:
+    """Returns the name of a file until it is complete: ``path.part``."""
     return path.with_name(path.name + ".part")
 
 
-def put(path: Path, data: bytes) -> None:
-    """Puts ``data`` in the place of what a file held before, in one move.
+def write_atomic(path: Path, data: bytes) -> None:
+    """Writes a file, or replaces its content, in one atomic step.
 
     Raises:
-        OSError: It could not be written; the file holds what it held.
+        OSError: Writing failed; the file keeps its old content.
     """
-    part = part_of(path)
+    part = partial_path(path)
     with part.open("wb") as file:
         file.write(data)
         sync(file)
@@ -28,13 +28,13 @@ def put(path: Path, data: bytes) -> None:
 
 
 def sync(file: IO[bytes]) -> None:
-    """Waits until the disk has what was written."""
+    """Flushes a file to the disk."""
     file.flush()
     os.fsync(file.fileno())
 
 
 def sync_folder(folder: Path) -> None:
-    """Waits until the disk has the names in a folder."""
+    """Flushes the names in a folder to the disk."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         os.fsync(descriptor)
@@ -43,11 +43,11 @@ def sync_folder(folder: Path) -> None:
 
 
 @contextmanager
-def alone(folder: Path) -> Iterator[None]:
-    """Waits until no other process is alone in a folder, and then keeps the others waiting.
+def lock_folder(folder: Path) -> Iterator[None]:
+    """Context manager that holds an exclusive, advisory lock on a folder.
 
-    Only those that ask in the same way are kept out; a process that dies lets them in.
+    Only callers of this function exclude each other. The lock of a process that dies is released.
     """
     with (folder / "lock").open("wb") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)  # given up when the file is closed
+        fcntl.flock(file, fcntl.LOCK_EX)  # released when the file is closed
         yield

@@ -1,73 +1,85 @@
-"""How much of the machine one file may take, however its bytes are arranged."""
+"""Limits on the memory and time that reading one file may take."""
 
 from mcap.opcode import Opcode
 
 RECORD_LIMIT = 1_000_000
-"""Records that the chunks of a log may hold: six topics at 100 Hz for 27 minutes."""
+"""Maximum records in the chunks of a log: six topics at 100 Hz for 27 minutes."""
 
 FRAME_LIMIT = 200_000
-"""Records that a log may hold beside those in chunks: one chunk has about ten indices."""
+"""Maximum records of a log outside its chunks: a chunk has about ten indices."""
 
 UNPACKED_LIMIT = 384 * 2**20
-"""Bytes that the chunks of a log may have, unpacked."""
+"""Maximum decompressed size of all chunks of a log, bytes."""
 
 OTHER_LIMIT = 32 * 2**20
-"""Bytes of all that is neither chunk, message nor attachment: in memory it takes twenty times as
-much."""
+"""Maximum size of all records but chunks, messages and attachments, bytes: these records take
+twenty times their size in memory."""
 
 ATTACHED_LIMIT = 32 * 2**20
-"""Bytes that all attachments of a log may have."""
+"""Maximum size of all attachments of a log, bytes."""
 
 
 class ExcessError(ValueError):
-    """A file holds more than a log may."""
+    """A file exceeds a limit on the size of a log."""
 
 
 class Budget:
-    """Counts what one file has asked for."""
+    """Counters of the records and bytes of one file, with their limits."""
 
     def __init__(self) -> None:
         self._frames = self._records = self._unpacked = self._attached = self._other = 0
 
     def frame(self, opcode: int, size: int) -> None:
-        """Counts a record that is no message in a chunk.
+        """Counts a record outside a chunk, or one within a chunk that is not a message.
+
+        Args:
+            opcode: Type of the record.
+            size: Length of the record's content, bytes.
 
         Raises:
-            ExcessError: It is one too many.
+            ExcessError: The file exceeds a limit.
         """
         self._frames += 1
         if self._frames > FRAME_LIMIT:
-            raise ExcessError(f"it holds more than a log may: {FRAME_LIMIT} records and chunks")
+            raise _excess(FRAME_LIMIT, "records and chunks")
         if opcode == Opcode.ATTACHMENT:
             self._attached += size
         elif opcode not in (Opcode.CHUNK, Opcode.MESSAGE):
             self._other += size
         if self._attached > ATTACHED_LIMIT:
-            raise ExcessError(f"it holds more than a log may: {ATTACHED_LIMIT} bytes attached")
+            raise _excess(ATTACHED_LIMIT, "bytes attached")
         if self._other > OTHER_LIMIT:
-            raise ExcessError(
-                f"it holds more than a log may: {OTHER_LIMIT} bytes beside its messages and "
-                f"attachments"
-            )
+            raise _excess(OTHER_LIMIT, "bytes beside its messages and attachments")
 
     def chunk(self, size: int) -> None:
-        """Counts a chunk before it is unpacked.
+        """Counts a chunk before it is decompressed.
+
+        Args:
+            size: Decompressed size, bytes.
 
         Raises:
-            ExcessError: It is one too many.
+            ExcessError: The file exceeds a limit.
         """
         self._unpacked += size
         if self._unpacked > UNPACKED_LIMIT:
-            raise ExcessError(f"it holds more than a log may: {UNPACKED_LIMIT} bytes, unpacked")
+            raise _excess(UNPACKED_LIMIT, "bytes, unpacked")
 
     def record(self, opcode: int, size: int) -> None:
         """Counts a record within a chunk.
 
+        Args:
+            opcode: Type of the record.
+            size: Length of the record's content, bytes.
+
         Raises:
-            ExcessError: It is one too many.
+            ExcessError: The file exceeds a limit.
         """
         self._records += 1
         if self._records > RECORD_LIMIT:
-            raise ExcessError(f"it holds more than a log may: {RECORD_LIMIT} messages")
+            raise _excess(RECORD_LIMIT, "messages")
         if opcode != Opcode.MESSAGE:
             self.frame(opcode, size)
+
+
+def _excess(limit: int, unit: str) -> ExcessError:
+    return ExcessError(f"it holds more than a log may: {limit} {unit}")

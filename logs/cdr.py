@@ -1,9 +1,9 @@
-"""ROS 2's binary message format (CDR, little-endian), as templates that are patched.
+"""ROS 2's binary message format (CDR, little-endian), as patched templates.
 
-All messages of one topic of a trial are the same but for their time stamps and their numbers. So a
-message is laid out once, with zeros for both, and whole series of messages are made from it, and
-read back, by copying columns of bytes. The tests hold this layout to rosbags' serialiser, byte by
-byte; rosbags itself is not needed at run time.
+All messages of one topic of a trial differ only in their time stamps and their numbers. A message
+is laid out once, with zeros for both, and series of messages are encoded and decoded by copying
+columns of bytes. The tests compare this layout with rosbags' serialiser, byte by byte; rosbags
+itself is not needed at run time.
 """
 
 import struct
@@ -24,12 +24,12 @@ _BILLION = 1_000_000_000
 
 @dataclass(frozen=True)
 class Template:
-    """A message with holes for its time stamps and its numbers.
+    """Bytes of a message with gaps for its time stamps and its numbers.
 
     Attributes:
-        payload: The message with zeros in the holes.
-        stamps: Where each time stamp stands (int32 seconds, uint32 nanoseconds).
-        blocks: Offset and length of each run of float64, in order.
+        payload: Message with zeros in the gaps.
+        stamps: Offsets of the time stamps (int32 seconds, uint32 nanoseconds), bytes.
+        blocks: Offset in bytes and number of values of each float64 block, in order.
     """
 
     payload: bytes
@@ -38,15 +38,15 @@ class Template:
 
     @property
     def width(self) -> int:
-        """How many float64 a message has holes for."""
+        """Number of float64 values in a message."""
         return sum(count for _, count in self.blocks)
 
     def encode(self, nanoseconds: IntArray, values: FloatArray) -> list[bytes]:
-        """Returns one message a row.
+        """Returns one message per row of values.
 
         Args:
-            nanoseconds: ``(steps,)``, at least 0: each goes into every stamp of its message.
-            values: ``(steps, width)``.
+            nanoseconds: Non-negative times, ``(steps,)`` ns, written into every stamp of a message.
+            values: Numbers, ``(steps, width)``.
         """
         messages = np.tile(np.frombuffer(self.payload, np.uint8), (len(values), 1))
         seconds = np.column_stack([nanoseconds // _BILLION, nanoseconds % _BILLION])
@@ -61,14 +61,14 @@ class Template:
         return [row.tobytes() for row in messages]
 
     def decode(self, payloads: Sequence[bytes]) -> tuple[IntArray, FloatArray]:
-        """Returns what ``encode`` was given.
+        """Returns the times and numbers of messages; the inverse of ``encode``.
 
         Returns:
-            ``(steps,)`` nanoseconds and ``(steps, width)`` values.
+            Times, ``(steps,)`` ns, and numbers, ``(steps, width)``.
 
         Raises:
-            ValueError: A message differs from the template outside of its holes, or its stamps
-                differ from each other; the sentence says which message.
+            ValueError: A message differs from the template outside its gaps, or its stamps differ
+                from each other; the message names its index.
         """
         length = len(self.payload)
         for index, payload in enumerate(payloads):
@@ -86,7 +86,7 @@ class Template:
             raise ValueError("the time stamps within a message differ")
         seconds = stamps[0].astype(np.int64)
         blocks = [_view(messages, offset, 8 * count, "<f8") for offset, count in self.blocks]
-        none: FloatArray = np.empty((len(messages), 0))  # for a robot that feels nothing
+        none: FloatArray = np.empty((len(messages), 0))  # for a robot without sensors
         values = np.concatenate([none, *blocks], axis=1).astype(np.float64, copy=False)
         return seconds[:, 0] * _BILLION + seconds[:, 1], values
 
@@ -100,7 +100,7 @@ class Template:
 
 
 class Layout:
-    """Lays out a message field by field, in the order of its definition."""
+    """Builder of a template, field by field in the order of the message definition."""
 
     def __init__(self) -> None:
         self._bytes = bytearray(_ENCAPSULATION)
@@ -108,14 +108,14 @@ class Layout:
         self._blocks: list[tuple[int, int]] = []
 
     def header(self, frame: str) -> None:
-        """Adds a ``std_msgs/Header``: a hole for the stamp, and the frame's name."""
+        """Adds a ``std_msgs/Header``: a gap for the stamp, and the name of the frame."""
         self._align(4)
         self._stamps.append(len(self._bytes))
         self._bytes += bytes(8)
         self.string(frame)
 
     def length(self, count: int) -> None:
-        """Adds the length of a sequence whose elements follow."""
+        """Adds the length of a sequence; its elements must follow."""
         self._align(4)
         self._bytes += struct.pack("<I", count)
 
@@ -132,42 +132,42 @@ class Layout:
             self.string(text)
 
     def floats(self, count: int) -> None:
-        """Adds a hole for so many float64."""
+        """Adds a gap for ``count`` float64 values."""
         self._align(8)
         self._blocks.append((len(self._bytes), count))
         self._bytes += bytes(8 * count)
 
     def zeros(self, count: int) -> None:
-        """Adds so many float64 that are always zero."""
+        """Adds ``count`` float64 values that are always zero."""
         self._align(8)
         self._bytes += bytes(8 * count)
 
     def sequence(self, count: int) -> None:
-        """Adds a sequence of float64: its length, and a hole; an empty one has no hole."""
+        """Adds a sequence of float64: its length, and a gap unless the sequence is empty."""
         self.length(count)
         if count:
             self.floats(count)
 
     def template(self) -> Template:
-        """Returns what has been laid out."""
+        """Returns the template of the fields added so far."""
         return Template(bytes(self._bytes), tuple(self._stamps), tuple(self._blocks))
 
     def _align(self, size: int) -> None:
         self._bytes += bytes(-(len(self._bytes) - len(_ENCAPSULATION)) % size)
 
 
-def names_of(payload: bytes) -> tuple[str, ...]:
+def decode_names(payload: bytes) -> tuple[str, ...]:
     """Returns the names in a message that begins with a header and a ``string[] name``.
 
     Raises:
-        ValueError: The bytes do not begin so.
+        ValueError: The message has another layout.
     """
     if payload[:4] != _ENCAPSULATION:
         raise ValueError(f"expected little-endian CDR (00 01 00 00), got {payload[:4].hex(' ')!r}")
     _, at = _text(payload, len(_ENCAPSULATION) + 8)
     count, at = _uint32(payload, at)
     names = []
-    for _ in range(count):  # each takes bytes, so a wrong count ends at the payload's end
+    for _ in range(count):  # every name takes bytes, so a wrong count ends with the payload
         name, at = _text(payload, at)
         names.append(name)
     return tuple(names)

@@ -1,4 +1,4 @@
-"""What stands in an MCAP file, by name, with every way of its being damaged as a ``LogError``."""
+"""Contents of an MCAP file by name; any damage is a ``LogError``."""
 
 import struct
 from collections.abc import Collection, Iterator, Mapping
@@ -9,7 +9,9 @@ from typing import TypeVar
 from mcap.exceptions import EndOfFile, InvalidMagic
 from mcap.records import Attachment, Channel, Header, McapRecord, Message, Metadata, Schema
 
+from selfmodel.files import check_regular, read_file
 from selfmodel.logs.budget import ExcessError
+from selfmodel.logs.checksums import verified_records
 from selfmodel.logs.errors import (
     ANOTHER,
     IMPORT_IT,
@@ -20,7 +22,6 @@ from selfmodel.logs.errors import (
     UnsupportedError,
     salvage_it,
 )
-from selfmodel.logs.files import check_regular, read_bounded
 from selfmodel.logs.framing import (
     FAILURES,
     MAGIC,
@@ -29,24 +30,23 @@ from selfmodel.logs.framing import (
     UnknownCompressionError,
 )
 from selfmodel.logs.records import OWN, without_digest
-from selfmodel.logs.scan import scan
 
 FILE_LIMIT = 128 * 2**20
-"""Bytes that a log may have: ten seconds of a quadruped take 0.52 MB."""
+"""Maximum size of a log, bytes: ten seconds of a quadruped take 0.52 MB."""
 
 _Item = TypeVar("_Item")
 
 
 @dataclass
 class Messages:
-    """The messages of one channel, in the order of the file.
+    """Messages of one channel, in the order of the file.
 
     Attributes:
-        type: The name of their schema, or "".
-        schema: Its text.
-        encoding: Such as ``cdr``.
-        payloads: The messages.
-        times: Log time and publish time of each, ns.
+        type: Name of the schema, or "".
+        schema: Text of the schema.
+        encoding: Encoding of the messages, such as ``cdr``.
+        payloads: Bytes of the messages.
+        times: Log time and publish time of each message, ns.
     """
 
     type: str
@@ -58,12 +58,12 @@ class Messages:
 
 @dataclass
 class Contents:
-    """What stands in a file.
+    """Records of a file.
 
     Attributes:
-        profile: Which rules the file follows, such as ``ros2``.
-        metadata: Records by name; ours without the digest that was checked.
-        attachments: Files by name.
+        profile: Profile of the file, such as ``ros2``.
+        metadata: Metadata records by name; those of selfmodel without their verified digest.
+        attachments: Attached files by name.
         topics: Messages by topic.
     """
 
@@ -74,51 +74,51 @@ class Contents:
 
     @property
     def good(self) -> str:
-        """Says how much was read."""
+        """Description of the complete messages, for an error message."""
         counts = [len(messages.payloads) for messages in self.topics.values()]
         return f"{sum(counts)} messages on {len(counts)} topics before that are complete"
 
 
 def read_contents(path: Path, unread: Collection[str] = ()) -> Contents:
-    """Returns what stands in a file, once all of it is known to be sound.
+    """Returns the contents of a file after all its checksums have been verified.
 
     Args:
         path: The file.
-        unread: Names of metadata records to pass over.
+        unread: Names of metadata records to ignore.
 
     Raises:
-        LogError: The file is damaged, not MCAP, or holds what is not supported.
-        InputError: There is no such file, or it cannot be opened.
+        LogError: The file is damaged, not MCAP, or contains unsupported records.
+        InputError: The file does not exist, or cannot be opened.
     """
     contents = Contents()
     data = read_bytes(path)
     try:
-        _gather(scan(data), contents, unread)
+        _gather(verified_records(data), contents, unread)
     except FAILURES as failure:
         raise _explain(path, data, failure, contents) from failure
     return contents
 
 
 def read_bytes(path: Path) -> bytes:
-    """Returns all of a file.
+    """Returns the bytes of a file.
 
     Raises:
-        LogError: It is too large for a log.
-        InputError: There is no such file, or it cannot be opened.
+        LogError: The file is too large for a log.
+        InputError: The file does not exist, or cannot be opened.
     """
     check_regular(path, "a log file")
     if path.stat().st_size > FILE_LIMIT:
         raise UnsupportedError(
             path, f"expected at most {FILE_LIMIT} bytes, got more", advice=ANOTHER
         )
-    return read_bounded(path, "a log file", FILE_LIMIT)
+    return read_file(path, "a log file", FILE_LIMIT)
 
 
-def _put(items: dict[str, _Item], name: str, item: _Item) -> None:
-    """Adds what must be there only once.
+def _add_once(items: dict[str, _Item], name: str, item: _Item) -> None:
+    """Adds an item.
 
     Raises:
-        ContradictionError: It is there.
+        ContradictionError: An item of that name exists.
     """
     if name in items:
         raise ContradictionError(f"it has {name!r} twice")
@@ -136,22 +136,22 @@ def _gather(records: Iterator[McapRecord], contents: Contents, unread: Collectio
             schemas[record.id] = record
         elif isinstance(record, Channel) and record.id not in channels:
             channels[record.id] = messages_of(record, schemas)
-            _put(contents.topics, record.topic, channels[record.id])
+            _add_once(contents.topics, record.topic, channels[record.id])
         elif isinstance(record, Metadata) and record.name not in unread:
             ours = record.name.startswith(OWN)
             texts = without_digest(record.name, record.metadata) if ours else record.metadata
-            _put(contents.metadata, record.name, texts)
+            _add_once(contents.metadata, record.name, texts)
         elif isinstance(record, Attachment):
-            _put(contents.attachments, record.name, record.data)
+            _add_once(contents.attachments, record.name, record.data)
         elif isinstance(record, Header):
             contents.profile = record.profile
 
 
 def messages_of(channel: Channel, schemas: Mapping[int, Schema]) -> Messages:
-    """Returns a channel without messages.
+    """Returns an empty list of messages for a channel.
 
     Raises:
-        KeyError: Its schema is not known.
+        KeyError: The schema of the channel is unknown.
     """
     schema = schemas[channel.schema_id] if channel.schema_id else Schema(0, b"", "", "")
     return Messages(schema.name, schema.data, channel.message_encoding)
@@ -165,7 +165,7 @@ def _explain(path: Path, data: bytes, failure: Exception, contents: Contents) ->
         advice = ANOTHER if isinstance(failure, ExcessError) else "pack it again with zstd"
         return UnsupportedError(path, str(failure), good=good, advice=advice)
     if isinstance(failure, UncheckedError):
-        what = f"{failure}: it is no log that selfmodel wrote"
+        what = f"{failure}: selfmodel did not write this file"
         return UnsupportedError(path, what, good=good, advice=IMPORT_IT)
     if isinstance(failure, (EndOfFile, struct.error)) and not data.endswith(MAGIC):
         if len(data) <= len(MAGIC):

@@ -25,8 +25,8 @@ from selfmodel.controllers.controller import Controller, Design
 from selfmodel.controllers.cpg import Cpg
 from selfmodel.controllers.network import Network
 from selfmodel.errors import InputError
+from selfmodel.files import read_file
 from selfmodel.logs.errors import LogWriteError
-from selfmodel.logs.files import read_bounded
 
 LARGEST = 2**20
 """Largest size of a controller file, bytes; those of the paper's robots are under 3,000."""
@@ -118,7 +118,7 @@ def load_controller(path: Path) -> Controller:
     Raises:
         InputError: The file contains no controller; the message names the file.
     """
-    return parse_controller(read_bounded(path, "a controller file", LARGEST), str(path))
+    return parse_controller(read_file(path, "a controller file", LARGEST), str(path))
 
 
 def controller_bytes(controller: Controller) -> bytes:

@@ -1,4 +1,4 @@
-"""From the rows of some steps to the messages that a log gets for them."""
+"""Encoder of control steps as the messages of a log."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -8,11 +8,11 @@ from operator import itemgetter
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.logs.frames import (
+from selfmodel.logs.kinematics import (
     Kinematics,
     body_names,
-    into_child_frame,
     parent_names,
+    to_body_frame,
     to_micrometres,
 )
 from selfmodel.logs.topics import TIMING, Part, frames_stride, topics, transforms
@@ -21,12 +21,12 @@ from selfmodel.trials.behaviour import SIGNALS, Names, Sample
 
 
 def empty_rows(names: Names, steps: int, *, timed: bool) -> dict[Part, FloatArray]:
-    """Returns room for what so many steps have to be told of, ``(steps, width)`` each.
+    """Returns uninitialised rows of the numbers to log, ``(steps, width)`` each.
 
     Args:
-        names: The columns of a robot's signals.
-        steps: How many rows.
-        timed: Whether the steps say when they really happened.
+        names: Columns of a robot's signals.
+        steps: Number of rows.
+        timed: Whether the steps have a step timing.
     """
     rows: dict[Part, FloatArray] = {
         signal: np.empty((steps, names.width(signal))) for signal in SIGNALS
@@ -36,8 +36,8 @@ def empty_rows(names: Names, steps: int, *, timed: bool) -> dict[Part, FloatArra
     return rows
 
 
-def parts_of(sample: Sample) -> dict[Part, FloatArray]:
-    """Returns what a sample tells, ``(width,)`` each."""
+def sample_rows(sample: Sample) -> dict[Part, FloatArray]:
+    """Returns the numbers of a sample, ``(width,)`` each."""
     parts: dict[Part, FloatArray] = {}
     parts.update(sample.values.items())
     if sample.moment is not None:
@@ -46,14 +46,14 @@ def parts_of(sample: Sample) -> dict[Part, FloatArray]:
 
 
 class Encoder:
-    """Makes the messages of one trial.
+    """Encoder of the messages of one trial.
 
     Args:
-        robot: As its model describes it.
-        timed: Whether the rows say when they really happened.
+        robot: Robot as its model describes it.
+        timed: Whether the steps have a step timing.
 
     Attributes:
-        topics: What there are messages of, in the order in which a step has them.
+        topics: Topics, in the order of a step's messages.
     """
 
     def __init__(self, robot: Robot, *, timed: bool = False) -> None:
@@ -70,32 +70,34 @@ class Encoder:
         """Returns the messages of some steps, in order.
 
         Args:
-            first: The number of the first step.
-            rows: Each signal, ``(steps, width)``, and ``timing`` if there is one.
+            first: Index of the first step.
+            rows: Signals, ``(steps, width)`` each, with ``timing`` on a timed robot.
 
         Returns:
-            Step, index into ``topics``, time in ns, and payload of each.
+            Step, index into ``topics``, time in ns, and payload of each message.
         """
         count = len(rows["sensors"])
         steps = np.arange(first, first + count)
         stamps = np.rint(steps * self._timestep * 1e9).astype(np.int64)
-        seen = slice(-first % self._stride, None, self._stride)
+        with_frames = slice(-first % self._stride, None, self._stride)
         every = slice(None)
         parts: dict[Part, FloatArray] = {
             "child_linear_velocity": to_micrometres(
-                into_child_frame(rows["base_linear_velocity"], rows["base_orientation"])
+                to_body_frame(rows["base_linear_velocity"], rows["base_orientation"])
             ),
             "transforms": self._kinematics.transforms(
-                rows["joint_positions"][seen],
-                rows["base_position"][seen],
-                rows["base_orientation"][seen],
+                rows["joint_positions"][with_frames],
+                rows["base_position"][with_frames],
+                rows["base_orientation"][with_frames],
             ),
         }
         parts.update(rows)
-        told: list[tuple[int, int, int, bytes]] = []
+        messages: list[tuple[int, int, int, bytes]] = []
         for number, topic in enumerate(self.topics):
-            chosen = seen if number == len(self.topics) - 1 else every
+            chosen = with_frames if number == len(self.topics) - 1 else every
             payloads = topic.template.encode(stamps[chosen], topic.pack(parts))
-            told += zip(steps[chosen].tolist(), repeat(number), stamps[chosen].tolist(), payloads)
-        told.sort(key=itemgetter(0, 1))
-        return told
+            messages += zip(
+                steps[chosen].tolist(), repeat(number), stamps[chosen].tolist(), payloads
+            )
+        messages.sort(key=itemgetter(0, 1))
+        return messages

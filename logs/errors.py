@@ -1,4 +1,4 @@
-"""What can be wrong with a log: one small family, each sentence with the file and the way out."""
+"""Errors of a log; each message names the file, the damage and the remedy."""
 
 import errno
 import shlex
@@ -16,7 +16,7 @@ _LONGEST = 2000
 
 
 def salvage_it(path: str | PathLike[str]) -> str:
-    """Returns the advice to save what is complete, as a command that can be pasted."""
+    """Returns the advice to salvage a log, with the command to paste."""
     name = shlex.quote(str(path))
     return f"save what is complete with `selfmodel logs salvage {name} -o NEW.mcap`"
 
@@ -26,56 +26,56 @@ class LogError(WorkError):
 
     Args:
         path: The file.
-        what: What is wrong with it.
-        good: How much of it is good; left out where nothing is known.
-        advice: What can be done.
+        what: Description of the damage.
+        good: Description of the intact part, if known.
+        advice: Remedy.
 
     Attributes:
         path: The file.
-        what: What is wrong with it.
-        good: How much of it is good, or "".
-        advice: What can be done.
+        what: Description of the damage.
+        good: Description of the intact part, or "".
+        advice: Remedy.
     """
 
     def __init__(
         self, path: str | PathLike[str], what: str, *, good: str = "", advice: str = AGAIN
     ) -> None:
-        if len(what) > _LONGEST:  # what a log says may be megabytes
+        if len(what) > _LONGEST:  # a text from the log may have megabytes
             what = f"{what[:_LONGEST]}..."
         self.path, self.what, self.good, self.advice = str(path), what, good, advice
         super().__init__(f"{path}: " + "; ".join(part for part in (what, good, advice) if part))
 
 
 class NotMcapError(LogError):
-    """The file is not MCAP, or too short to tell."""
+    """The file is not MCAP, or too short for MCAP."""
 
 
 class TruncatedError(LogError):
-    """The file ends before its end: it was cut, or its writer was."""
+    """The file is truncated."""
 
 
 class CorruptError(LogError):
-    """The file's bytes are not those that were written, or contradict each other."""
+    """A checksum of the file is wrong, or its records contradict each other."""
 
 
 class UnsupportedError(LogError):
-    """The file is sound, but of a kind, version or size that is not known here."""
+    """The file is intact, but has an unsupported format, version or size."""
 
 
 class IncompleteError(LogError):
-    """The trial did not run to its end, and nobody has said so in its log."""
+    """The trial ended early, and its log has no record of that."""
 
 
 class SchemaMismatchError(LogError):
-    """The file is sound, but what stands in it does not fit the format of a trial log."""
+    """The file is intact, but its content does not fit the format of a trial log."""
 
 
 class LogWriteError(OSError):
-    """A log could not be written on; what had been written stays.
+    """Writing a log failed; the file keeps all earlier data.
 
     Args:
-        path: The file that was being written.
-        cause: What the operating system said.
+        path: The file.
+        cause: Error of the operating system.
     """
 
     def __init__(self, path: str | PathLike[str], cause: OSError) -> None:

@@ -1,135 +1,91 @@
-"""Files that come to be whole or not at all, and never in the place of another."""
+"""Safe creation of output files: complete or absent, and without replacing an existing file."""
 
 import errno
 import os
-import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
 from selfmodel.errors import InputError
-from selfmodel.logs.atomic import part_of, put, sync, sync_folder
+from selfmodel.logs.atomic import partial_path, sync, sync_folder, write_atomic
 from selfmodel.logs.errors import LogWriteError
 
 
-def read_bounded(path: Path, what: str, limit: int) -> bytes:
-    """Returns all of a file that somebody named.
-
-    Args:
-        path: The file.
-        what: What it should be, such as "a trial log".
-        limit: Bytes that such a file may have.
+def create_partial(path: Path) -> IO[bytes]:
+    """Creates and opens the ``.part`` file that ``publish`` renames to ``path``.
 
     Raises:
-        InputError: There is none, it cannot be read, is no file but a pipe, a device or a folder,
-            or is larger.
-    """
-    check_regular(path, what)
-    try:
-        with path.open("rb") as file:
-            data = file.read(limit + 1)
-    except OSError as error:
-        raise InputError(
-            f"{path}: expected {what} that can be read, got: {error.strerror}"
-        ) from error
-    if len(data) > limit:
-        raise InputError(f"{path}: expected {what} of at most {limit} bytes, got more")
-    return data
-
-
-def check_regular(path: Path, what: str) -> None:
-    """Checks that a name is that of a file: a pipe would be waited for, a device never ends.
-
-    Raises:
-        InputError: It is not.
-    """
-    try:
-        mode = path.stat().st_mode
-    except OSError as error:
-        raise InputError(
-            f"{path}: expected {what} that can be read, got: {error.strerror}"
-        ) from error
-    if stat.S_ISDIR(mode):
-        raise InputError(f"{path}: expected {what} that can be read, got: Is a directory")
-    if not stat.S_ISREG(mode):
-        raise InputError(f"{path}: expected {what}, got a pipe or a device: give a file")
-
-
-def create_part(path: Path) -> IO[bytes]:
-    """Opens the unfinished file that is to become ``path``.
-
-    Raises:
-        InputError: Either of them exists, or their folder does not.
-        LogWriteError: It could not be made.
+        InputError: ``path`` or its ``.part`` exists, or their folder does not.
+        LogWriteError: The file system refused to create the file.
     """
     refuse_existing(path)
+    part = partial_path(path)
     try:
-        return part_of(path).open("xb")
+        return part.open("xb")
     except FileExistsError:
-        raise InputError(
-            f"{part_of(path)} exists, and is not overwritten: choose another name"
-        ) from None
+        raise InputError(f"{part} exists, and is not overwritten: choose another name") from None
     except (FileNotFoundError, NotADirectoryError):
         raise InputError(
             f"{path}: there is no folder {path.parent}: make it, or choose another"
         ) from None
     except OSError as error:
-        raise LogWriteError(part_of(path), error) from error
+        raise LogWriteError(part, error) from error
 
 
 def refuse_existing(path: Path) -> None:
-    """Refuses a name that is taken, before any work is done for it.
+    """Checks that neither ``path`` nor its ``.part`` exists, before any work is done.
 
     Raises:
-        InputError: A file of that name exists, or one that is to become it.
+        InputError: One of the two exists.
     """
-    for existing in (path, part_of(path)):
+    for existing in (path, partial_path(path)):
         if os.path.lexists(existing):
             raise InputError(f"{existing} exists, and is not overwritten: choose another name")
 
 
 def publish(file: IO[bytes], path: Path) -> None:
-    """Closes a finished part, and gives it its name once the disk has it.
+    """Closes a complete ``.part`` file, and renames it once its content is on the disk.
 
     Raises:
-        InputError: ``path`` has come to exist meanwhile, or the file system has no hard links;
-            the part stays.
+        InputError: ``path`` was created meanwhile, or the file system has no hard links; the
+            ``.part`` file remains.
         OSError: The disk failed.
     """
+    part = partial_path(path)
     sync(file)
     file.close()
     try:
-        os.link(part_of(path), path)  # unlike a rename, this never replaces a file
+        os.link(part, path)  # unlike a rename, a link never replaces a file
     except FileExistsError:
         raise InputError(
-            f"{path} has come to exist meanwhile, and is not overwritten; the finished file is "
-            f"{part_of(path)}: give it another name"
+            f"{path} was created meanwhile, and is not overwritten; the finished file is "
+            f"{part}: give it another name"
         ) from None
     except OSError as error:
         if error.errno not in (errno.EPERM, errno.ENOTSUP):
             raise
         raise InputError(
             f"{path}: this file system has no hard links ({error.strerror}); the finished file is "
-            f"{part_of(path)}: rename it, and choose another folder for the next"
+            f"{part}: rename it, and choose another folder for the next"
         ) from error
-    part_of(path).unlink()
+    part.unlink()
     sync_folder(path.parent)
 
 
-def replace(path: Path, data: bytes) -> None:
-    """Puts ``data`` in the place of what a file held before, in one move.
+def replace_file(path: Path, data: bytes) -> None:
+    """Writes a file, or replaces its content, in one atomic step.
 
     Raises:
-        LogWriteError: It could not be written; the file holds what it held.
+        LogWriteError: Writing failed; the file keeps its old content.
     """
-    with explained(part_of(path)):
-        put(path, data)
+    with as_write_error(partial_path(path)):
+        write_atomic(path, data)
 
 
 @contextmanager
-def explained(path: Path) -> Iterator[None]:
-    """Says of an error in writing which file it met, and whether the disk is full."""
+def as_write_error(path: Path) -> Iterator[None]:
+    """Context manager that turns an ``OSError`` into a ``LogWriteError`` that names the file."""
     try:
         yield
     except LogWriteError:

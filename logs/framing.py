@@ -1,7 +1,7 @@
-"""How records lie in an MCAP file, and what a record or a chunk holds; every size is bounded.
+"""Bounded parsing of MCAP: a file into records, a record's fields, a chunk's records.
 
-The library reads a damaged length before it looks whether so many bytes are there, and unpacks lz4
-without a bound. So the bytes are cut into records here, and each is given to the library alone.
+The mcap library trusts a damaged length, and decompresses lz4 without a limit. The bytes are
+therefore split into records here, and each record is parsed by the library alone.
 """
 
 import io
@@ -36,27 +36,28 @@ from mcap.records import (
 from mcap.stream_reader import get_chunk_data_stream
 
 from selfmodel.logs.budget import Budget
-from selfmodel.logs.unpack import unlz4, unzstd
+from selfmodel.logs.decompress import unlz4, unzstd
 
 MAGIC = b"\x89MCAP0\r\n"
 
 FRAME = 1 + 8
-"""Bytes before a record's own: what it is, and its length."""
+"""Size of the opcode and the length before a record's content, bytes."""
 
 CHUNK_LIMIT = 16 * 2**20
-"""Bytes that a chunk may unpack to: ours have 64 KiB, and the smallest messages take 30 bytes."""
+"""Maximum decompressed size of a chunk, bytes. Chunks of selfmodel have 64 KiB, and the smallest
+messages take 30 bytes."""
 
 
 class ContradictionError(ValueError):
-    """Every record can be read, but two of them do not agree."""
+    """Every record can be parsed, but two records contradict each other."""
 
 
 class UncheckedError(ValueError):
-    """There is no checksum, so nobody can say whether these are the bytes that were written."""
+    """A checksum is missing, so damage could not be detected."""
 
 
 class UnknownCompressionError(ValueError):
-    """A chunk is packed in a way that is not known here."""
+    """A chunk has an unknown compression."""
 
 
 FAILURES = (
@@ -70,17 +71,17 @@ FAILURES = (
     MemoryError,
     OverflowError,
 )
-"""Everything that the library and its decompressors raise over damaged bytes."""
+"""Exceptions that the mcap library and its decompressors raise for damaged bytes."""
 
 
 @dataclass(frozen=True)
 class Frame:
-    """One record as it lies in a file.
+    """Undecoded record of a file.
 
     Attributes:
-        offset: Where it begins.
-        opcode: What it is.
-        body: Its bytes, after its length.
+        offset: Offset of the record in the file, bytes.
+        opcode: Type of the record.
+        body: Content of the record, without opcode and length.
     """
 
     offset: int
@@ -89,7 +90,7 @@ class Frame:
 
     @property
     def end(self) -> int:
-        """Where the next record begins."""
+        """Offset of the next record, bytes."""
         return self.offset + FRAME + len(self.body)
 
 
@@ -97,7 +98,7 @@ def frames(data: bytes, offset: int = len(MAGIC)) -> Iterator[Frame]:
     """Yields the records from an offset on, up to the footer.
 
     Raises:
-        EndOfFile: The data end before the footer does.
+        EndOfFile: The data end before the end of the footer.
     """
     opcode = 0
     while opcode != Opcode.FOOTER:
@@ -112,10 +113,10 @@ def frames(data: bytes, offset: int = len(MAGIC)) -> Iterator[Frame]:
 
 
 def parse(frame: Frame) -> McapRecord | None:
-    """Returns what a record says; None for one of a kind that the format does not know yet.
+    """Returns the decoded record; None for a type that the format does not define.
 
     Raises:
-        Exception: One of ``FAILURES``: its bytes do not fit its kind.
+        Exception: One of ``FAILURES``: the content is invalid for the type.
     """
     stream = ReadDataStream(io.BytesIO(frame.body))
     if frame.opcode == Opcode.MESSAGE:
@@ -133,12 +134,12 @@ def unpack(chunk: Chunk, budget: Budget) -> list[McapRecord]:
     """Returns the records in a chunk.
 
     Args:
-        chunk: It is changed.
-        budget: Counts what it holds.
+        chunk: Chunk, which is decompressed in place.
+        budget: Counters of the file.
 
     Raises:
-        Exception: One of ``FAILURES``: it is damaged, unpacks to more than ``CHUNK_LIMIT`` bytes,
-            or has no checksum.
+        Exception: One of ``FAILURES``: the chunk is damaged, has more than ``CHUNK_LIMIT`` bytes
+            when decompressed, or has no checksum.
     """
     if chunk.uncompressed_size > CHUNK_LIMIT:
         raise ContradictionError(
@@ -153,7 +154,7 @@ def unpack(chunk: Chunk, budget: Budget) -> list[McapRecord]:
 
 
 def _records(data: bytes, budget: Budget) -> list[McapRecord]:
-    """Cuts a chunk up as the library does, but stops where there are too many records."""
+    """Splits a chunk as the library does, but raises if there are too many records."""
     found: list[McapRecord] = []
     offset = 0
     while offset < len(data):
@@ -172,7 +173,7 @@ def _records(data: bytes, budget: Budget) -> list[McapRecord]:
 
 
 def _message(body: bytes) -> Message:
-    """Reads a message as the library does, in a third of the time."""
+    """Parses a message as the library does, in a third of the time."""
     channel, sequence, log_time, publish_time = _MESSAGE.unpack_from(body)
     return Message(channel, log_time, body[_MESSAGE.size :], publish_time, sequence)
 
@@ -181,10 +182,11 @@ _MESSAGE = struct.Struct("<HIQQ")
 
 
 def unpack_chunk(chunk: Chunk) -> None:
-    """Puts what a chunk holds in the place of what it was packed to.
+    """Decompresses a chunk in place.
 
     Raises:
-        Exception: One of ``FAILURES``: it is damaged, or unpacks to another size than it claims.
+        Exception: One of ``FAILURES``: the chunk is damaged, or its decompressed size is not the
+            size that it claims.
     """
     size = chunk.uncompressed_size
     if chunk.compression == "zstd":

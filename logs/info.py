@@ -1,4 +1,4 @@
-"""What is in a log, at a glance."""
+"""Summary of a log."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,12 +14,12 @@ from selfmodel.trials.behaviour import SIGNALS, Signal
 
 @dataclass(frozen=True)
 class TopicInfo:
-    """One topic of a log.
+    """Summary of one topic of a log.
 
     Attributes:
-        type: Of its messages.
-        messages: How many there are.
-        rate: Messages a second; 0 for one message.
+        type: Type of the messages.
+        messages: Number of messages.
+        rate: Mean message rate, 1/s; 0 for a single message.
     """
 
     type: str
@@ -29,17 +29,17 @@ class TopicInfo:
 
 @dataclass(frozen=True, eq=False)
 class Info:
-    """What is in a log.
+    """Summary of a log.
 
     Attributes:
-        log: The trial and what belongs to it.
-        bytes: Size of the file.
-        topics: By name.
-        attachments: Size of each, by name.
-        records: The names of the metadata records.
-        observed: For each signal the share of its numbers that were observed, in [0, 1].
-        driver: What drove the robot, in words.
-        source: Where an imported or salvaged trial comes from, as the log says; or nothing.
+        log: Trial, model and settings.
+        bytes: Size of the file, bytes.
+        topics: Topics by name.
+        attachments: Sizes of the attachments by name, bytes.
+        records: Names of the metadata records.
+        observed: Fraction of observed numbers by signal, in [0, 1].
+        driver: Description of the controller, or of its replacement by recorded commands.
+        source: Origin of an imported or salvaged trial; empty for other trials.
     """
 
     log: TrialLog
@@ -53,11 +53,11 @@ class Info:
 
 
 def read_info(path: Path) -> Info:
-    """Returns what is in a log. What a simulated robot hides is not told.
+    """Returns the summary of a log, without the hidden faults of a simulated robot.
 
     Raises:
-        LogError: The log is damaged, or no trial log.
-        InputError: There is no such file.
+        LogError: The file is damaged, or not a trial log.
+        InputError: The file does not exist.
     """
     contents = read_contents(path)
     log = interpret(path, contents)
@@ -77,8 +77,8 @@ def read_info(path: Path) -> Info:
     )
 
 
-def hides_truth(info: Info) -> bool:
-    """Returns whether the log says what was wrong, for those who score."""
+def has_truth(info: Info) -> bool:
+    """Returns whether the log contains the hidden faults of a simulated robot, for scoring."""
     return HIDDEN in info.records
 
 

@@ -1,4 +1,4 @@
-"""An MCAP file that is being written: a ``.part`` until it is finished, flushed as told."""
+"""MCAP file under construction: a ``.part`` until it is finished, flushed on request."""
 
 import contextlib
 from collections.abc import Mapping
@@ -6,23 +6,22 @@ from pathlib import Path
 
 from mcap.writer import CompressionType, Writer
 
-import selfmodel
-from selfmodel.logs.atomic import part_of, sync
-from selfmodel.logs.files import create_part, explained, publish
+from selfmodel.logs.atomic import partial_path, sync
+from selfmodel.logs.files import as_write_error, create_partial, publish
 from selfmodel.logs.records import MEDIA_TYPES, with_digest
 from selfmodel.logs.schemas import schema_text
+from selfmodel.version import __version__
 
 CHUNK = 256 * 2**10
-"""Bytes that are packed together: with the library's 1 MiB a kill would lose a whole trial."""
+"""Size of a chunk before compression, bytes: with the library's 1 MiB, a kill would lose a whole
+trial."""
 
 
 class LogFile:
-    """Writes the records of a log.
-
-    Making one makes the file, so ``TrialWriter`` does it only as it is entered.
+    """Writer of the records of a log; the constructor creates the file.
 
     Args:
-        path: What the file is to be called once it is finished.
+        path: Name of the finished file.
 
     Raises:
         InputError: The file exists, finished or not, or its folder does not.
@@ -31,32 +30,32 @@ class LogFile:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._file = create_part(path)
+        self._file = create_partial(path)
         self._schemas: dict[str, int] = {}
         self._mcap = Writer(
             self._file,
             chunk_size=CHUNK,
             compression=CompressionType.ZSTD,
-            # Without it nothing protects attachments and metadata.
+            # No other checksum covers attachments and metadata.
             enable_data_crcs=True,
         )
-        with explained(part_of(path)):
-            self._mcap.start(profile="ros2", library=f"selfmodel/{selfmodel.__version__}")
+        with as_write_error(partial_path(path)):
+            self._mcap.start(profile="ros2", library=f"selfmodel/{__version__}")
 
     def metadata(self, name: str, texts: Mapping[str, str]) -> None:
-        """Writes a record of names and texts, with its digest."""
-        with explained(part_of(self.path)):
+        """Writes a metadata record, with its digest."""
+        with as_write_error(partial_path(self.path)):
             self._mcap.add_metadata(name, with_digest(name, texts))
 
     def attach(self, name: str, data: bytes) -> None:
-        """Writes a file within the file."""
+        """Writes an attachment."""
         media_type = MEDIA_TYPES.get(name, "application/octet-stream")
-        with explained(part_of(self.path)):
-            # Times of 0: the same trial gives the same bytes, whenever it is run.
+        with as_write_error(partial_path(self.path)):
+            # Times of 0: the bytes do not depend on the date.
             self._mcap.add_attachment(0, 0, name, media_type, data)
 
     def channel(self, topic: str, kind: str) -> int:
-        """Announces a topic of messages of one type, and returns its number."""
+        """Registers a topic of messages of one type, and returns its channel number."""
         schema = self._schemas.get(kind)
         if schema is None:
             schema = self._mcap.register_schema(kind, "ros2msg", schema_text(kind).encode())
@@ -64,36 +63,36 @@ class LogFile:
         return self._mcap.register_channel(topic, "cdr", schema)
 
     def message(self, channel: int, nanoseconds: int, payload: bytes, sequence: int) -> None:
-        """Writes a message. A full chunk goes to the disk, so this is to be ``explained``."""
+        """Writes a message; wrap calls in ``as_write_error``: a full chunk is written to disk."""
         self._mcap.add_message(channel, nanoseconds, payload, nanoseconds, sequence)
 
     def flush(self) -> None:
-        """Hands everything to the operating system, where a kill cannot reach it."""
-        with explained(part_of(self.path)):
+        """Flushes to the operating system; a kill of the process then loses no data."""
+        with as_write_error(partial_path(self.path)):
             self._mcap.flush()
 
     def sync(self) -> None:
-        """Waits until the disk has everything."""
+        """Flushes to the disk."""
         self.flush()
-        with explained(part_of(self.path)):
+        with as_write_error(partial_path(self.path)):
             sync(self._file)
 
     def finish(self) -> None:
-        """Writes what ends a file, and gives the file its name.
+        """Writes the end of the file, and renames the ``.part``.
 
         Raises:
-            InputError: A file of that name has come to exist meanwhile; the part stays.
+            InputError: A file of that name was created meanwhile; the ``.part`` remains.
         """
-        with explained(part_of(self.path)):
+        with as_write_error(partial_path(self.path)):
             self._mcap.finish()
             publish(self._file, self.path)
 
     def abandon(self) -> None:
-        """Closes the file and takes it away: what it holds is also elsewhere."""
+        """Closes and deletes the unfinished file."""
         self.close()
-        part_of(self.path).unlink(missing_ok=True)
+        partial_path(self.path).unlink(missing_ok=True)
 
     def close(self) -> None:
-        """Closes the file as it is; harmless when it is closed."""
-        with contextlib.suppress(OSError):  # what led here has been raised already
+        """Closes the file without finishing it; no effect on a closed file."""
+        with contextlib.suppress(OSError):  # an earlier error has been raised already
             self._file.close()

@@ -1,4 +1,4 @@
-"""What a log begins with, written before the robot moves."""
+"""Preamble of a log, written before the robot moves."""
 
 import platform
 
@@ -6,7 +6,6 @@ import mcap
 import mujoco
 import numpy as np
 
-import selfmodel
 from selfmodel.controllers.playback import Playback
 from selfmodel.logs.controllers import controller_bytes
 from selfmodel.logs.logfile import LogFile
@@ -23,7 +22,7 @@ from selfmodel.logs.records import (
     TIMED_FORMAT,
     TRIAL,
     TRUTH,
-    Imported,
+    TrialHeader,
     TrialRecord,
     settings_json,
     sha256,
@@ -31,32 +30,18 @@ from selfmodel.logs.records import (
 from selfmodel.logs.topics import DESCRIPTION, DESCRIPTION_TYPE, description
 from selfmodel.logs.urdf import urdf
 from selfmodel.robot.robot import Robot
-from selfmodel.settings import Settings
 from selfmodel.trials.trial import TrialPlan
+from selfmodel.version import __version__
 
 
-def write_preamble(
-    log: LogFile,
-    robot: Robot,
-    plan: TrialPlan,
-    *,
-    timed: bool,
-    settings: Settings,
-    hidden: str | None,
-    gap: str | None,
-    imported: Imported | None,
-) -> None:
-    """Writes the records, attachments and description that precede the first step.
+def write_preamble(log: LogFile, robot: Robot, plan: TrialPlan, header: TrialHeader) -> None:
+    """Writes the records, attachments and robot description that precede the first step.
 
     Args:
-        log: Where to.
-        robot: The robot as its model describes it.
-        plan: What is to be done.
-        timed: Whether it is to be told when each step really happened.
-        settings: The paper's numbers.
-        hidden: What is wrong with a simulated robot, in notation.
-        gap: How else it differs from its model, as JSON.
-        imported: Where an imported trial comes from.
+        log: File to write to.
+        robot: Robot as its model describes it.
+        plan: Plan of the trial.
+        header: Other content of the preamble.
 
     Raises:
         LogWriteError: The disk is full, or failed.
@@ -65,7 +50,7 @@ def write_preamble(
     controller = b"" if isinstance(driver, Playback) else controller_bytes(driver)
     model = robot.mjcf.encode()
     record = TrialRecord(
-        format=TIMED_FORMAT if timed else FORMAT,
+        format=TIMED_FORMAT if header.timed else FORMAT,
         name=plan.name,
         stage=plan.stage,
         robot=robot.name,
@@ -78,7 +63,7 @@ def write_preamble(
     )
     log.metadata(TRIAL, record.texts())
     log.metadata(SOFTWARE, _software())
-    secrets = {TRUTH: hidden, GAP: gap}
+    secrets = {TRUTH: header.hidden, GAP: header.gap}
     if known := {name: text for name, text in secrets.items() if text is not None}:
         log.metadata(HIDDEN, known)
     log.attach(MODEL_FILE, model)
@@ -86,16 +71,16 @@ def write_preamble(
         log.attach(name, data)
     if controller:
         log.attach(CONTROLLER_FILE, controller)
-    log.attach(SETTINGS_FILE, settings_json(settings))
-    if imported is not None:
-        log.metadata(IMPORT, imported.facts)
-        log.attach(MAPPING_FILE, imported.mapping.encode())
+    log.attach(SETTINGS_FILE, settings_json(header.settings))
+    if header.imported is not None:
+        log.metadata(IMPORT, header.imported.facts)
+        log.attach(MAPPING_FILE, header.imported.mapping.encode())
     log.message(log.channel(DESCRIPTION, DESCRIPTION_TYPE), 0, description(urdf(robot)), 0)
 
 
 def _software() -> dict[str, str]:
     return {
-        "selfmodel": selfmodel.__version__,
+        "selfmodel": __version__,
         "mujoco": mujoco.__version__,
         "numpy": np.__version__,
         "python": platform.python_version(),

@@ -1,4 +1,4 @@
-"""Reads a trial from its log, and believes nothing that it has not checked."""
+"""Strict reader of trial logs: every checksum, digest, count and name is verified."""
 
 import json
 from collections.abc import Mapping
@@ -54,22 +54,22 @@ from selfmodel.trials.trial import Trial, TrialPlan
 
 @dataclass(frozen=True, eq=False)
 class TrialLog:
-    """Everything that a log says of a trial, but what the robot hides.
+    """Content of a trial log, without the hidden faults of a simulated robot.
 
     Attributes:
-        trial: What was to be done and what was observed.
-        mjcf: The robot's model with nothing wrong, as XML: whoever wrote the log may have put
-            anything there, and ``selfmodel.logs.robots.robot_of`` is how it is loaded.
-        assets: The files that the model may name.
-        root: The body whose motion was logged as the base's.
-        control_timestep: Seconds between two commands.
-        settings: The paper's numbers, as they were.
-        software: Versions, by the name of what they are of.
-        status: ``finished``, ``interrupted`` where the steps that were salvaged are all, or
-            ``stopped`` where a robot with a clock of its own was.
-        reason: Why it was stopped, or "".
-        timing: When each step really happened, on a robot with a clock of its own.
-        imported: Whether it is a recording that was resampled, and rounded by that.
+        trial: Plan and observed behaviour.
+        mjcf: Model of the healthy robot, as XML. The text is untrusted: load it with
+            ``selfmodel.logs.robots.robot_of``.
+        assets: Files that the model may name.
+        root: Name of the body that was logged as the base.
+        control_timestep: Control time step, s.
+        settings: The paper's numbers at the time of the trial.
+        software: Versions by the name of the software.
+        status: ``finished``; ``interrupted`` for a salvaged trial; or ``stopped`` for a robot with
+            its own clock that ended early.
+        reason: Cause of the stop, or "".
+        timing: Measured timing of the steps, on a robot with its own clock.
+        imported: Whether the trial is an imported recording, resampled and thereby rounded.
     """
 
     trial: Trial
@@ -86,29 +86,29 @@ class TrialLog:
 
 
 def read_log(path: str | Path) -> TrialLog:
-    """Returns the trial in a log.
+    """Returns the content of a log.
 
-    The file's checksums, its counts, the digests of its records, of the model and the controller,
-    the layout of every message and its time, the names, and the displacement are checked. What the
-    robot hides is not looked at.
+    Verified are the checksums and counts of the file, the digests of its records, of the model and
+    of the controller, the layout and time of every message, the names, and the displacement. The
+    hidden faults of a simulated robot are not read.
 
     Raises:
-        LogError: Something does not hold; the sentence names the file.
-        InputError: There is no such file.
+        LogError: A check failed.
+        InputError: The file does not exist.
     """
     path = Path(path)
     return interpret(path, read_contents(path, unread=(HIDDEN,)))
 
 
 def interpret(path: Path, contents: Contents) -> TrialLog:
-    """Returns the trial that the contents of a file tell of.
+    """Returns the trial log in the contents of a file.
 
     Args:
-        path: The file, for errors and as the trial's name for itself.
-        contents: What stands in it; known to be sound.
+        path: The file, for errors and as the path of the trial.
+        contents: Contents of the file, with verified checksums.
 
     Raises:
-        LogError: They do not fit the format of a trial log, or each other.
+        LogError: The contents do not fit the format of a trial log, or contradict each other.
     """
     record = read_record(path, contents)
     result = _result(path, contents, record)
@@ -121,12 +121,12 @@ def interpret(path: Path, contents: Contents) -> TrialLog:
     driver = controller or _playback(path, behaviour)
     plan = TrialPlan(record.name, record.stage, driver, record.steps, record.seed)
     trial = Trial(plan, record.robot, behaviour, str(path))
-    # As texts, for a robot that was lost to sight: nan is nan.
+    # Compared as text: the displacement is NaN if the base was not observed.
     if repr(result.displacement) != repr(trial.displacement):
         raise CorruptError(
             path,
-            f"its result says {result.displacement!r} m of displacement, its messages say "
-            f"{trial.displacement!r} m",
+            f"the displacement is {result.displacement!r} m in its result, and "
+            f"{trial.displacement!r} m in its messages",
             good=contents.good,
         )
     try:
@@ -154,29 +154,30 @@ def interpret(path: Path, contents: Contents) -> TrialLog:
 
 
 def read_truth(path: str | Path) -> str | None:
-    """Returns what was wrong with a simulated physical robot, in notation; None if unknown.
+    """Returns the hidden faults of a simulated physical robot, in notation; None if unknown.
 
-    This is for scoring. Nothing that diagnoses may call it.
+    For scoring only: no code of a diagnosis may call this function.
 
     Raises:
         LogError: The file is damaged.
-        InputError: There is no such file.
+        InputError: The file does not exist.
     """
     return read_contents(Path(path)).metadata.get(HIDDEN, {}).get(TRUTH)
 
 
 def read_gap(path: str | Path) -> dict[str, Any] | None:
-    """Returns how a simulated physical robot differed from its model, beside what was wrong.
+    """Returns the reality gap of a simulated physical robot.
 
-    This is for scoring. Nothing that diagnoses may call it.
+    For scoring only: no code of a diagnosis may call this function.
 
     Returns:
-        The numbers of a ``selfmodel.physical.reality_gap.Gap``, and under ``structure`` those of a
-        ``selfmodel.physical.structural_mismatch.Structure`` or None; None where no gap is told.
+        Attributes of a ``selfmodel.physical.reality_gap.RealityGap``, and under ``structure`` those
+        of a ``selfmodel.physical.structural_mismatch.StructuralMismatch`` or None; None without a
+        gap.
 
     Raises:
-        LogError: The file is damaged, or what it says is no gap.
-        InputError: There is no such file.
+        LogError: The file is damaged, or its gap is invalid.
+        InputError: The file does not exist.
     """
     contents = read_contents(Path(path))
     text = contents.metadata.get(HIDDEN, {}).get(GAP)
@@ -199,10 +200,10 @@ _OWN_FILES = (MODEL_FILE, CONTROLLER_FILE, SETTINGS_FILE, MAPPING_FILE)
 
 
 def read_record(path: Path, contents: Contents) -> TrialRecord:
-    """Returns what was known of the trial before it started.
+    """Returns the record ``selfmodel.trial``, which precedes the first step.
 
     Raises:
-        LogError: It is missing, of another format, or wrong.
+        LogError: The record is missing, of another format, or invalid.
     """
     texts = contents.metadata.get(TRIAL)
     if texts is None:
@@ -222,16 +223,16 @@ def read_record(path: Path, contents: Contents) -> TrialRecord:
 
 
 def read_attachment(path: Path, contents: Contents, name: str, expected: str = "") -> bytes:
-    """Returns a file within the file.
+    """Returns an attachment of a log.
 
     Args:
-        path: The file, for errors.
-        contents: What stands in it.
-        name: The attachment's.
-        expected: Its SHA-256, if it is known.
+        path: The log, for errors.
+        contents: Contents of the log.
+        name: Name of the attachment.
+        expected: SHA-256 of the attachment, if known.
 
     Raises:
-        LogError: It is missing, or another one.
+        LogError: The attachment is missing, or its SHA-256 is wrong.
     """
     data = contents.attachments.get(name)
     if data is None:
@@ -246,10 +247,10 @@ def read_attachment(path: Path, contents: Contents, name: str, expected: str = "
 
 
 def read_controller(path: Path, contents: Contents, record: TrialRecord) -> Controller | None:
-    """Returns what drove the robot; None if that is not known.
+    """Returns the controller of the robot; None if unknown.
 
     Raises:
-        LogError: It is missing, another one, or none at all.
+        LogError: The attached controller is missing, invalid, or its SHA-256 is wrong.
     """
     if not record.controller_sha256:
         return None

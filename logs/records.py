@@ -1,4 +1,4 @@
-"""What a log says of its trial beside the messages: metadata records and attachments."""
+"""Metadata records and attachments of a trial log."""
 
 import dataclasses
 import hashlib
@@ -14,25 +14,25 @@ from selfmodel.settings import Settings
 from selfmodel.trials.trial import STAGES, Stage, stage_of
 
 FORMAT = "1"
-"""The version of the log's format; a reader refuses others."""
+"""Version of the format of a log; a reader refuses unknown versions."""
 
 TIMED_FORMAT = "2"
-"""That of a robot with a clock of its own: the same with ``/timing``."""
+"""Version of the format of a robot with its own clock: the same with ``/timing``."""
 
 FORMATS = (FORMAT, TIMED_FORMAT)
 
 TRIAL = "selfmodel.trial"
 SOFTWARE = "selfmodel.software"
 HIDDEN = "selfmodel.hidden"
-"""The record with what a simulated physical robot hides; diagnosis never reads it."""
+"""Hidden faults and reality gap of a simulated physical robot, which a diagnosis never reads."""
 IMPORT = "selfmodel.import"
-"""Where an imported trial comes from, and how good what was recorded is."""
+"""Origin of an imported trial, and the quality of the recording."""
 SALVAGE = "selfmodel.salvage"
-"""Which damaged file a salvaged trial comes from."""
+"""Origin of a salvaged trial."""
 RESULT = "selfmodel.result"
 
 OWN = "selfmodel."
-"""What the names of all our records begin with; each holds a digest of itself."""
+"""Prefix of the names of selfmodel's records; each contains a digest of itself."""
 DIGEST = "sha256"
 
 MODEL_FILE = "model.xml"
@@ -47,7 +47,7 @@ MEDIA_TYPES: Mapping[str, str] = MappingProxyType(
         MAPPING_FILE: "application/toml",
     }
 )
-"""What the attachments are; all others are bytes."""
+"""Media types by attachment; other attachments are ``application/octet-stream``."""
 
 TRUTH = "truth"
 GAP = "gap"
@@ -55,30 +55,31 @@ FINISHED = "finished"
 INTERRUPTED = "interrupted"
 STOPPED = "stopped"
 
-SHORTEST, LONGEST = 1e-9, 3600.0
-"""Seconds that a control step may take: a log's clock ticks in nanoseconds, and ends."""
+MIN_CONTROL_TIMESTEP, MAX_CONTROL_TIMESTEP = 1e-9, 3600.0
+"""Bounds of the control time step, s: the time stamps of a log are in nanoseconds, and bounded."""
 
-LONGEST_TEXT = 1000
+MAX_TEXT = 1000
+"""Maximum length of a text in a record, characters."""
 
 _NAME = re.compile(r"[A-Za-z0-9-]{1,100}")
 
 
 @dataclass(frozen=True)
 class TrialRecord:
-    """The record ``selfmodel.trial``, written before the trial starts.
+    """Record ``selfmodel.trial``, written before the trial starts.
 
     Attributes:
         format: Version of the log's format.
-        name: The trial's name within its run.
-        stage: Where in the story it stands.
-        robot: The robot's name.
-        root: The body that ``/odom`` tells of.
-        control_timestep: Seconds between two commands; step k is at k times this.
-        steps: Control steps that it is to last.
-        seed: From which everything random about it is drawn.
-        controller_sha256: Of the attached controller, or "" where there is none because what drove
-            the robot is not known; its commands are.
-        model_sha256: Of the attached model.
+        name: Name of the trial within its run.
+        stage: Stage of the recovery.
+        robot: Name of the robot.
+        root: Name of the root body, whose motion is on ``/odom``.
+        control_timestep: Control time step, s; step k is at k times this.
+        steps: Planned number of control steps.
+        seed: Seed of all random choices.
+        controller_sha256: SHA-256 of the attached controller, or "" without one: then only the
+            commands are known.
+        model_sha256: SHA-256 of the attached model.
     """
 
     format: str
@@ -93,7 +94,7 @@ class TrialRecord:
     model_sha256: str
 
     def texts(self) -> dict[str, str]:
-        """Returns the record as MCAP holds it."""
+        """Returns the record as texts, the form of MCAP metadata."""
         return {
             name: value if isinstance(value, str) else repr(value)
             for name, value in dataclasses.asdict(self).items()
@@ -102,13 +103,13 @@ class TrialRecord:
 
 @dataclass(frozen=True)
 class Result:
-    """The record ``selfmodel.result``, written last.
+    """Record ``selfmodel.result``, written last.
 
     Attributes:
         status: ``finished``, ``interrupted`` or ``stopped``.
-        steps: Control steps that were logged.
-        displacement: How far the robot travelled forward, m.
-        reason: Why it was stopped.
+        steps: Number of logged control steps.
+        displacement: Forward displacement of the base, m.
+        reason: Cause of the stop, or "".
     """
 
     status: str
@@ -117,33 +118,52 @@ class Result:
     reason: str = ""
 
     def texts(self) -> dict[str, str]:
-        """Returns the record as MCAP holds it."""
+        """Returns the record as texts, the form of MCAP metadata."""
         return {
             "status": self.status,
             "steps": str(self.steps),
             "displacement": repr(self.displacement),
-            **({"reason": self.reason[:LONGEST_TEXT]} if self.reason else {}),
+            **({"reason": self.reason[:MAX_TEXT]} if self.reason else {}),
         }
 
 
 @dataclass(frozen=True)
 class Imported:
-    """Where an imported trial comes from.
+    """Origin of an imported trial.
 
     Attributes:
-        facts: Its source, and the quality of what was recorded, as texts by name.
-        mapping: The mapping by which it was imported, as TOML.
+        facts: Source and quality of the recording, as texts by name.
+        mapping: Mapping from the recording's topics to signals, as TOML.
     """
 
     facts: Mapping[str, str]
     mapping: str
 
 
+@dataclass(frozen=True)
+class TrialHeader:
+    """Content of a log's preamble beside the robot and the plan.
+
+    Attributes:
+        settings: The paper's numbers, for the record.
+        timed: Whether the samples have a step timing; see ``physical.interface.TimedRobot``.
+        hidden: Faults of a simulated physical robot, in notation; for ``read_truth`` only.
+        gap: Reality gap of a simulated physical robot, as JSON; for ``read_gap`` only.
+        imported: Origin of an imported trial.
+    """
+
+    settings: Settings
+    timed: bool = False
+    hidden: str | None = None
+    gap: str | None = None
+    imported: Imported | None = None
+
+
 def trial_record(texts: Mapping[str, str]) -> TrialRecord:
-    """Returns the record that stands in a log.
+    """Returns the trial record of a log.
 
     Raises:
-        ValueError: A field is missing or cannot be what it says; the sentence names it.
+        ValueError: A field is missing or invalid; the message names the field.
     """
     fields = [field.name for field in dataclasses.fields(TrialRecord)]
     missing = [name for name in fields if name not in texts]
@@ -152,14 +172,14 @@ def trial_record(texts: Mapping[str, str]) -> TrialRecord:
     stage = stage_of(texts["stage"])
     if stage is None:
         raise ValueError(f"stage must be one of {', '.join(STAGES)}, got {texts['stage']!r}")
-    long = [name for name in fields if len(texts[name]) > LONGEST_TEXT]
+    long = [name for name in fields if len(texts[name]) > MAX_TEXT]
     if long:
-        raise ValueError(f"expected at most {LONGEST_TEXT} characters in {', '.join(long)}")
+        raise ValueError(f"expected at most {MAX_TEXT} characters in {', '.join(long)}")
     timestep = float(texts["control_timestep"])
-    if not SHORTEST <= timestep <= LONGEST:
+    if not MIN_CONTROL_TIMESTEP <= timestep <= MAX_CONTROL_TIMESTEP:
         raise ValueError(
-            f"control_timestep must be above 0 s, from {SHORTEST} to {LONGEST}, "
-            f"got {texts['control_timestep']!r}"
+            f"control_timestep must be above 0 s, from {MIN_CONTROL_TIMESTEP} to "
+            f"{MAX_CONTROL_TIMESTEP}, got {texts['control_timestep']!r}"
         )
     return TrialRecord(
         format=texts["format"],
@@ -176,17 +196,17 @@ def trial_record(texts: Mapping[str, str]) -> TrialRecord:
 
 
 def result_record(texts: Mapping[str, str]) -> Result:
-    """Returns the record that stands in a log.
+    """Returns the result record of a log.
 
     Raises:
-        ValueError: A field is missing or cannot be what it says.
+        ValueError: A field is missing or invalid.
     """
     missing = [name for name in ("status", "steps", "displacement") if name not in texts]
     if missing:
         raise ValueError(f"it lacks {', '.join(missing)}")
     reason = texts.get("reason", "")
-    if len(reason) > LONGEST_TEXT:
-        raise ValueError(f"expected at most {LONGEST_TEXT} characters in reason")
+    if len(reason) > MAX_TEXT:
+        raise ValueError(f"expected at most {MAX_TEXT} characters in reason")
     return Result(texts["status"], int(texts["steps"]), float(texts["displacement"]), reason)
 
 
@@ -196,10 +216,11 @@ def settings_json(settings: Settings) -> bytes:
 
 
 def parse_settings(data: bytes) -> Settings:
-    """Returns the settings that stand in a log; those that it does not name have their defaults.
+    """Returns the settings of a log; a missing setting has its default.
 
     Raises:
-        ValueError: It is not JSON, or names what is no setting, or a value does not fit.
+        ValueError: The data are not JSON, or a name or a value is invalid.
+        TypeError: The data are no JSON object, or a value is no number.
     """
     values: Any = json.loads(data)
     if not isinstance(values, dict):
@@ -214,19 +235,19 @@ def parse_settings(data: bytes) -> Settings:
 
 
 def with_digest(name: str, texts: Mapping[str, str]) -> dict[str, str]:
-    """Returns a record with a digest of itself: MCAP has no checksum for one record alone."""
+    """Returns a record with its digest: MCAP has no checksum of a single record."""
     return {**texts, DIGEST: _digest(name, texts)}
 
 
 def without_digest(name: str, texts: Mapping[str, str]) -> dict[str, str]:
-    """Returns a record of ours as it was before its digest was added.
+    """Returns a record of selfmodel without its verified digest.
 
     Raises:
-        ValueError: The digest is missing, or is not that of the record.
+        ValueError: The digest is missing or wrong.
     """
     bare = {key: text for key, text in texts.items() if key != DIGEST}
     if texts.get(DIGEST) != _digest(name, bare):
-        raise ValueError(f"the record {name} does not have the digest that it says")
+        raise ValueError(f"the digest of the record {name} is missing or wrong")
     return bare
 
 
@@ -240,10 +261,10 @@ def sha256(data: bytes) -> str:
 
 
 def checked_name(name: str) -> str:
-    """Returns ``name`` if it can name a trial and its file.
+    """Returns ``name`` if it is a valid name of a trial and its file.
 
     Raises:
-        InputError: It has other characters than letters, digits and ``-``.
+        InputError: The name has other characters than letters, digits and ``-``.
     """
     if not _NAME.fullmatch(name):
         raise InputError(

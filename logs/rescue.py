@@ -1,4 +1,4 @@
-"""Finds what is whole in a damaged file: records whose own checksum holds, wherever they lie."""
+"""Search of a damaged file for intact records: records whose own checksum is correct."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -25,23 +25,23 @@ from selfmodel.logs.records import OWN, without_digest
 
 
 def rescue(path: Path) -> Contents:
-    """Returns what a damaged log has that is known to be whole.
+    """Returns the intact contents of a damaged log.
 
-    That is every chunk and attachment whose checksum holds, and every record of ours whose digest
-    does. After bytes that make no sense, the next record that does is looked for. What stands in
-    the file twice counts once.
+    Intact are the chunks and attachments with a correct checksum, and the metadata records of
+    selfmodel with a correct digest. After damaged bytes, the search continues at the next intact
+    record. Of duplicates, the first counts.
 
     Args:
         path: The file; it is only read.
 
     Raises:
-        LogError: It is too large, has nothing of a log, or says two different things of one
-            message.
-        InputError: There is no such file, or it cannot be opened.
+        LogError: The file is too large, has no record of a log, or has two different messages of
+            one time.
+        InputError: The file does not exist, or cannot be opened.
     """
     found = _Found()
     try:
-        for record in _whole(read_bytes(path)):
+        for record in _intact_records(read_bytes(path)):
             found.add(record)
         contents = found.contents()
     except ContradictionError as error:
@@ -50,13 +50,13 @@ def rescue(path: Path) -> Contents:
         what = f"nothing can be salvaged: {error}"
         raise UnsupportedError(path, what, advice=ANOTHER) from error
     if not contents.metadata:
-        raise NotMcapError(path, "nothing in this file is of a trial log", advice=ANOTHER)
+        raise NotMcapError(path, "no record of a trial log is intact in this file", advice=ANOTHER)
     return contents
 
 
 @dataclass
 class _Found:
-    """What has been found so far; of two things with one name, the first."""
+    """Intact records found so far; the first of each name."""
 
     metadata: dict[str, Mapping[str, str]] = field(default_factory=dict)
     attachments: dict[str, bytes] = field(default_factory=dict)
@@ -83,7 +83,7 @@ class _Found:
             raise ContradictionError(f"it has two different messages of time {message.log_time} ns")
 
     def contents(self) -> Contents:
-        """Returns all of it, as a sound file would have it."""
+        """Returns the records as the contents of an undamaged file."""
         topics: dict[str, Messages] = {}
         by_channel: dict[int, Messages] = {}
         for number, channel in self.channels.items():
@@ -97,35 +97,35 @@ class _Found:
         return Contents("ros2", self.metadata, self.attachments, topics)
 
 
-def _whole(data: bytes) -> Iterator[McapRecord]:
-    """Yields what is whole; schemas and channels that no chunk vouches for come last."""
-    bare: list[McapRecord] = []
+def _intact_records(data: bytes) -> Iterator[McapRecord]:
+    """Yields intact records; schemas and channels without a checksum come last."""
+    unprotected: list[McapRecord] = []
     work = _Work()
     offset = len(MAGIC)
     while offset < len(data):
         try:
             frame = next(frames(data, offset))
-            records = _vouched(frame, work)
+            records = _verified(frame, work)
         except ExcessError:
             raise
         except FAILURES:
-            offset = _next_whole(data, offset + 1, work, len(data))
+            offset = _next_intact(data, offset + 1, work, len(data))
             continue
-        if frame.opcode in _VOUCHED and records:
+        if frame.opcode in _PROTECTED and records:
             yield from records
             offset = frame.end
         else:
-            bare += records
-            # Nothing vouches for its length: it may have swallowed what is whole.
-            offset = _next_whole(data, frame.offset + 1, work, frame.end)
-    yield from bare
+            unprotected += records
+            # Its length has no checksum: the record may contain intact records.
+            offset = _next_intact(data, frame.offset + 1, work, frame.end)
+    yield from unprotected
 
 
-_VOUCHED = (Opcode.CHUNK, Opcode.ATTACHMENT, Opcode.METADATA)
+_PROTECTED = (Opcode.CHUNK, Opcode.ATTACHMENT, Opcode.METADATA)
 
 
 class _Work:
-    """Counts what was tried, in vain or not: bytes can be such that every one begins a record."""
+    """Limits of the search: in hostile bytes, every byte may begin a record."""
 
     def __init__(self) -> None:
         self.budget = Budget()
@@ -134,21 +134,21 @@ class _Work:
     def attempt(self, frame: Frame) -> None:
         self.budget.frame(frame.opcode, len(frame.body))
         self._tried += len(frame.body)
-        if self._tried > _MOST_TRIED:
-            raise ExcessError("too much of it looks like a log and is none")
+        if self._tried > _MAX_TRIED_BYTES:
+            raise ExcessError("too many of its bytes look like damaged records")
 
 
-_MOST_TRIED = 4 * FILE_LIMIT
+_MAX_TRIED_BYTES = 4 * FILE_LIMIT
 _BEGINNING = re.compile(rb"[\x06\x09\x0c](?=.{3}[\x00-\x10]\x00{4})", re.DOTALL)
-"""How a chunk, an attachment or a record of ours begins: what it is, and a length that a file may
-have."""
+"""First bytes of a chunk, an attachment or a metadata record: the opcode, and a length that a file
+may have."""
 
 
-def _vouched(frame: Frame, work: _Work) -> list[McapRecord]:
-    """The records of a frame that are what was written, as far as their checksums can say.
+def _verified(frame: Frame, work: _Work) -> list[McapRecord]:
+    """Intact records of a frame.
 
     Raises:
-        Exception: One of ``FAILURES``: they are not.
+        Exception: One of ``FAILURES``: the frame is damaged, or has no checksum.
     """
     work.attempt(frame)
     record = parse(frame)
@@ -164,11 +164,11 @@ def _vouched(frame: Frame, work: _Work) -> list[McapRecord]:
     return [record] if kept and record is not None else []
 
 
-def _next_whole(data: bytes, offset: int, work: _Work, end: int) -> int:
-    """Where the next chunk, attachment or record of ours begins that is whole; or ``end``."""
+def _next_intact(data: bytes, offset: int, work: _Work, end: int) -> int:
+    """Offset of the next intact chunk, attachment or metadata record, or ``end``."""
     for match in _BEGINNING.finditer(data, offset, end):
         try:
-            if _vouched(next(frames(data, match.start())), work):
+            if _verified(next(frames(data, match.start())), work):
                 return match.start()
         except ExcessError:
             raise

@@ -1,4 +1,4 @@
-"""The robot of a log, made from the log alone, whoever wrote it."""
+"""Robot of a log, built from the untrusted model in the log."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -13,17 +13,17 @@ from selfmodel.robot.mjcf.untrusted import checked_model
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Names
 
-GOOD = "what was observed reads well"
+GOOD = "its observations are intact"
 
 
 def robot_of(log: TrialLog) -> Robot:
-    """Returns the robot whose model stands in a log.
+    """Returns the robot of the model in a log.
 
-    MuJoCo gets no file but those attached to the log.
+    MuJoCo can read no files but the log's attachments.
 
     Raises:
-        LogError: The model asks for files or for too much, is none, or is of another robot than the
-            messages.
+        LogError: The model is invalid, names other files, exceeds a limit, or is of another robot
+            than the messages.
     """
     path = log.trial.path
     try:
@@ -43,11 +43,11 @@ def robot_of(log: TrialLog) -> Robot:
         )
     names = log.trial.behaviour.names
     if (robot.anatomy.names, robot.root) != (names, log.root):
-        what = described_difference(robot.anatomy.names, names)
+        what = describe_difference(robot.anatomy.names, names)
         raise SchemaMismatchError(
             path,
             f"its model is of another robot than its messages: {what}; the base is {robot.root!r} "
-            f"in the one and {log.root!r} in the others",
+            f"in the model and {log.root!r} in the messages",
             good=GOOD,
         )
     return robot
@@ -61,12 +61,12 @@ _FAILURES = (
     RuntimeError,  # "unknown exception": MuJoCo is out of memory
     mujoco.FatalError,
 )
-"""Everything that MuJoCo and a robot's parts raise over a model that is none."""
+"""Exceptions that MuJoCo and a robot's parts raise for an invalid model."""
 
 
 @contextmanager
 def _silent() -> Iterator[None]:
-    """Keeps MuJoCo from writing its warnings to a file in the working folder."""
+    """Context manager that keeps MuJoCo from writing warnings to a file in the working folder."""
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda _: None)
     try:
@@ -75,26 +75,26 @@ def _silent() -> Iterator[None]:
         mujoco.set_mju_user_warning(before)
 
 
-def described_difference(names: Names, logged: Names) -> str:
-    """Returns in what a robot differs from that of a log, in words."""
-    told = []
+def describe_difference(names: Names, logged: Names) -> str:
+    """Returns the differences between a robot's names and those of a log, as text."""
+    differences = []
     for what in ("sensors", "motors", "hinges"):
         mine, theirs = getattr(names, what), getattr(logged, what)
         if mine != theirs:
             lacks = [name for name in theirs if name not in mine]
-            told.append(
+            differences.append(
                 f"it has {len(mine)} {what}, the log {len(theirs)}"
                 + (f", of which it lacks {', '.join(lacks[:3])}" if lacks else " or in other order")
             )
-    return "; ".join(told) or "their parts are called alike"
+    return "; ".join(differences) or "their parts have the same names"
 
 
-def the_robot_of(logs: Sequence[TrialLog]) -> Robot:
-    """Returns the robot that all logs are of.
+def common_robot(logs: Sequence[TrialLog]) -> Robot:
+    """Returns the common robot of logs.
 
     Raises:
-        InputError: There is no log, or they are of different robots; both are named.
-        LogError: The model of the first cannot be loaded.
+        InputError: There is no log, or two logs are of different robots.
+        LogError: The model of the first log cannot be loaded.
     """
     if not logs:
         raise InputError("expected at least one log, got none")
@@ -104,7 +104,7 @@ def the_robot_of(logs: Sequence[TrialLog]) -> Robot:
             what = (
                 "of different robots"
                 if other.trial.robot != first.trial.robot
-                else "of different models, though they are called alike"
+                else "of different models of the same name"
             )
             raise InputError(
                 f"the logs are {what}: {first.trial.path} is of {first.trial.robot!r}, "

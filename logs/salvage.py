@@ -1,4 +1,4 @@
-"""Saves what is complete of a damaged or unfinished log in a new one."""
+"""Salvage of a damaged or unfinished log: its complete steps in a new log."""
 
 import dataclasses
 from contextlib import ExitStack
@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from selfmodel.errors import InputError
-from selfmodel.logs.atomic import part_of
+from selfmodel.logs.atomic import partial_path
 from selfmodel.logs.budget import RECORD_LIMIT, UNPACKED_LIMIT
 from selfmodel.logs.contents import Contents, Messages
 from selfmodel.logs.errors import CorruptError, LogError, SchemaMismatchError
-from selfmodel.logs.files import explained, refuse_existing
+from selfmodel.logs.files import as_write_error, refuse_existing
 from selfmodel.logs.logfile import LogFile
 from selfmodel.logs.reader import interpret, read_controller, read_log, read_record
 from selfmodel.logs.records import (
@@ -37,17 +37,17 @@ from selfmodel.trials.behaviour import forward_displacement
 
 @dataclass(frozen=True)
 class Salvaged:
-    """What was saved.
+    """Result of a salvage.
 
     Attributes:
-        log: The new file.
-        steps: How many steps are complete.
-        span: How many steps it has, from the first to the last that is complete.
-        planned: How many the trial was to last.
-        missing: For each topic, how many messages of those steps are lost; they are NaN, which
-            means not observed, and on ``/tf`` they are not there.
-        lost: What else is lost. Without the controller, the commands are played back; without the
-            settings, those of the paper stand in their place.
+        log: New file.
+        steps: Number of complete steps.
+        span: Number of steps in the new log, up to the last complete step.
+        planned: Planned number of steps.
+        missing: Number of lost messages by topic; they are replaced by NaN (not observed), except
+            on ``/tf``, where they are left out.
+        lost: Other lost parts. A lost controller is replaced by a playback of the commands, lost
+            settings by those of the paper.
     """
 
     log: str
@@ -66,8 +66,8 @@ def salvage(path: Path, out: Path) -> Salvaged:
         out: The new log, whose status is ``interrupted``.
 
     Raises:
-        LogError: Too little is left for a log: its first records, its model, or every step is lost.
-        InputError: The log is sound, ``out`` exists, or there is no such file.
+        LogError: The first records, the model, or every step is lost.
+        InputError: The log is valid, ``out`` exists, or ``path`` does not.
         LogWriteError: The disk is full, or failed.
     """
     refuse_existing(out)
@@ -78,10 +78,10 @@ def salvage(path: Path, out: Path) -> Salvaged:
 
 
 def salvageable_steps(path: Path) -> int:
-    """Returns how many steps ``salvage`` would save.
+    """Returns the number of complete steps that ``salvage`` would write.
 
     Raises:
-        InputError: There is no such file.
+        InputError: The file does not exist.
     """
     try:
         return _saved(path)[1].steps
@@ -90,7 +90,7 @@ def salvageable_steps(path: Path) -> int:
 
 
 def _saved(path: Path) -> tuple[Contents, Salvaged]:
-    """What the new log would hold; nothing is written that could not be read."""
+    """Contents of the new log, checked as a reader would check them."""
     contents = rescue(path)
     record, lost = _with_what_is_left(path, contents)
     controller = read_controller(path, contents, record)
@@ -104,8 +104,8 @@ def _saved(path: Path) -> tuple[Contents, Salvaged]:
     contents.metadata[RESULT] = result.texts()
     contents.metadata[SALVAGE] = {"source": path.name, "complete_steps": str(len(whole))}
     interpret(path, contents)
-    told = {name: count for name, count in missing.items() if count}
-    return contents, Salvaged("", len(whole), span, record.steps, told, lost)
+    lost_messages = {name: count for name, count in missing.items() if count}
+    return contents, Salvaged("", len(whole), span, record.steps, lost_messages, lost)
 
 
 def _refuse_sound(path: Path) -> None:
@@ -114,12 +114,12 @@ def _refuse_sound(path: Path) -> None:
     except LogError:
         return
     raise InputError(
-        f"{path} is sound, and the trial in it is {status}: there is nothing to salvage"
+        f"{path} is valid, and the trial in it is {status}: there is nothing to salvage"
     )
 
 
 def _with_what_is_left(path: Path, contents: Contents) -> tuple[TrialRecord, tuple[str, ...]]:
-    """The record of the trial, changed for attachments that are lost, and the names of these."""
+    """Record of the trial, without lost attachments, and the names of the lost parts."""
     record = read_record(path, contents)
     lost = []
     attached = contents.attachments.get(CONTROLLER_FILE, b"")
@@ -139,7 +139,7 @@ def _with_what_is_left(path: Path, contents: Contents) -> tuple[TrialRecord, tup
 def _complete(
     path: Path, contents: Contents, record: TrialRecord
 ) -> tuple[tuple[Topic, ...], set[int]]:
-    """The topics, and the steps that all of them tell of."""
+    """Topics, and the steps for which every topic has a message."""
     try:
         every = topics(read_names(path, contents), record.root)
         if record.format == TIMED_FORMAT:
@@ -156,7 +156,7 @@ def _complete(
     if not whole:
         raise _nothing(path)
     span = max(whole) + 1
-    # What is missing is filled in, and could be many times what is there.
+    # Missing messages are filled in, and may take many times the size of the file.
     if span * sum(len(topic.template.payload) for topic in every) > UNPACKED_LIMIT:
         raise CorruptError(path, f"{span} steps of it have more bytes than a log may")
     return every, whole
@@ -167,7 +167,7 @@ def _nothing(path: Path) -> CorruptError:
 
 
 def _fill(contents: Contents, topic: Topic, steps: int, record: TrialRecord) -> int:
-    """Puts NaN where a topic lacks the message of a step; returns how many it lacked."""
+    """Fills the missing messages of a topic with NaN; returns their number."""
     messages = contents.topics[topic.name]
     known = {
         log: (payload, publish)
@@ -183,7 +183,7 @@ def _fill(contents: Contents, topic: Topic, steps: int, record: TrialRecord) -> 
 
 
 def _cut(contents: Contents, names: set[str], end: int) -> None:
-    """Leaves out what came after the last step that is complete, and what is no topic of ours."""
+    """Removes messages after the last complete step, and topics that selfmodel does not write."""
     for name in set(contents.topics) - names - {TRANSFORMS, DESCRIPTION}:
         del contents.topics[name]
     for messages in contents.topics.values():
@@ -193,7 +193,7 @@ def _cut(contents: Contents, names: set[str], end: int) -> None:
 
 
 def _missing_frames(contents: Contents, span: int, record: TrialRecord) -> int:
-    """How many messages on ``/tf`` there should be more than there are."""
+    """Number of missing messages on ``/tf``."""
     stride = frames_stride(record.control_timestep)
     held = contents.topics.get(TRANSFORMS)
     return len(range(0, span, stride)) - (len(held.payloads) if held else 0)
@@ -206,7 +206,7 @@ def _time_of(step: int, record: TrialRecord) -> int:
 def _write(out: Path, contents: Contents) -> None:
     log = LogFile(out)
     with ExitStack() as undo:
-        undo.callback(log.abandon)  # whatever ends this, the damaged file still has everything
+        undo.callback(log.abandon)  # on any error; the damaged file is unchanged
         for name, texts in contents.metadata.items():
             if name != RESULT:
                 log.metadata(name, texts)
@@ -227,6 +227,6 @@ def _write_messages(log: LogFile, every: dict[str, Messages]) -> None:
             for payload, (time, _) in zip(messages.payloads, messages.times, strict=True)
         ]
     rows.sort(key=lambda row: row[:2])
-    with explained(part_of(log.path)):
+    with as_write_error(partial_path(log.path)):
         for time, channel, payload in rows:
             log.message(channel, time, payload, 0)

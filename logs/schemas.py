@@ -1,7 +1,7 @@
-"""The definitions of the ROS 2 messages in a trial log, as texts that a log embeds (``ros2msg``).
+"""Definitions of the ROS 2 messages in a trial log, as embedded text (``ros2msg``).
 
-They are those of ROS 2's common interfaces, as rosbags prints them; a test compares. The one of
-our own is ``selfmodel_msgs/msg/SensorReadings``.
+The definitions are those of ROS 2's common interfaces, as rosbags prints them; a test compares
+both. Only ``selfmodel_msgs/msg/SensorReadings`` is a definition of selfmodel.
 """
 
 from collections.abc import Mapping
@@ -45,10 +45,10 @@ _DEFINITIONS: Mapping[str, str] = MappingProxyType(
 
 
 def schema_text(name: str) -> str:
-    """Returns the definition of a message with those of all messages it consists of.
+    """Returns the definition of a message type, with the definitions of all nested types.
 
     Args:
-        name: Such as ``sensor_msgs/msg/JointState``.
+        name: Message type, such as ``sensor_msgs/msg/JointState``.
     """
     short = name.replace("/msg/", "/")
     parts = [_DEFINITIONS[short]]
@@ -57,7 +57,7 @@ def schema_text(name: str) -> str:
 
 
 def _parts(name: str) -> list[str]:
-    """The messages that one consists of: depth first, each once."""
+    """Nested types of a message type, depth first, without duplicates."""
     found: dict[str, None] = {}
     for line in _DEFINITIONS[name].splitlines():
         field = line.split(" ")[0].partition("[")[0]

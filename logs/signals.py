@@ -1,4 +1,4 @@
-"""A behaviour from the messages of its log."""
+"""Decoding of a log's messages into a behaviour."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray, frozen
 from selfmodel.controllers.controller import Controller
-from selfmodel.logs.cdr import names_of
+from selfmodel.logs.cdr import decode_names
 from selfmodel.logs.contents import Contents, Messages
 from selfmodel.logs.errors import CorruptError, SchemaMismatchError
 from selfmodel.logs.records import TrialRecord
@@ -17,14 +17,14 @@ from selfmodel.trials.behaviour import SIGNALS, Behaviour, Names, Signal
 def read_behaviour(
     path: Path, contents: Contents, record: TrialRecord, steps: int, controller: Controller | None
 ) -> Behaviour:
-    """Returns what the messages of a log say.
+    """Returns the behaviour in the messages of a log.
 
     Args:
         path: The log, for errors.
-        contents: What stands in it.
-        record: What was to be done.
-        steps: How many steps the log says it has.
-        controller: What drove the robot, if that is known; the messages must have its names.
+        contents: Contents of the log.
+        record: Record of the trial.
+        steps: Number of steps in the log's result.
+        controller: Controller of the robot, if known; the messages must have its names.
 
     Raises:
         LogError: The messages do not fit the record, the controller or their types.
@@ -52,15 +52,15 @@ def read_behaviour(
 
 
 def times_of(record: TrialRecord, steps: int) -> FloatArray:
-    """Returns when the first steps of a trial were due, ``(steps,)`` s."""
+    """Returns the nominal times of the first steps of a trial, ``(steps,)`` s."""
     return np.arange(steps, dtype=np.float64) * record.control_timestep
 
 
 def read_names(path: Path, contents: Contents) -> Names:
-    """Returns the names in the first message of each topic.
+    """Returns the column names of the signals, from the first message of each topic.
 
     Raises:
-        LogError: There is no message, or it has no names.
+        LogError: A topic has no message, or the message has no names.
     """
     return Names(
         sensors=_names(path, contents, "/sensors"),
@@ -78,7 +78,7 @@ def _messages(path: Path, contents: Contents, topic: str) -> Messages:
 
 def _names(path: Path, contents: Contents, topic: str) -> tuple[str, ...]:
     try:
-        return names_of(_messages(path, contents, topic).payloads[0])
+        return decode_names(_messages(path, contents, topic).payloads[0])
     except ValueError as error:
         raise SchemaMismatchError(path, f"on {topic}: {error}", good=contents.good) from error
 
@@ -86,16 +86,16 @@ def _names(path: Path, contents: Contents, topic: str) -> tuple[str, ...]:
 def read_rows(
     path: Path, contents: Contents, topic: Topic, time: FloatArray
 ) -> dict[Part, FloatArray]:
-    """Returns what the messages of a topic say, ``(steps, width)`` for each of its parts.
+    """Returns the numbers in the messages of a topic, ``(steps, width)`` per part.
 
     Args:
         path: The log, for errors.
-        contents: What stands in it.
-        topic: What the messages are to be.
-        time: When the steps were due, ``(steps,)`` s.
+        contents: Contents of the log.
+        topic: Expected type and layout of the messages.
+        time: Nominal times of the steps, ``(steps,)`` s.
 
     Raises:
-        LogError: The messages are not those of these steps, or not of the topic's type.
+        LogError: The messages have other times, or another type.
     """
     messages, good = _messages(path, contents, topic.name), contents.good
     if (messages.type, messages.encoding) != (topic.type, "cdr"):

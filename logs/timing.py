@@ -1,4 +1,4 @@
-"""When the steps of a trial really happened, from the messages of its log."""
+"""Measured timing of the steps of a trial, from the messages of its log."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,12 +15,13 @@ from selfmodel.logs.topics import TIMING
 
 @dataclass(frozen=True, eq=False)
 class Timing:
-    """The moments of a trial's steps; see ``selfmodel.trials.behaviour.StepTiming``.
+    """Timing of a trial's steps; see ``selfmodel.trials.behaviour.StepTiming``.
 
     Attributes:
-        elapsed: ``(steps,)`` s; NaN where it is not known.
-        late: ``(steps,)``; a step that was lost counts as late.
-        missing: ``(steps,)``; a step that was lost counts as missing.
+        elapsed: Time since the first step, ``(steps,)`` s; NaN if unknown.
+        late: Flags of late steps, ``(steps,)``; a step lost from a damaged log is late.
+        missing: Flags of steps without an observation, ``(steps,)``; a step lost from a damaged log
+            is missing.
     """
 
     elapsed: FloatArray
@@ -29,16 +30,16 @@ class Timing:
 
 
 def read_timing(path: Path, contents: Contents, record: TrialRecord, steps: int) -> Timing | None:
-    """Returns when the steps really happened; None for a robot without a clock of its own.
+    """Returns the measured timing of the steps; None for a robot without its own clock.
 
     Args:
         path: The log, for errors.
-        contents: What stands in it.
-        record: What was to be done.
-        steps: How many steps the log says it has.
+        contents: Contents of the log.
+        record: Record of the trial.
+        steps: Number of steps in the log's result.
 
     Raises:
-        LogError: The messages are missing, or what they say cannot be.
+        LogError: The messages are missing, or their values are invalid.
     """
     if record.format != TIMED_FORMAT:
         return None
@@ -51,5 +52,5 @@ def read_timing(path: Path, contents: Contents, record: TrialRecord, steps: int)
     if not np.all(np.isin(marks, (0.0, 1.0)) | np.isnan(marks)):
         what = f"on {TIMING.name}: expected 0 or 1 for late and for missing"
         raise SchemaMismatchError(path, what, good=contents.good)
-    # What is not 0, so NaN too, is marked: nothing is judged by what is not known.
+    # NaN, unknown, counts as late and missing: such steps are not compared with predictions.
     return Timing(frozen(elapsed), marks[:, 0] != 0, marks[:, 1] != 0)

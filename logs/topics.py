@@ -1,4 +1,4 @@
-"""Which topic of a log carries which signals of a behaviour, and in what message."""
+"""Topics of a log: the signals that each carries, and its message layout."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,29 +17,29 @@ TRANSFORMS = "/tf"
 DESCRIPTION_TYPE = "std_msgs/msg/String"
 
 FRAMES_PERIOD = 0.05
-"""Seconds between two messages on ``/tf``: it is for eyes, and would be a fifth of a log."""
+"""Period of ``/tf``, s: at every step, this topic for display would be a fifth of a log."""
 
 Derived = Literal["child_linear_velocity", "transforms"]
-"""What a log holds for other tools and the reader leaves alone: the base's velocity in its own
-frame, ``(steps, 3)`` m/s; each body's position and orientation (x y z w) in its parent's frame,
+"""Quantities for other tools, which the reader ignores: the velocity of the base in its own frame,
+``(steps, 3)`` m/s; position and quaternion (x y z w) of each body in its parent's frame,
 ``(steps, 7 bodies)``."""
 
 Part = Signal | Derived | Literal["timing"]
-"""What the numbers of a message are. ``timing`` is ``(steps, 3)``: the seconds that had elapsed,
-and 1 or 0 for whether the step was late and whether its observation is missing."""
+"""Quantity in a message. ``timing`` is ``(steps, 3)``: elapsed time in s, and 1 or 0 for a late
+step and for a missing observation."""
 
-_XYZW = (1, 2, 3, 0)  # where a message's quaternion stands in one of MuJoCo
+_XYZW = (1, 2, 3, 0)  # index in MuJoCo's quaternion of each element of a message's
 
 
 @dataclass(frozen=True)
 class Topic:
-    """One topic of a trial.
+    """Topic of a trial's log.
 
     Attributes:
-        name: Such as ``/odom``.
-        type: Its messages' type.
-        template: Its messages' layout.
-        parts: What its numbers are, in order.
+        name: Name of the topic, such as ``/odom``.
+        type: Message type.
+        template: Message layout.
+        parts: Quantities in a message with their widths, in order.
     """
 
     name: str
@@ -48,11 +48,11 @@ class Topic:
     parts: tuple[tuple[Part, int], ...]
 
     def pack(self, rows: Mapping[Part, FloatArray]) -> FloatArray:
-        """Returns the numbers of its messages, ``(steps, width)``."""
+        """Returns the numbers of the messages, ``(steps, width)``."""
         return np.concatenate([rows[part][:, _order(part, width)] for part, width in self.parts], 1)
 
     def unpack(self, values: FloatArray) -> dict[Part, FloatArray]:
-        """Returns what ``pack`` was given, each part ``(steps, ...)``."""
+        """Returns the parts of the numbers, ``(steps, ...)`` each; the inverse of ``pack``."""
         rows: dict[Part, FloatArray] = {}
         start = 0
         for part, width in self.parts:
@@ -65,13 +65,13 @@ class Topic:
 def topics(names: Names, root: str) -> tuple[Topic, ...]:
     """Returns the topics that a behaviour is read from.
 
-    ``/odom`` tells the base's velocity in the base's frame, as its type demands. Rotating it there
-    and back would cost its last bits, so ``/base_linear_velocity`` carries the very numbers in the
-    world's frame, and those are read.
+    ``/odom`` contains the velocity of the base in the frame of the base, as its type requires.
+    Rotating back would change the last bits, so the behaviour is read from
+    ``/base_linear_velocity``, which contains the velocity in the world frame.
 
     Args:
-        names: The behaviour's columns.
-        root: The body that ``/odom`` tells of.
+        names: Columns of the behaviour's signals.
+        root: Name of the root body, the child frame of ``/odom``.
     """
     hinges = len(names.hinges)
     return (
@@ -118,11 +118,11 @@ def topics(names: Names, root: str) -> tuple[Topic, ...]:
 
 
 def transforms(bodies: Sequence[str], parents: Sequence[str]) -> Topic:
-    """Returns the topic that tells other tools where each body is.
+    """Returns the topic of the poses of all bodies, for other tools.
 
     Args:
-        bodies: The name of each body's frame.
-        parents: The name of the frame that it is told in.
+        bodies: Names of the bodies' frames.
+        parents: Names of their parents' frames.
     """
     layout = Layout()
     layout.length(len(bodies))
@@ -135,12 +135,12 @@ def transforms(bodies: Sequence[str], parents: Sequence[str]) -> Topic:
 
 
 def frames_stride(control_timestep: float) -> int:
-    """Returns how many control steps there are from one message on ``/tf`` to the next."""
+    """Returns the number of control steps between two messages on ``/tf``."""
     return max(1, round(FRAMES_PERIOD / control_timestep))
 
 
 def description(text: str) -> bytes:
-    """Returns the message of ``/robot_description``."""
+    """Returns the message on ``/robot_description``."""
     layout = Layout()
     layout.string(text)
     return layout.template().payload
@@ -151,7 +151,7 @@ def _order(part: Part, width: int) -> Sequence[int]:
 
 
 def _joint_state(names: Sequence[str], sequences: Sequence[int]) -> Template:
-    """A header, names, and sequences of numbers: JointState, and our SensorReadings."""
+    """Header, names, and sequences of numbers: JointState, and SensorReadings."""
     layout = Layout()
     layout.header("")
     layout.strings(names)
@@ -184,4 +184,4 @@ TIMING = Topic(
     _joint_state(("elapsed", "late", "missing"), (3,)),
     (("timing", 3),),
 )
-"""When each step really happened, on a robot with a clock of its own."""
+"""Measured timing of the steps, on a robot with its own clock."""

@@ -1,9 +1,9 @@
-"""A robot as URDF, so that viewers of a log can draw it.
+"""Conversion of a compiled model to URDF, for viewers of a log.
 
-It is made from the compiled model, for looking at: links are called what the frames on ``/tf``
-are. Hinges and slides become joints, a body without any is fixed to its parent, and a hinge that
-does not pass through the origin of its body, or that shares its body with others, gets a link
-without mass in between. Ground and meshes are left out; a capsule becomes a cylinder of its length.
+Links have the names of the frames on ``/tf``. Hinges and slides become joints; a body without a
+joint is fixed to its parent. A hinge that does not pass through the origin of its body, or that
+shares its body with other hinges, gets an intermediate link without mass. Ground and meshes are
+left out; a capsule becomes a cylinder of its length.
 """
 
 import math
@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.logs.frames import body_names
+from selfmodel.logs.kinematics import body_names
 from selfmodel.robot.robot import Robot
 
 _JOINTS = {
@@ -24,7 +24,7 @@ _JOINTS = {
 
 
 def urdf(robot: Robot) -> str:
-    """Returns the robot's model as URDF text, with the robot's root body as root link."""
+    """Returns the model of a robot as URDF; the root link is the robot's root body."""
     model = robot.model
     names = ("world", *body_names(model))
     root = model.body(robot.root).id
@@ -43,7 +43,7 @@ def urdf(robot: Robot) -> str:
 
 
 def _joints(tree: ET.Element, model: mujoco.MjModel, body: int, parent: str, name: str) -> None:
-    """Adds the chain of joints and massless links from a body's parent to the body."""
+    """Adds the chain of joints and massless links from the parent of a body to the body."""
     first = int(model.body_jntadr[body])
     joints = [
         model.joint(j)
@@ -81,7 +81,7 @@ def _limit(element: ET.Element, model: mujoco.MjModel, joint: int) -> None:
         element.set("type", "continuous")
         return
     low, high = model.jnt_range[joint] if model.jnt_limited[joint] else (-1e3, 1e3)
-    # URDF demands an effort and a velocity; viewers ignore them.
+    # URDF requires an effort and a velocity; viewers ignore both.
     ET.SubElement(
         element, "limit", lower=f"{low:.9g}", upper=f"{high:.9g}", effort="1000", velocity="100"
     )
@@ -127,7 +127,7 @@ def _roll_pitch_yaw(quaternion: FloatArray) -> tuple[float, float, float]:
     """Returns URDF's fixed-axis angles of a rotation, rad."""
     w, x, y, z = (float(value) for value in quaternion)
     sine = 2 * (w * y - x * z)
-    if abs(sine) > 1 - 1e-9:  # straight up or down, where roll and yaw turn about one axis
+    if abs(sine) > 1 - 1e-9:  # gimbal lock
         return 0.0, math.copysign(math.pi / 2, sine), -math.copysign(2, sine) * math.atan2(x, w)
     return (
         math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),

@@ -1,4 +1,4 @@
-"""Every check that a log can be put to without a simulator."""
+"""Verification of a log: checksums, format and model, without simulation."""
 
 from pathlib import Path
 
@@ -8,20 +8,20 @@ from selfmodel.robot.mjcf.untrusted import checked_model
 
 
 def verify(path: Path) -> tuple[TrialLog, bool]:
-    """Returns the trial in a log that has passed every check, and whether its model was loaded.
+    """Returns the trial of a verified log, and whether its model was loaded.
 
-    The checks are those of ``read_log``; that its model asks for no files and for bounded sizes;
-    and, where there is MuJoCo, that it loads and is of the robot that the messages are of.
+    Verified are the checks of ``read_log``; that the model names no other files and has bounded
+    sizes; and, if MuJoCo is installed, that the model loads and is of the robot of the messages.
 
     Raises:
-        LogError: One does not hold; the sentence names the file.
-        InputError: There is no such file.
+        LogError: A check failed.
+        InputError: The file does not exist.
     """
     log = read_log(path)
     try:
         checked_model(log.mjcf, log.assets)
     except ValueError as error:
-        raise SchemaMismatchError(path, str(error), good="what was observed reads well") from error
+        raise SchemaMismatchError(path, str(error), good="its observations are intact") from error
     return log, _load(log)
 
 

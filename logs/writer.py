@@ -1,4 +1,4 @@
-"""Writes a trial into its log while it runs, so that whatever happens, what happened is kept."""
+"""Writer of a trial's log, while the trial runs."""
 
 import itertools
 from collections.abc import Iterable
@@ -10,21 +10,20 @@ from typing import Self
 from selfmodel.controllers.command_source import CommandSource
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError, describe
-from selfmodel.logs.atomic import part_of
-from selfmodel.logs.encoder import Encoder, empty_rows, parts_of
+from selfmodel.logs.atomic import partial_path
+from selfmodel.logs.encoder import Encoder, empty_rows, sample_rows
 from selfmodel.logs.errors import IncompleteError, salvage_it
-from selfmodel.logs.files import explained
+from selfmodel.logs.files import as_write_error
 from selfmodel.logs.logfile import LogFile
 from selfmodel.logs.preamble import write_preamble
-from selfmodel.logs.records import FINISHED, RESULT, STOPPED, Imported, Result, checked_name
-from selfmodel.physical.cleanup import Ending
+from selfmodel.logs.records import FINISHED, RESULT, STOPPED, Result, TrialHeader, checked_name
+from selfmodel.physical.cleanup import Cleanup
 from selfmodel.robot.robot import Robot
-from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Names, Sample
 from selfmodel.trials.trial import TrialPlan
 
 FLUSH_STEPS = 50
-"""How many steps a kill can cost at most. It makes the file 1 % larger than never flushing."""
+"""Steps between two flushes, the most that a kill can lose. The file is 1 % larger than without."""
 
 
 def write_trial(
@@ -32,87 +31,57 @@ def write_trial(
     robot: Robot,
     plan: TrialPlan,
     samples: Iterable[Sample],
-    *,
-    timed: bool = False,
-    settings: Settings,
-    hidden: str | None = None,
-    gap: str | None = None,
-    imported: Imported | None = None,
+    header: TrialHeader,
 ) -> Path:
-    """Logs a trial while it runs; see ``TrialWriter``.
+    """Writes the log of a trial while the trial runs; see ``TrialWriter``.
 
     Args:
-        path: The log's name; until the trial is finished, the file is called ``path.part``.
-        robot: The robot as its model describes it.
-        plan: What is to be done.
-        samples: What happens, as it happens; not more than the plan's steps are asked for, and what
-            has ``close``, as a generator has, is closed before the log is, which stops the robot.
-            To look at them on their way, use ``TrialWriter``: a ``map`` over a generator has none.
-        timed: Whether the robot is ``physical.interface.TimedRobot``: its samples have moments.
-        settings: The paper's numbers, for the record.
-        hidden: What is wrong with a simulated robot, in notation; for ``read_truth`` only.
-        gap: How else it differs from its model, as JSON; for ``read_gap`` only.
-        imported: Where an imported trial comes from.
+        path: Name of the log; the unfinished file is ``path.part``.
+        robot: Robot as its model describes it.
+        plan: Plan of the trial.
+        samples: Samples, one per control step as they happen; at most ``plan.steps`` are read.
+            An iterable with a method ``close``, as a generator has, is closed before the log is,
+            which stops the robot. A ``map`` over a generator has no ``close``: to process samples
+            on their way, use ``TrialWriter``.
+        header: Other content of the log's preamble.
 
     Returns:
         ``path``.
 
     Raises:
         InputError: The file exists, or the plan or a sample does not fit the robot.
-        IncompleteError: There were fewer samples than planned; they are in the ``.part``.
+        IncompleteError: There were fewer samples than planned; the ``.part`` contains them.
         LogWriteError: The disk is full, or failed.
     """
-    writer = TrialWriter(
-        path,
-        robot,
-        plan,
-        timed=timed,
-        settings=settings,
-        hidden=hidden,
-        gap=gap,
-        imported=imported,
-    )
-    # Whatever ends a trial, the robot is stopped.
-    with writer, Ending(getattr(samples, "close", lambda: None)):
+    # The robot is stopped in any case.
+    with (
+        TrialWriter(path, robot, plan, header) as writer,
+        Cleanup(getattr(samples, "close", lambda: None)),
+    ):
         for sample in itertools.islice(samples, plan.steps):
             writer.add(sample)
     return path
 
 
 class TrialWriter:
-    """Writes one trial, sample by sample; a context manager that finishes the file by itself.
+    """Writer of one trial's log, sample by sample; a context manager that finishes the file.
 
-    Whatever ends the trial early, from an exception to a kill, leaves a ``.part`` with all steps
-    but at most the last ``FLUSH_STEPS``. Only of a robot with a clock of its own, whose trial
-    cannot be made again, an exception leaves a whole log, whose status is ``stopped``; and none
-    where there is no step yet, so that the trial can be tried again under its name.
+    A trial that ends early, by an exception or a kill, leaves a ``.part`` with all steps but at
+    most the last ``FLUSH_STEPS``. The trial of a robot with its own clock cannot be repeated:
+    there, an exception leaves a complete log with the status ``stopped``, or no file if there is no
+    step yet, so that the trial can be repeated under its name.
 
     Args:
-        path: The log's name.
-        robot: The robot as its model describes it.
-        plan: What is to be done.
-        timed: Whether the robot has a clock of its own.
-        settings: The paper's numbers.
-        hidden: What is wrong with a simulated robot, in notation.
-        gap: How else it differs from its model, as JSON.
-        imported: Where an imported trial comes from.
+        path: Name of the log.
+        robot: Robot as its model describes it.
+        plan: Plan of the trial.
+        header: Other content of the log's preamble.
 
     Raises:
         InputError: The plan does not fit the robot.
     """
 
-    def __init__(
-        self,
-        path: Path,
-        robot: Robot,
-        plan: TrialPlan,
-        *,
-        timed: bool = False,
-        settings: Settings,
-        hidden: str | None = None,
-        gap: str | None = None,
-        imported: Imported | None = None,
-    ) -> None:
+    def __init__(self, path: Path, robot: Robot, plan: TrialPlan, header: TrialHeader) -> None:
         checked_name(plan.name)
         names = robot.anatomy.names
         _check_ends(robot.name, names, plan.controller)
@@ -120,11 +89,9 @@ class TrialWriter:
             raise InputError(f"a trial has at least 1 step, got {plan.steps}")
         self.path = path
         self.steps = 0
-        self._robot, self._plan, self._settings = robot, plan, settings
-        self._hidden, self._gap, self._imported = hidden, gap, imported
-        self._timed = timed
-        self._encoder = Encoder(robot, timed=timed)
-        self._rows = empty_rows(names, FLUSH_STEPS, timed=timed)
+        self._robot, self._plan, self._header = robot, plan, header
+        self._encoder = Encoder(robot, timed=header.timed)
+        self._rows = empty_rows(names, FLUSH_STEPS, timed=header.timed)
         self._written = 0
         self._start = self._end = 0.0
         self._sound = False
@@ -132,30 +99,22 @@ class TrialWriter:
     def __enter__(self) -> Self:
         self._log = LogFile(self.path)
         with ExitStack() as undo:
-            undo.callback(self._log.close)  # `__exit__` is not called where this is interrupted
-            write_preamble(
-                self._log,
-                self._robot,
-                self._plan,
-                timed=self._timed,
-                settings=self._settings,
-                hidden=self._hidden,
-                gap=self._gap,
-                imported=self._imported,
-            )
+            undo.callback(self._log.close)  # an interrupted `__enter__` has no `__exit__`
+            write_preamble(self._log, self._robot, self._plan, self._header)
             self._channels = [
                 self._log.channel(topic.name, topic.type) for topic in self._encoder.topics
             ]
-            self._log.sync()  # before the robot moves, the disk has all that steps are read by
+            self._log.sync()  # the disk has the preamble before the robot moves
             undo.pop_all()
         self._sound = True
         return self
 
     def add(self, sample: Sample) -> None:
-        """Takes the next step's sample.
+        """Adds the sample of the next step.
 
         Raises:
-            InputError: It is one too many, not of its time, or its rows do not fit the robot.
+            InputError: The trial has all its steps, the time is not that of the next step, or the
+                rows do not fit the robot.
             LogWriteError: The disk is full, or failed.
         """
         time = self.steps * self._robot.control_timestep
@@ -164,15 +123,15 @@ class TrialWriter:
                 f"step {self.steps} of {self._plan.steps} is due at {time!r} s, "
                 f"got a sample of {sample.time!r} s"
             )
-        if (sample.moment is not None) != self._timed:
-            has, given = ("no", "True") if self._timed else ("a", "False")
+        if (sample.moment is not None) != self._header.timed:
+            has, given = ("no", "True") if self._header.timed else ("a", "False")
             raise InputError(
                 f"the sample of step {self.steps} has {has} moment, and timed is {given}: a trial "
                 f"is timed if its robot has a clock of its own"
             )
-        told = parts_of(sample)
+        sampled = sample_rows(sample)
         for part, rows in self._rows.items():
-            row = told.get(part)
+            row = sampled.get(part)
             if row is None or row.shape != rows.shape[1:]:
                 raise InputError(
                     f"the sample of step {self.steps} must have {part} of shape "
@@ -183,7 +142,7 @@ class TrialWriter:
         if self.steps == 0:
             self._start = self._end
         self.steps += 1
-        # The first step goes out at once: with it, what follows can always be salvaged.
+        # The first step is flushed at once: salvage needs one complete step.
         if self.steps == 1 or self.steps - self._written == FLUSH_STEPS:
             self._flush()
 
@@ -194,12 +153,12 @@ class TrialWriter:
         traceback: TracebackType | None,
     ) -> None:
         try:
-            # Not where writing itself was interrupted: half a record would be written on.
+            # Not after an interrupted write, which may have left an incomplete record.
             if self._sound:
                 self._flush()
             if error is None and self.steps == self._plan.steps:
                 self._finish(FINISHED)
-            elif error is not None and self._timed and self._sound:
+            elif error is not None and self._header.timed and self._sound:
                 if self.steps:
                     self._finish(STOPPED, _in_words(error))
                 else:
@@ -207,25 +166,25 @@ class TrialWriter:
         except (OSError, InputError) as failure:
             if error is None:
                 raise
-            error.add_note(str(failure))  # what ended the trial comes first
+            error.add_note(str(failure))  # the first error is the cause
         finally:
             self._log.close()
         if error is None and self.steps < self._plan.steps:
             raise IncompleteError(
-                part_of(self.path),
+                partial_path(self.path),
                 f"the robot stopped after {self.steps} of {self._plan.steps} steps",
                 good=f"{self.steps} steps are in that file",
-                advice=salvage_it(part_of(self.path)),
+                advice=salvage_it(partial_path(self.path)),
             )
 
     def _flush(self) -> None:
-        """Writes the steps that wait, and hands them to the operating system."""
+        """Writes the buffered steps, and flushes them to the operating system."""
         count = self.steps - self._written
         if not count:
             return
         self._sound = False
         rows = {part: rows[:count] for part, rows in self._rows.items()}
-        with explained(part_of(self.path)):
+        with as_write_error(partial_path(self.path)):
             for step, topic, stamp, payload in self._encoder.encode(self._written, rows):
                 self._log.message(self._channels[topic], stamp, payload, step)
         self._log.flush()
@@ -240,7 +199,7 @@ class TrialWriter:
 
 def _in_words(error: BaseException) -> str:
     text = " ".join(f"{type(error).__name__}: {describe(error)}".split()).removesuffix(":")
-    # A file's name that is no text comes with surrogates, which a log cannot hold.
+    # A file name that is not UTF-8 contains surrogates, which a log cannot contain.
     return text.encode("utf-8", "backslashreplace").decode()
 
 

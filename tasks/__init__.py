@@ -1,44 +1,42 @@
-"""The robots and their dm_control tasks, by name."""
+"""The registry of robots and of their dm_control tasks, by name."""
 
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.tasks import hexapod, quadruped, suite_bodies
+from selfmodel.tasks import suite_bodies
 from selfmodel.tasks.entry import Entry
-from selfmodel.tasks.walking_return import WALKING_RETURN
+from selfmodel.tasks.hexapod import HEXAPOD
+from selfmodel.tasks.quadruped import QUADRUPED
 
 if TYPE_CHECKING:
     from dm_control.rl import control
 
 
-ROBOTS: Mapping[str, Entry] = {
-    name: Entry(module.robot, module.CASES, module.SUITE, episode_return=WALKING_RETURN)
-    for name, module in (("quadruped", quadruped), ("hexapod", hexapod))
-}
-"""Every robot that comes with selfmodel."""
+ROBOTS: Mapping[str, Entry] = {"quadruped": QUADRUPED, "hexapod": HEXAPOD}
+"""The built-in robots by name."""
 
 SUITE: Mapping[str, Mapping[str, Callable[..., "control.Environment"]]] = {
     domain: entry.suite for domain, entry in ROBOTS.items()
 }
-"""The tasks of every domain; each is what ``SUITE`` is in a domain of dm_control's suite."""
+"""Tasks by domain; each value is the counterpart of ``SUITE`` in a dm_control domain."""
 
 ALL_TASKS: tuple[tuple[str, str], ...] = tuple(
     (domain, task) for domain, tasks in SUITE.items() for task in tasks
 )
-"""Every ``(domain, task)`` that ``load`` knows."""
+"""Every ``(domain, task)`` that ``load`` accepts."""
 
 TASKS_BY_DOMAIN: Mapping[str, tuple[str, ...]] = {
     domain: tuple(tasks) for domain, tasks in SUITE.items()
 }
-"""The names of the tasks of every domain."""
+"""Task names by domain."""
 
 
 def entry(name: str) -> Entry:
-    """Returns what is known of a robot: one of ``ROBOTS``, or a body of dm_control's suite.
+    """Returns the entry of a robot: one of ``ROBOTS``, or a body of dm_control's suite.
 
     Raises:
-        InputError: There is none of that name; the message names the nearest.
+        InputError: The name is unknown; the message contains the nearest one.
     """
     if name in ROBOTS:
         return ROBOTS[name]
@@ -57,17 +55,18 @@ def load(
     """Returns a dm_control environment, as ``dm_control.suite.load`` does for its own.
 
     Args:
-        domain_name: A robot, such as ``"quadruped"``.
-        task_name: A task of it, such as ``"walk"``.
-        task_kwargs: For the task: ``hypothesis``, what is wrong with the robot, in notation or as
-            a ``Hypothesis``, which may be of kinds of one's own; ``time_limit`` in seconds;
+        domain_name: Name of a robot, such as ``"quadruped"``.
+        task_name: Name of one of its tasks, such as ``"walk"``.
+        task_kwargs: Arguments of the task: ``hypothesis``, the robot's faults, in notation or as a
+            ``Hypothesis``, which may have faults of third-party kinds; ``time_limit`` in seconds;
             ``random``, a seed or a numpy ``RandomState``.
-        environment_kwargs: For ``dm_control.rl.control.Environment``.
-        visualize_reward: Has to be ``False``: these rewards are speeds, and have no colours.
+        environment_kwargs: Arguments of ``dm_control.rl.control.Environment``.
+        visualize_reward: Must be ``False``: the rewards are speeds, which dm_control cannot map to
+            colours.
 
     Raises:
-        InputError: There is no such robot or task, the hypothesis cannot be read, or the reward is
-            to be shown.
+        InputError: The robot or the task is unknown, the hypothesis cannot be parsed, or
+            ``visualize_reward`` is true.
     """
     if domain_name not in SUITE:
         raise unknown_name("robot", domain_name, SUITE)

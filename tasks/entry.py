@@ -1,10 +1,12 @@
-"""What is known of a robot beside its model."""
+"""The registry entry of a robot: its model, its failures, its tasks."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.faults.table_one import cases_of
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery.fitness import Score
 from selfmodel.robot.robot import Robot
@@ -15,19 +17,21 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Entry:
-    """A robot that is known by name, or somebody's own.
+    """A robot of the registry, or a robot from a user's MJCF.
 
     Attributes:
-        robot: Makes it, with nothing wrong.
-        cases: Its failures like those of Table I of the paper, by number, in notation.
-        suite: Its tasks, as dm_control's suite keeps them; those of selfmodel's own.
-        physical: Makes the physical robot with something wrong, where that is more than a
-            simulation of the model: the suite's environment.
-        episode_return: The sum of its task's rewards, where it has a task.
+        robot: Makes the healthy robot.
+        suite: The robot's dm_control tasks by name; empty for robots without tasks of selfmodel.
+        physical: Makes the physical robot under a hypothesis; None for a simulation of the model.
+        episode_return: Score that is the sum of the task's rewards; None without a task.
     """
 
     robot: Callable[[], Robot]
-    cases: Mapping[int, str]
     suite: Mapping[str, Callable[..., "control.Environment"]] = field(default_factory=dict)
     physical: Callable[[Robot, Hypothesis], PhysicalRobot] | None = None
     episode_return: Score | None = None
+
+    @cached_property
+    def cases(self) -> Mapping[int, str]:
+        """Failures by their number in Table I of the paper, in notation."""
+        return cases_of(self.robot().anatomy)

@@ -1,4 +1,4 @@
-"""The bodies of dm_control's suite that move about, as robots."""
+"""The locomotion bodies of dm_control's suite as robots."""
 
 import importlib
 import math
@@ -7,7 +7,6 @@ from functools import lru_cache, partial
 from typing import Any
 
 from selfmodel.errors import unknown_name
-from selfmodel.faults.table_one import cases_of
 from selfmodel.robot.mjcf.adaptation import adapt_text
 from selfmodel.robot.mjcf.load import robot_from
 from selfmodel.robot.mjcf.settings import MjcfSettings
@@ -16,7 +15,7 @@ from selfmodel.tasks.entry import Entry
 from selfmodel.tasks.suite_environment import SuiteRobot, episode_return
 
 PREFIX = "suite-"
-"""What the name of such a robot begins with: ``suite-walker-run``."""
+"""Prefix of the robots' names, as in ``suite-walker-run``."""
 
 DOMAINS: Mapping[str, tuple[str, ...]] = {
     "quadruped": ("walk", "run"),
@@ -29,20 +28,20 @@ DOMAINS: Mapping[str, tuple[str, ...]] = {
     "swimmer": ("swimmer6", "swimmer15"),
     "fish": ("swim", "upright"),
 }
-"""The tasks of each domain, the one that counts first where none is named.
+"""Tasks by domain; the first is the default.
 
-Left out are those with a ball to fetch, which is a second thing that moves, and the quadruped's
-``escape``, whose ground is drawn anew for each episode: no self-model knows it.
+Tasks with a ball are omitted, because the ball is a second free body, and so is the quadruped's
+``escape``, because its terrain is random in each episode and unknown to a self-model.
 """
 
 
 def names() -> tuple[str, ...]:
-    """Returns the names of all these robots."""
+    """Returns the names of all robots of the suite."""
     return tuple(name(domain, task) for domain, tasks in DOMAINS.items() for task in tasks)
 
 
 def name(domain: str, task: str) -> str:
-    """Returns what the body of a task is called as a robot."""
+    """Returns the robot's name of the body of a task."""
     return f"{PREFIX}{domain}-{task}"
 
 
@@ -50,7 +49,7 @@ def parse_name(text: str) -> tuple[str, str]:
     """Returns the domain and the task of a robot's name.
 
     Raises:
-        InputError: There is none of that name; the message names the nearest.
+        InputError: The name is unknown; the message contains the nearest one.
     """
     domain, _, task = text.removeprefix(PREFIX).partition("-")
     if not text.startswith(PREFIX) or task not in DOMAINS.get(domain, ()):
@@ -59,10 +58,9 @@ def parse_name(text: str) -> tuple[str, str]:
 
 
 def entry(domain: str, task: str) -> Entry:
-    """Returns the body of a task with its failures, its environment and its return."""
+    """Returns the registry entry of the body of a task, with its environment and its return."""
     return Entry(
         robot=partial(robot, domain, task),
-        cases=cases_of(robot(domain, task).anatomy),
         physical=partial(SuiteRobot, domain, task),
         episode_return=episode_return(domain, task),
     )
@@ -70,10 +68,10 @@ def entry(domain: str, task: str) -> Entry:
 
 @lru_cache
 def robot(domain: str, task: str) -> Robot:
-    """Returns the body of a task with nothing wrong, with the suite's own time steps.
+    """Returns the healthy body of a task, with the suite's own time steps.
 
-    It starts as ``Physics.reset`` leaves it, without the pose that the suite draws afterwards; a
-    swimmer, which lies across there, with its nose forward.
+    The initial pose is that of ``Physics.reset``, without the random pose of the suite's episodes.
+    A swimmer is rotated by a right angle, so that its nose points forward.
 
     Args:
         domain: One of ``DOMAINS``.
@@ -83,22 +81,23 @@ def robot(domain: str, task: str) -> Robot:
     text = mjcf.decode() if isinstance(mjcf, bytes) else mjcf
     keyframe = "none"
     if domain == "swimmer":
-        keyframe, text = _FORWARD, text.replace("</mujoco>", _swimmers_start(_links(task)))
+        keyframe, text = _FORWARD, text.replace("</mujoco>", _swimmer_keyframe(_links(task)))
     settings = MjcfSettings(keyframe=keyframe, control_timestep=control_timestep(domain))
     named = name(domain, task)
     return robot_from(adapt_text(named, text, assets, settings), named)
 
 
 def control_timestep(domain: str) -> float | None:
-    """Returns the seconds between two commands in a domain of the suite; None for the physics'."""
+    """Returns the control time step of a domain, s; None if it is the physics time step."""
     found: float | None = getattr(_module(domain), "_CONTROL_TIMESTEP", None)
     return found
 
 
 def _model(domain: str, task: str) -> tuple[str | bytes, Mapping[str, bytes]]:
-    """The MJCF of a task and the files that it names, as the suite makes them.
+    """The MJCF of a task and its assets, from the suite.
 
-    The size of the ground, which the suite chooses by the task, is only seen: planes are endless.
+    The size of the ground, which depends on the task in the suite, is visual only: planes are
+    infinite.
     """
     module = _module(domain)
     if domain == "quadruped":
@@ -112,8 +111,8 @@ def _links(task: str) -> int:
     return int(task.removeprefix("swimmer"))
 
 
-def _swimmers_start(links: int) -> str:
-    """A swimmer turned by a right angle; its other joints, one fewer than links, at 0."""
+def _swimmer_keyframe(links: int) -> str:
+    """A keyframe of a swimmer rotated by a right angle; its ``links - 1`` other joints are at 0."""
     qpos = f"0 0 {math.pi / 2!r}" + " 0" * (links - 1)
     return f'<keyframe><key name="{_FORWARD}" qpos="{qpos}"/></keyframe></mujoco>'
 
@@ -122,5 +121,5 @@ _FORWARD = "forward"
 
 
 def _module(domain: str) -> Any:  # noqa: ANN401  # modules of dm_control have no types
-    # When it is needed, because dm_control's physics looks for a display as it is imported.
+    # Imported here, because dm_control's physics initialises a display when imported.
     return importlib.import_module(f"dm_control.suite.{domain}")

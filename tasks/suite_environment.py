@@ -1,4 +1,4 @@
-"""The environments of dm_control's suite as physical robots, and the return of their episodes."""
+"""The environments of dm_control's suite as physical robots, and the returns of episodes."""
 
 import importlib
 from collections import OrderedDict
@@ -21,7 +21,7 @@ from selfmodel.robot.mjcf.mujoco_errors import mujoco_errors_as_input_errors
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
 from selfmodel.robot.state_access import current_value, signal_fields, state_writer
-from selfmodel.simulation.activations import activations_of
+from selfmodel.simulation.activations import activations_since_rest
 from selfmodel.trials.behaviour import SIGNALS, Behaviour, Sample, Signal
 
 STATE: tuple[Signal, ...] = (
@@ -35,16 +35,16 @@ STATE: tuple[Signal, ...] = (
 
 
 class SuiteRobot:
-    """A physical robot in an environment of the suite, stepped through its interface.
+    """A physical robot in an environment of the suite, stepped through the dm_env interface.
 
     Args:
-        domain: Of the suite.
-        task: Of the domain.
-        robot: The body as its model describes it.
-        hidden: What is wrong with it.
+        domain: Domain of the suite.
+        task: Task of the domain.
+        robot: The healthy body.
+        hidden: Faults of the physical robot.
 
     Attributes:
-        returns: The sum of the environment's rewards in each run so far.
+        returns: Sum of the environment's rewards, per run so far.
     """
 
     def __init__(self, domain: str, task: str, robot: Robot, hidden: Hypothesis) -> None:
@@ -54,7 +54,7 @@ class SuiteRobot:
         control = importlib.import_module("dm_control.rl.control")
         env = control.Environment(physics(embodiment.model), stepped, n_sub_steps=robot.substeps)
         self.returns = stepped.returns
-        # Nothing but a simulation is to be brought to rest; and a step would be rewarded.
+        # A simulation needs no stop command, whose step would add a reward.
         self._robot = EnvironmentRobot(
             env, robot, stop=lambda: None, silent_neurons=embodiment.silent_neurons
         )
@@ -66,58 +66,58 @@ class SuiteRobot:
 
 
 class _Stepped:
-    """A task of the suite but for its start, which is always the same, and what is observed.
+    """A task of the suite with a fixed initial pose and with the robot's own observations.
 
     Args:
-        task: The suite's, begun once; it is asked for everything else.
-        robot: The robot with nothing wrong.
-        embodiment: The same with what is wrong.
+        task: The suite's task after one reset; all other attributes are delegated to it.
+        robot: The healthy robot.
+        embodiment: The robot with its faults.
     """
 
     def __init__(self, task: Any, robot: Robot, embodiment: Embodiment) -> None:  # noqa: ANN401
         self._task = task
         self._robot, self._embodiment = robot, embodiment
-        self._places = signal_fields(robot)
+        self._fields = signal_fields(robot)
         self.returns: list[float] = []
 
-    def __getattr__(self, name: str) -> Any:  # noqa: ANN401  # the task's own
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401  # attributes of the suite's task
         return getattr(self._task, name)
 
     def initialize_episode(self, _physics: Any) -> None:  # noqa: ANN401
-        """Leaves the robot as the physics' reset has put it."""
-        self._senses = SensorReader(self._embodiment.model, self._robot.anatomy, [self._embodiment])
+        """Keeps the pose of the physics' reset and starts a new return."""
+        self._reader = SensorReader(self._embodiment.model, self._robot.anatomy, [self._embodiment])
         self.returns.append(0.0)
 
     def get_reward(self, physics: Any) -> float:  # noqa: ANN401
-        """Returns the suite's reward."""
+        """Returns the suite's reward, and adds it to the return."""
         reward = float(self._task.get_reward(physics))
         self.returns[-1] += reward
         return reward
 
     def get_observation(self, physics: Any) -> "OrderedDict[str, FloatArray | float]":  # noqa: ANN401
-        """Returns what the controller receives, the state, and the time, by our names."""
+        """Returns the sensor readings, the state signals and the time, by signal name."""
         data = physics.data
         readings = np.empty((1, len(self._robot.anatomy.sensors)))
-        self._senses.read(data.sensordata[np.newaxis], data.qpos[np.newaxis], readings)
-        seen: OrderedDict[str, FloatArray | float] = OrderedDict(sensors=readings[0])
+        self._reader.read(data.sensordata[np.newaxis], data.qpos[np.newaxis], readings)
+        observation: OrderedDict[str, FloatArray | float] = OrderedDict(sensors=readings[0])
         for signal in SIGNALS:
             if signal not in ("sensors", "commands"):
-                seen[signal] = current_value(self._places[signal], data)
-        seen["time"] = physics.time()
-        return seen
+                observation[signal] = current_value(self._fields[signal], data)
+        observation["time"] = physics.time()
+        return observation
 
 
 @lru_cache
 def episode_parts(domain: str, task: str) -> tuple[Callable[[mujoco.MjModel], Any], Any]:
-    """Returns what makes the physics of a model as the suite does, and the suite's task.
+    """Returns the suite's constructor of a physics from a model, and the suite's task.
 
-    The task is begun once, on the suite's own body with nothing wrong: what it measures there, such
-    as how heavy a dog is, holds for every episode, and what it draws there is forgotten.
+    The task is reset once, on the suite's healthy body: constants measured in the reset, such as
+    the mass of the dog, hold for every episode, and the random pose of the reset is discarded.
     """
-    # When it is needed, because dm_control's physics looks for a display as it is imported.
+    # Imported here, because dm_control's physics initialises a display when imported.
     suite = importlib.import_module("dm_control.suite")
     wrapper = importlib.import_module("dm_control.mujoco.wrapper.core")
-    with mujoco_errors_as_input_errors():  # of a cheetah it warns
+    with mujoco_errors_as_input_errors():  # MuJoCo warns about the cheetah
         env = suite.load(domain, task, task_kwargs={"random": 0})
     env.reset()
     own = type(env.physics)
@@ -127,10 +127,10 @@ def episode_parts(domain: str, task: str) -> tuple[Callable[[mujoco.MjModel], An
 def episode_return(domain: str, task: str) -> Score:
     """Returns the score that is the sum of a task's rewards.
 
-    A run of ``steps`` samples has been rewarded after each command but the last, whose consequence
-    it does not show. Rewards are computed from the recorded states; what follows from forces of
-    contact, such as a dog's weight on its feet, is that of the state itself, where the suite's
-    environment has that of one physics step before.
+    The reward of every command but the last is included: a run does not record the state after its
+    last command. Rewards are computed from the recorded states. Rewards that depend on contact
+    forces, such as the dog's, use the forces in the recorded state, where the suite's environment
+    uses the forces one physics step earlier.
     """
 
     def of(robot: Robot, hypothesis: Hypothesis, behaviour: Behaviour) -> FloatArray:
@@ -143,12 +143,12 @@ def episode_return(domain: str, task: str) -> Score:
 
 
 def _sum(robot: Robot, physics: Any, task: Any, behaviour: Behaviour, run: int) -> float:  # noqa: ANN401
-    physics.reset()  # the solver's first guess, too, is that of every run
+    physics.reset()  # resets the solver's warm start too
     model, data, commands = physics.model, physics.data, behaviour["commands"][run]
     fields = {"qpos": np.zeros((len(commands), model.nq))}
     fields["qvel"] = np.zeros((len(commands), model.nv))
     state_writer(robot, fields.__getitem__)({signal: behaviour[signal][run] for signal in STATE})
-    activations = activations_of(robot, commands)
+    activations = activations_since_rest(robot, commands)
     total = 0.0
     for k in range(1, len(commands)):
         data.qpos[:], data.qvel[:] = fields["qpos"][k], fields["qvel"][k]

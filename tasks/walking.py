@@ -1,4 +1,4 @@
-"""The walking task: get forward, in the form of a dm_control task."""
+"""The walking task as a dm_control task: the reward is the forward speed."""
 
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
@@ -28,17 +28,17 @@ def environment(
     random: int | np.random.RandomState | None,
     environment_kwargs: dict[str, Any] | None,
 ) -> control.Environment:
-    """Returns the environment in which a robot walks.
+    """Returns the dm_control environment of the walking task.
 
-    The physics, the readings and their timing are those of the simulator, to the bit.
+    The physics, the readings and their timing equal the simulator's to the bit.
 
     Args:
-        robot: The robot with nothing wrong.
-        hypothesis: What is to be wrong, or its notation, which can name what comes with selfmodel;
-            silent neurons are the controller's affair and change nothing here.
+        robot: The healthy robot.
+        hypothesis: Faults of the robot, or their notation with built-in kinds. Silent neurons have
+            no effect, because they belong to the controller.
         time_limit: Length of an episode, s.
-        random: For dm_control's tasks; walking starts from one place, so nothing depends on it.
-        environment_kwargs: For ``control.Environment``.
+        random: Seed or generator of dm_control's tasks; walking uses no random numbers.
+        environment_kwargs: Arguments of ``control.Environment``.
     """
     if isinstance(hypothesis, str):
         hypothesis = parse(hypothesis, robot.anatomy)
@@ -55,30 +55,32 @@ def environment(
 def motion_capture(
     environment: control.Environment,
 ) -> Callable[[Mapping[str, FloatArray]], Mapping[str, Any]]:
-    """Returns what adds to an observation what a robot does not see: where it is, torques, time.
+    """Returns a callable that adds base position, joint efforts and time to an observation.
 
-    With it as ``observe``, an ``EnvironmentRobot`` has trials of all signals.
+    An ``EnvironmentRobot`` with this callable as ``observe`` records trials with all signals.
 
     Args:
-        environment: The one that the observations are of.
+        environment: The environment of the observations.
     """
 
     def observe(observation: Mapping[str, FloatArray]) -> Mapping[str, Any]:
         task, physics = environment.task, environment.physics
-        seen = {
+        added = {
             signal: task.observe(physics, signal) for signal in ("base_position", "joint_efforts")
         }
-        return {**observation, **seen, "time": physics.time()}
+        return {**observation, **added, "time": physics.time()}
 
     return observe
 
 
 class Walk(base.Task):
-    """Rewards forward speed, m/s: the sum of the rewards times the time step is the distance.
+    """The task of walking forward; the reward is the forward speed, m/s.
+
+    The sum of the rewards times the control time step is the distance, m.
 
     Args:
-        robot: The robot with nothing wrong.
-        embodiment: The same with what is wrong.
+        robot: The healthy robot.
+        embodiment: The robot with its faults.
         random: A seed or a numpy ``RandomState``.
     """
 
@@ -88,22 +90,22 @@ class Walk(base.Task):
         super().__init__(random=random)
         self._robot = robot
         self._embodiment = embodiment
-        self._senses = SensorReader(embodiment.model, robot.anatomy, [embodiment])
-        self._places = signal_fields(robot, embodiment.model)
+        self._reader = SensorReader(embodiment.model, robot.anatomy, [embodiment])
+        self._fields = signal_fields(robot, embodiment.model)
         self._start = self._end = 0.0
 
     def initialize_episode(self, physics: mujoco.Physics) -> None:
-        """Puts the robot at its start."""
+        """Resets the position for the reward."""
         super().initialize_episode(physics)
         self._start = self._end = self._forward(physics)
 
     def before_step(self, action: FloatArray, physics: mujoco.Physics) -> None:
-        """Takes the commands of the motors."""
+        """Records the position before the step, and applies the motor commands."""
         self._start = self._forward(physics)
         super().before_step(action, physics)
 
     def after_step(self, physics: mujoco.Physics) -> None:
-        """Sees where the step led."""
+        """Records the position after the step."""
         self._end = self._forward(physics)
         super().after_step(physics)
 
@@ -112,10 +114,10 @@ class Walk(base.Task):
         return (self._end - self._start) / self._robot.control_timestep
 
     def get_observation(self, physics: mujoco.Physics) -> "OrderedDict[str, FloatArray]":
-        """Returns what the controller receives, and the rest of the state but for where it is."""
+        """Returns the sensor readings, and the state without the horizontal position."""
         readings = np.empty((1, len(self._robot.anatomy.sensors)))
         data = physics.data
-        self._senses.read(data.sensordata[np.newaxis], data.qpos[np.newaxis], readings)
+        self._reader.read(data.sensordata[np.newaxis], data.qpos[np.newaxis], readings)
         observation = OrderedDict(sensors=readings[0])
         signals: tuple[Signal, ...] = (
             "joint_positions",
@@ -130,9 +132,9 @@ class Walk(base.Task):
         return observation
 
     def observe(self, physics: mujoco.Physics, signal: Signal) -> FloatArray:
-        """Returns a signal of the physics' state, ``(width,)``."""
-        return current_value(self._places[signal], physics.data)
+        """Returns a signal of the state, ``(width,)``."""
+        return current_value(self._fields[signal], physics.data)
 
     def _forward(self, physics: mujoco.Physics) -> float:
-        """Where the root body is along the world's x axis, m."""
+        """Position of the root body along the world's x axis, m."""
         return float(self.observe(physics, "base_position")[0])

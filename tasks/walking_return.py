@@ -1,4 +1,4 @@
-"""The return of our own walking task."""
+"""The return of the walking task."""
 
 from selfmodel.arrays import FloatArray
 from selfmodel.faults.hypothesis import Hypothesis
@@ -12,4 +12,4 @@ def _speeds(robot: Robot, _hypothesis: Hypothesis, behaviour: Behaviour) -> Floa
 
 
 WALKING_RETURN = Score("return", ("base_position",), _speeds)
-"""The sum of the speeds in m/s that ``walking.Walk`` rewards: the way over the time step."""
+"""Sum of the rewards of ``walking.Walk``, m/s: the displacement over the control time step."""

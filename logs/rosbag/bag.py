@@ -1,4 +1,4 @@
-"""Opens a bag of any form: a folder, one file or split files, compressed or not."""
+"""Reader of rosbag2 bags: a folder, one file or split files, compressed or not."""
 
 import hashlib
 import re
@@ -14,27 +14,27 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from selfmodel.errors import InputError
+from selfmodel.files import check_regular, read_file
+from selfmodel.logs.decompress import ZSTD_MAGIC, BombError, unzstd, unzstd_file
 from selfmodel.logs.errors import CorruptError, NotMcapError
-from selfmodel.logs.files import check_regular, read_bounded
 from selfmodel.logs.framing import MAGIC
 from selfmodel.logs.rosbag.stored import Announced, Stored
 from selfmodel.logs.rosbag.stored_mcap import read_mcap
 from selfmodel.logs.rosbag.stored_sqlite import SQLITE_MAGIC, read_sqlite
-from selfmodel.logs.unpack import ZSTD_MAGIC, BombError, unzstd, unzstd_file
 
 METADATA = "metadata.yaml"
 EXPECTED = "give a bag's folder, or its .mcap or .db3"
-AGAIN = "record it again, or decompress it with its own tool to recover complete messages"
+AGAIN = "record it again, or unpack it by its own tool to see what is whole"
 
 
 @dataclass(frozen=True)
 class Topic:
-    """A topic of a bag.
+    """Topic of a bag.
 
     Attributes:
-        name: Name of the topic, such as ``/joint_states``.
-        type: Message type, such as ``sensor_msgs/msg/JointState``; "" if the bag has none.
-        encoding: Encoding of the messages; only ``cdr`` can be read.
+        name: Name, such as ``/joint_states``.
+        type: Message type, such as ``sensor_msgs/msg/JointState``; "" if unknown.
+        encoding: Encoding of the messages; only ``cdr`` is supported.
         count: Number of messages.
     """
 
@@ -46,11 +46,11 @@ class Topic:
 
 @dataclass(frozen=True)
 class Source:
-    """A file of a bag.
+    """File of a bag.
 
     Attributes:
-        name: File name.
-        sha256: Hexadecimal SHA-256 of the file; recorders write no checksums.
+        name: Name within the bag.
+        sha256: SHA-256 of the file, in hexadecimal: recorders write no checksums.
     """
 
     name: str
@@ -59,13 +59,13 @@ class Source:
 
 @dataclass(frozen=True)
 class Bag:
-    """A recording whose files have been read once and are complete.
+    """Recording whose files have been read and checked once.
 
     Attributes:
-        path: Path of the bag, as given by the user.
+        path: Path from the user.
         topics: Topics by name.
         sources: Files of the bag, in order.
-        files: Path of the decompressed file, and path of the file itself, of each source.
+        files: Readable file, decompressed if necessary, and original name of each source.
     """
 
     path: Path
@@ -76,39 +76,34 @@ class Bag:
     def messages(self, wanted: Collection[str]) -> Iterator[tuple[str, int, bytes]]:
         """Yields topic, log time in ns and bytes of each message on some topics, file by file.
 
-        Messages are not decoded, so other topics may have any type.
-
-        Args:
-            wanted: Names of the topics.
+        Messages are not decoded.
 
         Raises:
-            LogError: A file has been damaged since it was opened, or a message cannot be
-                decompressed.
+            LogError: A file was damaged meanwhile, or a message cannot be decompressed.
         """
         for file, name in self.files:
             for item in _read(file, name):
                 if isinstance(item, Stored) and item.topic in wanted:
-                    yield item.topic, item.time, _decompressed(item, name)
+                    yield item.topic, item.time, _unpacked(item, name)
 
 
 @contextmanager
 def open_bag(path: Path) -> Iterator[Bag]:
-    """Opens a bag; decompressed files are removed at the end.
+    """Context manager that yields a bag, and removes decompressed files at the end.
 
     Args:
-        path: Folder of the bag, with or without a ``metadata.yaml``, or one of its files.
+        path: Folder of a bag, with or without ``metadata.yaml``, or one of its files.
 
     Raises:
-        LogError: A file is damaged, missing, or no recording.
-        InputError: The bag does not exist or cannot be read.
+        LogError: A file is damaged, missing, or not a recording.
+        InputError: The bag does not exist, or cannot be read.
     """
-    with TemporaryDirectory(prefix="selfmodel-") as folder, _read_errors_as_input_errors(path):
+    with TemporaryDirectory(prefix="selfmodel-") as folder, _explained(path):
         names = _files(path)
         if not names:
             raise InputError(f"{path}: expected a bag, got a folder without one: {EXPECTED}")
         files = [
-            (_decompressed_file(name, Path(folder) / str(number)), name)
-            for number, name in enumerate(names)
+            (_ready(name, Path(folder) / str(number)), name) for number, name in enumerate(names)
         ]
         yield Bag(
             path,
@@ -119,8 +114,7 @@ def open_bag(path: Path) -> Iterator[Bag]:
 
 
 @contextmanager
-def _read_errors_as_input_errors(path: Path) -> Iterator[None]:
-    """Converts an ``OSError`` of a file within the bag to ``InputError``."""
+def _explained(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as failure:
@@ -136,7 +130,7 @@ def _within(filename: object, path: Path) -> bool:
 
 
 def _files(path: Path) -> list[Path]:
-    """Returns the storage files of a bag, in order."""
+    """Storage files of a bag, in order."""
     if not path.is_dir():
         check_regular(path, "a bag")
         return [path]
@@ -147,8 +141,8 @@ def _files(path: Path) -> list[Path]:
     if missing := [file.name for file in files if not file.is_file()]:
         raise CorruptError(
             path,
-            f"its {METADATA} lists {', '.join(missing)}, which is missing",
-            advice=f"add it, or remove {METADATA} to read the files that exist",
+            f"its {METADATA} lists {', '.join(missing)}, which is not there",
+            advice=f"add it, or remove {METADATA} to read the files that are there",
         )
     return files
 
@@ -157,15 +151,15 @@ _STORAGE = re.compile(r"\.(mcap|db3)(\.zstd)?$")
 
 
 def _natural(path: Path) -> list[tuple[int, str]]:
-    """Returns a sort key with numbers by value: ``bag_2`` before ``bag_10``."""
+    """Sort key that orders ``bag_2`` before ``bag_10``."""
     return [(int(part) if part.isdecimal() else 0, part) for part in re.split(r"(\d+)", path.name)]
 
 
 def _listed(path: Path) -> list[str]:
-    """Returns the file names in ``metadata.yaml``, without the folders of older versions."""
+    """Files in ``metadata.yaml``, without the folder that older versions prepend."""
     try:
-        # The base loader returns all scalars as text, so no value fails to convert.
-        data: Any = YAML(typ="base", pure=True).load(read_bounded(path, METADATA, 2**20))
+        # The base loader returns every value as text.
+        data: Any = YAML(typ="base", pure=True).load(read_file(path, METADATA, 2**20))
         listed = data["rosbag2_bagfile_information"]["relative_file_paths"]
     except (YAMLError, ValueError, KeyError, TypeError, RecursionError) as failure:
         reason = re.sub(r"\s+", " ", str(failure))
@@ -177,26 +171,26 @@ def _listed(path: Path) -> list[str]:
     return [PurePath(name).name for name in listed]
 
 
-def _decompressed_file(name: Path, target: Path) -> Path:
-    """Returns the file itself, or ``target`` with its decompressed content."""
-    if not _begins_with(name, ZSTD_MAGIC):
+def _ready(name: Path, place: Path) -> Path:
+    """Returns a readable file: the file itself, or its content decompressed to ``place``."""
+    if not _begins(name, ZSTD_MAGIC):
         return name
     try:
-        unzstd_file(name, target)
+        unzstd_file(name, place)
     except (BombError, zstandard.ZstdError) as failure:
         raise CorruptError(name, f"it cannot be unpacked: {failure}", advice=AGAIN) from failure
-    return target
+    return place
 
 
-def _begins_with(path: Path, magic: bytes) -> bool:
+def _begins(path: Path, magic: bytes) -> bool:
     with path.open("rb") as file:
         return file.read(len(magic)) == magic
 
 
 def _read(file: Path, name: Path) -> Iterator[Announced | Stored]:
-    if _begins_with(file, SQLITE_MAGIC):
+    if _begins(file, SQLITE_MAGIC):
         return read_sqlite(file, name)
-    if _begins_with(file, MAGIC):
+    if _begins(file, MAGIC):
         return read_mcap(file, name)
     raise NotMcapError(name, "this is no rosbag2 recording", advice=EXPECTED)
 
@@ -207,13 +201,13 @@ def _topics(files: list[tuple[Path, Path]]) -> dict[str, Topic]:
     for file, name in files:
         for item in _read(file, name):
             if isinstance(item, Announced):
-                kinds.setdefault(item.topic, {})[_full_type(item.type), item.encoding] = None
+                kinds.setdefault(item.topic, {})[_full(item.type), item.encoding] = None
             else:
                 counts[item.topic] = counts.get(item.topic, 0) + 1
     return {
         topic: Topic(
             topic,
-            # A topic of several types fits no role; error messages list them.
+            # A topic of two types fits no role; the error names both types.
             " and ".join(dict.fromkeys(kind for kind, _ in found)),
             " and ".join(dict.fromkeys(encoding for _, encoding in found)),
             counts.get(topic, 0),
@@ -222,13 +216,13 @@ def _topics(files: list[tuple[Path, Path]]) -> dict[str, Topic]:
     }
 
 
-def _full_type(kind: str) -> str:
-    """Returns ``sensor_msgs/msg/JointState`` for ``sensor_msgs/JointState`` of old recordings."""
+def _full(kind: str) -> str:
+    """Full name of a message type; old recordings omit its ``msg``."""
     package, slash, name = kind.partition("/")
     return f"{package}/msg/{name}" if slash and "/" not in name else kind
 
 
-def _decompressed(item: Stored, name: Path) -> bytes:
+def _unpacked(item: Stored, name: Path) -> bytes:
     if not item.payload.startswith(ZSTD_MAGIC):
         return item.payload
     try:

@@ -1,4 +1,4 @@
-"""Checks of a mapping against a robot and a bag; errors have the line and the valid names."""
+"""Checks of a mapping against robot and bag; an error names the line and the alternatives."""
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
@@ -26,36 +26,36 @@ TYPES: Mapping[RoleKind, tuple[str, ...]] = MappingProxyType(
         "touch": (WRENCH, *NUMBERS, ARRAY),
     }
 )
-"""Message types that each role accepts."""
+"""Message types that can play each role."""
 
 
 def check_names(
     mapping: BagMapping, hinges: Sequence[str], motors: Sequence[str], touches: Sequence[str]
 ) -> None:
-    """Checks that a mapping lists all hinges and motors of a robot, and no unknown parts.
+    """Checks that a mapping names the parts of the robot and no others.
 
     Args:
         mapping: The mapping.
-        hinges: Hinges of the robot, all required.
-        motors: Motors of the robot, all required.
-        touches: Touch sensors of the robot, all optional.
+        hinges: Hinges of the robot; all must be mapped.
+        motors: Motors of the robot; all must be mapped.
+        touches: Touch sensors of the robot; some may be mapped.
 
     Raises:
-        InputError: A part in the mapping is unknown, or a required part is missing.
+        InputError: The mapping names an unknown part, or omits a required part.
     """
     document = mapping.document
-    for angles, kind, known in (
+    for angles, what, known in (
         (mapping.joints, "hinge", hinges),
         (mapping.commands, "motor", motors),
     ):
         path = (angles.role, "names")
         for name in angles.links:
             if name not in known:
-                raise document.unknown((*path, name), f"{kind} of the robot", name, known)
+                raise document.unknown((*path, name), f"{what} of the robot", name, known)
         if missing := [name for name in known if name not in angles.links]:
             raise document.error(
                 path,
-                f"[{'.'.join(path)}] must list every {kind} of the robot, and lacks "
+                f"[{'.'.join(path)}] must list every {what} of the robot, and lacks "
                 f"{', '.join(missing)}: add a line for each",
             )
     for name in mapping.touch:
@@ -64,15 +64,15 @@ def check_names(
 
 
 def fitting(bag: Bag, kind: RoleKind) -> list[str]:
-    """Returns the names of the topics of a bag whose type a role accepts."""
+    """Returns the topics of a bag that can play a role."""
     return [topic.name for topic in bag.topics.values() if topic.type in TYPES[kind]]
 
 
 def check_topics(mapping: BagMapping, bag: Bag) -> None:
-    """Checks that each topic of a mapping exists, has an accepted type, and has messages.
+    """Checks that each topic of a mapping exists, has a suitable type, and has messages.
 
     Raises:
-        InputError: A topic fails a check.
+        InputError: A check failed.
     """
     for role in mapping.roles:
         path, known = (*role.path, "topic"), fitting(bag, role.kind)
@@ -92,11 +92,11 @@ def check_topics(mapping: BagMapping, bag: Bag) -> None:
             raise mapping.document.error(
                 path, f"expected messages on {topic.name}, got none: name another topic"
             )
-        _check_column_names(mapping, role, topic.type)
+        _check_columns_are_named(mapping, role, topic.type)
 
 
-def _check_column_names(mapping: BagMapping, role: Role, kind: str) -> None:
-    """Checks that ``order`` or ``index`` is given for Float64MultiArray, and for no other type."""
+def _check_columns_are_named(mapping: BagMapping, role: Role, kind: str) -> None:
+    """Checks that the columns of a Float64MultiArray, and of no other type, have names."""
     if role.kind == "commands":
         key, given = "order", bool(mapping.commands.order)
     elif role.kind == "touch":
@@ -106,8 +106,8 @@ def _check_column_names(mapping: BagMapping, role: Role, kind: str) -> None:
     if kind == ARRAY and not given:
         raise mapping.document.error(
             role.path,
-            f"{role.topic} has numbers without names ({ARRAY}): add {key} to [{role.name}], to "
-            f"name them",
+            f"{role.topic} has numbers without names ({ARRAY}): add {key} to "
+            f"[{role.name}], which names them",
         )
     if kind != ARRAY and given:
         raise mapping.document.error(
@@ -117,10 +117,10 @@ def _check_column_names(mapping: BagMapping, role: Role, kind: str) -> None:
 
 
 def check_columns(mapping: BagMapping, series: Mapping[str, Series]) -> None:
-    """Checks that the messages of each topic contain the names of the mapping.
+    """Checks that each name of a mapping occurs on its topic.
 
     Raises:
-        InputError: A name is missing in the messages.
+        InputError: A name does not.
     """
     order = mapping.commands.order
     width = len(series[mapping.commands.topic].columns)

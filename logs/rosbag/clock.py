@@ -1,4 +1,4 @@
-"""Measurement times of messages: their header stamps, or else their log times."""
+"""Measurement time of each message: its time stamp, or else its log time."""
 
 from dataclasses import dataclass
 
@@ -8,21 +8,21 @@ from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.logs.rosbag.series import Column, IntArray, Series
 
 MAX_LATENCY = 60.0
-"""Largest difference between stamps and log times of the same clock, s."""
+"""Maximum median difference of stamps and log times of one clock, s."""
 
 MAX_MEASUREMENT = 1e12
-"""Largest valid measurement, in any unit; its square is finite."""
+"""Magnitude above which a value is no measurement, in any unit; its square is finite."""
 
 
 @dataclass(frozen=True, eq=False)
 class Clocked:
-    """The times of a topic's messages.
+    """Times of a topic's messages.
 
     Attributes:
-        times: Measurement times, ``(n,)`` ns.
-        usable: Whether the time is valid, ``(n,)``; False for stamps far from their log time.
-        fallbacks: Number of messages without a stamp, whose log time is used.
-        latency: Log time minus stamp of the messages with a valid stamp, ``(k,)`` s.
+        times: Times, ``(n,)`` ns.
+        usable: Flags, ``(n,)``; False for a stamp far from all other stamps.
+        fallbacks: Number of messages without a stamp, which have their log time.
+        latency: Delay from stamp to log time, ``(k,)`` s, of the messages with a usable stamp.
     """
 
     times: IntArray
@@ -32,12 +32,12 @@ class Clocked:
 
 
 class ClocksApartError(ValueError):
-    """The stamps and the log times of a topic are from different clocks."""
+    """The stamps of a topic and its log times are of different clocks."""
 
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """Samples of one quantity over time.
+    """Time series of one quantity.
 
     Attributes:
         times: Times, ``(m,)`` ns, strictly increasing.
@@ -52,9 +52,9 @@ def clocked(series: Series, clock: str) -> Clocked:
     """Returns the times of a topic's messages.
 
     Args:
-        series: The messages.
-        clock: ``header`` for stamps, with log times for messages without one; ``log`` for log
-            times only.
+        series: Messages of the topic.
+        clock: ``header`` for stamps, with log times for messages without a stamp; ``log`` for log
+            times.
 
     Raises:
         ClocksApartError: Stamps and log times differ by more than ``MAX_LATENCY``.
@@ -62,14 +62,14 @@ def clocked(series: Series, clock: str) -> Clocked:
     stamped = series.stamps > 0
     latency = (series.logged - series.stamps)[stamped] / 1e9
     everything = np.ones(len(stamped), dtype=bool)
-    difference = float(np.median(latency)) if len(latency) else 0.0
+    apart = float(np.median(latency)) if len(latency) else 0.0
     if clock == "log":
-        valid = latency if abs(difference) <= MAX_LATENCY else latency[:0]
-        return Clocked(series.logged, everything, 0, valid)
-    if abs(difference) > MAX_LATENCY:
+        usable_latency = latency if abs(apart) <= MAX_LATENCY else latency[:0]
+        return Clocked(series.logged, everything, 0, usable_latency)
+    if abs(apart) > MAX_LATENCY:
         raise ClocksApartError(
             f"the stamps on {series.topic.name} and the times at which it was recorded are "
-            f"{abs(difference):.0f} s apart (median), so they are of different clocks"
+            f"{abs(apart):.0f} s apart (median), so they are of different clocks"
         )
     usable = everything.copy()
     usable[stamped] = np.abs(latency) <= MAX_LATENCY
@@ -82,17 +82,17 @@ def clocked(series: Series, clock: str) -> Clocked:
 
 
 def track(clock: Clocked, column: Column, wanted: slice) -> Track:
-    """Returns the track of some numbers of a column: sorted, with unique times and valid values.
+    """Returns the time series of some of a column's numbers, sorted, with distinct times.
 
-    Values that are not finite, or above ``MAX_MEASUREMENT``, are dropped.
+    Rows with a value that is NaN, infinite or above ``MAX_MEASUREMENT`` are left out.
 
     Args:
-        clock: The times of the topic.
-        column: The column of the topic.
-        wanted: Columns of the numbers.
+        clock: Times of the topic.
+        column: Column of the topic.
+        wanted: Slice of the numbers.
     """
     times, values = clock.times[column.index], column.values[:, wanted]
-    valid = clock.usable[column.index] & (np.abs(values) <= MAX_MEASUREMENT).all(axis=1)
-    # numpy.unique keeps the first of equal times, in the order of the recording.
-    times, first = np.unique(times[valid], return_index=True)
-    return Track(times, values[valid][first])
+    known = clock.usable[column.index] & (np.abs(values) <= MAX_MEASUREMENT).all(axis=1)
+    # unique() keeps the first of equal times, in the order of the recording.
+    times, first = np.unique(times[known], return_index=True)
+    return Track(times, values[known][first])

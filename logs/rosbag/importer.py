@@ -1,4 +1,4 @@
-"""Imports a trial from a bag, given a mapping and a robot."""
+"""Import of a recording: behaviour and quality from a bag, a mapping and a robot."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -10,7 +10,7 @@ import numpy as np
 from selfmodel.arrays import FloatArray, frozen
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
-from selfmodel.logs.records import Imported
+from selfmodel.logs.records import Imported, TrialHeader
 from selfmodel.logs.rosbag.bag import Source, open_bag
 from selfmodel.logs.rosbag.checks import check_columns, check_names, check_topics
 from selfmodel.logs.rosbag.clock import Clocked, ClocksApartError, clocked
@@ -33,20 +33,20 @@ from selfmodel.trials.behaviour import SIGNALS, Behaviour, Sample, Signal
 from selfmodel.trials.trial import TrialPlan
 
 MAX_STEPS = 1_000_000
-"""Largest number of control steps of an import: one wrong stamp must not fill the memory."""
+"""Maximum control steps of an import: a wrong stamp must not fill the memory."""
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """A trial that was imported from a bag.
+    """Trial in a bag, resampled at the control steps.
 
     Attributes:
-        behaviour: Signals at the control steps; values that were not observed are NaN.
-        qualities: Quality of the recording by topic.
+        behaviour: Behaviour at the control steps; NaN where not observed.
+        qualities: Recording quality by topic.
         sources: Files of the bag.
-        clock: Clock of the times, ``header`` or ``log``.
+        clock: Clock of the times: ``header`` or ``log``.
         origin: Start of the trial, ns since 1970.
-        notes: Remarks on the recording for the user, one sentence each.
+        notes: Warnings for the user, one sentence each.
     """
 
     behaviour: Behaviour
@@ -58,14 +58,14 @@ class Recording:
 
     @property
     def valid(self) -> dict[str, float]:
-        """Fraction of observed values per signal."""
+        """Fraction of observed values by signal."""
         return {
             signal: float(np.mean(np.isfinite(values)))
             for signal, values in self.behaviour.signals.items()
         }
 
     def facts(self) -> dict[str, str]:
-        """Returns the metadata of the import for the log, as text; lists and records are JSON."""
+        """Returns the origin of the trial as texts for its log; lists and records are JSON."""
         topics = {topic: found.facts() for topic, found in self.qualities.items()}
         sources = {source.name: source.sha256 for source in self.sources}
         return {
@@ -79,12 +79,12 @@ class Recording:
 
 
 def import_bag(path: Path, mapping: BagMapping, robot: Robot) -> Recording:
-    """Returns the trial of a robot in a bag.
+    """Returns the trial in a bag.
 
     Args:
-        path: The bag, a folder or a file.
-        mapping: Mapping from the robot's parts to topics.
-        robot: The robot that the mapping names.
+        path: Folder or file of the bag.
+        mapping: Mapping from topics to roles.
+        robot: Robot that the mapping names.
 
     Raises:
         LogError: The bag is damaged.
@@ -119,14 +119,14 @@ def write_recording(
     mapping: BagMapping,
     controller: Controller | None,
 ) -> Path:
-    """Writes a recording as a trial's log.
+    """Writes a recording as the log of a trial.
 
     Args:
-        path: Path of the log, which must not exist.
-        robot: The robot.
-        recording: The imported trial.
-        mapping: Mapping of the import, whose text is written into the log.
-        controller: Controller of the robot; None for a playback of the recorded commands.
+        path: Name of the log; it must not exist.
+        robot: Robot as its model describes it.
+        recording: Trial in the bag.
+        mapping: Mapping of the import; the log contains its text.
+        controller: Controller of the robot; if not given, a playback of the recorded commands.
 
     Raises:
         InputError: The file exists, or the controller does not fit the robot.
@@ -139,8 +139,7 @@ def write_recording(
         robot,
         TrialPlan("imported", mapping.stage, driver, behaviour.steps, seed=0),
         _samples(behaviour),
-        settings=Settings(),
-        imported=Imported(recording.facts(), mapping.document.text),
+        TrialHeader(Settings(), imported=Imported(recording.facts(), mapping.document.text)),
     )
 
 
@@ -151,22 +150,22 @@ def _clocks(mapping: BagMapping, series: Mapping[str, Series]) -> dict[str, Cloc
             found[role.topic] = clocked(series[role.topic], mapping.clock)
         except ClocksApartError as error:
             raise mapping.document.error(
-                (*role.path, "topic"), f'{error}: set clock = "log" to go by the log times alone'
+                (*role.path, "topic"), f'{error}: set clock = "log" to use the log times'
             ) from error
     return found
 
 
 def _steps(mapping: BagMapping, tracks: Tracks, timestep: float) -> Steps:
-    """Returns the control steps at which every role has data."""
+    """Control steps at which every role has data."""
     needed = required(mapping, tracks)
     for role, part, track in needed:
         if not len(track.times):
             raise mapping.document.error(
                 (*role.path, "topic"),
-                f"{role.topic} has no finite numbers for {part}: name another topic",
+                f"{role.topic} has no number for {part}: name another topic",
             )
     first = max(int(track.times[0]) for _, _, track in needed)
-    # The last command is held, so commands do not end a trial.
+    # The last command is held, so the end of the commands does not end the trial.
     last = min(int(track.times[-1]) for role, _, track in needed if role.kind != "commands")
     origin = first + round(mapping.start * 1e9)
     period = timestep * 1e9
@@ -176,8 +175,8 @@ def _steps(mapping: BagMapping, tracks: Tracks, timestep: float) -> Steps:
         raise mapping.document.error(
             ("duration" if mapping.duration is not None else "start",),
             f"every role has data for {max(0, last - first) / 1e9:.3f} s in all, got a start "
-            f"{mapping.start:g} s after their first data and {max(steps, 2)} steps of "
-            f"{timestep:g} s: shorten the trial, or leave out the role with the least data",
+            f"{mapping.start:g} s after that begins and {max(steps, 2)} steps of {timestep:g} s: "
+            f"ask for less, or leave out the role that has the least data",
         )
     if not 2 <= steps <= MAX_STEPS:
         raise mapping.document.error(

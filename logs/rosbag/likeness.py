@@ -1,4 +1,4 @@
-"""Matches the names of a bag with the names of a model by similarity."""
+"""Matching of a bag's joint names to those of the model, by similarity."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -7,15 +7,15 @@ from difflib import SequenceMatcher
 from types import MappingProxyType
 
 CERTAIN_SIMILARITY = 0.75
-"""Least similarity, from 0 to 1, of a certain match."""
+"""Minimum similarity of a certain match, of at most 1, if no other name is ``CERTAIN_LEAD``."""
 
 MIN_SIMILARITY = 0.3
-"""Least similarity of a match."""
+"""Minimum similarity of a match."""
 
 CERTAIN_LEAD = 0.1
-"""Least lead in similarity over the second-best name of a certain match."""
+"""Minimum lead over the second most similar name of a certain match."""
 
-_SYNONYMS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+_WORDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         **dict.fromkeys(("fl", "lf"), ("front", "left")),
         **dict.fromkeys(("fr", "rf"), ("front", "right")),
@@ -32,19 +32,19 @@ _SYNONYMS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         **dict.fromkeys(("kfe", "calf", "shank", "tibia", "lower"), ("knee",)),
         "haa": ("hip",),
         **dict.fromkeys(("foot", "ft", "contact", "force", "wrench", "sole"), ("touch",)),
-        # Words that identify no joint.
+        # Words that do not identify a joint.
         **dict.fromkeys(("joint", "motor", "servo", "actuator", "link", "position"), ()),
     }
 )
 
 
 _SIDES = (frozenset({"front", "middle", "back"}), frozenset({"left", "right"}))
-"""Mutually exclusive words: names with different ones never match."""
+"""Sets of exclusive words: names with two words of one set never match."""
 
 
 @dataclass(frozen=True)
 class NameMatch:
-    """A match of a name of the model.
+    """Name in the bag that matches a name of the model.
 
     Attributes:
         name: Name in the bag.
@@ -56,9 +56,9 @@ class NameMatch:
 
 
 def matched(wanted: Sequence[str], offered: Sequence[str]) -> dict[str, NameMatch]:
-    """Returns a one-to-one match of names by similarity, the most similar pairs first.
+    """Returns the most similar offered name for each wanted name, each used once.
 
-    Word order, case and common abbreviations do not matter: ``FL_calf_joint`` is similar to
+    Order, case and the usual abbreviations do not matter: ``FL_calf_joint`` is similar to
     ``front_left_knee``.
 
     Args:
@@ -66,7 +66,7 @@ def matched(wanted: Sequence[str], offered: Sequence[str]) -> dict[str, NameMatc
         offered: Names in the bag.
 
     Returns:
-        Matches by the model's name; names without a similar one are omitted.
+        Matches by wanted name; names without a match are left out.
     """
     scores = {(ours, theirs): likeness(ours, theirs) for ours in wanted for theirs in offered}
     found: dict[str, NameMatch] = {}
@@ -74,19 +74,18 @@ def matched(wanted: Sequence[str], offered: Sequence[str]) -> dict[str, NameMatc
     for (ours, theirs), score in sorted(scores.items(), key=lambda item: -item[1]):
         if score < MIN_SIMILARITY or ours in found or theirs in used:
             continue
-        competing = [
+        rivals = [
             other for pair, other in scores.items() if (pair[0] == ours) != (pair[1] == theirs)
         ]
         found[ours] = NameMatch(
-            theirs,
-            score >= CERTAIN_SIMILARITY and score - max(competing, default=0.0) >= CERTAIN_LEAD,
+            theirs, score >= CERTAIN_SIMILARITY and score - max(rivals, default=0.0) >= CERTAIN_LEAD
         )
         used.add(theirs)
     return found
 
 
 def likeness(ours: str, theirs: str) -> float:
-    """Returns the similarity of two names: 0 without common words, 1 for same words or initials."""
+    """Returns the similarity of two names, 0 to 1, which is 1 for the same words or initials."""
     if "".join(word[0] for word in _parts(ours)) == theirs.lower():
         return 1.0
     first, second = _words(ours), _words(theirs)
@@ -99,9 +98,9 @@ def likeness(ours: str, theirs: str) -> float:
 
 
 def _words(name: str) -> frozenset[str]:
-    return frozenset(word for part in _parts(name) for word in _SYNONYMS.get(part, (part,)))
+    return frozenset(word for part in _parts(name) for word in _WORDS.get(part, (part,)))
 
 
 def _parts(name: str) -> list[str]:
-    """Returns the parts of a name: ``fl``, ``knee`` and ``2`` of ``FLKnee_2``."""
+    """Words of a name: ``FLKnee_2`` has ``fl``, ``knee`` and ``2``."""
     return [part.lower() for part in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", name)]

@@ -1,4 +1,4 @@
-"""Mapping from the parts of a robot to the topics of a bag."""
+"""Mapping from the topics of a bag to roles and parts of a robot."""
 
 import math
 from collections.abc import Mapping
@@ -12,10 +12,10 @@ from selfmodel.trials.trial import Stage
 ANGLES: Mapping[str, float] = MappingProxyType({"rad": 1.0, "deg": math.pi / 180})
 LENGTHS: Mapping[str, float] = MappingProxyType({"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0})
 FORCES = ("N", "kN", "raw")
-"""Units of a touch threshold; it has the unit of its topic, so no unit is converted."""
+"""Units of touch sensors; the threshold has the unit of the topic, so none is converted."""
 
 UNKNOWN = "?"
-"""Placeholder in a suggested mapping for a name that the user must fill in."""
+"""Placeholder of a suggested mapping for a name that the user must fill in."""
 
 RoleKind = Literal["joints", "commands", "base", "imu", "touch"]
 
@@ -28,8 +28,8 @@ class Link:
     """Conversion of a recorded angle: angle = sign x recorded + offset.
 
     Attributes:
-        name: Name of the part in the bag.
-        sign: 1 or -1.
+        name: Name in the bag.
+        sign: Sign, 1 or -1.
         offset: Offset, rad.
     """
 
@@ -40,14 +40,14 @@ class Link:
 
 @dataclass(frozen=True)
 class Angles:
-    """A topic of measured joint angles, or of commanded angles.
+    """Topic of joint angles or of commanded angles.
 
     Attributes:
         role: ``joints`` or ``commands``.
         topic: Name of the topic.
-        scale: Unit of the topic, rad.
+        scale: Recorded unit, rad.
         links: Conversions by the model's hinge or motor.
-        order: Names of the numbers of a Float64MultiArray; empty for other types.
+        order: Names of the columns of a Float64MultiArray; empty for other types.
     """
 
     role: Literal["joints", "commands"]
@@ -59,13 +59,12 @@ class Angles:
 
 @dataclass(frozen=True)
 class Base:
-    """A topic of the pose of the base.
+    """Topic of the pose of the root body.
 
     Attributes:
         topic: Name of the topic.
-        frame: Frame of the imported pose: ``start``, in which the trial starts at x = y = 0 and
-            heads along +x, or ``recorded``.
-        scale: Unit of the topic, m.
+        frame: ``start``, in which the trial begins at x = y = 0 heading along +x; or ``recorded``.
+        scale: Recorded unit, m.
     """
 
     topic: str
@@ -75,12 +74,12 @@ class Base:
 
 @dataclass(frozen=True)
 class Touch:
-    """A topic of one touch sensor.
+    """Topic of one touch sensor.
 
     Attributes:
         topic: Name of the topic.
-        column: Index of the number in a Float64MultiArray, as text; "" for other types.
-        threshold: Upper bound of the values with the reading 0, in the unit of the topic.
+        column: Column of a Float64MultiArray; "" for other types.
+        threshold: Value above which the sensor reads 1, in the unit of the topic.
     """
 
     topic: str
@@ -90,11 +89,11 @@ class Touch:
 
 @dataclass(frozen=True)
 class Role:
-    """A role of a topic.
+    """Role of a topic.
 
     Attributes:
         kind: Kind of the role.
-        path: Keys of its table in the mapping.
+        path: Table of the role in the mapping.
         topic: Name of the topic.
     """
 
@@ -104,28 +103,28 @@ class Role:
 
     @property
     def name(self) -> str:
-        """Name of the role in reports, such as ``touch.front_left_touch``."""
+        """Name for reports, such as ``touch.front_left_touch``."""
         return ".".join(self.path)
 
 
 @dataclass(frozen=True)
 class BagMapping:
-    """A mapping of a bag, consistent in itself.
+    """Mapping of a file, checked for internal consistency.
 
     Attributes:
-        document: Text of the mapping, with the lines of its keys for error messages.
-        robot: Name of a robot, or path of an MJCF file.
-        control_timestep: Control time step, s; given with an MJCF file only.
-        controller: Path of the controller's file; None if the controller is unknown.
-        stage: Stage of the trial, such as ``before`` for a healthy robot.
-        clock: Clock of the times, ``header`` or ``log``.
+        document: Text of the mapping; errors name its lines.
+        robot: Name of a robot, or an MJCF file.
+        control_timestep: Control time step, s; with an MJCF file only.
+        controller: File of the controller.
+        stage: Stage of the trial: ``before`` for a healthy robot.
+        clock: Clock of the times: ``header`` or ``log``.
         start: Start of the trial after the first time at which every role has data, s.
         duration: Duration, s; None for as long as every role has data.
-        joints: Topic of the joint angles.
-        commands: Topic of the commands.
-        base: Topic of the base's pose, or None.
-        imu: Name of the Imu topic, or None.
-        touch: Topics by the robot's touch sensor.
+        joints: Topic of the hinges.
+        commands: Topic of the motors.
+        base: Topic of the root body.
+        imu: Name of the topic of an Imu.
+        touch: Topics by touch sensor.
     """
 
     document: Document
@@ -144,7 +143,7 @@ class BagMapping:
 
     @property
     def roles(self) -> tuple[Role, ...]:
-        """All roles of the mapping."""
+        """Roles of all mapped topics."""
         found = [
             Role("joints", ("joints",), self.joints.topic),
             Role("commands", ("commands",), self.commands.topic),

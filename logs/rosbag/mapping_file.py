@@ -1,10 +1,10 @@
-"""Reads the file of a mapping; unknown entries are errors."""
+"""Strict reader of mapping files: an entry without effect is an error."""
 
 from pathlib import Path
 from typing import Literal
 
 from selfmodel.errors import InputError
-from selfmodel.logs.files import read_bounded
+from selfmodel.files import read_file
 from selfmodel.logs.rosbag.mapping import (
     ANGLES,
     CLOCKS,
@@ -22,17 +22,17 @@ from selfmodel.logs.rosbag.tables import Table, parse_document
 from selfmodel.trials.trial import STAGES
 
 MAX_MAPPING_BYTES = 2**20
-"""Largest mapping file, in bytes."""
+"""Maximum size of a mapping, bytes."""
 
 
 def read_mapping(path: Path) -> BagMapping:
     """Returns the mapping in a file.
 
     Raises:
-        InputError: The file cannot be read, or is invalid; the sentence has the line.
+        InputError: The file cannot be read, or is invalid; the message names the line.
     """
     try:
-        text = read_bounded(path, "a mapping", MAX_MAPPING_BYTES).decode()
+        text = read_file(path, "a mapping", MAX_MAPPING_BYTES).decode()
     except UnicodeDecodeError as failure:
         raise InputError(f"{path}: expected TOML in UTF-8, got: {failure.reason}") from failure
     return parse_mapping(text, path.name)
@@ -42,8 +42,8 @@ def parse_mapping(text: str, name: str) -> BagMapping:
     """Returns the mapping in a text; see ``read_mapping``.
 
     Args:
-        text: The mapping in TOML.
-        name: Name of the text in error messages.
+        text: Text, as TOML.
+        name: Name of the text in errors.
     """
     document, tables = parse_document(text, name)
     top = Table(document, (), tables)
@@ -93,19 +93,19 @@ def _angles(table: Table, role: Literal["joints", "commands"]) -> Angles:
         order = table.texts("order")
     names = table.table("names")
     links = {name: _link(names, name, scale) for name in names.keys}
-    used: dict[str, str] = {}
+    parts: dict[str, str] = {}
     for name, link in links.items():
         if link.name == UNKNOWN:
             raise table.document.error(
                 (*names.path, name), f"{name} is still {UNKNOWN!r}: fill in its name in the bag"
             )
-        if link.name in used:
+        if link.name in parts:
             raise table.document.error(
                 (*names.path, name),
-                f"{link.name} is listed twice, for {used[link.name]} and for {name}: expected "
+                f"{link.name} is listed twice, for {parts[link.name]} and for {name}: expected "
                 f"each joint of the bag once",
             )
-        used[link.name] = name
+        parts[link.name] = name
         if order and link.name not in order:
             raise table.document.unknown((*names.path, name), "name in order", link.name, order)
     table.done()

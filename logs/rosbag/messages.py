@@ -1,4 +1,4 @@
-"""Message types that can be imported, each decoded into names and rows of numbers."""
+"""Decoders of the supported message types, into names and rows of numbers."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -25,16 +25,16 @@ WRENCH = "geometry_msgs/msg/WrenchStamped"
 NUMBERS = ("std_msgs/msg/Float64", "std_msgs/msg/Float32", "std_msgs/msg/Bool")
 
 Rows = tuple[tuple[str, ...], FloatArray]
-"""Names in a message, and a row of numbers per name, ``(names, width)``."""
+"""Names in a message, and a row of numbers for each, ``(names, width)``."""
 
 
 @dataclass(frozen=True)
 class MessageType:
-    """A message type that can be imported.
+    """Supported message type.
 
     Attributes:
-        stamped: Whether messages have a header with the time of measurement.
-        rows: Function from a decoded message to its rows.
+        stamped: Whether the message has a header with a time stamp.
+        rows: Returns the rows of a decoded message.
     """
 
     stamped: bool
@@ -42,25 +42,25 @@ class MessageType:
 
 
 class RefusedError(ValueError):
-    """A message is inconsistent; the import counts and drops the message."""
+    """A message contradicts itself; it is counted and left out."""
 
 
 class UndecodableError(ValueError):
-    """The bytes of a message do not decode as its type."""
+    """The bytes of a message do not fit its type."""
 
 
 def read_message(payload: bytes, kind: str) -> tuple[int, Rows]:
     """Returns the time stamp of a message, ns (0 if it has none), and its rows.
 
     Args:
-        payload: The message in CDR.
+        payload: Message, as CDR.
         kind: Message type, one of ``KINDS``.
 
     Raises:
-        RefusedError: The message is inconsistent.
+        RefusedError: The message contradicts itself.
         UndecodableError: The message is damaged.
     """
-    from rosbags.serde import SerdeError  # noqa: PLC0415  # slow to import
+    from rosbags.serde import SerdeError  # noqa: PLC0415 - takes a while
 
     try:
         message: Any = _types().deserialize_cdr(payload, kind)
@@ -76,8 +76,8 @@ def read_message(payload: bytes, kind: str) -> tuple[int, Rows]:
 
 @cache
 def _types() -> "Typestore":
-    """Returns the standard types; those in ``KINDS`` are the same in every ROS 2 distribution."""
-    from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415  # slow to import
+    """Standard message types. Those in KINDS are the same in every ROS 2 distribution."""
+    from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415 - takes a while
 
     return get_typestore(Stores.ROS2_HUMBLE)
 
@@ -131,12 +131,12 @@ def _pose_stamped(message: "ros.geometry_msgs__msg__PoseStamped") -> Rows:
 
 
 def _imu(message: "ros.sensor_msgs__msg__Imu") -> Rows:
-    # REP 145: a first covariance of -1 marks a quantity that is not measured.
-    has_orientation = message.orientation_covariance[0] != -1
-    has_velocity = message.angular_velocity_covariance[0] != -1
+    # REP 145: a first covariance of -1 means no measurement.
+    known = message.orientation_covariance[0] != -1
+    turning = message.angular_velocity_covariance[0] != -1
     row = [
-        *(_wxyz(message.orientation) if has_orientation else [np.nan] * 4),
-        *(_xyz(message.angular_velocity) if has_velocity else [np.nan] * 3),
+        *(_wxyz(message.orientation) if known else [np.nan] * 4),
+        *(_xyz(message.angular_velocity) if turning else [np.nan] * 3),
     ]
     return ("",), np.array([row])
 
@@ -165,10 +165,10 @@ KINDS: Mapping[str, MessageType] = MappingProxyType(
         **dict.fromkeys(NUMBERS, MessageType(stamped=False, rows=_number)),
     }
 )
-"""Message types that can be imported, by name.
+"""Supported message types by name.
 
-Widths of the rows: JointState 3 (position, velocity, effort), command types 1, Odometry and
-PoseStamped 13 (position, orientation w x y z, linear and angular velocity in the child's frame),
-Imu 7 (orientation w x y z, angular velocity), touch types 1. Quantities that a message does not
-contain are NaN. The names of the numbers of a Float64MultiArray are their indices.
+Widths: JointState 3 (position, velocity, effort), those of commands 1, Odometry and PoseStamped 13
+(position, orientation w x y z, linear and angular velocity in the child's frame), Imu 7
+(orientation w x y z, angular velocity), touch 1. Missing numbers are NaN. The columns of a
+Float64MultiArray are named by their index.
 """

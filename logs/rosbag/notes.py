@@ -1,4 +1,4 @@
-"""Remarks on an imported trial that affect the reliability of a diagnosis."""
+"""Warnings about an imported recording."""
 
 from collections.abc import Iterator, Mapping
 
@@ -10,16 +10,16 @@ from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Behaviour
 
 MAX_INITIAL_DIFFERENCE = 0.1
-"""Largest difference of a joint angle from the model's initial pose without a remark, rad."""
+"""Difference from the model's initial pose above which a joint is listed, rad."""
 
 MAX_LISTED_GAPS = 5
-"""Largest number of gaps of a topic in a remark."""
+"""Maximum listed gaps of a topic."""
 
 
 def notes(
     mapping: BagMapping, behaviour: Behaviour, qualities: Mapping[str, Quality], robot: Robot
 ) -> tuple[str, ...]:
-    """Returns the remarks, the most important first, one sentence each."""
+    """Returns the warnings, one sentence each, most important first."""
     return (
         *_pose(behaviour, robot),
         *_travel(behaviour),
@@ -32,15 +32,15 @@ def notes(
 
 def _pose(behaviour: Behaviour, robot: Robot) -> Iterator[str]:
     start = [robot.model.joint(name).qpos0[0] for name in behaviour.names.hinges]
-    differences = np.abs(behaviour["joint_positions"][0] - start)
+    apart = np.abs(behaviour["joint_positions"][0] - start)
     far = [
         f"{name} {difference:.2f}"
-        for name, difference in zip(behaviour.names.hinges, differences, strict=True)
+        for name, difference in zip(behaviour.names.hinges, apart, strict=True)
         if difference > MAX_INITIAL_DIFFERENCE
     ]
     if far:
         yield (
-            f"at the start these joints are far from the model's initial pose, in which every "
+            f"at the start these joints are far from the model's start pose, from which every "
             f"simulation begins (rad): {', '.join(far)}"
         )
 
@@ -48,23 +48,23 @@ def _pose(behaviour: Behaviour, robot: Robot) -> Iterator[str]:
 def _travel(behaviour: Behaviour) -> Iterator[str]:
     x = behaviour["base_position"][:, 0]
     if np.isnan(x).all():
-        yield "the position of the base was not observed, so the trial has no displacement"
+        yield "where the base was is not known, so this trial says nothing of displacement"
     elif np.isnan(x[[0, -1]]).any():
         yield (
-            "the position of the base was not observed at the start or at the end, so the trial "
-            "has no displacement: set another start or duration"
+            "where the base was at the start or at the end is not known, so the trial has no "
+            "displacement: set another start or duration"
         )
 
 
 def _clock(mapping: BagMapping, qualities: Mapping[str, Quality]) -> Iterator[str]:
     if mapping.clock == "log":
-        yield 'all times are log times, because of clock = "log": they include the latency'
+        yield 'all times are log times, as clock = "log" says: latency is part of them'
         return
     for topic, found in qualities.items():
         if found.fallbacks:
             yield (
                 f"{topic}: {found.fallbacks} of {found.messages} messages have no time stamp and "
-                f"get their log time, which includes the latency"
+                f"go by log time, latency included"
             )
 
 
@@ -90,7 +90,7 @@ def _left_out(qualities: Mapping[str, Quality]) -> Iterator[str]:
     for topic, found in qualities.items():
         reasons = [f"{count} {reason}" for reason, count in found.refused.items()]
         if found.repeated:
-            reasons.append(f"{found.repeated} with a repeated stamp")
+            reasons.append(f"{found.repeated} with a stamp that another has")
         if found.strays:
             reasons.append(f"{found.strays} with a stamp far from its log time")
         if reasons:

@@ -1,6 +1,6 @@
-"""Interpolation of irregular samples at the control steps.
+"""Resampling of irregular samples at the control steps, with NaN in gaps.
 
-All times are in the same unit. Results are NaN outside the samples and in gaps between them.
+All times of a call are in the same unit.
 """
 
 import numpy as np
@@ -8,14 +8,14 @@ import numpy as np
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 
 MAX_PERIOD_RATIO = 1.5
-"""Largest period between two samples without a gap, in median periods."""
+"""Minimum gap between two samples, in usual (median) periods."""
 
 
 def reach(times: FloatArray) -> float:
-    """Returns the largest period between two samples across which values are interpolated.
+    """Returns the maximum distance of two samples between which a series is interpolated.
 
     Args:
-        times: Sample times, ``(m,)``, increasing.
+        times: Times of the samples, ``(m,)``, increasing.
     """
     return MAX_PERIOD_RATIO * float(np.median(np.diff(times))) if len(times) > 1 else 0.0
 
@@ -24,13 +24,13 @@ def linear(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) 
     """Returns linearly interpolated values.
 
     Args:
-        times: Sample times, ``(m,)``, strictly increasing.
-        values: Sample values, ``(m, width)``.
-        at: Times of the control steps, ``(steps,)``.
-        limit: Largest period across which values are interpolated; see ``reach``.
+        times: Times of the samples, ``(m,)``, strictly increasing.
+        values: Samples, ``(m, width)``.
+        at: Times of the steps, ``(steps,)``.
+        limit: See ``reach``.
 
     Returns:
-        ``(steps, width)``; the exact sample at the time of a sample.
+        Values, ``(steps, width)``; exactly the sample at the time of a sample.
     """
     before, after, share, valid = _bracket(times, at, limit)
     result = np.full((len(at), values.shape[1]), np.nan)
@@ -40,25 +40,25 @@ def linear(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) 
 
 
 def angles(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -> FloatArray:
-    """Returns linearly interpolated angles, across wrap-arounds; see ``linear``.
+    """Returns angles interpolated along the shorter arc; see ``linear``.
 
     Args:
-        times: Sample times, ``(m,)``, strictly increasing.
-        values: Sample values, ``(m, width)`` rad; a jump by more than pi is a wrap-around.
-        at: Times of the control steps, ``(steps,)``.
-        limit: Largest period across which values are interpolated; see ``reach``.
+        times: Times of the samples, ``(m,)``, strictly increasing.
+        values: Angles, ``(m, width)`` rad; a jump by more than pi is a wrap-around.
+        at: Times of the steps, ``(steps,)``.
+        limit: See ``reach``.
     """
     return linear(times, np.unwrap(values, axis=0), at, limit)
 
 
 def slerp(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -> FloatArray:
-    """Returns spherically interpolated orientations, along the shortest arc.
+    """Returns orientations interpolated along the shortest arc.
 
     Args:
-        times: Sample times, ``(m,)``, strictly increasing.
-        values: Unit quaternions, ``(m, 4)``; a quaternion and its negative are equivalent.
-        at: Times of the control steps, ``(steps,)``.
-        limit: Largest period across which values are interpolated; see ``reach``.
+        times: Times of the samples, ``(m,)``, strictly increasing.
+        values: Unit quaternions of either sign, ``(m, 4)``.
+        at: Times of the steps, ``(steps,)``.
+        limit: See ``reach``.
 
     Returns:
         Unit quaternions, ``(steps, 4)``.
@@ -68,35 +68,35 @@ def slerp(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -
     low, high = values[before[valid]], values[after[valid]]
     cosine = np.sum(low * high, axis=1, keepdims=True)
     high = np.where(cosine < 0, -high, high)
-    # Half the angle from both chords: accurate for small angles, unlike the arc cosine.
+    # The angle from both chords: exact for small angles, where that of a cosine is not.
     half = np.arctan2(
         np.linalg.norm(high - low, axis=1, keepdims=True),
         np.linalg.norm(high + low, axis=1, keepdims=True),
     )
-    fraction = share[valid, np.newaxis]
-    # sin(x)/sin(a) by sinc, which is finite at a = 0.
+    part = share[valid, np.newaxis]
+    # sin(x)/sin(a) as sinc, which has its limit at 0.
     sine = np.sinc(2 * half / np.pi)
-    interpolated = (
-        (1 - fraction) * np.sinc((1 - fraction) * 2 * half / np.pi) * low
-        + fraction * np.sinc(fraction * 2 * half / np.pi) * high
+    turned = (
+        (1 - part) * np.sinc((1 - part) * 2 * half / np.pi) * low
+        + part * np.sinc(part * 2 * half / np.pi) * high
     ) / sine
-    result[valid] = interpolated / np.linalg.norm(interpolated, axis=1, keepdims=True)
+    result[valid] = turned / np.linalg.norm(turned, axis=1, keepdims=True)
     return result
 
 
 def hold(
     times: FloatArray, values: FloatArray, at: FloatArray, limit: float = np.inf
 ) -> FloatArray:
-    """Returns the last sample before each time (zero-order hold).
+    """Returns the last sample before each step (zero-order hold).
 
     Args:
-        times: Sample times, ``(m,)``, strictly increasing.
-        values: Sample values, ``(m, width)``.
-        at: Times of the control steps, ``(steps,)``.
-        limit: Largest age of a sample; infinite for commands, finite for measurements.
+        times: Times of the samples, ``(m,)``, strictly increasing.
+        values: Samples, ``(m, width)``.
+        at: Times of the steps, ``(steps,)``.
+        limit: Maximum age of a sample; infinite for commands.
 
     Returns:
-        ``(steps, width)``.
+        Values, ``(steps, width)``.
     """
     before = np.searchsorted(times, at, side="right") - 1
     result = np.full((len(at), values.shape[1]), np.nan)
@@ -109,10 +109,10 @@ def hold(
 def _bracket(
     times: FloatArray, at: FloatArray, limit: float
 ) -> tuple[IndexArray, IndexArray, FloatArray, BoolArray]:
-    """Returns the samples before and after each time, the fraction between them, and validity."""
+    """Samples before and after each time, the fraction between them, and its validity."""
     if not len(times):
-        indices = np.zeros(len(at), dtype=np.intp)
-        return indices, indices, np.zeros(len(at)), np.zeros(len(at), dtype=bool)
+        nowhere = np.zeros(len(at), dtype=np.intp)
+        return nowhere, nowhere, np.zeros(len(at)), np.zeros(len(at), dtype=bool)
     last = len(times) - 1
     before = np.searchsorted(times, at, side="right") - 1
     inside = before >= 0

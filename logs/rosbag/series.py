@@ -1,4 +1,4 @@
-"""Messages of topics as columns of numbers, by name."""
+"""Messages of topics as columns of numbers by name."""
 
 from collections import Counter
 from collections.abc import Collection, Mapping
@@ -21,7 +21,7 @@ class Column:
 
     Attributes:
         index: Indices of the messages with that name, ``(m,)``.
-        values: Rows of these messages, ``(m, width)``; see ``KINDS``.
+        values: Numbers, ``(m, width)``; see ``KINDS``.
     """
 
     index: IndexArray
@@ -30,15 +30,14 @@ class Column:
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """The messages of a topic.
+    """Messages of a topic.
 
     Attributes:
         topic: The topic.
-        stamps: Measurement time in the header of each message, ``(n,)`` ns; 0 for messages
-            without a header.
-        logged: Time of reception of each message, ``(n,)`` ns.
-        columns: Columns by the names in the messages; the names may differ between messages.
-        refused: Number of dropped messages, by reason.
+        stamps: Time stamps, ``(n,)`` ns; 0 without a stamp.
+        logged: Log times, ``(n,)`` ns.
+        columns: Columns by name; each message may have other names.
+        refused: Numbers of messages left out, by reason.
     """
 
     topic: Topic
@@ -49,14 +48,14 @@ class Series:
 
 
 def read_series(bag: Bag, wanted: Collection[str]) -> dict[str, Series]:
-    """Returns the messages of some topics of a bag, read in one pass.
+    """Returns the messages of some topics of a bag, in one pass.
 
     Args:
-        bag: The recording.
+        bag: The bag.
         wanted: Names of topics of the bag, of types in ``KINDS``.
 
     Raises:
-        LogError: A message is damaged, or its encoding is not CDR.
+        LogError: A message is damaged, or has an unknown encoding.
     """
     for name in wanted:
         if bag.topics[name].encoding != "cdr":
@@ -65,28 +64,26 @@ def read_series(bag: Bag, wanted: Collection[str]) -> dict[str, Series]:
                 f"expected messages in cdr on {name}, got {bag.topics[name].encoding!r}",
                 advice="record it with an RMW that uses DDS",
             )
-    builders = {name: _SeriesBuilder() for name in wanted}
+    gathered = {name: _Gathered() for name in wanted}
     for name, time, payload in bag.messages(wanted):
         try:
             stamp, rows = read_message(payload, bag.topics[name].type)
         except RefusedError as refused:
-            builders[name].refused[str(refused)] += 1
+            gathered[name].refused[str(refused)] += 1
         except UndecodableError as failure:
             raise CorruptError(
                 bag.path, f"a message on {name} is damaged: {failure}", advice="record it again"
             ) from failure
         else:
-            builders[name].add(stamp, time, rows)
-    return {name: found.series(bag.topics[name]) for name, found in builders.items()}
+            gathered[name].add(stamp, time, rows)
+    return {name: found.series(bag.topics[name]) for name, found in gathered.items()}
 
 
 @dataclass
-class _SeriesBuilder:
-    """Collects the messages of a topic one by one."""
-
+class _Gathered:
     stamps: list[int] = field(default_factory=list)
     logged: list[int] = field(default_factory=list)
-    # Keyed by the names in a message, which rarely change between messages.
+    # By the names in a message, nearly always the names of the message before.
     layouts: dict[tuple[str, ...], tuple[list[int], list[FloatArray]]] = field(default_factory=dict)
     refused: Counter[str] = field(default_factory=Counter)
 

@@ -1,4 +1,4 @@
-"""Signals of a behaviour at the control steps, interpolated from tracks."""
+"""Signals of a behaviour at the control steps, from tracks."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -17,16 +17,15 @@ from selfmodel.trials.behaviour import Signal
 from selfmodel.trials.rotation import rotated
 
 Interpolation = Callable[[FloatArray, FloatArray, FloatArray, float], FloatArray]
-"""Function from sample times, values, query times and the largest gap to values; see ``linear``."""
 
 
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """The control steps of a trial.
+    """Control steps of a trial.
 
     Attributes:
-        origin: Time of the first step, ns since 1970.
-        at: Times of the steps from the origin, ``(steps,)`` ns.
+        origin: Time of the first step, ns.
+        at: Times after the first step, ``(steps,)`` ns.
     """
 
     origin: int
@@ -34,9 +33,9 @@ class Steps:
 
 
 def joint_signals(tracks: Tracks, robot: Robot, steps: Steps) -> dict[Signal, FloatArray]:
-    """Returns the joint signals.
+    """Returns positions, velocities and efforts of the hinges.
 
-    Angles are unwrapped for unlimited hinges only, because a limited hinge makes no full turn.
+    Only the angle of a hinge without limits can wrap around.
     """
     anatomy, model = robot.anatomy, robot.model
     positions = [
@@ -51,20 +50,20 @@ def joint_signals(tracks: Tracks, robot: Robot, steps: Steps) -> dict[Signal, Fl
 
 
 def command_signals(tracks: Tracks, anatomy: Anatomy, steps: Steps) -> dict[Signal, FloatArray]:
-    """Returns the commands; a command is held until the next one."""
-    return {"commands": _columns(tracks.commands, anatomy.motors, steps, _held_command)}
+    """Returns the commands; each is held until the next."""
+    return {"commands": _columns(tracks.commands, anatomy.motors, steps, _standing)}
 
 
 def sensor_signals(
     tracks: Tracks, anatomy: Anatomy, steps: Steps, joint_positions: FloatArray
 ) -> dict[Signal, FloatArray]:
-    """Returns the normalised sensor readings of the robot.
+    """Returns the readings of the robot's sensors.
 
     Args:
-        tracks: Tracks with those of the touch sensors.
-        anatomy: The robot's parts.
-        steps: The control steps.
-        joint_positions: Angles that the angle sensors measure, ``(steps, hinges)`` rad.
+        tracks: Tracks, of which those of touch sensors are read.
+        anatomy: Parts of the robot.
+        steps: Control steps.
+        joint_positions: Joint angles, the readings of angle sensors, ``(steps, hinges)`` rad.
     """
     readings = np.full((len(steps.at), len(anatomy.sensors)), np.nan)
     for column, sensor in enumerate(anatomy.sensors):
@@ -77,24 +76,23 @@ def sensor_signals(
 
 
 def base_signals(tracks: Tracks, steps: Steps, *, from_start: bool) -> dict[Signal, FloatArray]:
-    """Returns the signals of the base.
+    """Returns the pose and velocities of the root body.
 
     Args:
-        tracks: Tracks with those of the base.
-        steps: The control steps.
-        from_start: Whether the signals are relative to the first step: the base then starts at
-            x = y = 0 and heads along +x.
+        tracks: Tracks, of which those of the base are read.
+        steps: Control steps.
+        from_start: Whether to transform the trial to begin at x = y = 0 heading along +x.
 
     Raises:
-        ValueError: ``from_start``, and the pose at the first step was not observed.
+        ValueError: The initial pose, which the transform needs, is unknown.
     """
     position = _wide(_at(tracks.base_position, steps, linear), 3)
     orientation = _wide(_at(tracks.base_orientation, steps, slerp), 4)
     velocity = _wide(_at(tracks.base_linear_velocity, steps, linear), 3)
     if from_start:
-        recorded = [(tracks.base_position, position), (tracks.base_orientation, orientation)]
-        if any(len(track.times) and np.isnan(rows[0]).any() for track, rows in recorded):
-            raise ValueError("the pose of the base at the start of the trial is not known")
+        required = [(tracks.base_position, position), (tracks.base_orientation, orientation)]
+        if any(len(track.times) and np.isnan(rows[0]).any() for track, rows in required):
+            raise ValueError("where the base is at the start of the trial is not known")
         if len(tracks.base_orientation.times):
             rotation = heading_removal(orientation[0])
             orientation = rotate_world(orientation, rotation)
@@ -116,7 +114,7 @@ def _columns(
 
 
 def _at(track: Track, steps: Steps, method: Interpolation) -> FloatArray:
-    # float64 represents nanoseconds since the start exactly for a hundred days.
+    # float64 represents nanoseconds exactly for a hundred days.
     times = (track.times - steps.origin).astype(np.float64)
     at = steps.at.astype(np.float64)
     if not len(times):
@@ -124,13 +122,11 @@ def _at(track: Track, steps: Steps, method: Interpolation) -> FloatArray:
     return method(times, track.values, at, reach(times))
 
 
-def _held_command(
-    times: FloatArray, values: FloatArray, at: FloatArray, limit: float
-) -> FloatArray:
+def _standing(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -> FloatArray:
     del limit
     return hold(times, values, at)
 
 
 def _wide(values: FloatArray, width: int) -> FloatArray:
-    """Returns values of a fixed width: a track without samples has one column, of NaN."""
+    """Values with ``width`` columns; a track without samples has one column."""
     return values if values.shape[1] == width else np.full((len(values), width), np.nan)

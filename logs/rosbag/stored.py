@@ -1,19 +1,19 @@
-"""Records of a bag file of any storage: announced topics, and messages as bytes."""
+"""Records of a bag's file in any format: announced topics, and messages as bytes."""
 
 from dataclasses import dataclass
 
 MAX_LOG_TIME = 2**62
-"""Upper bound of log times, ns since 1970: the year 2116; sums of two times fit 64 bits."""
+"""Maximum log time of a bag, ns: the year 2116; sums still fit 64 bits."""
 
 
 @dataclass(frozen=True)
 class Announced:
-    """A topic that a file declares.
+    """Announcement of a topic in a file.
 
     Attributes:
-        topic: Name of the topic.
-        type: Message type, as written in the file.
-        encoding: Encoding of the messages; only ``cdr`` can be read.
+        topic: Name in the file.
+        type: Message type in the file.
+        encoding: Encoding of the messages; only ``cdr`` is supported.
     """
 
     topic: str
@@ -23,11 +23,11 @@ class Announced:
 
 @dataclass(frozen=True)
 class Stored:
-    """A message of a file, not decoded.
+    """Message in a file.
 
     Attributes:
         topic: Name of the topic.
-        time: Time of reception, ns since 1970.
+        time: Log time, ns.
         payload: Bytes of the message, possibly compressed with zstd.
     """
 
@@ -37,14 +37,14 @@ class Stored:
 
 
 class DamageError(ValueError):
-    """The content of a file is invalid."""
+    """The content of a file is impossible."""
 
 
 def checked_time(time: object) -> int:
-    """Returns a validated log time, ns.
+    """Returns a valid log time, ns.
 
     Raises:
-        DamageError: The time is no whole number from 0 to ``MAX_LOG_TIME``.
+        DamageError: The time is invalid.
     """
     if not isinstance(time, int) or not 0 <= time < MAX_LOG_TIME:
         raise DamageError(f"a message has the log time {time!r} ns")

@@ -1,8 +1,8 @@
-"""Reads the MCAP file of a bag, in one pass from its start.
+"""Reader of the MCAP file of a bag, in one pass.
 
-Recorders write neither checksums nor, with some presets, an index, and the file may be a part of a
-split recording. So the requirements on a trial log do not apply. The checks are those that the file
-allows: the checksums other than 0, and the count of messages.
+Recorders write no checksums and, with some presets, no index, and the file may be part of a split
+recording. Unlike in a trial log, none of these is required; checksums other than 0 and the count
+of messages are verified.
 """
 
 import struct
@@ -15,33 +15,33 @@ from mcap.exceptions import EndOfFile, InvalidMagic, McapError
 from mcap.records import Channel, Chunk, Footer, McapRecord, Message, Schema, Statistics
 from mcap.stream_reader import StreamReader, breakup_chunk
 
+from selfmodel.logs.decompress import LARGEST
 from selfmodel.logs.errors import CorruptError, LogError, NotMcapError, TruncatedError
 from selfmodel.logs.framing import unpack_chunk
 from selfmodel.logs.rosbag.stored import Announced, DamageError, Stored, checked_time
-from selfmodel.logs.unpack import LARGEST
 
-ADVICE = "record it again, or recover the complete messages with `mcap recover`"
+ADVICE = "record it again, or recover what is whole with `mcap recover`"
 
 _FAILURES = (
     McapError,
-    ValueError,  # checksums, invalid UTF-8, and DamageError
+    ValueError,  # checksums, invalid text, and DamageError
     RuntimeError,  # lz4
     struct.error,
     zstandard.ZstdError,
     MemoryError,
     OverflowError,
 )
-"""Exceptions of the library and its decompressors for damaged bytes."""
+"""Exceptions that the mcap library and its decompressors raise for damaged bytes."""
 
 
 def read_mcap(path: Path, name: Path) -> Iterator[Announced | Stored]:
-    """Yields the topics and messages of a file, in the order of the file.
+    """Yields the records of a file, in order.
 
-    The file is complete if the iteration ends without an exception.
+    The file is undamaged if the iteration ends without an exception.
 
     Args:
         path: The file.
-        name: Path in error messages: that of the file before decompression.
+        name: Name of the file in errors: the name before decompression.
 
     Raises:
         LogError: The file is damaged or ends too early.
@@ -54,7 +54,7 @@ def read_mcap(path: Path, name: Path) -> Iterator[Announced | Stored]:
                 count += isinstance(item, Stored)
                 yield item
     except _FAILURES as failure:
-        raise _as_log_error(name, failure, f"{count} messages before that can be read") from failure
+        raise _explained(name, failure, f"{count} messages before that can be read") from failure
 
 
 def _items(file: IO[bytes]) -> Iterator[Announced | Stored]:
@@ -77,7 +77,7 @@ def _items(file: IO[bytes]) -> Iterator[Announced | Stored]:
         elif isinstance(record, Statistics):
             claimed = record.message_count
     if claimed is not None and claimed != count:
-        raise DamageError(f"its statistics say {claimed} messages, it holds {count}")
+        raise DamageError(f"its statistics have {claimed} messages, its records {count}")
     if file.read(1):
         raise DamageError("something follows its end")
 
@@ -102,12 +102,12 @@ def _unpacked(chunk: Chunk) -> Chunk:
     return chunk
 
 
-def _as_log_error(name: Path, failure: Exception, good: str) -> LogError:
+def _explained(name: Path, failure: Exception, good: str) -> LogError:
     if isinstance(failure, InvalidMagic):
         return NotMcapError(
             name, "its first or last bytes are not those of MCAP", good=good, advice=ADVICE
         )
     if isinstance(failure, (EndOfFile, struct.error)):
         return TruncatedError(name, "the file ends too early", good=good, advice=ADVICE)
-    reason = f"the file is damaged: {failure or type(failure).__name__}"
-    return CorruptError(name, reason, good=good, advice=ADVICE)
+    what = f"the file is damaged: {failure or type(failure).__name__}"
+    return CorruptError(name, what, good=good, advice=ADVICE)

@@ -1,4 +1,4 @@
-"""Reads the SQLite file of a bag (``.db3``), the default of ROS 2 up to Humble."""
+"""Reader of the SQLite file of a bag (``.db3``), the default of ROS 2 up to Humble."""
 
 import shlex
 import sqlite3
@@ -6,22 +6,22 @@ from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
+from selfmodel.logs.decompress import LARGEST
 from selfmodel.logs.errors import CorruptError, IncompleteError
 from selfmodel.logs.rosbag.stored import Announced, DamageError, Stored, checked_time
-from selfmodel.logs.unpack import LARGEST
 
 SQLITE_MAGIC = b"SQLite format 3\x00"
 
 
 def read_sqlite(path: Path, name: Path) -> Iterator[Announced | Stored]:
-    """Yields the topics of a file, then its messages in the order of the recording.
+    """Yields the records of a file: topics, then messages in the order of their recording.
 
     Args:
-        path: The file, which is read only.
-        name: Path in error messages: that of the file before decompression.
+        path: The file; it is only read.
+        name: Name of the file in errors: the name before decompression.
 
     Raises:
-        CorruptError: The file is damaged, or no rosbag2 recording.
+        CorruptError: The file is damaged, or not a rosbag2 recording.
     """
     _refuse_unfinished(path, name)
     count = 0
@@ -34,38 +34,38 @@ def read_sqlite(path: Path, name: Path) -> Iterator[Announced | Stored]:
             name,
             f"the file is damaged or no rosbag2 recording: {failure}",
             good=f"{count} messages before that can be read",
-            advice="record it again, or recover the complete messages with `sqlite3 FILE .recover`",
+            advice="record it again, or recover what is whole with `sqlite3 FILE .recover`",
         ) from failure
 
 
 _FAILURES = (
     sqlite3.Error,
-    ValueError,  # invalid UTF-8, and DamageError
+    ValueError,  # invalid text, and DamageError
     OverflowError,
     MemoryError,
 )
-"""Exceptions for damaged bytes."""
+"""Exceptions of a damaged file."""
 
 
 def _refuse_unfinished(path: Path, name: Path) -> None:
-    """Checks that SQLite has written all of a recording into its file.
+    """Checks that no write-ahead log or rollback journal is beside the file.
 
     Raises:
-        IncompleteError: There is a write-ahead log or a rollback journal that is not empty.
+        IncompleteError: Such a file exists.
     """
     for suffix in ("-wal", "-journal"):
-        pending = path.with_name(path.name + suffix)
-        if pending.is_file() and pending.stat().st_size:
+        beside = path.with_name(path.name + suffix)
+        if beside.is_file() and beside.stat().st_size:
             raise IncompleteError(
                 name,
-                f"its recorder did not close it: {pending.name} has data that is not in it yet",
-                advice=f"merge them with `sqlite3 {shlex.quote(str(path))} "
+                f"its recorder did not close it: {beside.name} holds what is not in it yet",
+                advice=f"bring them together with `sqlite3 {shlex.quote(str(path))} "
                 f"'PRAGMA wal_checkpoint(TRUNCATE)'`",
             )
 
 
 def _items(path: Path) -> Iterator[Announced | Stored]:
-    # Immutable: SQLite cannot create lock files on a read-only disk.
+    # Immutable: SQLite cannot create its lock files on a read-only disk.
     address = f"{path.resolve().as_uri()}?mode=ro&immutable=1"
     with closing(sqlite3.connect(address, uri=True)) as database:
         database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST)
@@ -76,7 +76,7 @@ def _items(path: Path) -> Iterator[Announced | Stored]:
             "SELECT id, name, type, serialization_format FROM topics ORDER BY id"
         ):
             if not all(isinstance(text, str) for text in (topic, kind, encoding)):
-                raise DamageError(f"topic {number!r} has a description that is no text")
+                raise DamageError(f"topic {number!r} is described by what is no text")
             topics[number] = topic
             yield Announced(topic, kind, encoding)
         for number, time, payload in database.execute(
@@ -88,7 +88,7 @@ def _items(path: Path) -> Iterator[Announced | Stored]:
 
 
 def _check(database: sqlite3.Connection) -> None:
-    """Checks that both tables exist and are no views, which could compute without end."""
+    """Checks the tables of a recording; a view in place of a table might never end."""
     tables = {
         name
         for name, sql in database.execute("SELECT name, sql FROM sqlite_master WHERE type='table'")

@@ -1,4 +1,4 @@
-"""Suggests a mapping for a bag and a robot.
+"""Suggestion of a mapping from a bag and a robot.
 
 Comments mark uncertain entries: ``CHECK`` marks a guess, ``CHANGE`` an entry to fill in.
 """
@@ -17,19 +17,19 @@ _COMMANDED = ("command", "cmd", "target", "desired", "setpoint", "goal", "refere
 
 
 def suggest(bag: Bag, robot: Robot, name: str, *, with_timestep: bool) -> str:
-    """Returns a suggested mapping as TOML.
+    """Returns the suggestion of a mapping, as TOML.
 
     Args:
-        bag: The recording.
-        robot: The robot of the trial.
-        name: Robot in the mapping: its name, or its MJCF file.
-        with_timestep: Whether the mapping contains the control time step.
+        bag: The bag.
+        robot: Robot of the recording.
+        name: Name of the robot in the mapping, or its MJCF file.
+        with_timestep: Whether the mapping must contain the control time step.
 
     Raises:
         LogError: A message of the bag is damaged.
     """
     hinges, motors = robot.anatomy.hinges, robot.anatomy.motors
-    joints, commands = _accepted_topics(bag, "joints"), _accepted_topics(bag, "commands")
+    joints, commands = _able(bag, "joints"), _able(bag, "commands")
     series = read_series(bag, {topic.name for topic in (*joints, *commands)})
     joints = [topic for topic in joints if not _is_command(topic)]
     joints.sort(key=lambda topic: -_fit(series[topic.name], hinges))
@@ -45,8 +45,8 @@ def suggest(bag: Bag, robot: Robot, name: str, *, with_timestep: bool) -> str:
             f"# s; CHECK: how often the robot is commanded"
         )
     lines += [
-        '# controller = "gait.npz"  # the controller of the robot, if it is known',
-        '# stage = "before"  # of a healthy robot',
+        '# controller = "gait.npz"  # controller of the robot, if known',
+        '# stage = "before"  # of the healthy robot',
         'clock = "header"  # or "log", if the time stamps are of another clock',
         "# start = 0.0      # s after the first moment at which every role has data",
         "# duration = 10.0  # s",
@@ -62,14 +62,14 @@ def suggest(bag: Bag, robot: Robot, name: str, *, with_timestep: bool) -> str:
     return "\n".join(lines).rstrip() + "\n"
 
 
-def _accepted_topics(bag: Bag, kind: RoleKind) -> list[Topic]:
-    """Returns the topics that a role accepts, sorted by the role's preference of types."""
-    accepted = [
+def _able(bag: Bag, kind: RoleKind) -> list[Topic]:
+    """Topics that can play a role, in the order of the role's types."""
+    able = [
         topic
         for topic in bag.topics.values()
         if topic.type in TYPES[kind] and topic.encoding == "cdr" and topic.count
     ]
-    return sorted(accepted, key=lambda topic: TYPES[kind].index(topic.type))
+    return sorted(able, key=lambda topic: TYPES[kind].index(topic.type))
 
 
 def _is_command(topic: Topic) -> bool:
@@ -77,7 +77,7 @@ def _is_command(topic: Topic) -> bool:
 
 
 def _fit(series: Series, parts: Sequence[str]) -> int:
-    """Returns the number of the robot's parts whose names match names on a topic."""
+    """Number of parts of the robot with a matching name on a topic."""
     if series.topic.type == ARRAY:
         return len(parts) if len(series.columns) == len(parts) else 0
     return len(matched(parts, list(series.columns)))
@@ -94,14 +94,14 @@ def _angles(
     parts: Sequence[str],
     order: tuple[str, ...],
 ) -> Iterator[str]:
-    """Yields the lines of the table of the joints or commands.
+    """Table of the joints or of the commands.
 
     Args:
         table: Name of the table.
-        topics: Topics that the role accepts, the most likely first.
+        topics: Topics that can play the role, most likely first.
         series: Messages by topic.
         parts: Hinges or motors of the robot.
-        order: Likely names of the numbers of a Float64MultiArray, in order.
+        order: Likely names of the columns of a Float64MultiArray, in order.
     """
     yield f"[{table}]"
     yield _topic(topics)
@@ -111,7 +111,7 @@ def _angles(
         offered = _names(series, topics[:1])
         if topics[0].type == ARRAY:
             offered = _order(len(offered), order)
-            yield f"order = [{', '.join(map(_quoted, offered))}]  # CHECK: the bag has no order"
+            yield f"order = [{', '.join(map(_quoted, offered))}]  # CHECK: the bag has no names"
     yield f"[{table}.names]  # each may also be {{ name = ..., sign = -1, offset = 0.1 }}"
     found = matched(parts, offered)
     for part in parts:
@@ -131,15 +131,15 @@ def _link(guess: NameMatch | None, offered: Sequence[str]) -> str:
 
 def _topic(topics: Sequence[Topic]) -> str:
     if not topics:
-        return f'topic = "{UNKNOWN}"  # CHANGE: the bag has no topic of an accepted type'
+        return f'topic = "{UNKNOWN}"  # CHANGE: the bag has none of a type that fits'
     others = ", ".join("".join(map(_escaped, topic.name)) for topic in topics[1:])
     return f"topic = {_quoted(topics[0].name)}" + (f"  # CHECK: or {others}" if others else "")
 
 
 def _base(bag: Bag) -> Iterator[str]:
-    topics = _accepted_topics(bag, "base")
+    topics = _able(bag, "base")
     if not topics:
-        yield "# No topic has the pose of the base: the trial has no displacement."
+        yield "# No topic has the position of the base: the trial has no displacement."
         yield ""
         return
     yield "[base]"
@@ -152,7 +152,7 @@ def _base(bag: Bag) -> Iterator[str]:
 
 
 def _imu(bag: Bag) -> Iterator[str]:
-    if topics := _accepted_topics(bag, "imu"):
+    if topics := _able(bag, "imu"):
         yield "[imu]  # CHECK: its axes must be those of the root body"
         yield _topic(topics)
         yield ""
@@ -160,9 +160,7 @@ def _imu(bag: Bag) -> Iterator[str]:
 
 def _touches(bag: Bag, sensors: Sequence[str]) -> Iterator[str]:
     topics = {
-        topic.name: topic
-        for topic in _accepted_topics(bag, "touch")
-        if topic.type in (WRENCH, *NUMBERS)
+        topic.name: topic for topic in _able(bag, "touch") if topic.type in (WRENCH, *NUMBERS)
     }
     found = matched(sensors, list(topics))
     for sensor in sensors:
@@ -174,12 +172,12 @@ def _touches(bag: Bag, sensors: Sequence[str]) -> Iterator[str]:
         yield f"[touch.{_key(sensor)}]"
         yield f"topic = {_quoted(topic.name)}{unsure}"
         if not topic.type.endswith("Bool"):
-            yield "threshold = 5.0  # CHECK: the reading is 1 above this"
+            yield "threshold = 5.0  # CHECK: it reads 1 above this"
         yield ""
 
 
 def _quoted(text: str) -> str:
-    """Returns a text as a TOML string: names in a bag may have any character."""
+    """TOML string of a text; names in a bag may contain any character."""
     return f'"{"".join(map(_escaped, text))}"'
 
 

@@ -1,4 +1,4 @@
-"""Strict TOML reader whose errors contain the line of the entry."""
+"""Strict TOML reader; each error names its line."""
 
 import re
 import tomllib
@@ -11,7 +11,7 @@ from selfmodel.errors import InputError, unknown_name
 Name = TypeVar("Name", bound=str)
 
 Keys = tuple[str, ...]
-"""Path of an entry: the names of its tables, then its key."""
+"""Path of an entry: names of its tables, then its key."""
 
 _KEY = r"""(?:[A-Za-z0-9_-]+|"(?:[^"\\]|\\.)*"|'[^']*')"""
 _KEYS = rf"{_KEY}(?:\s*\.\s*{_KEY})*"
@@ -21,12 +21,12 @@ _ENTRY = re.compile(rf"\s*({_KEYS})\s*=")
 
 @dataclass(frozen=True)
 class Document:
-    """A TOML text with the lines of its entries.
+    """TOML text with the lines of its entries.
 
     Attributes:
-        name: Name of the text in error messages.
+        name: Name of the text in errors.
         text: The text.
-        lines: Line of each key and table, from 1; keys of inline tables are not included.
+        lines: Line of each key and table, from 1; keys of inline tables are left out.
     """
 
     name: str
@@ -34,13 +34,12 @@ class Document:
     lines: Mapping[Keys, int]
 
     def error(self, path: Keys, sentence: str, item: str = "") -> InputError:
-        """Returns an error that contains the line of an entry.
+        """Returns an error that names the line of an entry.
 
         Args:
-            path: Path of the entry; an entry without a line of its own has the line of the
-                smallest entry that contains it.
-            sentence: Sentence with the expected value, the given value and the remedy.
-            item: Text in a list of the entry, which may be some lines below.
+            path: Path of the entry; for an entry without its own line, the line of its table.
+            sentence: Expected value, given value, and remedy.
+            item: Text in a list under that key, which may be some lines below.
         """
         known = next((path[:n] for n in range(len(path), 0, -1) if path[:n] in self.lines), ())
         line = self.lines.get(known, 1)
@@ -50,17 +49,17 @@ class Document:
         return InputError(f"{self.name}:{line}: {sentence}")
 
     def unknown(
-        self, path: Keys, kind: str, name: str, known: Iterable[str], item: str = ""
+        self, path: Keys, what: str, name: str, known: Iterable[str], item: str = ""
     ) -> InputError:
         """Returns the error for a name that is not in ``known``; see ``error``."""
-        return self.error(path, str(unknown_name(kind, name, known)), item)
+        return self.error(path, str(unknown_name(what, name, known)), item)
 
 
 def parse_document(text: str, name: str) -> tuple[Document, dict[str, Any]]:
-    """Returns a TOML text as a document and as its tables.
+    """Returns the document and the tables of a TOML text.
 
     Raises:
-        InputError: The text is no TOML, or has an entry twice.
+        InputError: The text is not TOML, or has a duplicate entry.
     """
     document = Document(name, text, _lines(text))
     try:
@@ -70,11 +69,11 @@ def parse_document(text: str, name: str) -> tuple[Document, dict[str, Any]]:
         found = re.search(r" \(at line (\d+), column \d+\)", reason)
         line = int(found[1]) if found else max(1, text.count("\n"))
         reason = reason.replace(found[0] if found else "", "")
-        raise InputError(f"{name}:{line}: {_described_error(reason, text, line)}") from failure
+        raise InputError(f"{name}:{line}: {_explained(reason, text, line)}") from failure
 
 
-def _described_error(reason: str, text: str, line: int) -> str:
-    entry = _ENTRY.match(text.split("\n")[line - 1])  # not splitlines: TOML ends lines with \n only
+def _explained(reason: str, text: str, line: int) -> str:
+    entry = _ENTRY.match(text.split("\n")[line - 1])  # not splitlines: TOML has no other line end
     if reason == "Cannot overwrite a value" and entry:
         return f"{entry[1]} is listed twice: expected each name once, remove one of the two"
     if reason.startswith(("Cannot declare", "Cannot mutate")):
@@ -101,7 +100,7 @@ def _names(keys: str) -> Keys:
 
 
 class Table:
-    """A TOML table whose entries are removed one by one; entries that are left are errors.
+    """Table whose entries are taken one by one; an entry that is not taken is an error.
 
     Args:
         document: Document of the table.
@@ -116,10 +115,10 @@ class Table:
         self._known: list[str] = []
 
     def text(self, key: str, default: str | None = None) -> str:
-        """Removes and returns a text.
+        """Takes a text.
 
         Raises:
-            InputError: The entry is missing, or has another type; also in the other methods.
+            InputError: The entry is missing or not a text; likewise in the other methods.
         """
         value = self._take(key, default)
         if not isinstance(value, str):
@@ -127,7 +126,7 @@ class Table:
         return value
 
     def choice(self, key: str, known: Iterable[Name], default: Name | None = None) -> Name:
-        """Removes and returns a text that is one of ``known``."""
+        """Takes a text that is one of ``known``."""
         value = self.text(key, default)
         names = list(known)
         if value not in names:
@@ -135,15 +134,15 @@ class Table:
         return names[names.index(value)]
 
     def number(self, key: str, default: float | None = None) -> float:
-        """Removes and returns a finite number."""
+        """Takes a finite number."""
         value = self._take(key, default)
-        # bool is a subclass of int; TOML floats include inf and nan.
+        # A bool is an int to Python; infinity and nan are floats to TOML.
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < 1e15:
             raise self._wrong(key, "a number", value)
         return float(value)
 
     def texts(self, key: str) -> tuple[str, ...]:
-        """Removes and returns a list of different texts."""
+        """Takes a list of distinct texts."""
         value = self._take(key, None)
         if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
             raise self._wrong(key, "a list of texts", value)
@@ -154,32 +153,32 @@ class Table:
         return tuple(value)
 
     def table(self, key: str) -> "Table":
-        """Removes and returns a table."""
+        """Takes a table."""
         value = self._take(key, None)
         if not isinstance(value, dict):
             raise self._wrong(key, "a table", value)
         return Table(self.document, (*self.path, key), value)
 
     def value(self, key: str) -> object:
-        """Removes and returns an entry of any type."""
+        """Takes an entry of any type."""
         return self._take(key, None)
 
     def has(self, key: str) -> bool:
-        """Returns whether the table still has an entry."""
+        """Returns whether there is an entry that has not been taken."""
         if key not in self._known:
             self._known.append(key)
         return key in self._entries
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """Keys of the entries that are left."""
+        """Keys of the entries that have not been taken."""
         return tuple(self._entries)
 
     def done(self) -> None:
-        """Checks that no entry is left.
+        """Checks that all entries have been taken.
 
         Raises:
-            InputError: An entry is left: its key is unknown.
+            InputError: An entry has not been taken.
         """
         for key in self._entries:
             where = f"[{'.'.join(self.path)}]" if self.path else "the mapping"

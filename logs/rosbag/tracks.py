@@ -1,4 +1,4 @@
-"""Tracks of a robot's parts in a bag, in the units and signs of the model."""
+"""Time series of each part of the robot, in the model's units and signs."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,23 +14,23 @@ if TYPE_CHECKING:
     from selfmodel.arrays import FloatArray
 
 _POSITION, _VELOCITY, _EFFORT = slice(0, 1), slice(1, 2), slice(2, 3)
-_NO_SAMPLES = Track(np.zeros(0, dtype=np.int64), np.zeros((0, 1)))
+_NOTHING = Track(np.zeros(0, dtype=np.int64), np.zeros((0, 1)))
 
 
 @dataclass(frozen=True, eq=False)
 class Tracks:
-    """All tracks of a recording; a quantity that was not recorded has a track without samples.
+    """Tracks of a recording; a missing quantity is a track without samples.
 
     Attributes:
         positions: Joint angles by hinge, rad.
         velocities: Joint velocities by hinge, rad/s.
         efforts: Joint torques by hinge, N m.
         commands: Commanded angles by motor, rad.
-        touch: Touch readings by sensor, 0 or 1.
-        base_position: Position of the base in the recorded frame, m.
-        base_orientation: Orientation of the base in the recorded frame, unit quaternions w x y z.
-        base_linear_velocity: Linear velocity of the base in its own frame, m/s.
-        base_angular_velocity: Angular velocity of the base in its own frame, rad/s.
+        touch: Readings by touch sensor, 0 or 1.
+        base_position: Position in the recorded frame, m.
+        base_orientation: Unit quaternions, w x y z, in the recorded frame.
+        base_linear_velocity: Linear velocity in the frame of the base, m/s.
+        base_angular_velocity: Angular velocity in the frame of the base, rad/s.
     """
 
     positions: Mapping[str, Track]
@@ -50,14 +50,14 @@ def read_tracks(
     """Returns the tracks of a recording.
 
     Args:
-        mapping: Mapping from parts to topics, checked against the series.
+        mapping: Mapping, checked against the series.
         series: Messages by topic.
         clocks: Times by topic.
     """
 
     def of(topic: str, name: str, wanted: slice) -> Track:
         column = series[topic].columns.get(name)
-        return _NO_SAMPLES if column is None else track(clocks[topic], column, wanted)
+        return _NOTHING if column is None else track(clocks[topic], column, wanted)
 
     joints, commands = mapping.joints, mapping.commands
     positions, velocities, efforts = {}, {}, {}
@@ -75,7 +75,7 @@ def read_tracks(
     for sensor, touch in mapping.touch.items():
         found = of(touch.topic, touch.column, _POSITION)
         touches[sensor] = Track(found.times, (found.values > touch.threshold).astype(np.float64))
-    position = orientation = linear = angular = _NO_SAMPLES
+    position = orientation = linear = angular = _NOTHING
     if mapping.base is not None:
         topic, scale = mapping.base.topic, mapping.base.scale
         position = _scaled(of(topic, "", slice(0, 3)), scale)
@@ -85,7 +85,7 @@ def read_tracks(
     if mapping.imu is not None:
         if mapping.base is None:
             orientation = _unit(of(mapping.imu, "", slice(0, 4)))
-        # A gyroscope measures the angular velocity; odometry derives it at best.
+        # A gyroscope measures the angular velocity; odometry derives it.
         measured = of(mapping.imu, "", slice(4, 7))
         angular = measured if len(measured.times) else angular
     return Tracks(
@@ -94,7 +94,7 @@ def read_tracks(
 
 
 def required(mapping: BagMapping, tracks: Tracks) -> list[tuple[Role, str, Track]]:
-    """Returns the tracks that a trial requires, with the role and the part of each."""
+    """Returns the tracks that a trial requires, each with its role and part."""
     roles = {role.path: role for role in mapping.roles}
     found = [(roles["joints",], hinge, track) for hinge, track in tracks.positions.items()]
     found += [(roles["commands",], motor, track) for motor, track in tracks.commands.items()]
@@ -112,7 +112,7 @@ def _scaled(track: Track, scale: float, offset: float = 0.0) -> Track:
 
 
 def _unit(track: Track) -> Track:
-    """Returns normalised quaternions, without those far from unit length, such as unset ones."""
+    """Normalised quaternions; unset ones, of length 0, are left out."""
     lengths: FloatArray = np.linalg.norm(track.values, axis=1)
-    valid = np.abs(lengths - 1) < 0.1
-    return Track(track.times[valid], track.values[valid] / lengths[valid, np.newaxis])
+    known = np.abs(lengths - 1) < 0.1
+    return Track(track.times[known], track.values[known] / lengths[known, np.newaxis])

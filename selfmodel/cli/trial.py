@@ -1,79 +1,61 @@
-"""``selfmodel trial``: runs and logs one physical trial."""
+"""``selfmodel trial``: one logged trial of the simulated physical robot."""
 
 import json
 from pathlib import Path
-from typing import Annotated
 
+import numpy as np
 import typer
 
+from selfmodel.cli import inputs
 from selfmodel.cli.options import (
+    ControllerSource,
     Damage,
     GapLevel,
     Json,
     ModelSettings,
     NamedKinds,
     Neurons,
+    NewLog,
     RobotName,
     Seed,
     StageName,
+    Steps,
     Structural,
-    check_log_name,
 )
+from selfmodel.controllers.controller import Controller, check_silent_neurons, draw_genomes
+from selfmodel.experiments import plugins, robots, trial_logs
+from selfmodel.experiments.reality import draw_reality
+from selfmodel.faults.hypothesis_space import HypothesisSpace
+from selfmodel.faults.neuron import silent_neurons
+from selfmodel.logs.physical_trial import run_trial
+from selfmodel.logs.records import TrialHeader
+from selfmodel.robot.designs import DESIGNS
+from selfmodel.settings import Settings
+from selfmodel.trials.trial import TrialPlan
 
 
 def trial(
     robot: RobotName,
     *,
-    out: Annotated[
-        Path,
-        typer.Option(
-            "--out", "-o", metavar="FILE.mcap", help="The log to write; it must not exist."
-        ),
-    ],
+    out: NewLog,
     damage: Damage = None,
     kinds: NamedKinds = "all",
     model_settings: ModelSettings = None,
-    controller: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.npz|LOG.mcap|network|cpg",
-            help="Whose controller drives the robot, or the kind of a random one from the seed.",
-            show_default="network",
-        ),
-    ] = None,
+    controller: ControllerSource = None,
     neurons: Neurons = None,
     gap: GapLevel = 0.0,
     structure: Structural = False,
+    steps: Steps = 1000,
     stage: StageName = "single",
     seed: Seed = 0,
     as_json: Json = False,
 ) -> None:
     """Run one trial of the simulated physical robot and write its log."""
-    # Whatever brings MuJoCo waits until the command runs.
-    import numpy as np  # noqa: PLC0415
-
-    from selfmodel.cli import inputs  # noqa: PLC0415
-    from selfmodel.controllers.controller import (  # noqa: PLC0415
-        Controller,
-        check_silent_neurons,
-        draw_genomes,
-    )
-    from selfmodel.experiments import plugins, robots, trial_logs  # noqa: PLC0415
-    from selfmodel.experiments.reality import draw_reality  # noqa: PLC0415
-    from selfmodel.faults.neuron import silent_neurons  # noqa: PLC0415
-    from selfmodel.faults.notation import parse  # noqa: PLC0415
-    from selfmodel.faults.registry import known  # noqa: PLC0415
-    from selfmodel.logs import read_log  # noqa: PLC0415
-    from selfmodel.logs.writer import write_trial  # noqa: PLC0415
-    from selfmodel.robot.designs import DESIGNS  # noqa: PLC0415
-    from selfmodel.settings import Settings  # noqa: PLC0415
-    from selfmodel.trials.trial import TrialPlan  # noqa: PLC0415
-
     kind = "network" if controller is None else str(controller)
     made = robots.robot_entry(robot, model_settings or ()).robot()
-    check_log_name(out)
-    hidden = parse(
-        "intact" if damage is None else damage, made.anatomy, known(plugins.kinds(kinds))
+    inputs.check_log_name(out)
+    hidden = HypothesisSpace(made.anatomy, plugins.kinds(kinds)).parse(
+        "intact" if damage is None else damage
     )
     reality = draw_reality(made, seed, gap, structure=structure)
     if kind in DESIGNS:
@@ -82,17 +64,14 @@ def trial(
     else:
         driver = trial_logs.controller(Path(kind), made, neurons)
     check_silent_neurons(driver.design, silent_neurons(hidden))
-    settings = Settings()
+    settings = Settings(steps=steps)
     plan = TrialPlan("trial", inputs.stage(stage), driver, settings.steps, seed)
-    samples = reality.robot(made, hidden).run(driver, settings.steps)
+    header = TrialHeader(settings, hidden=str(hidden), gap=reality.text)
     try:
-        write_trial(
-            out, made, plan, samples, settings=settings, hidden=str(hidden), gap=reality.text
-        )
+        logged = run_trial(reality.robot(made, hidden), plan, out, made, header)
     except KeyboardInterrupt:
         typer.echo(f"interrupted: the steps so far are in {out}.part", err=True)
         raise typer.Exit(130) from None
-    log = read_log(out)
     facts = {
         "log": str(out),
         "robot": made.name,
@@ -100,10 +79,10 @@ def trial(
         "gap": gap,
         "structure": structure,
         "seed": seed,
-        "steps": log.trial.behaviour.steps,
-        "displacement": log.trial.displacement,
+        "steps": logged.behaviour.steps,
+        "displacement": logged.displacement,
     }
     if as_json:
         typer.echo(json.dumps(facts, indent=2))
     else:
-        typer.echo(f"{made.name} ({hidden}) went {log.trial.displacement:.3f} m forward: {out}")
+        typer.echo(f"{made.name} ({hidden}) went {logged.displacement:.3f} m forward: {out}")

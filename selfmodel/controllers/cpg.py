@@ -10,8 +10,7 @@ locomotion* (ICRA 2008).
 """
 
 import math
-from collections.abc import Sequence
-from collections.abc import Set as AbstractSet
+from collections.abc import Sequence, Set as AbstractSet
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -66,14 +65,14 @@ class Cpg:
 
     @property
     def description(self) -> str:
-        """Numbers of sensors and motors and the time step, in words."""
+        """Numbers of sensors and motors and the time step as text."""
         return (
             f"a CPG of {len(self.sensors)} sensors and {len(self.motors)} motors with steps of "
             f"{self.timestep:g} s"
         )
 
     def summary(self, genome: FloatArray) -> str:
-        """Returns the stride frequency, in words."""
+        """Returns the stride frequency as text."""
         return f"a CPG of {self.decode(genome).frequency:.2f} Hz"
 
     def decode(self, genome: FloatArray) -> "CpgParameters":

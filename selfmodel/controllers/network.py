@@ -1,7 +1,6 @@
 """Recurrent network: the paper's controller design."""
 
-from collections.abc import Sequence
-from collections.abc import Set as AbstractSet
+from collections.abc import Sequence, Set as AbstractSet
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -48,14 +47,14 @@ class Network:
 
     @property
     def description(self) -> str:
-        """Numbers of sensors, hidden neurons and motors, in words."""
+        """Numbers of sensors, hidden neurons and motors as text."""
         return (
             f"a network of {len(self.sensors)} sensors, {self.hidden} hidden neurons and "
             f"{len(self.motors)} motors"
         )
 
     def summary(self, _genome: FloatArray) -> str:
-        """Returns the number of hidden neurons, in words."""
+        """Returns the number of hidden neurons as text."""
         return f"a network of {self.hidden} hidden neurons"
 
     def batch(self, genomes: FloatArray, silent: Sequence[AbstractSet[int]]) -> "NetworkBatch":

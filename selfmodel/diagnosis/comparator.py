@@ -1,77 +1,117 @@
-"""What a comparator is: a distance between simulated behaviour and a logged trial."""
+"""Comparator interface: distances between simulated behaviour and a logged trial."""
 
 from typing import Protocol, runtime_checkable
 
 from selfmodel.arrays import FloatArray
+from selfmodel.errors import InputError
 from selfmodel.simulation.requests import Request
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.trial import Trial
 
 
 @runtime_checkable
-class Comparator(Protocol):
-    """Judges how far the behaviour that hypotheses predict is from what a trial showed.
+class PreparedTrial(Protocol):
+    """A logged trial prepared for comparison, made by ``Comparator.prepare``.
 
-    A plug-in is a plain object with these members. ``comparator_contract.check_comparator`` tests
-    whether an object conforms.
+    It contains everything that depends on the trial and not on a hypothesis, and is never changed
+    after ``prepare``.
+    """
+
+    @property
+    def request(self) -> Request:
+        """The simulation that a comparison with the trial requires."""
+        ...
+
+    def distances(self, simulated: Behaviour) -> FloatArray:
+        """Returns the distance of each simulation from the trial.
+
+        The result depends on the prepared trial and the argument alone; neither is changed.
+
+        Args:
+            simulated: The requested signals, with a leading axis of ``n`` hypotheses.
+
+        Returns:
+            ``(n,)`` finite numbers of at least 0, smaller is closer; exactly 0 for a simulation
+            that reproduces the trial, as ``comparator_contract.shown`` returns.
+        """
+        ...
+
+
+@runtime_checkable
+class PiecewiseTrial(PreparedTrial, Protocol):
+    """A prepared trial whose distance is a mean of losses: of segments, windows or steps.
+
+    The losses make a paired test possible: whether one hypothesis is *significantly* closer to
+    the trial than another. With a single distance per trial there is no such test.
+    """
+
+    def losses(self, simulated: Behaviour) -> FloatArray:
+        """Returns the loss of each segment, window or step of the trial.
+
+        Args:
+            simulated: As for ``distances``.
+
+        Returns:
+            ``(n, pieces)`` finite numbers of at least 0; ``distances`` is their mean over the
+            pieces. The pieces and their order are the same for every hypothesis.
+        """
+        ...
+
+
+@runtime_checkable
+class Comparator(Protocol):
+    """A distance between simulated behaviour and a logged trial.
+
+    A plug-in is an object with these members; no base class is required.
+    ``comparator_contract.check_comparator`` tests conformance.
     """
 
     @property
     def name(self) -> str:
-        """What it is called on the command line and in results."""
+        """The name on the command line and in results."""
         ...
 
-    def request(self, trial: Trial) -> Request:
-        """Returns what must be simulated to judge a trial.
+    def prepare(self, trial: Trial) -> PreparedTrial:
+        """Returns the trial prepared for comparison: a ``PreparedTrial`` or ``PiecewiseTrial``.
+
+        The result depends on the trial alone.
 
         Raises:
-            InputError: The trial lacks a signal that it needs; the sentence says which.
-        """
-        ...
-
-    def distances(self, simulated: Behaviour, trial: Trial) -> FloatArray:
-        """Returns how far each simulation is from the trial.
-
-        It depends on its arguments alone and changes neither.
-
-        Args:
-            simulated: What was requested, with a leading axis of ``n`` hypotheses.
-            trial: The logged trial, ``(steps, width)`` for each signal.
-
-        Returns:
-            ``(n,)`` finite numbers of at least 0, smaller is closer; exactly 0 for a simulation
-            that did what the trial shows, as ``comparator_contract.shown`` does.
+            InputError: The trial lacks a required signal; the message names the signal.
         """
         ...
 
 
 @runtime_checkable
-class Screened(Comparator, Protocol):
-    """A comparator that knows a cheaper one, which tells what is far from what is near."""
+class ComparatorWithSurrogate(Comparator, Protocol):
+    """A comparator with a surrogate: a cheaper comparator, used to pre-select hypotheses."""
 
     @property
-    def screen(self) -> Comparator:
-        """A comparator of the same kind that needs less to be simulated; piecewise as this is."""
+    def surrogate(self) -> Comparator:
+        """A comparator that requests less simulation and prepares trials of the same kind."""
         ...
 
 
-@runtime_checkable
-class Piecewise(Comparator, Protocol):
-    """A comparator whose distance is the mean over pieces of the trial, such as windows of it.
+def as_comparator(found: object, name: str) -> Comparator:
+    """Returns an object as a comparator.
 
-    Only such a comparator can be asked whether one hypothesis is *significantly* closer than
-    another: paired over the pieces.
+    Args:
+        found: Any object.
+        name: The name that the user gave, for the error.
+
+    Raises:
+        InputError: The object is no comparator, or is one of selfmodel 0.1.
     """
-
-    def losses(self, simulated: Behaviour, trial: Trial) -> FloatArray:
-        """Returns how badly each piece of the trial is predicted.
-
-        Args:
-            simulated: As for ``distances``.
-            trial: As for ``distances``.
-
-        Returns:
-            ``(n, pieces)`` finite numbers of at least 0; ``distances`` is their mean over the
-            pieces. The pieces are the same, in the same order, for every hypothesis.
-        """
-        ...
+    if not isinstance(found, type):
+        if isinstance(found, Comparator):
+            return found
+        if hasattr(found, "request") and hasattr(found, "distances"):
+            raise InputError(
+                f"{name!r} is a comparator of selfmodel 0.1: give it a method prepare(trial) that "
+                f"returns an object with .request and .distances(simulated), both without the "
+                f"argument trial, and .losses(simulated) if it had losses"
+            )
+    raise InputError(
+        f"{name!r} is no comparator: expected an object, not a class, with the members of "
+        f"selfmodel.diagnosis.comparator.Comparator, got {found!r}"
+    )

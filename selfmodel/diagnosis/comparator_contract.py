@@ -1,76 +1,81 @@
-"""The contract of a comparator, as a check that anybody can run on theirs."""
+"""Contract of a comparator, as a check for plug-ins and for the comparators of selfmodel."""
+
+from collections.abc import Callable
 
 import numpy as np
 
 from selfmodel.arrays import FloatArray, IndexArray
-from selfmodel.diagnosis.comparator import Comparator, Piecewise
+from selfmodel.diagnosis.comparator import Comparator, PiecewiseTrial, PreparedTrial
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments, recordable
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.trial import Trial
 
-CROWDED = (
+DEPENDS_ON_BATCH = (
     "must not depend on the other runs, not in the last bit: numpy adds in the order of memory, "
     "which np.ascontiguousarray before a sum or a mean fixes"
 )
 
 
 def check_comparator(comparator: Comparator, trial: Trial, simulated: Behaviour) -> None:
-    """Checks that a comparator does what ``Comparator`` says, and ``Piecewise`` if it is one.
+    """Checks that a comparator fulfils ``Comparator``, and its trials ``PreparedTrial``.
+
+    If the prepared trial has losses, it is checked as a ``PiecewiseTrial``.
 
     Args:
-        comparator: The one to check.
+        comparator: The comparator to check.
         trial: A logged trial.
-        simulated: What ``comparator.request(trial)`` asks to simulate, for at least two
-            hypotheses, of which the first did what the trial shows, to the bit: ``shown`` makes
-            such a one. Signals that it did not ask for do no harm: all signals, ``(n, steps,
-            width)``, serve every ``ClosedLoop`` request.
+        simulated: The simulation that ``comparator.prepare(trial).request`` requires, for at least
+            two hypotheses; the first reproduces the trial to the bit, as ``shown`` returns. Other
+            signals are ignored: all signals, ``(n, steps, width)``, serve every ``ClosedLoop``
+            request.
 
     Raises:
-        ValueError: It breaks its contract, or ``simulated`` is not what it asked for; the message
-            says in which way.
+        ValueError: The comparator violates its contract, or ``simulated`` does not have the
+            requested shapes; the message names the violation.
     """
     if not comparator.name or comparator.name != comparator.name.strip():
         raise ValueError(f"a comparator needs a name, got {comparator.name!r}")
-    request = comparator.request(trial)
-    _check_request(request, trial)
-    asked = _as_requested(request, trial, simulated)
-    before = {signal: asked[signal].copy() for signal in request.record}
-    distances = comparator.distances(asked, trial)
-    runs = len(asked[request.record[0]])
-    if distances.shape != (runs,):
-        raise ValueError(f"expected a distance for each of {runs} runs, got {distances.shape}")
-    if not np.all(np.isfinite(distances)) or np.any(distances < 0):
-        raise ValueError(f"distances must be finite and at least 0, got {distances}")
-    if distances[0] != 0:
-        raise ValueError(f"a run that did what the trial shows must be at 0, got {distances[0]}")
-    if not np.array_equal(distances, comparator.distances(asked, trial)):
-        raise ValueError("the same arguments must give the same distances")
-    for run in range(runs):
-        alone = comparator.distances(_only(asked, run), trial)
-        if not np.array_equal(alone, distances[run : run + 1]):
-            raise ValueError(f"the distance of run {run} {CROWDED}")
-    if isinstance(comparator, Piecewise):
-        _check_pieces(comparator, trial, asked, distances)
-    if any(not np.array_equal(before[signal], asked[signal]) for signal in request.record):
+    logged = _copied(trial.behaviour)
+    prepared, again = comparator.prepare(trial), comparator.prepare(trial)
+    for one in (prepared, again):
+        if not isinstance(one, PreparedTrial):
+            raise ValueError(  # noqa: TRY004  # every breach of the contract is a ValueError
+                f"prepare must return an object with request and distances, got {one!r}"
+            )
+    _check_request(prepared.request, trial)
+    if not _is_same_request(prepared.request, again.request):
+        raise ValueError("the same trial must be prepared with the same request")
+    requested = _as_requested(prepared.request, trial, simulated)
+    before = _copied(requested)
+    runs = len(requested[prepared.request.record[0]])
+    distances = _checked_distances(prepared, requested, runs)
+    _check_pure(
+        ("distances", "the distance"), distances, requested, prepared.distances, again.distances
+    )
+    if isinstance(prepared, PiecewiseTrial):
+        _check_pieces(prepared, again, requested, distances)
+    if not _is_same(before, requested):
         raise ValueError("a comparator must not change what it is given")
+    if not _is_same(logged, trial.behaviour):
+        raise ValueError("a comparator must not change the trial")
 
 
 def shown(request: Request, trial: Trial) -> Behaviour:
-    """Returns what a simulation would give that does exactly what a trial shows.
+    """Returns a simulation that reproduces a trial to the bit.
 
-    No simulation of segments does so to the bit, not even one of the truth, because the solver of
-    the contacts starts from other guesses there than in one long run: some 1e-9 is left.
+    No real simulation of segments does, not even of the true hypothesis, because the contact solver
+    starts from other initial guesses than in one long run: differences of about 1e-9 remain.
 
     Args:
-        request: What a comparator asked for.
-        trial: A logged trial; for segments, one without noise, in which the states that they begin
-            with are found as they were logged.
+        request: The request of the prepared trial.
+        trial: A logged trial; for segments, a trial without noise, whose estimated states are the
+            logged states.
 
     Returns:
-        The signals that were asked for, with a leading axis of one run.
+        The requested signals, with a leading axis of one run.
 
     Raises:
-        ValueError: The trial does not show what a segment begins with.
+        ValueError: The trial does not contain the beginning of a segment.
     """
     behaviour, time = trial.behaviour, trial.behaviour.time
     rows: IndexArray = np.arange(behaviour.steps)
@@ -84,7 +89,7 @@ def shown(request: Request, trial: Trial) -> Behaviour:
 
 
 def _starts(request: Segments, behaviour: Behaviour) -> IndexArray:
-    """The step of the trial at which each segment begins."""
+    """Returns the step of the trial at which each segment begins."""
     horizon = request.horizon
     steps = np.arange(behaviour.steps - horizon)
     fits = np.ones((len(request.commands), len(steps)), dtype=bool)
@@ -103,7 +108,6 @@ def _starts(request: Segments, behaviour: Behaviour) -> IndexArray:
 
 
 def _check_request(request: Request, trial: Trial) -> None:
-    """Checks that a request can be met."""
     if not isinstance(request, ClosedLoop | Segments | Ensemble):
         raise ValueError(  # noqa: TRY004  # every breach of the contract is a ValueError
             f"a request must be a ClosedLoop, Segments or an Ensemble, got {request!r}"
@@ -146,8 +150,19 @@ def _check_segments(request: Segments, trial: Trial) -> None:
         raise ValueError("the states and the commands of segments must all be known, got NaN")
 
 
+def _is_same_request(one: Request, other: Request) -> bool:
+    if isinstance(one, Segments) and isinstance(other, Segments):
+        return (
+            (one.lead, one.record) == (other.lead, other.record)
+            and np.array_equal(one.commands, other.commands)
+            and one.states.keys() == other.states.keys()
+            and all(np.array_equal(one.states[key], other.states[key]) for key in one.states)
+        )
+    return one == other
+
+
 def _as_requested(request: Request, trial: Trial, simulated: Behaviour) -> Behaviour:
-    """What was asked for of what was simulated, once its shapes are seen to fit."""
+    """Returns the requested signals of a simulation, after a check of their shapes."""
     lengths: tuple[int, ...] = (trial.behaviour.steps,)
     if isinstance(request, Segments):
         lengths = (len(request.commands), request.horizon + 1)
@@ -164,6 +179,18 @@ def _as_requested(request: Request, trial: Trial, simulated: Behaviour) -> Behav
     )
 
 
+def _copied(behaviour: Behaviour) -> Behaviour:
+    signals = {signal: values.copy() for signal, values in behaviour.signals.items()}
+    return Behaviour(behaviour.names, behaviour.time, signals)
+
+
+def _is_same(one: Behaviour, other: Behaviour) -> bool:
+    return all(
+        np.array_equal(values, other[signal], equal_nan=True)
+        for signal, values in one.signals.items()
+    )
+
+
 def _only(simulated: Behaviour, run: int) -> Behaviour:
     return Behaviour(
         simulated.names,
@@ -172,10 +199,43 @@ def _only(simulated: Behaviour, run: int) -> Behaviour:
     )
 
 
-def _check_pieces(
-    comparator: Piecewise, trial: Trial, simulated: Behaviour, distances: FloatArray
+def _checked_distances(prepared: PreparedTrial, simulated: Behaviour, runs: int) -> FloatArray:
+    distances = prepared.distances(simulated)
+    if distances.shape != (runs,):
+        raise ValueError(f"expected a distance for each of {runs} runs, got {distances.shape}")
+    if not np.all(np.isfinite(distances)) or np.any(distances < 0):
+        raise ValueError(f"distances must be finite and at least 0, got {distances}")
+    if distances[0] != 0:
+        raise ValueError(f"a run that did what the trial shows must be at 0, got {distances[0]}")
+    return distances
+
+
+def _check_pure(
+    words: tuple[str, str],
+    expected: FloatArray,
+    simulated: Behaviour,
+    compare: Callable[[Behaviour], FloatArray],
+    compare_again: Callable[[Behaviour], FloatArray],
 ) -> None:
-    losses = comparator.losses(simulated, trial)
+    """Checks that a comparison depends on the trial and each run alone."""
+    plural, of_one_run = words
+    if not np.array_equal(expected, compare(simulated)):
+        raise ValueError(f"the same arguments must give the same {plural}")
+    if not np.array_equal(expected, compare_again(simulated)):
+        raise ValueError(f"a trial that is prepared again must give the same {plural}")
+    for run in range(len(expected)):
+        if not np.array_equal(compare(_only(simulated, run)), expected[run : run + 1]):
+            raise ValueError(f"{of_one_run} of run {run} {DEPENDS_ON_BATCH}")
+
+
+def _check_pieces(
+    prepared: PiecewiseTrial, again: PreparedTrial, simulated: Behaviour, distances: FloatArray
+) -> None:
+    if not isinstance(again, PiecewiseTrial):
+        raise ValueError(  # noqa: TRY004  # every breach of the contract is a ValueError
+            "a trial that is prepared again must have losses again"
+        )
+    losses = prepared.losses(simulated)
     if losses.ndim != 2 or len(losses) != len(distances) or not losses.shape[1]:
         raise ValueError(
             f"expected losses of shape (n, pieces) = ({len(distances)}, 1 or more), got "
@@ -188,9 +248,4 @@ def _check_pieces(
             f"the mean of the losses must be the distance, got {losses.mean(axis=1)} for "
             f"{distances}"
         )
-    if not np.array_equal(losses, comparator.losses(simulated, trial)):
-        raise ValueError("the same arguments must give the same losses")
-    for run in range(len(losses)):
-        alone = comparator.losses(_only(simulated, run), trial)
-        if not np.array_equal(alone, losses[run : run + 1]):
-            raise ValueError(f"the losses of run {run} {CROWDED}")
+    _check_pure(("losses", "the losses"), losses, simulated, prepared.losses, again.losses)

@@ -1,54 +1,54 @@
-"""The diagnostic EA: evolves hypotheses that explain all trials."""
+"""The diagnostic search: an EA over hypotheses, local refinement, and the verdict."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis.comparator import Comparator
-from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, UnsearchedFault, Verdict
+from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
 from selfmodel.diagnosis.evidence import Evidence
-from selfmodel.diagnosis.genome import VALUES, decode, encode
-from selfmodel.diagnosis.loss_functions import LossFunctions
+from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
 from selfmodel.diagnosis.model_error import any_fault_is_model_error
 from selfmodel.diagnosis.refine import refined
-from selfmodel.diagnosis.screening import screen_of
-from selfmodel.diagnosis.severity import coarse_candidates
-from selfmodel.diagnosis.significance import TEST, exceeds_healthy_loss, is_better
+from selfmodel.diagnosis.significance import TEST, is_better
+from selfmodel.diagnosis.surrogate import Surrogate, own_surrogate, surrogate_of
 from selfmodel.diagnosis.undetectable import undetectable_faults
 from selfmodel.diagnosis.unsearched import best_unsearched_fault
+from selfmodel.diagnosis.verdict import verdict_of
 from selfmodel.evolution import Evolution, GenerationCallback, evolve
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.hypothesis_space import GENE_VALUES, HypothesisSpace
 from selfmodel.faults.kind import FaultKind
-from selfmodel.faults.registry import PAPER_KINDS, applicable_kinds
+from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Trial
 
-KNOWN = 2
-"""Of what the EA found closest, how much is refined."""
+REFINEMENT_STARTS = 2
+"""Hypotheses from the EA that the refinement starts from, best first."""
 
-EQUAL = "equal distances"
-"""The test of a comparator that gives one number for a trial."""
+EQUAL_DISTANCES = "equal distances"
+"""Name of the test for a comparator with one distance per trial."""
 
 
 class DiagnosticSearch:
-    """Evolves hypotheses against logged trials; it remembers every distance.
+    """Evolves hypotheses against logged trials; every distance is cached.
 
-    Fitness is minus the sum of the distances over all trials. Source: the paper, section III.
-    Where the comparator judges in pieces, what the EA found is refined: see ``refine``.
+    Fitness is minus the sum of the distances over all trials. Source: the paper, section III. For
+    a comparator with losses per segment or window, the best hypotheses are refined; see ``refine``.
 
     Args:
         simulator: The self-model.
-        comparator: Says what to simulate and how far it is from a trial.
-        settings: The numbers of the search.
-        kinds: What is considered, as far as it can strike the robot; see ``considered``.
-        intact: Trials of the robot with nothing wrong, which show how well the self-model
-            predicts when it is right; without any, no verdict can be ``unexplained``.
+        comparator: Distance between simulations and a trial.
+        settings: Parameters of the EA.
+        kinds: Fault kinds to search, as far as they apply to the robot; see ``HypothesisSpace.of``.
+        intact: Trials of the healthy robot, which measure the loss of a correct model; without
+            any, no verdict is ``unexplained``.
 
     Raises:
-        InputError: None of the kinds can strike the robot.
+        InputError: No kind applies to the robot, or a kind is not searchable.
     """
 
     def __init__(
@@ -60,14 +60,12 @@ class DiagnosticSearch:
         *,
         intact: Sequence[Trial] = (),
     ) -> None:
-        self._anatomy = simulator.robot.anatomy
         self._settings = settings
-        self._kinds = applicable_kinds(kinds, self._anatomy)
+        self._space = HypothesisSpace.of(kinds, simulator.robot.anatomy)
         self._intact = tuple(intact)
         self.evidence = Evidence(simulator, comparator)
-        self._screen = screen_of(comparator, simulator, self.evidence)
-        # What is only looked at is remembered apart, so that it is never ranked.
-        self._aside, self._screen_aside = self.evidence.aside(), self._screen.aside()
+        self._own_surrogate = own_surrogate(comparator, simulator)
+        self._proposed: set[Hypothesis] = set()
         self.evaluations = 0
 
     def __call__(
@@ -77,145 +75,164 @@ class DiagnosticSearch:
         rng: np.random.Generator,
         on_generation: GenerationCallback,
     ) -> Diagnosis:
-        """Returns the hypotheses that explain the trials best.
+        """Returns the diagnosis of some trials.
 
         Args:
-            trials: At least one.
-            seeds: Hypotheses to start from, beside random ones.
-            rng: Every random choice comes from it.
-            on_generation: Is told of every generation.
+            trials: At least one trial.
+            seeds: Hypotheses of the initial population, in addition to random ones.
+            rng: Source of all random numbers.
+            on_generation: Callback, called after each generation.
         """
-        found = self._evolved(trials, seeds, rng, on_generation)
-        best, aside = found[0], self._looks_aside(trials)
-        if self.evidence.is_piecewise:
-            best = self._refined(trials, found[:KNOWN], aside)
-        judged = list(self.evidence.judged(trials) | {best, INTACT})
+        surrogate = surrogate_of(self.evidence, self._own_surrogate, trials)
+        is_piecewise = self.evidence.is_piecewise(trials)
+        found = self._evolved(surrogate, seeds, rng, on_generation)
+        best, losses = found[0], self._loss_functions(trials, surrogate)
+        # Ranked: hypotheses that were proposed and compared with the whole trials. Hypotheses that
+        # only the tests below compare with the trials are never ranked.
+        ranked: set[Hypothesis] = set() if is_piecewise else set(found)
+        if is_piecewise:
+            best = self._refined(found[:REFINEMENT_STARTS], losses, ranked)
+        ranked |= {best, INTACT}
+        self._proposed |= ranked
+        judged = list(ranked)
         totals = dict(zip(judged, map(float, self.evidence.distances(judged, trials)), strict=True))
         others = [one for one in _ranked(totals) if one != best]
-        indistinguishable = self._indistinguishable(best, others, aside)
-        better = best_unsearched_fault(best, self._kinds, self._anatomy, aside)
-        besides = (
-            undetectable_faults(best, self._kinds, self._anatomy, aside)
-            if self.evidence.is_piecewise
-            else []
-        )
+        indistinguishable = self._indistinguishable(best, others, losses, is_piecewise=is_piecewise)
+        unsearched = best_unsearched_fault(best, self._space, losses)
+        undetectable = undetectable_faults(best, self._space, losses) if is_piecewise else []
         kept = self._settings.kept
         return Diagnosis(
             ranked=tuple(Candidate(one, totals[one]) for one in [best, *others][:kept]),
             trials=len(trials),
             intact_distance=totals[INTACT],
             indistinguishable=indistinguishable[:kept],
-            verdict=self._verdict(best, indistinguishable, better, aside),
-            test=TEST if self.evidence.is_piecewise else EQUAL,
-            unsearched=better,
-            undetectable=tuple(besides[:kept]),
+            verdict=verdict_of(
+                losses=partial(losses.damaged, [best]),
+                healthy=self._healthy_losses,
+                indistinguishable=indistinguishable,
+                unsearched=unsearched,
+            ),
+            test=TEST if is_piecewise else EQUAL_DISTANCES,
+            unsearched=unsearched,
+            undetectable=tuple(undetectable[:kept]),
         )
 
     def check(self, trials: Sequence[Trial]) -> None:
-        """Checks that the comparator can judge all trials, before any search.
+        """Checks that the comparator accepts all trials, before any search.
 
         Raises:
-            InputError: It cannot; the sentence names every trial that it cannot judge, and why.
+            InputError: The comparator rejects a trial; the message names every such trial, and why.
         """
         self.evidence.check([*self._intact, *trials])
-        self._screen.evidence.check(self._screen.of(trials))
+        surrogate = surrogate_of(self.evidence, self._own_surrogate, trials)
+        surrogate.evidence.check(surrogate.trials)
 
     @property
     def distinct_hypotheses(self) -> int:
-        """How many hypotheses of the considered kinds were ever simulated."""
-        return len(self.evidence.hypotheses | self._screen.evidence.hypotheses)
+        """Number of distinct hypotheses that were proposed, by all searches so far."""
+        return len(self._proposed)
 
     def _evolved(
         self,
-        trials: Sequence[Trial],
+        surrogate: Surrogate,
         seeds: Sequence[Hypothesis],
         rng: np.random.Generator,
         on_generation: GenerationCallback,
     ) -> list[Hypothesis]:
-        """The hypotheses that the EA looked at, closest first."""
-        genes, anatomy = self._settings.genes, self._anatomy
-        looked_at = self._screen.of(trials)
+        """The hypotheses that the EA evaluated, smallest distance first."""
+        genes = self._settings.genes
         totals: dict[Hypothesis, float] = {}
 
         def fitness(genomes: FloatArray) -> FloatArray:
-            hypotheses = [decode(genome, anatomy, self._kinds) for genome in genomes]
-            distances = self._screen.evidence.distances(hypotheses, looked_at)
+            hypotheses = [self._space.decode(genome) for genome in genomes]
+            distances = surrogate.distances(hypotheses)
             totals.update(zip(hypotheses, map(float, distances), strict=True))
             return 0.0 - distances  # not -distances: a perfect fitness reads 0, not -0
 
         search = Evolution(
-            genes * VALUES,
+            genes * GENE_VALUES,
             np.random.Generator.random,
             self._settings,
             rng,
-            [encode(hypothesis, genes, anatomy, self._kinds) for hypothesis in seeds],
+            [self._space.encode(hypothesis, genes) for hypothesis in seeds],
         )
         evolve(search, fitness, on_generation)
         self.evaluations += search.evaluations
+        self._proposed |= totals.keys()
         return _ranked(totals)
 
-    def _looks_aside(self, trials: Sequence[Trial]) -> LossFunctions:
-        """How badly hypotheses predict the trials, without a trace in what is ranked.
+    def _loss_functions(self, trials: Sequence[Trial], surrogate: Surrogate) -> LossFunctions:
+        """Returns the losses on the trials, the surrogate's, and those on healthy trials.
 
-        Pieces of a whole trial, closed loop, hang together: what helps there may be luck, and is
-        not compared with what helped before.
+        Closed-loop windows are correlated, so gains on them are not compared with gains on healthy
+        trials.
         """
         known = [*self._intact, *trials]
-        comparable = self.evidence.is_piecewise and self.evidence.uses_segments(known)
+        comparable = self.evidence.is_piecewise(trials) and self.evidence.uses_segments(known)
         return LossFunctions(
-            after=partial(self._aside.losses, trials=trials),
-            screen=partial(self._screen_aside.losses, trials=trials),
-            before=partial(self._aside.losses, trials=self._intact)
+            damaged=partial(self.evidence.losses, trials=trials),
+            surrogate=surrogate.losses,
+            healthy=partial(self.evidence.losses, trials=self._intact)
             if comparable and self._intact
             else None,
         )
 
+    @property
+    def _healthy_losses(self) -> Callable[[], FloatArray] | None:
+        """The losses of the empty hypothesis on healthy trials; None without such trials."""
+        return partial(self.evidence.losses, [INTACT], self._intact) if self._intact else None
+
     def _refined(
-        self, trials: Sequence[Trial], known: Sequence[Hypothesis], aside: LossFunctions
+        self, known: Sequence[Hypothesis], losses: LossFunctions, compared: set[Hypothesis]
     ) -> Hypothesis:
-        """The best hypothesis around those known."""
+        """Returns the best hypothesis around the known ones.
+
+        Args:
+            known: Hypotheses to start from.
+            losses: Losses on the trials.
+            compared: Every hypothesis that is compared with the whole trials is added.
+        """
         return refined(
             known,
-            coarse_candidates(self._kinds, self._anatomy),
+            self._space,
             self._settings.genes,
             LossFunctions(
-                after=partial(self.evidence.losses, trials=trials),
-                screen=partial(self._screen.losses, trials=trials),
-                before=aside.before,
+                damaged=_recorded(losses.damaged, compared),
+                surrogate=_recorded(losses.surrogate, self._proposed),
+                healthy=losses.healthy,
             ),
-            self._anatomy,
         )
 
     def _indistinguishable(
-        self, best: Hypothesis, others: Sequence[Hypothesis], aside: LossFunctions
-    ) -> tuple[Hypothesis, ...]:
-        """Those that cannot be told from the best, but for those that only say more of the same."""
-        said = _without_severities(best)
-        candidates = [other for other in others if not said <= _without_severities(other)]
-        mine, *theirs = aside.after([best, *candidates])
-        if self.evidence.is_piecewise:
-            told = [is_better(mine, losses) for losses in theirs]
-        else:
-            told = [bool(losses.sum() != mine.sum()) for losses in theirs]
-        untold = [other for other, apart in zip(candidates, told, strict=True) if not apart]
-        return tuple(
-            one for one in untold if not any_fault_is_model_error(one, aside, self._anatomy)
-        )
-
-    def _verdict(
         self,
         best: Hypothesis,
-        indistinguishable: Sequence[Hypothesis],
-        better: UnsearchedFault | None,
-        aside: LossFunctions,
-    ) -> Verdict:
-        if better is not None:
-            return "unexplained"
-        if self._intact:
-            usual = self._aside.losses([INTACT], self._intact)[0]
-            if exceeds_healthy_loss(aside.after([best])[0], usual):
-                return "unexplained"
-        return "ambiguous" if indistinguishable else "explained"
+        others: Sequence[Hypothesis],
+        losses: LossFunctions,
+        *,
+        is_piecewise: bool,
+    ) -> tuple[Hypothesis, ...]:
+        """Hypotheses not significantly worse than the best, without supersets of its faults."""
+        parts = _without_severities(best)
+        candidates = [other for other in others if not parts <= _without_severities(other)]
+        best_losses, *rows = losses.damaged([best, *candidates])
+        if is_piecewise:
+            distinct = [is_better(best_losses, row) for row in rows]
+        else:
+            distinct = [bool(row.sum() != best_losses.sum()) for row in rows]
+        indistinct = [one for one, apart in zip(candidates, distinct, strict=True) if not apart]
+        return tuple(
+            one for one in indistinct if not any_fault_is_model_error(one, losses, self._space)
+        )
+
+
+def _recorded(losses: Losses, into: set[Hypothesis]) -> Losses:
+    """Returns a loss function that adds every hypothesis to a set."""
+
+    def recorded(hypotheses: Sequence[Hypothesis]) -> FloatArray:
+        into.update(hypotheses)
+        return losses(hypotheses)
+
+    return recorded
 
 
 def _without_severities(hypothesis: Hypothesis) -> set[tuple[FaultKind, str]]:
@@ -223,4 +240,4 @@ def _without_severities(hypothesis: Hypothesis) -> set[tuple[FaultKind, str]]:
 
 
 def _ranked(totals: dict[Hypothesis, float]) -> list[Hypothesis]:
-    return sorted(totals, key=lambda known: (totals[known], len(known), known))
+    return sorted(totals, key=lambda one: (totals[one], len(one), one))

@@ -1,66 +1,74 @@
-"""A diagnosis: hypotheses ranked by how well they explain all trials, and how sure that is."""
+"""A diagnosis: hypotheses ranked by distance to all trials, and a verdict on the best."""
 
+import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.trials.data_frame import data_frame
 
 Verdict = Literal["explained", "ambiguous", "unexplained"]
 """``explained``: the best hypothesis predicts the trials about as well as the self-model predicts
-the intact robot, and no other does, ``unseen`` apart. ``ambiguous``: others cannot be told from it.
-``unexplained``: it predicts significantly worse, or significantly worse than with a fault of a kind
-that was not considered, so something is wrong that it does not say; only where a trial of the
-intact robot is known."""
+the healthy robot, and no other hypothesis does, ``undetectable`` ones apart. ``ambiguous``: other
+hypotheses are indistinguishable from the best. ``unexplained``: the best hypothesis predicts
+significantly worse than the self-model predicts the healthy robot, or significantly worse than with
+a fault of an unsearched kind, so a fault is missing; requires a trial of the healthy robot."""
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A hypothesis and how far its predictions are from the trials.
+    """A hypothesis and its distance to the trials.
 
     Attributes:
-        hypothesis: What may be wrong.
-        distance: Sum over the trials of the comparator's distance; in the comparator's unit.
+        hypothesis: In canonical form.
+        distance: Sum over the trials of the comparator's distance, in the comparator's unit.
     """
 
     hypothesis: Hypothesis
     distance: float
 
+    def to_dict(self) -> dict[str, Any]:
+        """Returns the JSON values; the distance is None where a simulation diverged."""
+        return {"hypothesis": str(self.hypothesis), "distance": _finite(self.distance)}
+
 
 @dataclass(frozen=True)
 class UnsearchedFault:
-    """A hypothesis with a fault that was not considered.
+    """A hypothesis with one fault of an unsearched kind.
 
     Attributes:
-        hypothesis: All that it says.
-        kind: The name of the kind that was not considered.
+        hypothesis: The whole hypothesis.
+        kind: Name of the unsearched kind.
     """
 
     hypothesis: Hypothesis
     kind: str
 
-    def as_object(self) -> dict[str, str]:
-        """Returns it as JSON has it."""
+    def to_dict(self) -> dict[str, Any]:
+        """Returns the JSON values."""
         return {"hypothesis": str(self.hypothesis), "kind": self.kind}
 
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Hypotheses, best first.
+    """Hypotheses ranked against some trials, and a verdict.
 
     Attributes:
-        ranked: At least one. The first is the best: the one with the fewest faults of which every
-            one makes the prediction significantly better; where a comparator allows no such test,
-            the closest. The others follow by distance; of equal distances the one with fewer faults
-            comes first.
-        trials: How many trials they had to explain.
-        intact_distance: The distance that "nothing changed" gets.
-        indistinguishable: Hypotheses not significantly worse than the best, closest first.
-        unseen: The best hypothesis with one fault more, each that the trials neither show nor rule
-            out, closest first, no more than are ranked; see ``unseen.undetectable``.
-        verdict: Whether the best hypothesis explains the trials.
-        test: By which test the rivals were told from the others.
-        outside: The best hypothesis with a fault of a kind that was not considered, where that
-            predicts the trials significantly better; see ``outside.best_unsearched_fault``.
+        ranked: Candidates, at least one. The first is the best: the hypothesis with the fewest
+            faults of which every one makes the prediction significantly better; for a comparator
+            without a significance test, the one with the smallest distance. The others follow by
+            distance, at equal distances by number of faults.
+        trials: Number of trials.
+        intact_distance: Distance of the empty hypothesis.
+        indistinguishable: Hypotheses not significantly worse than the best, smallest distance
+            first.
+        verdict: ``explained``, ``ambiguous`` or ``unexplained``; see ``Verdict``.
+        test: Name of the test behind ``indistinguishable``.
+        unsearched: The best hypothesis with a fault of an unsearched kind, if it predicts the
+            trials significantly better; see ``unsearched.best_unsearched_fault``.
+        undetectable: The best hypothesis with one more fault, for each undetectable fault,
+            smallest distance first, at most as many as are ranked; see
+            ``undetectable.undetectable_faults``.
     """
 
     ranked: tuple[Candidate, ...]
@@ -74,5 +82,46 @@ class Diagnosis:
 
     @property
     def best(self) -> Hypothesis:
-        """The hypothesis that explains the trials best."""
+        """The best hypothesis."""
         return self.ranked[0].hypothesis
+
+    def __repr__(self) -> str:
+        count = f"{self.trials} {'trial' if self.trials == 1 else 'trials'}"
+        lines = [f"<Diagnosis of {count}: {self.best}, {self.verdict}"]
+        lines += [f"  {one.distance:10.4f}  {one.hypothesis}" for one in self.ranked]
+        for name in ("indistinguishable", "undetectable"):
+            others = ", ".join(map(str, getattr(self, name)))
+            lines += [f"  {name}: {others}"] if others else []
+        if self.unsearched is not None:
+            lines.append(f"  unsearched: {self.unsearched.hypothesis} ({self.unsearched.kind})")
+        return "\n".join(lines) + ">"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns the JSON values of a run's ``diagnoses.json``.
+
+        The keys ``rivals``, ``unseen`` and ``outside`` are those of a published format; they hold
+        the attributes ``indistinguishable``, ``undetectable`` and ``unsearched``.
+        """
+        return {
+            "trials": self.trials,
+            "intact_distance": _finite(self.intact_distance),
+            "rivals": [str(hypothesis) for hypothesis in self.indistinguishable],
+            "unseen": [str(hypothesis) for hypothesis in self.undetectable],
+            "verdict": self.verdict,
+            "test": self.test,
+            "outside": self.unsearched.to_dict() if self.unsearched else None,
+            "ranked": [candidate.to_dict() for candidate in self.ranked],
+        }
+
+    def to_pandas(self) -> Any:  # noqa: ANN401  # pandas is optional
+        """Returns the ranking as a ``pandas.DataFrame``: hypothesis and distance, best first.
+
+        Raises:
+            InputError: pandas is not installed.
+        """
+        return data_frame([candidate.to_dict() for candidate in self.ranked])
+
+
+def _finite(distance: float) -> float | None:
+    """JSON has no infinity, which is the distance of a simulation that diverged."""
+    return distance if math.isfinite(distance) else None

@@ -1,4 +1,4 @@
-"""How badly hypotheses predict logged trials: simulated once, remembered."""
+"""Losses of hypotheses on logged trials, each simulated once."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.diagnosis.comparator import Comparator, Piecewise
+from selfmodel.diagnosis.comparator import Comparator, PiecewiseTrial, PreparedTrial, as_comparator
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.simulation.cache import Cache
@@ -17,125 +17,132 @@ from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.trial import Trial
 
+TrialKey = tuple[str, int]
+"""Path of a trial's log and number of steps: the opening of a trial has the same path."""
+
+
+def _key(trial: Trial) -> TrialKey:
+    return trial.path, trial.behaviour.steps
+
 
 class Evidence:
-    """What a comparator makes of logged trials; it remembers every hypothesis.
+    """Losses of hypotheses on logged trials, cached by trial and hypothesis.
+
+    Trials are prepared once. Which hypotheses were computed changes no result.
 
     Args:
         simulator: The self-model.
-        comparator: Says what to simulate and how far it is from a trial.
-        beside: Evidence of the same two, whose rows are taken and never added to; see ``aside``.
+        comparator: The distance between a simulation and a trial.
+
+    Raises:
+        InputError: The object is no comparator.
     """
 
-    def __init__(
-        self, simulator: Simulator, comparator: Comparator, *, beside: "Evidence | None" = None
-    ) -> None:
+    def __init__(self, simulator: Simulator, comparator: Comparator) -> None:
         self._simulator = simulator
-        self._comparator = comparator
-        self._beside = beside
-        self._losses: dict[str, Cache[Hypothesis]] = {}  # by the trial's log
+        self._comparator = as_comparator(comparator, getattr(comparator, "name", repr(comparator)))
+        self._prepared: dict[TrialKey, PreparedTrial] = {}
+        self._losses: dict[TrialKey, Cache[Hypothesis]] = {}
 
-    def aside(self) -> "Evidence":
-        """Returns evidence that remembers apart, and simulates nothing that this one knows."""
-        return Evidence(self._simulator, self._comparator, beside=self)
+    def is_piecewise(self, trials: Sequence[Trial]) -> bool:
+        """Returns whether the distances are means of losses, so that paired tests are possible.
 
-    @property
-    def is_piecewise(self) -> bool:
-        """Whether the comparator judges in pieces, so that two hypotheses can be tested."""
-        return isinstance(self._comparator, Piecewise)
+        Raises:
+            InputError: The comparator cannot judge one of the trials.
+        """
+        return all(isinstance(self._prepare(trial), PiecewiseTrial) for trial in trials)
 
     def uses_segments(self, trials: Sequence[Trial]) -> bool:
-        """Returns whether the comparator judges all trials by short predictions."""
-        return all(isinstance(self._comparator.request(trial), Segments) for trial in trials)
+        """Returns whether the comparator judges all trials by short predictions.
 
-    @property
-    def hypotheses(self) -> set[Hypothesis]:
-        """The hypotheses that were ever simulated."""
-        return {hypothesis for memo in self._losses.values() for hypothesis in memo}
-
-    def judged(self, trials: Sequence[Trial]) -> set[Hypothesis]:
-        """Returns the hypotheses that were simulated for every one of some trials."""
-        return set.intersection(*(set(self.known(trial)) for trial in trials))
-
-    def known(self, trial: Trial) -> Cache[Hypothesis]:
-        """Returns what is remembered of a trial."""
-        return self._losses.get(trial.path, Cache())
+        Raises:
+            InputError: The comparator cannot judge one of the trials.
+        """
+        return all(isinstance(self._prepare(trial).request, Segments) for trial in trials)
 
     def check(self, trials: Sequence[Trial]) -> None:
         """Checks that the comparator can judge all trials, before any search.
 
         Raises:
-            InputError: It cannot; the sentence names every trial that it cannot judge, and why.
+            InputError: The comparator cannot judge some trials; the message names each and why.
         """
         problems = []
         for trial in trials:
             try:
-                self._comparator.request(trial)
+                self._prepare(trial)
             except InputError as error:
                 problems.append(str(error))
         if problems:
             raise InputError("; ".join(problems))
 
     def distances(self, hypotheses: Sequence[Hypothesis], trials: Sequence[Trial]) -> FloatArray:
-        """Returns how far each hypothesis is from all trials together, ``(n,)``.
+        """Returns the distance of each hypothesis from all trials together, ``(n,)``.
 
-        It is the sum of the comparator's distances; a hypothesis whose simulation diverges is
-        infinitely far.
+        The distance is the sum of the comparator's distances, and infinite for a hypothesis whose
+        simulation diverges.
         """
         total = np.zeros(len(hypotheses))
         for trial in trials:
-            total += np.array([row.mean() for row in self._of(hypotheses, trial)])
+            total += np.array([row.mean() for row in self._rows(hypotheses, trial)])
         return total
 
     def losses(self, hypotheses: Sequence[Hypothesis], trials: Sequence[Trial]) -> FloatArray:
-        """Returns how badly each hypothesis predicts each piece of all trials, ``(n, pieces)``.
+        """Returns the losses of each hypothesis on all trials, ``(n, pieces)``.
 
-        A comparator that does not judge in pieces has one for each trial.
+        A comparator without losses has one column per trial: the distance.
         """
-        return np.concatenate([np.array(self._of(hypotheses, trial)) for trial in trials], axis=1)
+        return np.concatenate([np.array(self._rows(hypotheses, trial)) for trial in trials], axis=1)
 
-    def _of(self, hypotheses: Sequence[Hypothesis], trial: Trial) -> list[FloatArray]:
-        memo = self._losses.setdefault(trial.path, Cache())
-        if self._beside is not None:
-            memo.update_from(self._beside.known(trial), hypotheses)
-        return memo.get_or_compute(hypotheses, partial(self._simulate, trial))
+    def _prepare(self, trial: Trial) -> PreparedTrial:
+        key = _key(trial)
+        if key not in self._prepared:
+            self._prepared[key] = self._checked(self._comparator.prepare(trial))
+        return self._prepared[key]
 
-    def _simulate(self, trial: Trial, hypotheses: list[Hypothesis]) -> FloatArray:
-        outcome = self._simulated(trial, hypotheses)
-        broken_down = outcome.diverged[:, np.newaxis]
-        # What a comparator makes of a simulation that broke down does not matter.
-        warnings: Literal["ignore"] | None = "ignore" if broken_down.any() else None
+    def _checked(self, prepared: PreparedTrial) -> PreparedTrial:
+        if not isinstance(prepared, PreparedTrial):
+            raise self._contract_error(f"prepared {prepared!r}, which is no PreparedTrial")
+        possible = recordable(prepared.request)
+        record = prepared.request.record
+        if not record or not set(record) <= set(possible):
+            raise self._contract_error(
+                f"asked for the signals {record!r}, of {', '.join(possible)}"
+            )
+        return prepared
+
+    def _rows(self, hypotheses: Sequence[Hypothesis], trial: Trial) -> list[FloatArray]:
+        cache = self._losses.setdefault(_key(trial), Cache())
+        return cache.get_or_compute(hypotheses, partial(self._compute, trial))
+
+    def _compute(self, trial: Trial, hypotheses: list[Hypothesis]) -> FloatArray:
+        prepared = self._prepare(trial)
+        result = simulate(self._simulator, prepared.request, trial, hypotheses)
+        diverged = result.diverged[:, np.newaxis]
+        # The losses of diverged simulations are replaced below.
+        warnings: Literal["ignore"] | None = "ignore" if diverged.any() else None
         with np.errstate(over=warnings, invalid=warnings, divide=warnings):
-            losses = self._judged(outcome.behaviour, trial, len(hypotheses))
-        wrong = losses[~((losses >= 0) | broken_down)]
+            losses = self._compare(prepared, result.behaviour, len(hypotheses))
+        wrong = losses[~((losses >= 0) | diverged)]
         if len(wrong):
-            raise self._broken(f"gave a distance that is not a number of at least 0: {wrong[0]}")
-        return np.where(broken_down, np.inf, losses)
+            raise self._contract_error(
+                f"gave a distance that is not a number of at least 0: {wrong[0]}"
+            )
+        return np.where(diverged, np.inf, losses)
 
-    def _judged(self, simulated: Behaviour, trial: Trial, count: int) -> FloatArray:
-        comparator = self._comparator
-        if isinstance(comparator, Piecewise):
-            losses = np.asarray(comparator.losses(simulated, trial))
+    def _compare(self, prepared: PreparedTrial, simulated: Behaviour, count: int) -> FloatArray:
+        if isinstance(prepared, PiecewiseTrial):
+            losses = np.asarray(prepared.losses(simulated))
             if losses.ndim != 2 or len(losses) != count or not losses.shape[1]:
-                raise self._broken(f"gave losses {losses.shape} for {count} simulations")
+                raise self._contract_error(f"gave losses {losses.shape} for {count} simulations")
             return losses
-        distances = np.asarray(comparator.distances(simulated, trial))
+        distances = np.asarray(prepared.distances(simulated))
         if distances.shape != (count,):
-            raise self._broken(f"gave {distances.shape} distances for {count} simulations")
+            raise self._contract_error(f"gave {distances.shape} distances for {count} simulations")
         return np.asarray(distances[:, np.newaxis])
 
-    def _simulated(self, trial: Trial, hypotheses: list[Hypothesis]) -> SimulationResult:
-        request = self._comparator.request(trial)
-        possible = recordable(request)
-        if not request.record or not set(request.record) <= set(possible):
-            raise self._broken(
-                f"asked for the signals {request.record!r}, of {', '.join(possible)}"
-            )
-        return simulate(self._simulator, request, trial, hypotheses)
-
-    def _broken(self, what: str) -> InputError:
+    def _contract_error(self, problem: str) -> InputError:
         return InputError(
-            f"the comparator {self._comparator.name!r} {what}: run "
+            f"the comparator {self._comparator.name!r} {problem}: run "
             f"selfmodel.diagnosis.comparator_contract.check_comparator on it"
         )
 
@@ -143,12 +150,12 @@ class Evidence:
 def simulate(
     simulator: Simulator, request: Request, trial: Trial, hypotheses: Sequence[Hypothesis]
 ) -> SimulationResult:
-    """Simulates what a comparator requested to judge a trial.
+    """Runs the simulation that a comparison with a trial requires.
 
     Args:
         simulator: The self-model.
-        request: What the comparator asked for.
-        trial: The trial that it asked about.
+        request: The request of the prepared trial.
+        trial: The trial that was prepared.
         hypotheses: At least one; each is a row of the signals.
     """
     driver, steps = trial.plan.controller, trial.behaviour.steps

@@ -1,25 +1,42 @@
-"""How badly hypotheses predict trials, and which trials a diagnosis looks at."""
+"""Loss functions of a diagnosis: on the damaged trials, by the surrogate, and on healthy trials.
+
+A loss measures how badly a hypothesis predicts one segment of a trial (one window, for closed-loop
+comparators). The segments of all trials are concatenated.
+"""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
+
+import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.faults.hypothesis import Hypothesis
 
 Losses = Callable[[Sequence[Hypothesis]], FloatArray]
-"""How badly hypotheses predict each piece of some trials, ``(n, pieces)``."""
+"""Returns the losses of some hypotheses, ``(n, segments)``; inf where a simulation diverged."""
+
+SHORTLIST_SIZE = 8
+"""Hypotheses that pass from the surrogate comparator to the comparator itself."""
 
 
 class LossFunctions(NamedTuple):
-    """How badly hypotheses predict the trials that a diagnosis looks at, ``(n, pieces)`` each.
+    """The loss functions of a diagnosis, each ``(n, segments)`` with its own number of segments.
 
     Attributes:
-        after: Of the trials to explain.
-        screen: Of the same, from fewer pieces and cheaper: it tells what is far from what is near.
-        before: Of trials of the robot with nothing wrong; None where there are none, or they cannot
-            be compared with those to explain.
+        damaged: Losses on the trials to explain.
+        surrogate: Losses on the same trials by the surrogate comparator, which simulates less.
+        healthy: Losses on trials of the healthy robot; None if there are none, or if the losses are
+            correlated over a trial and so not comparable between trials.
     """
 
-    after: Losses
-    screen: Losses
-    before: Losses | None
+    damaged: Losses
+    surrogate: Losses
+    healthy: Losses | None
+
+
+def by_total_loss(hypotheses: Sequence[Hypothesis], losses: Losses) -> list[Hypothesis]:
+    """Returns hypotheses sorted by the sum of their losses, smallest first; the sort is stable."""
+    if not hypotheses:
+        return []
+    order = np.argsort(losses(hypotheses).sum(axis=1), kind="stable")
+    return [hypotheses[i] for i in order]

@@ -1,49 +1,49 @@
-"""Which faults only mend the self-model: they would have helped before anything was wrong."""
+"""Model error: a fault corrects the self-model if it improves the healthy trials as well."""
 
 from itertools import combinations
 
 from selfmodel.diagnosis.loss_functions import LossFunctions
 from selfmodel.diagnosis.significance import gain_is_model_error
-from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
-from selfmodel.robot.anatomy import Anatomy
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.hypothesis_space import HypothesisSpace
 
 
 def is_model_error(
-    hypothesis: Hypothesis, fewer: Hypothesis, looks: LossFunctions, anatomy: Anatomy
+    hypothesis: Hypothesis, fewer: Hypothesis, losses: LossFunctions, space: HypothesisSpace
 ) -> bool:
-    """Returns whether what a hypothesis says more than another would have helped before as well.
+    """Returns whether the extra faults of a hypothesis improve the healthy trials as much.
 
     Args:
-        hypothesis: The one that says more.
-        fewer: The other.
-        looks: How badly they predict the trials.
-        anatomy: The robot's parts.
+        hypothesis: The hypothesis with the extra faults.
+        fewer: The hypothesis without the extra faults.
+        losses: Loss functions of the trials.
+        space: The hypotheses about the robot.
 
     Returns:
-        False where there is nothing from before to compare with.
+        False if there are no comparable healthy trials.
     """
-    if looks.before is None:
+    if losses.healthy is None:
         return False
-    more = [fault for fault in hypothesis.faults if fault not in fewer.faults]
-    with_it, without = looks.before([canonical(more, anatomy), INTACT])
-    # Most faults would have done harm, and of those nothing is simulated.
-    if not with_it.mean() < without.mean():
+    extra = [fault for fault in hypothesis.faults if fault not in fewer.faults]
+    healthy_with, healthy_without = losses.healthy([space.canonical(extra), INTACT])
+    # Most faults worsen the healthy trials; their losses on the damaged trials are not needed.
+    if not healthy_with.mean() < healthy_without.mean():
         return False
-    with_more, with_fewer = looks.after([hypothesis, fewer])
-    return gain_is_model_error(with_more, with_fewer, with_it, without)
+    damaged_with, damaged_without = losses.damaged([hypothesis, fewer])
+    return gain_is_model_error(damaged_with, damaged_without, healthy_with, healthy_without)
 
 
 def any_fault_is_model_error(
-    hypothesis: Hypothesis, looks: LossFunctions, anatomy: Anatomy
+    hypothesis: Hypothesis, losses: LossFunctions, space: HypothesisSpace
 ) -> bool:
-    """Returns whether one of the faults of a hypothesis would have helped before as well.
+    """Returns whether at least one fault of a hypothesis corrects model error.
 
     Args:
-        hypothesis: What may be wrong.
-        looks: How badly hypotheses predict the trials.
-        anatomy: The robot's parts.
+        hypothesis: In canonical form.
+        losses: Loss functions of the trials.
+        space: The hypotheses about the robot.
     """
     return any(
-        is_model_error(hypothesis, canonical(rest, anatomy), looks, anatomy)
+        is_model_error(hypothesis, space.canonical(rest), losses, space)
         for rest in combinations(hypothesis.faults, max(len(hypothesis) - 1, 0))
     )

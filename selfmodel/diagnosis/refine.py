@@ -1,188 +1,149 @@
-"""From a good hypothesis to the one with the fewest faults that explains the trials.
+"""Local search from good hypotheses to the one with the fewest faults that explains the trials.
 
-An EA finds the neighbourhood; here the neighbours are looked at one by one, and every fault has to
-be worth its while.
+The diagnostic EA finds the neighbourhood; this search tests every neighbour and keeps a fault only
+where the trials require it. The whole algorithm:
+
+1. **Starts**: the hypotheses found by the EA, the empty hypothesis, and the ``STARTS`` best single
+   faults by the surrogate comparator, one per kind and part. Severities are fitted by the
+   surrogate (``severity.with_fitted_severities``).
+2. **Descent** over the neighbours with one fault more, replaced, or less: the surrogate selects
+   ``SHORTLIST_SIZE`` of them, the comparator chooses the best, and its severities are fitted, until
+   the total loss falls no further. A hypothesis has at most ``max_faults`` faults.
+3. **Pruning**: the fault whose removal costs least is removed, as long as the hypothesis with it is
+   not significantly better (``significance.is_better``), or its gain is model error
+   (``model_error.is_model_error``).
+4. **Second descent** over the neighbours with one fault replaced, then pruning, until a hypothesis
+   repeats. Every pruned hypothesis is a local optimum.
+5. **Fit** of each local optimum's severities by the comparator itself, and pruning again.
+6. **Choice**: from the empty hypothesis on, in order of the number of faults and then of the total
+   loss, a hypothesis replaces the current best only if it is significantly better.
+7. **Mean severities** (``severity.with_mean_severities``), unless they make a fault prunable.
+
+The surrogate comparator simulates a third of the segments, or the first third of each trial. The
+measurements behind the significance levels are in ``significance``, those behind the mean severity
+in ``severity``. No ablation of ``STARTS`` and ``SHORTLIST_SIZE`` is on record.
 """
 
-import dataclasses
 from collections.abc import Callable, Iterable, Sequence
 
-import numpy as np
-
-from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
+from selfmodel.diagnosis.loss_functions import SHORTLIST_SIZE, LossFunctions, by_total_loss
 from selfmodel.diagnosis.model_error import is_model_error
 from selfmodel.diagnosis.severity import with_fitted_severities, with_mean_severities
 from selfmodel.diagnosis.significance import is_better
-from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
-from selfmodel.faults.kind import Fault, FaultKind
-from selfmodel.robot.anatomy import Anatomy
-
-SHORTLIST = 8
-"""Hypotheses of many that are looked at closely."""
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.hypothesis_space import HypothesisSpace
+from selfmodel.faults.kind import Fault
 
 STARTS = 3
-"""From how many of the best single faults a search begins, beside what is known already."""
+"""Single faults to start from, in addition to the known hypotheses."""
 
 
 def refined(
-    known: Iterable[Hypothesis],
-    faults: Sequence[Fault],
-    most: int,
-    looks: LossFunctions,
-    anatomy: Anatomy,
+    known: Iterable[Hypothesis], space: HypothesisSpace, max_faults: int, losses: LossFunctions
 ) -> Hypothesis:
-    """Returns the best hypothesis of which every fault is worth its while.
+    """Returns the best hypothesis in which every fault is required by the trials.
 
-    From each start, the best change of one fault (one more, one less, another in its place) is
-    made, and its degrees fitted, until none helps; then faults go that are not worth it. Of
-    what the starts lead to, a hypothesis with more faults wins only where it is significantly
-    better. Its degrees are the means of those that the trials cannot tell from the best.
+    The algorithm is in the docstring of the module.
 
     Args:
-        known: Hypotheses to start from, beside the best single faults and ``INTACT``.
-        faults: Those that may be proposed.
-        most: Faults that a hypothesis may have.
-        looks: How badly hypotheses predict the trials. Of many, those are looked at closely that
-            the screen finds closest. A fault that would have helped as much before anything was
-            wrong is not worth it: it mends the self-model.
-        anatomy: The robot's parts.
+        known: Hypotheses to start from, in addition to the best single faults and ``INTACT``.
+        space: The hypotheses about the robot; its coarse candidates are proposed.
+        max_faults: Maximum number of faults of a hypothesis.
+        losses: Loss functions of the trials.
     """
-    search = _Search(faults, most, looks, anatomy)
-    starts = dict.fromkeys([*known, INTACT, *_closest_parts(search)[:STARTS]])
-    found = {end for start in starts for end in search.settled(search.fitted(start))}
-    finest = {search.spared(search.fitted_finely(one)) for one in found}
+    search = _LocalSearch(space, max_faults, losses)
+    starts = dict.fromkeys([*known, INTACT, *search.best_single_faults()[:STARTS]])
+    local_optima = {
+        optimum
+        for start in starts
+        for optimum in search.local_optima(search.coarsely_fitted(start))
+    }
+    refits = {search.pruned(search.fitted(optimum)) for optimum in local_optima}
     best = INTACT
-    for hypothesis in sorted(finest, key=lambda one: (len(one), search.total(one), one)):
+    for hypothesis in sorted(refits, key=lambda one: (len(one), search.total_loss(one), one)):
         if search.is_better(hypothesis, best):
             best = hypothesis
-    mean = with_mean_severities(best, looks.after, anatomy)
-    return mean if search.spared(mean) == mean else best
+    mean = with_mean_severities(best, losses.damaged, space)
+    return mean if search.pruned(mean) == mean else best
 
 
-def _closest_parts(search: "_Search") -> list[Hypothesis]:
-    """The single faults, closest first, each kind at each part at its best degree only."""
-    singles = search.with_one_more(INTACT)
-    parts: dict[tuple[FaultKind, str], Hypothesis] = {}
-    for single in search.ordered(singles):
-        (fault,) = single.faults
-        parts.setdefault((fault.kind, fault.part), single)
-    return list(parts.values())
+class _LocalSearch:
+    """Descents and pruning with the loss functions of one diagnosis."""
 
+    def __init__(self, space: HypothesisSpace, max_faults: int, losses: LossFunctions) -> None:
+        self._space, self._max_faults, self._losses = space, max_faults, losses
 
-def _ordered(hypotheses: Sequence[Hypothesis], losses: Losses) -> list[Hypothesis]:
-    if not hypotheses:
-        return []
-    order = np.argsort(losses(hypotheses).sum(axis=1), kind="stable")
-    return [hypotheses[i] for i in order]
+    def total_loss(self, hypothesis: Hypothesis) -> float:
+        return float(self._losses.damaged([hypothesis])[0].sum())
 
-
-class _Search:
-    """Changes of one fault, and what they bring."""
-
-    def __init__(
-        self, faults: Sequence[Fault], most: int, looks: LossFunctions, anatomy: Anatomy
-    ) -> None:
-        self._faults, self._most, self._anatomy = faults, most, anatomy
-        self._looks = looks
-
-    def total(self, hypothesis: Hypothesis) -> float:
-        return float(self._looks.after([hypothesis])[0].sum())
+    def coarsely_fitted(self, hypothesis: Hypothesis) -> Hypothesis:
+        return with_fitted_severities(hypothesis, self._losses.surrogate, self._space)
 
     def fitted(self, hypothesis: Hypothesis) -> Hypothesis:
-        return with_fitted_severities(hypothesis, self._looks.screen, self._anatomy)
-
-    def fitted_finely(self, hypothesis: Hypothesis) -> Hypothesis:
-        return with_fitted_severities(hypothesis, self._looks.after, self._anatomy)
+        return with_fitted_severities(hypothesis, self._losses.damaged, self._space)
 
     def is_better(self, one: Hypothesis, other: Hypothesis) -> bool:
-        return is_better(*self._looks.after([one, other]))
+        return is_better(*self._losses.damaged([one, other]))
 
-    def ordered(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """The closest first, as the screen has it."""
-        return _ordered(hypotheses, self._looks.screen)
+    def best_single_faults(self) -> list[Hypothesis]:
+        """Single faults, best first by the surrogate, one severity per kind and part."""
+        singles = self._allowed(self._space.with_one_more(INTACT))
+        parts: dict[Fault, Hypothesis] = {}
+        for single in by_total_loss(singles, self._losses.surrogate):
+            (fault,) = single.faults
+            parts.setdefault(Fault(fault.kind, fault.part), single)
+        return list(parts.values())
 
-    def closest(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """Those that the screen lets through, the closest first."""
-        few = hypotheses if len(hypotheses) <= SHORTLIST else self.ordered(hypotheses)[:SHORTLIST]
-        return _ordered(few, self._looks.after)
+    def local_optima(self, start: Hypothesis) -> list[Hypothesis]:
+        """Pruned ends of the descents from a start; the last one leads to an earlier one.
 
-    def settled(self, start: Hypothesis) -> list[Hypothesis]:
-        """Where a search ends, no fault of which can be spared: by one more or less, then in place.
-
-        Another fault in its place may predict better and mend no more than the model.
+        The descent over replacements is needed because a replaced fault may lower the loss more
+        and correct no more than model error.
         """
-        current = self.spared(self._descended(start, self._neighbours))
-        ends = dict.fromkeys([current])
+        current = self.pruned(self._descended(start, self._space.neighbours))
+        optima = dict.fromkeys([current])
         while True:
-            current = self.spared(self._descended(current, self._others_in_place))
-            if current in ends:
-                return list(ends)
-            ends[current] = None
+            current = self.pruned(self._descended(current, self._space.with_one_replaced))
+            if current in optima:
+                return list(optima)
+            optima[current] = None
 
-    def with_one_more(self, hypothesis: Hypothesis) -> list[Hypothesis]:
-        return self._distinct(hypothesis, [(*hypothesis.faults, fault) for fault in self._faults])
+    def pruned(self, hypothesis: Hypothesis) -> Hypothesis:
+        """The hypothesis without the faults that are not required, the least useful first."""
+        current = hypothesis
+        while True:
+            sufficient = [
+                fewer
+                for fewer in self._shortlist(self._space.with_one_less(current))
+                if not self._is_required(current, fewer)
+            ]
+            if not sufficient:
+                return current
+            current = sufficient[0]
 
     def _descended(
         self, start: Hypothesis, neighbours: Callable[[Hypothesis], list[Hypothesis]]
     ) -> Hypothesis:
         current = start
         while True:
-            best = self.closest(neighbours(current))
-            if not best or self.total(best[0]) >= self.total(current):
+            best = self._shortlist(neighbours(current))
+            if not best or self.total_loss(best[0]) >= self.total_loss(current):
                 return current
-            # The screen fits degrees; what it likes need not be better when looked at closely.
-            current = min(best[0], self.fitted(best[0]), key=self.total)
+            # The fit by the surrogate may raise the loss of the comparator.
+            current = min(best[0], self.coarsely_fitted(best[0]), key=self.total_loss)
 
-    def spared(self, hypothesis: Hypothesis) -> Hypothesis:
-        """Without the faults that make the prediction no better, the least useful first."""
-        current = hypothesis
-        while True:
-            spared = [
-                fewer
-                for fewer in self.closest(self._with_one_less(current))
-                if not self._is_worth_it(current, fewer)
-            ]
-            if not spared:
-                return current
-            current = spared[0]
+    def _shortlist(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """The best by the surrogate, sorted by the comparator."""
+        few = self._allowed(hypotheses)
+        if len(few) > SHORTLIST_SIZE:
+            few = by_total_loss(few, self._losses.surrogate)[:SHORTLIST_SIZE]
+        return by_total_loss(few, self._losses.damaged)
 
-    def _is_worth_it(self, hypothesis: Hypothesis, fewer: Hypothesis) -> bool:
-        """Whether what a hypothesis says more than another tells what has changed."""
+    def _is_required(self, hypothesis: Hypothesis, fewer: Hypothesis) -> bool:
+        """Returns whether the extra faults are significantly better and no model error."""
         return self.is_better(hypothesis, fewer) and not is_model_error(
-            hypothesis, fewer, self._looks, self._anatomy
+            hypothesis, fewer, self._losses, self._space
         )
 
-    def _neighbours(self, hypothesis: Hypothesis) -> list[Hypothesis]:
-        return (
-            self.with_one_more(hypothesis)
-            + self._others_in_place(hypothesis)
-            + self._with_one_less(hypothesis)
-        )
-
-    def _others_in_place(self, hypothesis: Hypothesis) -> list[Hypothesis]:
-        return self._distinct(
-            hypothesis,
-            [
-                (*hypothesis.faults[:i], *hypothesis.faults[i + 1 :], fault)
-                for i in range(len(hypothesis))
-                for fault in self._faults
-            ],
-        )
-
-    def _with_one_less(self, hypothesis: Hypothesis) -> list[Hypothesis]:
-        """Without one of the faults, or with a simpler one in its place, such as no angle."""
-        faults = hypothesis.faults
-        fewer = [faults[:i] + faults[i + 1 :] for i in range(len(hypothesis))]
-        simpler = [
-            (*faults[:i], dataclasses.replace(fault, severity=special), *faults[i + 1 :])
-            for i, fault in enumerate(faults)
-            if fault.severity not in fault.kind.alone
-            for special in (*fault.kind.special, *fault.kind.alone)
-        ]
-        return self._distinct(hypothesis, [*fewer, *simpler])
-
-    def _distinct(
-        self, hypothesis: Hypothesis, changed: Iterable[tuple[Fault, ...]]
-    ) -> list[Hypothesis]:
-        made = dict.fromkeys(canonical(faults, self._anatomy) for faults in changed)
-        return [one for one in made if one != hypothesis and len(one) <= self._most]
+    def _allowed(self, hypotheses: Iterable[Hypothesis]) -> list[Hypothesis]:
+        return [one for one in hypotheses if len(one) <= self._max_faults]

@@ -1,55 +1,55 @@
-"""Whether one hypothesis predicts the trials significantly better than another.
+"""Significance tests on losses: paired between hypotheses, unpaired between trials.
 
-Two hypotheses are compared over the same pieces of the trials, so what makes a piece hard to
-predict for both does not count. A piece is not independent of the next one, and a model that is not
-the robot errs everywhere in the same way: so much more is asked for than a textbook would.
+Two hypotheses are compared over the same segments (windows, for closed-loop comparators), so the
+difficulty of a segment cancels. Neighbouring segments are dependent and the errors of a wrong model
+are systematic, so the significance levels are stricter than a textbook's.
 """
 
 import numpy as np
 
 from selfmodel.arrays import FloatArray
 
-Z = 3.0
-"""How many standard errors the mean difference of two hypotheses must have. Of some 1,500 faults
-that were proposed beside the truth, across gaps of 0.1 and 0.2, none reached 2."""
+MIN_Z = 3.0
+"""Standard errors by which a hypothesis has to be better than another. Of about 1,500 faults
+proposed in addition to the true ones, across gaps of 0.1 and 0.2, none reached 2."""
 
-WORSE = 5.0
-"""How many standard errors a mean loss must be above the usual one: other trials, other gaits, and
-so more than for two hypotheses on the same pieces."""
+MIN_Z_ACROSS_TRIALS = 5.0
+"""Standard errors by which a mean loss has to exceed that of other trials. It is larger than
+``MIN_Z`` because the trials and gaits differ; it also limits the luck of hundreds of candidates."""
 
-RATIO = 3.0
-"""How many times as large a mean loss counts as larger whatever the errors: where prediction is all
-but perfect, a few pieces that tell are proof."""
+LOSS_RATIO = 3.0
+"""Ratio of mean losses that is significant whatever the standard error: a few segments are enough
+where the prediction is almost exact."""
 
-NEGLIGIBLE = 1e-6
-"""A mean loss below this is none: what is left where the model is the robot is the rounding of its
-arithmetic."""
+NEGLIGIBLE_LOSS = 1e-6
+"""Mean loss that counts as 0: the rounding errors of a model that equals the robot."""
 
-TEST = f"paired z over the pieces of the trials >= {Z:g}, or {RATIO:g} times the loss"
-"""The test in words."""
+TEST = f"paired z over the pieces of the trials >= {MIN_Z:g}, or {LOSS_RATIO:g} times the loss"
+"""Name of the test in reports and in JSON."""
 
 
 def is_better(one: FloatArray, other: FloatArray) -> bool:
     """Returns whether the first of two hypotheses predicts significantly better.
 
     Args:
-        one: Its losses, ``(pieces,)``.
-        other: The losses of the other on the same pieces, ``(pieces,)``. Either is infinite where
-            a simulation diverged; then it is not the better one.
+        one: Losses of the first hypothesis, ``(segments,)``; infinite where a simulation diverged.
+        other: Losses of the second hypothesis on the same segments, ``(segments,)``, likewise. A
+            hypothesis that diverged is never better; a finite one is better than it.
     """
     if not np.isfinite(one).all():
         return False
     if not np.isfinite(other).all():
         return True
-    if not other.mean() > one.mean() + NEGLIGIBLE:
+    if not other.mean() > one.mean() + NEGLIGIBLE_LOSS:
         return False
-    return bool(paired_z(other, one) >= Z or other.mean() > RATIO * one.mean() + NEGLIGIBLE)
+    z_is_high = paired_z(other, one) >= MIN_Z
+    return bool(z_is_high or other.mean() > LOSS_RATIO * one.mean() + NEGLIGIBLE_LOSS)
 
 
 def paired_z(larger: FloatArray, smaller: FloatArray) -> float:
-    """Returns the mean difference of finite losses over its standard error.
+    """Returns the mean difference of finite losses divided by its standard error.
 
-    It is 0 for less than two pieces, and where all pieces differ by the same.
+    The result is 0 for fewer than two segments, and where all differences are equal.
     """
     difference = larger - smaller
     error = difference.std(ddof=1) / np.sqrt(len(difference)) if len(difference) > 1 else 0.0
@@ -57,74 +57,75 @@ def paired_z(larger: FloatArray, smaller: FloatArray) -> float:
 
 
 def gain_exceeds_healthy_gain(
-    one: FloatArray, other: FloatArray, one_before: FloatArray, other_before: FloatArray
+    one: FloatArray, other: FloatArray, healthy_one: FloatArray, healthy_other: FloatArray
 ) -> bool:
-    """Returns whether a hypothesis predicts significantly better since something is wrong.
+    """Returns whether a gain is significant, and significantly larger than on healthy trials.
 
-    What helps as much where nothing was wrong only mends the model. It is asked of hundreds of
-    hypotheses, so ``WORSE`` standard errors are wanted.
+    An equal gain on healthy trials is a correction of model error. Both tests require
+    ``MIN_Z_ACROSS_TRIALS`` standard errors, because hundreds of hypotheses are tested.
 
     Args:
-        one: The losses of the hypothesis, ``(pieces,)``.
-        other: Those of the hypothesis to beat, on the same pieces.
-        one_before: As ``one``, of other trials, from before.
-        other_before: As ``other``, of these.
+        one: Losses of the better hypothesis on the damaged trials, ``(segments,)``.
+        other: Losses of the other hypothesis on the same segments.
+        healthy_one: As ``one``, on the healthy trials, ``(healthy_segments,)``.
+        healthy_other: As ``other``, on the healthy trials.
     """
-    gains = _gains(one, other, one_before, other_before)
-    if gains is None or not gains[0].mean() > NEGLIGIBLE:
+    gains = _gains(one, other, healthy_one, healthy_other)
+    if gains is None or not gains[0].mean() > NEGLIGIBLE_LOSS:
         return False
-    more, error = _unpaired(*gains)
-    return paired_z(other, one) >= WORSE and more >= WORSE * error
+    more, error = _welch(*gains)
+    return paired_z(other, one) >= MIN_Z_ACROSS_TRIALS and more >= MIN_Z_ACROSS_TRIALS * error
 
 
 def gain_is_model_error(
-    one: FloatArray, other: FloatArray, one_before: FloatArray, other_before: FloatArray
+    one: FloatArray, other: FloatArray, healthy_one: FloatArray, healthy_other: FloatArray
 ) -> bool:
-    """Returns whether what predicts better mends the model, and tells of no change.
+    """Returns whether a gain corrects model error: healthy trials gain about as much.
 
-    It would have helped before anything was wrong, and does not help significantly more since;
-    though what is really wrong would have done as much harm then as it helps now, and that much the
-    trials would have shown.
+    Three conditions hold: the healthy trials gain; the damaged trials gain by less than ``MIN_Z``
+    standard errors more; and the test has the power to show a real fault, which would worsen the
+    healthy trials by as much as it improves the damaged ones.
 
     Args:
-        one: The losses of the better hypothesis; this and the others as for ``has_become_better``.
-        other: Those of the other.
-        one_before: As ``one``, from before.
-        other_before: As ``other``, from before.
+        one: Losses of the better hypothesis; as for ``gain_exceeds_healthy_gain``.
+        other: Losses of the other hypothesis.
+        healthy_one: As ``one``, on the healthy trials.
+        healthy_other: As ``other``, on the healthy trials.
     """
-    gains = _gains(one, other, one_before, other_before)
-    if gains is None or not gains[1].mean() > NEGLIGIBLE:
+    gains = _gains(one, other, healthy_one, healthy_other)
+    if gains is None or not gains[1].mean() > NEGLIGIBLE_LOSS:
         return False
-    more, error = _unpaired(*gains)
-    return more < Z * error < 2 * float(gains[0].mean())
+    more, error = _welch(*gains)
+    return more < MIN_Z * error < 2 * float(gains[0].mean())
 
 
 def _gains(
-    one: FloatArray, other: FloatArray, one_before: FloatArray, other_before: FloatArray
+    one: FloatArray, other: FloatArray, healthy_one: FloatArray, healthy_other: FloatArray
 ) -> tuple[FloatArray, FloatArray] | None:
-    """By how much the first predicts each piece better, and did before; None where nobody knows."""
-    known = all(np.isfinite(losses).all() for losses in (one, other, one_before, other_before))
-    if not known or min(len(one), len(one_before)) < 2:
+    """Gains of the first per damaged and per healthy segment; None if infinite or fewer than 2."""
+    losses = (one, other, healthy_one, healthy_other)
+    if not all(np.isfinite(each).all() for each in losses) or min(len(one), len(healthy_one)) < 2:
         return None
-    return other - one, other_before - one_before
+    return other - one, healthy_other - healthy_one
 
 
-def exceeds_healthy_loss(losses: FloatArray, usual: FloatArray) -> bool:
-    """Returns whether losses are significantly higher than those of a model that was right.
+def exceeds_healthy_loss(losses: FloatArray, healthy: FloatArray) -> bool:
+    """Returns whether losses are significantly higher than those on healthy trials.
 
     Args:
-        losses: ``(pieces,)``.
-        usual: ``(pieces,)`` of other trials, so the two are not paired (Welch). Where either has
-            one piece only, or diverged, nothing but the ratio can tell.
+        losses: Losses of the best hypothesis, ``(segments,)``.
+        healthy: Losses of the empty hypothesis on healthy trials, ``(healthy_segments,)``. The
+            test is unpaired (Welch). With a single segment, or with infinite losses, the ratio of
+            the means alone decides.
     """
-    larger = bool(losses.mean() > RATIO * usual.mean() + NEGLIGIBLE)
-    if min(len(losses), len(usual)) < 2 or not np.isfinite([losses.mean(), usual.mean()]).all():
+    larger = bool(losses.mean() > LOSS_RATIO * healthy.mean() + NEGLIGIBLE_LOSS)
+    if min(len(losses), len(healthy)) < 2 or not np.isfinite([losses.mean(), healthy.mean()]).all():
         return larger
-    difference, error = _unpaired(losses, usual)
-    return larger or difference > WORSE * error + NEGLIGIBLE
+    difference, error = _welch(losses, healthy)
+    return larger or difference > MIN_Z_ACROSS_TRIALS * error + NEGLIGIBLE_LOSS
 
 
-def _unpaired(one: FloatArray, other: FloatArray) -> tuple[float, float]:
-    """By how much the first mean is larger, and the standard error of that (Welch)."""
+def _welch(one: FloatArray, other: FloatArray) -> tuple[float, float]:
+    """Difference of the means and its standard error (Welch)."""
     variance = one.var(ddof=1) / len(one) + other.var(ddof=1) / len(other)
     return float(one.mean() - other.mean()), float(np.sqrt(variance))

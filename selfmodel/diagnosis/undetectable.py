@@ -1,49 +1,47 @@
-"""What may be wrong besides: faults that the trials neither show nor rule out."""
+"""Undetectable faults: added to the best hypothesis, they change the loss in neither direction."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
+from selfmodel.diagnosis.loss_functions import Losses, LossFunctions, by_total_loss
 from selfmodel.diagnosis.significance import is_better
-from selfmodel.faults.hypothesis import Hypothesis, canonical
-from selfmodel.faults.kind import FaultKind
-from selfmodel.robot.anatomy import Anatomy
+from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.faults.hypothesis_space import HypothesisSpace
 
 
 def undetectable_faults(
-    best: Hypothesis, kinds: Sequence[FaultKind], anatomy: Anatomy, looks: LossFunctions
+    best: Hypothesis, space: HypothesisSpace, losses: LossFunctions
 ) -> list[Hypothesis]:
-    """Returns the hypotheses of one fault more that the trials cannot tell from the best.
+    """Returns the best hypothesis with one fault more, for each undetectable fault.
 
-    A dead touch sensor is one, in a foot that the gait never put down. Faults of degree are left
-    out: of most there is one that is too slight to be seen.
+    An example is a dead touch sensor in a foot that the gait never puts down. Kinds with severities
+    are excluded: most have a severity that is too small to detect.
 
     Args:
         best: The best hypothesis.
-        kinds: What is considered.
-        anatomy: The robot's parts.
-        looks: How badly hypotheses predict the trials. What the screen can tell is not looked at
-            closely.
+        space: The hypotheses about the robot; faults of its kinds are added.
+        losses: Loss functions of the trials. Hypotheses that the surrogate comparator
+            distinguishes from the best are not simulated further.
 
     Returns:
-        Closest first; none where the best itself diverges.
+        Hypotheses sorted by total loss; none if the simulation of the best hypothesis diverged.
     """
-    exact = [kind for kind in kinds if kind.severity_bounds is None]
-    faults = [fault for kind in exact for fault in kind.candidates(anatomy)]
-    made = dict.fromkeys(canonical([*best.faults, fault], anatomy) for fault in faults)
-    more = [one for one in made if len(one) > len(best)]
-    few = _untold(best, _untold(best, more, looks.screen), looks.after)
-    order = np.argsort(looks.after(few).sum(axis=1), kind="stable") if few else ()
-    return [few[i] for i in order]
+    faults = [fault for fault in space.coarse_candidates if fault.kind.severity_bounds is None]
+    distinct = dict.fromkeys(space.canonical([*best.faults, fault]) for fault in faults)
+    larger = [one for one in distinct if len(one) > len(best)]
+    candidates = _indistinguishable(best, larger, losses.surrogate)
+    return by_total_loss(_indistinguishable(best, candidates, losses.damaged), losses.damaged)
 
 
-def _untold(best: Hypothesis, others: Sequence[Hypothesis], losses: Losses) -> list[Hypothesis]:
-    mine, *theirs = losses([best, *others])
-    if not np.isfinite(mine).all():
+def _indistinguishable(
+    best: Hypothesis, others: Sequence[Hypothesis], losses: Losses
+) -> list[Hypothesis]:
+    best_losses, *rows = losses([best, *others])
+    if not np.isfinite(best_losses).all():
         return []
     return [
         other
-        for other, row in zip(others, theirs, strict=True)
-        if not is_better(mine, row) and not is_better(row, mine)
+        for other, row in zip(others, rows, strict=True)
+        if not is_better(best_losses, row) and not is_better(row, best_losses)
     ]

@@ -1,83 +1,75 @@
-"""What was not considered: whether a kind outside the considered ones explains what is left."""
-
-from collections.abc import Sequence
+"""Unsearched faults: one more fault, of a kind outside the search, explains the trials better."""
 
 import numpy as np
 
 from selfmodel.diagnosis.diagnosis import UnsearchedFault
-from selfmodel.diagnosis.loss_functions import LossFunctions
-from selfmodel.diagnosis.severity import coarse_candidates
-from selfmodel.diagnosis.significance import NEGLIGIBLE, gain_exceeds_healthy_gain, paired_z
-from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
-from selfmodel.faults.kind import Fault, FaultKind
+from selfmodel.diagnosis.loss_functions import SHORTLIST_SIZE, LossFunctions, by_total_loss
+from selfmodel.diagnosis.significance import NEGLIGIBLE_LOSS, gain_exceeds_healthy_gain, paired_z
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.hypothesis_space import HypothesisSpace
+from selfmodel.faults.kind import Fault
 from selfmodel.faults.registry import ALL_KINDS
-from selfmodel.robot.anatomy import Anatomy
-
-SHORTLIST = 8
-"""Hypotheses that are looked at closely, of those that the screen likes."""
 
 
 def best_unsearched_fault(
-    best: Hypothesis, considered: Sequence[FaultKind], anatomy: Anatomy, looks: LossFunctions
+    best: Hypothesis, space: HypothesisSpace, losses: LossFunctions
 ) -> UnsearchedFault | None:
-    """Returns the best hypothesis with a fault that was not considered, if that explains more.
+    """Returns the best hypothesis with one fault of an unsearched kind, if significantly better.
 
-    One fault of one kind that comes with selfmodel is added to the best hypothesis, or takes the
-    place of all that is said of the same part. The result has to predict the trials significantly
-    better; and its fault alone must not do the same to trials of the intact robot, for then it
-    mends the self-model and nothing has changed.
+    One fault of a built-in kind is added to the best hypothesis, or replaces all faults of the same
+    part. The gain has to be significant, and significantly larger than the gain of the fault alone
+    on healthy trials; otherwise the fault corrects model error.
 
     Args:
-        best: The best hypothesis of the considered kinds.
-        considered: These kinds.
-        anatomy: The robot's parts.
-        looks: How badly hypotheses predict the trials.
+        best: The best hypothesis of the searched kinds.
+        space: The searched hypotheses.
+        losses: Loss functions of the trials.
 
     Returns:
-        The one that predicts best; None where nothing outside explains more, or where there is
-        nothing from before to compare with.
+        The hypothesis with the lowest total loss that passes; None if there is none, or if there
+        are no comparable healthy trials.
     """
-    if looks.before is None:
+    if losses.healthy is None:
         return None
-    mine = looks.after([best])[0]
-    if not np.isfinite(mine).all() or mine.mean() <= NEGLIGIBLE:
+    best_losses = losses.damaged([best])[0]
+    if not np.isfinite(best_losses).all() or best_losses.mean() <= NEGLIGIBLE_LOSS:
         return None
-    candidates = _candidates(best, considered, anatomy)
-    for candidate in _shortlist(best, candidates, looks):
-        alone = canonical([candidates[candidate]], anatomy)
-        usual, with_it = looks.before([INTACT, alone])
-        if gain_exceeds_healthy_gain(looks.after([candidate])[0], mine, with_it, usual):
+    candidates = _candidates(best, space)
+    for candidate in _shortlist(best, list(candidates), losses):
+        alone = space.canonical([candidates[candidate]])
+        healthy_without, healthy_with = losses.healthy([INTACT, alone])
+        damaged_with = losses.damaged([candidate])[0]
+        if gain_exceeds_healthy_gain(damaged_with, best_losses, healthy_with, healthy_without):
             return UnsearchedFault(candidate, candidates[candidate].kind.name)
     return None
 
 
-def _candidates(
-    best: Hypothesis, considered: Sequence[FaultKind], anatomy: Anatomy
-) -> dict[Hypothesis, Fault]:
-    """Hypotheses, and what each says that was not considered.
+def _candidates(best: Hypothesis, space: HypothesisSpace) -> dict[Hypothesis, Fault]:
+    """Hypotheses with the unsearched fault of each.
 
-    What reshapes the model, such as rough terrain, is left out: each needs a model of its own.
+    Kinds that edit the specification, such as rough terrain, are excluded: each hypothesis needs a
+    compiled model.
     """
-    outside = [kind for kind in ALL_KINDS if kind not in considered and kind.edit_spec is None]
+    unsearched = [kind for kind in ALL_KINDS if kind not in space.kinds and kind.edit_spec is None]
     found: dict[Hypothesis, Fault] = {}
-    for fault in coarse_candidates(outside, anatomy):
+    for fault in HypothesisSpace(space.anatomy, tuple(unsearched)).coarse_candidates:
         others = [other for other in best.faults if other.part != fault.part]
         for faults in ((*best.faults, fault), (*others, fault)):
-            found.setdefault(canonical(faults, anatomy), fault)
+            found.setdefault(space.canonical(faults), fault)
     found.pop(best, None)
     return found
 
 
 def _shortlist(
-    best: Hypothesis, candidates: dict[Hypothesis, Fault], looks: LossFunctions
+    best: Hypothesis, candidates: list[Hypothesis], losses: LossFunctions
 ) -> list[Hypothesis]:
-    """Those that the screen likes most, the closest first."""
+    """The most significant gains by the surrogate, sorted by total loss of the comparator."""
     if not candidates:
         return []
-    asked = list(candidates)
-    mine, *theirs = looks.screen([best, *asked])
-    finite = np.isfinite(mine).all()
-    z = [paired_z(mine, row) if finite and np.isfinite(row).all() else -np.inf for row in theirs]
-    few = [asked[i] for i in np.argsort(z, kind="stable")[::-1][:SHORTLIST]]
-    order = np.argsort(looks.after(few).sum(axis=1), kind="stable")
-    return [few[i] for i in order]
+    best_losses, *rows = losses.surrogate([best, *candidates])
+    finite = np.isfinite(best_losses).all()
+    z = [
+        paired_z(best_losses, row) if finite and np.isfinite(row).all() else -np.inf for row in rows
+    ]
+    few = [candidates[i] for i in np.argsort(z, kind="stable")[::-1][:SHORTLIST_SIZE]]
+    return by_total_loss(few, losses.damaged)

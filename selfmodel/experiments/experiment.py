@@ -14,8 +14,9 @@ from selfmodel.experiments.reality import draw_reality
 from selfmodel.experiments.scoring import is_correct
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import FaultKind
-from selfmodel.faults.registry import PAPER_KINDS, known
-from selfmodel.logs.journal import open_journal
+from selfmodel.faults.registry import PAPER_KINDS
+from selfmodel.logs.journal import create_journal
+from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery.events import Event
 from selfmodel.recovery.fitness import DISPLACEMENT, Score
@@ -97,19 +98,20 @@ def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
         healthy, damaged = (experiment.physical(robot, hidden) for hidden in (INTACT, truth))
     else:
         healthy, damaged = reality.robot(robot), reality.robot(robot, truth, stream=1)
+    journal = create_journal(experiment.folder, robot.anatomy, experiment.kinds)
     recovery = recover(
         healthy=healthy,
         damaged=damaged,
         simulator=simulator,
         comparator=experiment.comparator,
-        journal=open_journal(
-            experiment.folder,
+        run_trial=TrialRunner(
+            journal.trials,
             robot,
             experiment.settings,
             hidden={"before": str(INTACT), "after": str(truth), "recovery": str(truth)},
             gap=reality.text,
-            kinds=known(experiment.kinds),
         ),
+        journal=journal,
         settings=experiment.settings,
         seed=experiment.seed,
         on_event=on_event,

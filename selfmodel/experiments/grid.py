@@ -20,7 +20,7 @@ from urllib.parse import quote, unquote
 
 from selfmodel.errors import InputError, WorkError
 from selfmodel.experiments.worker_pool import Died, work_off
-from selfmodel.logs.atomic import alone, put
+from selfmodel.logs.atomic import lock_folder, write_atomic
 
 PARTS = "parts"
 RUN = "run.json"
@@ -212,7 +212,7 @@ def _perform(folder: Path, work: Work, task: tuple[Job, str]) -> tuple[float, st
     """Does a part in a process of its own; returns the seconds, and why it failed if it did."""
     job, part = task
     run, start = folder / job.key, perf_counter()
-    with alone(run):
+    with lock_folder(run):
         if _is_done(run, part):  # another process got there first
             return 0.0, None
         try:
@@ -248,10 +248,10 @@ def _check(run: Path, job: Job) -> None:
 
 def _enrol(run: Path, job: Job) -> None:
     (run / PARTS).mkdir(parents=True, exist_ok=True)
-    with alone(run):
+    with lock_folder(run):
         _check(run, job)
         if not (run / RUN).exists():
-            put(run / RUN, json.dumps(_described(job), indent=1, allow_nan=False).encode())
+            write_atomic(run / RUN, json.dumps(_described(job), indent=1, allow_nan=False).encode())
 
 
 def _described(job: Job) -> Any:  # noqa: ANN401  # JSON
@@ -267,7 +267,7 @@ def _is_done(run: Path, part: str) -> bool:
 def _keep(run: Path, part: str, kept: Mapping[str, Any]) -> None:
     path = _path(run, part)
     path.parent.mkdir(exist_ok=True)  # who wants a run made anew may have deleted its results
-    put(path, json.dumps(kept, indent=1, allow_nan=False).encode())
+    write_atomic(path, json.dumps(kept, indent=1, allow_nan=False).encode())
 
 
 def _path(run: Path, part: str) -> Path:

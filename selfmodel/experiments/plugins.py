@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 from selfmodel.comparators import COMPARATORS
 from selfmodel.controllers.controller import Design
-from selfmodel.diagnosis.comparator import Comparator
+from selfmodel.diagnosis.comparator import Comparator, as_comparator
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import ALL_KINDS, KINDS
@@ -35,13 +35,7 @@ def comparator(name: str) -> Comparator:
     """
     if name in COMPARATORS:
         return COMPARATORS[name]
-    found = _plugged_in("comparator", name, COMPARATORS)
-    if isinstance(found, type) or not isinstance(found, Comparator):
-        raise InputError(
-            f"{name!r} is no comparator: expected an object, not a class, with the members of "
-            f"selfmodel.diagnosis.comparator.Comparator, got {found!r}"
-        )
-    return found
+    return as_comparator(_plugged_in("comparator", name, COMPARATORS), name)
 
 
 def next_trial(name: str) -> str:

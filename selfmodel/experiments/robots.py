@@ -5,8 +5,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from selfmodel.errors import InputError
-from selfmodel.faults.table_one import cases_of
-from selfmodel.logs.files import read_bounded
+from selfmodel.files import read_file
 from selfmodel.robot.mjcf.adaptation import adapt
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings, parse_setting, read_settings
@@ -32,7 +31,7 @@ def robot_entry(name: str, settings: Iterable[str] = ()) -> Entry:
     given = tuple(settings)
     if is_model(name):
         made = load_mjcf(Path(name), _settings(name, given))
-        return Entry(robot=lambda: made, cases=cases_of(made.anatomy), suite={})
+        return Entry(robot=lambda: made)
     if given:
         raise InputError(f"--set {given[0]} is for a robot's MJCF: {name!r} has all that it needs")
     # Nothing is drawn here, and dm_control would look for what to draw with.
@@ -68,7 +67,7 @@ def robot(name: str, control_timestep: float) -> Robot:
     path = Path(name)
     if not is_model(name):
         return robot_entry(name).robot()
-    data = read_bounded(path, "an MJCF file", LARGEST_MODEL)
+    data = read_file(path, "an MJCF file", LARGEST_MODEL)
     try:
         return Robot(path.stem, data.decode(), control_timestep)
     except (ValueError, KeyError) as error:

@@ -9,7 +9,7 @@ from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError
 from selfmodel.experiments.robots import is_model, robot, robot_entry
 from selfmodel.logs import LogError, TrialLog, load_controller, read_log
-from selfmodel.logs.robots import described_difference, the_robot_of
+from selfmodel.logs.robots import common_robot, describe_difference
 from selfmodel.robot.designs import DESIGNS
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import read_settings
@@ -47,7 +47,7 @@ def robot_of_logs(found: Sequence[TrialLog], override: str | None) -> Robot:
             not have their sensors, motors and hinges.
     """
     try:
-        own = the_robot_of(found)
+        own = common_robot(found)
     except LogError as error:
         raise InputError(str(error)) from error
     if override is None:
@@ -56,7 +56,7 @@ def robot_of_logs(found: Sequence[TrialLog], override: str | None) -> Robot:
     if chosen.anatomy.names != own.anatomy.names:
         raise InputError(
             f"{override} is another robot than that of {found[0].trial.path}: "
-            f"{described_difference(chosen.anatomy.names, own.anatomy.names)}"
+            f"{describe_difference(chosen.anatomy.names, own.anatomy.names)}"
         )
     return chosen
 

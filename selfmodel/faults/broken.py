@@ -1,4 +1,4 @@
-"""A broken joint: it and the limb beyond it fall off."""
+"""A broken joint: the limb beyond it falls off."""
 
 from typing import TYPE_CHECKING
 
@@ -11,17 +11,17 @@ if TYPE_CHECKING:
 
 
 def _apply(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
-    """Loses the limb, and with it its readings."""
-    lost = anatomy.joint(fault.part).bodies
-    for name in lost:
+    """Detaches the bodies of the limb and zeroes the readings of its sensors."""
+    detached = anatomy.joint(fault.part).bodies
+    for name in detached:
         embodiment.detach_body(name)
     for column, sensor in enumerate(anatomy.sensors):
-        if sensor.body in lost:
+        if sensor.body in detached:
             embodiment.fix_reading(column, 0.0)
 
 
 def _absorbs(fault: Fault, other: Fault, anatomy: Anatomy) -> bool:
-    """Whatever is wrong with a part that fell off no longer matters."""
+    """Returns whether the other fault is at a lost part, or of a motor without a load."""
     if other.part == fault.part:
         return other.kind != fault.kind
     broken = anatomy.joint(fault.part)
@@ -33,7 +33,7 @@ def _absorbs(fault: Fault, other: Fault, anatomy: Anatomy) -> bool:
 
 
 def _joints_with_limbs(anatomy: Anatomy) -> tuple[str, ...]:
-    """A body without a name cannot be told from others."""
+    """Joints whose limb has only named bodies: faults refer to bodies by name."""
     return tuple(joint.name for joint in anatomy.joints if "" not in joint.bodies)
 
 

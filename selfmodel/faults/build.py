@@ -28,13 +28,13 @@ def build(
         robot: The nominal robot.
         hypothesis: In canonical form.
         seed: Seed of the random parts of the faults, such as the shape of rough terrain. The
-            self-model's seed is 0; a physical robot has another seed, unknown to the self-model.
+            self-model's seed is 0; a simulated physical robot has another seed.
         edits: Further edits of the specification, after those of the hypothesis.
         perturb: Maps the compiled model to the model that the faults are applied to; identity by
             default.
 
     Raises:
-        InputError: The model has no place for a fault of the hypothesis.
+        InputError: A fault does not apply to the model, such as roughness without a ground plane.
     """
     model = compile_model(robot, hypothesis, seed, edits)
     if perturb is not None:

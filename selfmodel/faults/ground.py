@@ -1,4 +1,4 @@
-"""The ground: how slippery it is, and how it slopes."""
+"""The ground: sliding friction and slope."""
 
 from typing import TYPE_CHECKING
 
@@ -25,8 +25,8 @@ FRICTION = FaultKind(
     levels=uniform_levels(0.1, 0.13, 0.16, 0.2, 0.25, 0.32, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.2, 1.5),
     unit="(coefficient)",
 )
-"""The coefficient of sliding friction between the ground and everything that touches it. It has no
-degree that means nothing: which friction is nominal is the model's affair."""
+"""Coefficient of sliding friction between the ground and all geoms. No severity is nominal for
+every robot: the nominal friction is the model's."""
 
 SLOPE = FaultKind(
     name="slope",
@@ -34,9 +34,9 @@ SLOPE = FaultKind(
     apply=_tilt,
     severity_bounds=uniform_bounds(-0.6, 0.6),
     levels=uniform_levels(-0.3, -0.25, -0.2, -0.15, -0.1, -0.05, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3),
-    special={0.0: None},
+    degenerates_to={0.0: None},
     unit="rad",
 )
-"""The angle of the ground along forward, uphill positive. The ground and the robot's start pose are
-turned about the start, and gravity stays: the world's z axis points up in every logged signal, as
-for a robot whose odometry knows from its IMU where up is."""
+"""Angle of the ground along forward, uphill positive. The ground and the initial pose are rotated
+about the initial position, and gravity is unchanged: the world's z axis points up in every logged
+signal, as in odometry that is aligned with gravity by an IMU."""

@@ -1,4 +1,4 @@
-"""A hypothesis: what may be wrong with a robot and its world, in canonical form."""
+"""A hypothesis: a set of faults and environments in canonical form."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -9,13 +9,13 @@ from selfmodel.robot.anatomy import Anatomy
 
 @dataclass(frozen=True, order=True)
 class Hypothesis:
-    """A set of faults; none means that nothing changed.
+    """A set of faults; the empty set is the nominal robot.
 
-    Make one with ``canonical`` or ``notation.parse``, which know the robot: only then do equal
-    hypotheses mean equal robots.
+    ``canonical``, ``notation.parse`` and ``HypothesisSpace`` make hypotheses in canonical form, in
+    which equal hypotheses have equal effects on a robot. The constructor checks nothing.
 
     Attributes:
-        faults: Sorted, without those that another leaves no effect.
+        faults: Sorted, without faults that another fault absorbs.
     """
 
     faults: tuple[Fault, ...] = ()
@@ -28,31 +28,31 @@ class Hypothesis:
 
     @property
     def dynamics_part(self) -> "Hypothesis":
-        """What of it changes how the robot moves under given commands."""
+        """The faults that change the robot's motion under given commands."""
         return Hypothesis(tuple(fault for fault in self.faults if fault.kind.affects_dynamics))
 
     @property
     def spec_part(self) -> "Hypothesis":
-        """What of it is worked into the model before that is compiled."""
+        """The faults that edit the specification before it is compiled."""
         return Hypothesis(tuple(fault for fault in self.faults if fault.kind.edit_spec))
 
 
 INTACT = Hypothesis()
-"""Nothing changed."""
+"""The empty hypothesis: the nominal robot in the nominal environment."""
 
 
 def canonical(faults: Iterable[Fault], anatomy: Anatomy) -> Hypothesis:
-    """Returns the hypothesis that says the same in the fewest words.
+    """Returns the hypothesis with the fewest faults that has the same effects on a robot.
 
-    Order and repetition do not matter. A fault that another absorbs is dropped: what lies beyond
-    a broken joint is gone, whatever else was wrong with it. So is one whose degree says that
-    nothing is wrong. Of several degrees of one kind on one part the first counts.
+    Order and repetition do not matter. Faults with a nominal severity and faults that another
+    fault absorbs are dropped: a joint beyond a broken joint is lost, whatever its own fault. Of
+    several severities of one kind at one part the first is kept.
     """
     distinct: dict[tuple[FaultKind, str], Fault] = {}
-    for fault in filter(None, (said.settled for said in faults)):
+    for fault in filter(None, (given.canonical for given in faults)):
         distinct.setdefault((fault.kind, fault.part), fault)
     for fault in list(distinct.values()):
-        simpler = fault.settled_alone
+        simpler = fault.canonical_alone
         rest = [other for other in distinct.values() if other is not fault]
         if simpler is not fault and not any(
             simpler.kind.absorbs(simpler, other, anatomy) for other in rest

@@ -1,6 +1,6 @@
-"""A jammed joint: it is held rigidly, at 0 or at an angle.
+"""A jammed joint: its hinges are welded, at 0 or at an angle.
 
-A hinge that cannot be at 0 is held at the end of its range that is nearest.
+A hinge whose range excludes 0 is welded at the limit nearest to 0.
 """
 
 from collections.abc import Mapping
@@ -14,21 +14,21 @@ from selfmodel.robot.anatomy import Anatomy, Joint
 if TYPE_CHECKING:
     from selfmodel.robot.embodiment import Embodiment
 
-LEVELS = 12
-"""Angles that a genome proposes, evenly inside the joint's range: 0.09 rad apart for 60 degrees."""
+ANGLE_LEVELS = 12
+"""Levels of the angle, evenly spaced inside the joint's range: 0.09 rad apart for 60 degrees."""
 
 
-def _strike_at_zero(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+def _apply_at_zero(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
     joint = anatomy.joint(fault.part)
-    _hold(embodiment, anatomy, _nearest_to_zero(joint))
+    _weld(embodiment, anatomy, _nearest_to_zero(joint))
 
 
-def _strike_at_angle(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+def _apply_at_angle(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
     hinges = anatomy.joint(fault.part).hinges
-    _hold(embodiment, anatomy, dict.fromkeys(hinges, fault.severity))
+    _weld(embodiment, anatomy, dict.fromkeys(hinges, fault.severity))
 
 
-def _hold(embodiment: "Embodiment", anatomy: Anatomy, angles: Mapping[str, float]) -> None:
+def _weld(embodiment: "Embodiment", anatomy: Anatomy, angles: Mapping[str, float]) -> None:
     for hinge, angle in angles.items():
         embodiment.weld_hinge(hinge, angle)
     for column, sensor in enumerate(anatomy.sensors):
@@ -44,9 +44,10 @@ def _nearest_to_zero(joint: Joint) -> dict[str, float]:
 
 
 def _absorbs_at_zero(fault: Fault, other: Fault, anatomy: Anatomy) -> bool:
-    """A sensor that reads 0 of a held joint might have failed, and any multiple of 0 is 0.
+    """Returns whether a fault of the joint's sensor, motor or angle has no further effect.
 
-    Of a joint that is said to be held at 0 and at another angle, 0 counts.
+    A sensor of the welded hinge that reads 0 reads 0 if it fails or with any gain. A joint jammed
+    at 0 and at another angle is jammed at 0.
     """
     if other.kind in (FAILED_SENSOR, SENSOR_GAIN):
         sensor, angles = anatomy.sensor(other.part), _nearest_to_zero(anatomy.joint(fault.part))
@@ -57,7 +58,7 @@ def _absorbs_at_zero(fault: Fault, other: Fault, anatomy: Anatomy) -> bool:
 
 
 def _absorbs_motor(fault: Fault, other: Fault, anatomy: Anatomy) -> bool:
-    """A joint that nothing turns is not turned by its motors either."""
+    """Returns whether the other fault weakens motors that move nothing but the welded joint."""
     if other.part != fault.part or other.kind != WEAK_MOTOR:
         return False
     joint = anatomy.joint(fault.part)
@@ -65,35 +66,35 @@ def _absorbs_motor(fault: Fault, other: Fault, anatomy: Anatomy) -> bool:
 
 
 def _joints_with_angles(anatomy: Anatomy) -> tuple[str, ...]:
-    """Those whose hinges can all be at one angle that is not the nearest to 0."""
+    """Joints with a common angle of all hinges that differs from that of ``JAMMED``."""
     return tuple(joint.name for joint in anatomy.joints if _levels(anatomy, joint.name))
 
 
-def _degrees(anatomy: Anatomy, part: str) -> tuple[float, float]:
+def _severity_bounds(anatomy: Anatomy, part: str) -> tuple[float, float]:
     limits = anatomy.joint(part).limits
     return max(low for low, _ in limits), min(high for _, high in limits)
 
 
 def _levels(anatomy: Anatomy, part: str) -> tuple[float, ...]:
-    low, high = _degrees(anatomy, part)
+    low, high = _severity_bounds(anatomy, part)
     if low >= high:
         return ()
-    angles = (low + (high - low) * (k + 0.5) / LEVELS for k in range(LEVELS))
+    angles = (low + (high - low) * (k + 0.5) / ANGLE_LEVELS for k in range(ANGLE_LEVELS))
     return tuple(dict.fromkeys(round(angle, 3) + 0.0 for angle in angles if round(angle, 3)))
 
 
 JAMMED = FaultKind(
-    name="jam", keyword="jam", parts=joints, apply=_strike_at_zero, absorbs=_absorbs_at_zero
+    name="jam", keyword="jam", parts=joints, apply=_apply_at_zero, absorbs=_absorbs_at_zero
 )
 
 JAMMED_AT_ANGLE = FaultKind(
     name="jam-angle",
     keyword="jam",
     parts=_joints_with_angles,
-    apply=_strike_at_angle,
+    apply=_apply_at_angle,
     absorbs=_absorbs_motor,
-    severity_bounds=_degrees,
+    severity_bounds=_severity_bounds,
     levels=_levels,
-    special={0.0: JAMMED},
+    degenerates_to={0.0: JAMMED},
     unit="rad",
 )

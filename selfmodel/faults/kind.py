@@ -1,4 +1,4 @@
-"""A fault, and what a kind of fault or of environment has to say about itself."""
+"""A fault, and the record of callables that defines a kind of fault or of environment."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 Values = TypeVar("Values")
 
 ENVIRONMENT = ""
-"""The part that an environment strikes: the world, which notation does not name."""
+"""Part of the environment kinds, which apply to the world; notation omits it."""
 
 
 def joints(anatomy: Anatomy) -> tuple[str, ...]:
@@ -25,22 +25,22 @@ def joints(anatomy: Anatomy) -> tuple[str, ...]:
 
 
 def environment_part(_anatomy: Anatomy) -> tuple[str, ...]:
-    """The parts of a kind of environment."""
+    """Returns the only part of an environment kind."""
     return (ENVIRONMENT,)
 
 
 def absorbs_nothing(_fault: "Fault", _other: "Fault", _anatomy: Anatomy) -> bool:
-    """A kind whose faults leave every other fault its effect."""
+    """Returns False: every other fault keeps its effect."""
     return False
 
 
 def uniform_bounds(lowest: float, highest: float) -> Callable[[Anatomy, str], tuple[float, float]]:
-    """Returns the bounds of the degree of a kind for which all parts are alike."""
+    """Returns ``severity_bounds`` that are the same for all parts."""
     return partial(_same_for_all, (lowest, highest))
 
 
 def uniform_levels(*levels: float) -> Callable[[Anatomy, str], tuple[float, ...]]:
-    """Returns the levels of a kind for which all parts are alike."""
+    """Returns ``levels`` that are the same for all parts."""
     return partial(_same_for_all, levels)
 
 
@@ -50,40 +50,40 @@ def _same_for_all(values: Values, _anatomy: Anatomy, _part: str) -> Values:
 
 @dataclass(frozen=True, order=True, kw_only=True)
 class FaultKind:
-    """One kind of fault or of environment; known, compared and sorted by its name.
+    """A kind of fault or of environment; compared, sorted and hashed by its name.
 
     In notation, a fault is ``keyword``, ``keyword:part``, ``keyword=severity`` or
-    ``keyword:part=severity``, with the prefix in front of the severity's number. Kinds may share
-    a keyword, but not keyword and prefix:
-    ``sensor:X`` and ``sensor:X=gain0.2`` are of two kinds.
+    ``keyword:part=severity``, with the prefix in front of the severity's number. Two kinds may
+    share a keyword if their prefixes differ: ``sensor:X`` and ``sensor:X=gain0.2`` are faults of
+    two kinds.
 
     Attributes:
-        name: What it is called where kinds are chosen, such as ``sensor-gain``.
-        word: The word for it in notation, such as ``sensor``.
-        strike: Works the fault into an embodiment: its model, readings or neurons. It keeps the
-            layout of the model. Faults strike in the order of their kinds' names.
-        reshape: Works the fault into the robot's specification before that is compiled, given the
-            seed of what is random: for what a compiled model cannot be edited into. What MjData
-            holds must keep its sizes all the same.
-        feel: Works into an embodiment what the feet of a robot felt of the ground in a trial, given
-            the points, ``(n, 3)``, world frame, m: for what is random, and known only where the
-            robot has been. It is asked when stretches of that trial are predicted.
-        parts: The names of the parts it can strike, in the order of the genome's third value; an
-            environment strikes ``ENVIRONMENT`` alone.
-        absorbs: Whether the first fault, of this kind, leaves the second without any effect.
-        degrees: Lowest and highest degree a part can have, or None where a degree has no meaning.
-        levels: The degrees that a genome or a local search proposes for a part, in the order of
-            the genome's fourth value.
-        special: Degrees at which a fault of this kind is one of another kind, without a degree, or
-            None, which is nothing at all.
-        alone: Degrees at which a fault of this kind is one of another kind, without a degree, as
-            long as there is nothing else that such a one would absorb: a sensor with a gain of 0
-            has failed, unless it has a bias too.
-        prefix: Letters in front of the degree's number in notation.
-        unit: The unit of the degree.
-        affects_dynamics: Whether it changes how a robot moves under given commands; if not, it
-            changes readings only, and needs no simulation of its own where the commands are given.
-        searchable: Whether a diagnosis may propose it; otherwise only a physical robot has it.
+        name: Name on the command line, such as ``sensor-gain``.
+        keyword: First word in notation, such as ``sensor``.
+        apply: Edits an embodiment: its model, readings or neurons. The layout of the model stays.
+            Faults are applied in the order of their kinds' names.
+        edit_spec: Optional hook: edits the robot's specification before it is compiled, given the
+            seed of the random parts, for changes that a compiled model does not allow. The sizes
+            of MjData stay.
+        adapt_to_contacts: Optional hook: adapts an embodiment to the contact points observed in a
+            trial, ``(n, 3)``, world frame, m, before segments of that trial are predicted.
+        parts: Names of the parts that the kind applies to, in the order of a gene's third value;
+            ``ENVIRONMENT`` alone for an environment.
+        absorbs: Returns whether the first fault, of this kind, removes any effect of the second.
+        severity_bounds: Lowest and highest severity at a part; None for a kind without severities.
+        levels: Severities at a part that the search proposes, in the order of a gene's fourth
+            value.
+        degenerates_to: Severities at which the fault is equivalent to one of another kind, without
+            a severity, or to no fault (None).
+        degenerates_alone_to: Severities at which the fault is equivalent to one of another kind,
+            without a severity, unless the hypothesis has a fault that the equivalent would absorb:
+            a sensor with a gain of 0 has failed, but with a gain of 0 and a bias it is stuck.
+        prefix: Letters in front of the severity's number in notation.
+        unit: Unit of the severity.
+        affects_dynamics: Whether the fault changes the robot's motion under given commands. If
+            not, it changes readings only and shares the simulation of the same commands.
+        searchable: Whether a diagnosis may propose the kind; otherwise only a simulated physical
+            robot has it.
     """
 
     name: str
@@ -92,7 +92,7 @@ class FaultKind:
     edit_spec: Callable[["MjSpec", "Fault", int], None] | None = field(
         default=None, compare=False, repr=False
     )
-    feel: Callable[["Embodiment", "Fault", FloatArray], None] | None = field(
+    adapt_to_contacts: Callable[["Embodiment", "Fault", FloatArray], None] | None = field(
         default=None, compare=False, repr=False
     )
     parts: Callable[[Anatomy], tuple[str, ...]] = field(
@@ -107,28 +107,35 @@ class FaultKind:
     levels: Callable[[Anatomy, str], tuple[float, ...]] = field(
         default=uniform_levels(0.0), compare=False, repr=False
     )
-    special: Mapping[float, "FaultKind | None"] = field(
+    degenerates_to: Mapping[float, "FaultKind | None"] = field(
         default_factory=dict, compare=False, repr=False
     )
-    alone: Mapping[float, "FaultKind"] = field(default_factory=dict, compare=False, repr=False)
+    degenerates_alone_to: Mapping[float, "FaultKind"] = field(
+        default_factory=dict, compare=False, repr=False
+    )
     prefix: str = field(default="", compare=False, repr=False)
     unit: str = field(default="", compare=False, repr=False)
     affects_dynamics: bool = field(default=True, compare=False, repr=False)
     searchable: bool = field(default=True, compare=False, repr=False)
 
     @property
-    def others(self) -> tuple["FaultKind", ...]:
-        """The kinds that a fault of this kind is of at some degree."""
-        found = (*self.special.values(), *self.alone.values())
+    def degenerate_severities(self) -> tuple[float, ...]:
+        """Severities at which the fault is equivalent to one of another kind, or to none."""
+        return (*self.degenerates_to, *self.degenerates_alone_to)
+
+    @property
+    def degenerate_kinds(self) -> tuple["FaultKind", ...]:
+        """Kinds that a fault of this kind degenerates to."""
+        found = (*self.degenerates_to.values(), *self.degenerates_alone_to.values())
         return tuple(dict.fromkeys(kind for kind in found if kind is not None))
 
     @property
     def without_severity(self) -> "FaultKind":
-        """The kind that a fault of this kind is at one of its degrees, if any; else this one."""
-        return self.others[0] if self.others else self
+        """The first of ``degenerate_kinds``; the kind itself if there is none."""
+        return self.degenerate_kinds[0] if self.degenerate_kinds else self
 
     def candidates(self, anatomy: Anatomy) -> tuple["Fault", ...]:
-        """Returns every fault that a genome or a local search proposes: each part, each level."""
+        """Returns the faults that a genome can encode: each part at each level."""
         return tuple(
             Fault(self, part, severity)
             for part in self.parts(anatomy)
@@ -138,12 +145,12 @@ class FaultKind:
 
 @dataclass(frozen=True, order=True)
 class Fault:
-    """One thing that is not as the model says, with the robot or with the world.
+    """One difference of the robot or of the world from the nominal model.
 
     Attributes:
-        kind: What kind of thing.
-        part: The joint, sensor or neuron it strikes; ``ENVIRONMENT`` for an environment.
-        severity: How far, in the kind's own unit; 0 for a kind without degrees.
+        kind: Kind of the fault.
+        part: Name of the joint, sensor or neuron; ``ENVIRONMENT`` for an environment.
+        severity: Severity in the kind's unit; 0 for a kind without severities.
     """
 
     kind: FaultKind
@@ -159,15 +166,15 @@ class Fault:
         )
 
     @property
-    def settled(self) -> "Fault | None":
-        """The same in the fewest words; None where its degree says that nothing is wrong."""
-        if self.severity not in self.kind.special:
+    def canonical(self) -> "Fault | None":
+        """The equivalent fault without a severity, if any; None if the severity is nominal."""
+        if self.severity not in self.kind.degenerates_to:
             return self
-        kind = self.kind.special[self.severity]
+        kind = self.kind.degenerates_to[self.severity]
         return None if kind is None else Fault(kind, self.part)
 
     @property
-    def settled_alone(self) -> "Fault":
-        """The same in the fewest words where nothing else is wrong with the part."""
-        kind = self.kind.alone.get(self.severity)
+    def canonical_alone(self) -> "Fault":
+        """The equivalent fault without a severity, if no other fault affects the part."""
+        kind = self.kind.degenerates_alone_to.get(self.severity)
         return self if kind is None else Fault(kind, self.part)

@@ -1,4 +1,4 @@
-"""A weak motor: it has a part of its torque."""
+"""A weak motor: its torque is scaled down."""
 
 from typing import TYPE_CHECKING
 
@@ -15,7 +15,7 @@ def _apply(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
 
 
 def _joints_with_motors(anatomy: Anatomy) -> tuple[str, ...]:
-    """One motor may move several joints through a tendon, and counts to the first."""
+    """Joints with motors; a motor of several joints through a tendon belongs to the first."""
     return tuple(joint.name for joint in anatomy.joints if joint.motors)
 
 
@@ -26,6 +26,6 @@ WEAK_MOTOR = FaultKind(
     apply=_apply,
     severity_bounds=uniform_bounds(0.0, 1.0),
     levels=uniform_levels(0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9),
-    special={1.0: None},
+    degenerates_to={1.0: None},
     unit="of its torque",
 )

@@ -1,7 +1,7 @@
-"""A sensor that fails, or that measures wrongly: with a gain, a bias, or noise.
+"""A failed sensor, and sensors with a gain, a bias or noise.
 
-The controller receives gain times what is measured, plus the bias, plus noise: in the units of
-readings, in which touch is 0 or 1 and an angle is 1 at the end of its joint's range.
+The controller receives gain times the measurement, plus bias, plus noise, in the units of readings:
+touch is 0 or 1, and an angle is 1 at the end of its joint's range.
 """
 
 from typing import TYPE_CHECKING
@@ -18,7 +18,7 @@ def _sensors(anatomy: Anatomy) -> tuple[str, ...]:
 
 
 def _angle_sensors(anatomy: Anatomy) -> tuple[str, ...]:
-    """Touch is yes or no; noise that adds up has no meaning there."""
+    """Angle sensors; additive noise has no meaning for a binary touch sensor."""
     return tuple(sensor.name for sensor in anatomy.sensors if sensor.kind == "angle")
 
 
@@ -42,8 +42,8 @@ def _blur(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
     embodiment.noise[_column(anatomy, fault)] = fault.severity
 
 
-def _silences(fault: Fault, other: Fault, _anatomy: Anatomy) -> bool:
-    """From a failed sensor 0 is received, whatever else is wrong with it."""
+def _absorbs(fault: Fault, other: Fault, _anatomy: Anatomy) -> bool:
+    """Returns whether the other fault is at the same sensor: a failed sensor reads 0."""
     return other.part == fault.part and other.kind in (SENSOR_GAIN, SENSOR_BIAS, SENSOR_NOISE)
 
 
@@ -52,7 +52,7 @@ FAILED_SENSOR = FaultKind(
     keyword="sensor",
     parts=_sensors,
     apply=_fail,
-    absorbs=_silences,
+    absorbs=_absorbs,
     affects_dynamics=False,
 )
 
@@ -65,9 +65,9 @@ SENSOR_GAIN = FaultKind(
     affects_dynamics=False,
     severity_bounds=uniform_bounds(0.0, 2.0),
     levels=uniform_levels(0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.2, 1.4, 1.6, 1.8, 2.0),
-    special={1.0: None},
-    # With a bias, a gain of 0 is a reading that is stuck.
-    alone={0.0: FAILED_SENSOR},
+    degenerates_to={1.0: None},
+    # With a bias, a gain of 0 is a stuck reading, which no other kind expresses.
+    degenerates_alone_to={0.0: FAILED_SENSOR},
     unit="times",
 )
 
@@ -80,7 +80,7 @@ SENSOR_BIAS = FaultKind(
     affects_dynamics=False,
     severity_bounds=uniform_bounds(-1.0, 1.0),
     levels=uniform_levels(-0.9, -0.7, -0.5, -0.35, -0.2, -0.1, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9),
-    special={0.0: None},
+    degenerates_to={0.0: None},
     unit="of the reading's range",
 )
 
@@ -93,6 +93,6 @@ SENSOR_NOISE = FaultKind(
     affects_dynamics=False,
     severity_bounds=uniform_bounds(0.0, 1.0),
     levels=uniform_levels(0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8),
-    special={0.0: None},
+    degenerates_to={0.0: None},
     unit="of the reading's range",
 )

@@ -1,4 +1,4 @@
-"""Failures like those of the paper's Table I, made for any body by one rule."""
+"""The failures of the paper's Table I, derived for any robot from its anatomy."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -8,12 +8,12 @@ from selfmodel.robot.anatomy import Anatomy, Joint, Sensor
 
 @dataclass(frozen=True)
 class _Limb:
-    """Joints that hang on one another without branching, and what is lost with all of them.
+    """A kinematic chain without branches, and its sensors.
 
     Attributes:
-        joints: From the one nearest the root outwards.
-        touch: The touch sensors on it, the outermost first.
-        angle: The angle sensors of its joints.
+        joints: Joints, the one nearest to the root body first.
+        touch: Names of its touch sensors, the outermost first.
+        angle: Names of its joints' angle sensors.
     """
 
     joints: tuple[Joint, ...]
@@ -22,30 +22,30 @@ class _Limb:
 
 
 def cases_of(anatomy: Anatomy) -> Mapping[int, str]:
-    """Returns a robot's failures by the number that they have in Table I, in notation.
+    """Returns a robot's failures by their number in Table I, in notation.
 
-    A limb is a row of joints that does not branch; those that feel the ground come first, then in
-    the model's order. What a body cannot have is left out: without touch sensors 3 and 4, with one
-    limb 4, 7 and 8, with two limbs 8.
+    A limb is a chain of joints without branches; limbs with touch sensors come first, then the
+    order is the model's. Cases that a robot cannot have are omitted: 3 and 4 without touch sensors;
+    4, 7 and 8 with one limb; 8 with two limbs.
 
-    Source: the paper, Table I; for its two robots these are its failures.
+    Source: the paper, Table I; for the paper's two robots the cases equal the paper's.
     """
     limbs = _limbs(anatomy)
     found: dict[int, str | None] = dict.fromkeys(range(1, 9))
     if limbs:
         first, others = limbs[0], limbs[1:]
-        lost = f"break:{first.joints[0].name}"
+        lost_limb = f"break:{first.joints[0].name}"
         found[1] = f"break:{first.joints[-1].name}" if len(first.joints) > 1 else None
-        found[2] = lost
-        found[3] = _dead(first.touch)
-        found[4] = _also(lost, _dead(name for limb in others for name in limb.touch))
-        found[5] = _dead(first.angle)
+        found[2] = lost_limb
+        found[3] = _failed(first.touch)
+        found[4] = _compound(lost_limb, _failed(name for limb in others for name in limb.touch))
+        found[5] = _failed(first.angle)
         found[6] = f"jam:{first.joints[0].name}"
-        # The paper jams the leg behind the lost one, not the one opposite.
-        held = next(iter(others[1:] or others), None)
-        found[7] = _also(lost, f"jam:{held.joints[0].name}" if held else None)
-        rest = [limb for limb in others if limb is not held and limb.angle]
-        found[8] = found[7] and _also(found[7], _dead(rest[-1].angle if rest else ()))
+        # The paper jams the leg behind the lost leg, not the opposite leg.
+        jammed = next(iter(others[1:] or others), None)
+        found[7] = _compound(lost_limb, f"jam:{jammed.joints[0].name}" if jammed else None)
+        rest = [limb for limb in others if limb is not jammed and limb.angle]
+        found[8] = found[7] and _compound(found[7], _failed(rest[-1].angle if rest else ()))
     cases = {number: notation for number, notation in found.items() if notation}
     return cases | {9: "intact", 10: "neuron:0"}
 
@@ -56,14 +56,14 @@ def _limbs(anatomy: Anatomy) -> Sequence[_Limb]:
     ends = [name for name in joints if not beyond[name]]
     limbs = []
     for end in ends:
-        # Of a joint on which two ends hang neither is the limb's.
-        row = [n for n in joints if n == end or (end in beyond[n] and _is_row(beyond, n))]
-        row.sort(key=lambda name: -len(beyond[name]))
-        limbs.append(_limb([joints[name] for name in row], anatomy.sensors))
+        # A joint with two chain ends beyond it belongs to no limb.
+        chain = [n for n in joints if n == end or (end in beyond[n] and _is_chain(beyond, n))]
+        chain.sort(key=lambda name: -len(beyond[name]))
+        limbs.append(_limb([joints[name] for name in chain], anatomy.sensors))
     return sorted(limbs, key=lambda limb: not limb.touch)  # stable
 
 
-def _is_row(beyond: Mapping[str, frozenset[str]], name: str) -> bool:
+def _is_chain(beyond: Mapping[str, frozenset[str]], name: str) -> bool:
     return sum(not beyond[other] for other in beyond[name]) == 1
 
 
@@ -78,10 +78,10 @@ def _limb(joints: Sequence[Joint], sensors: Iterable[Sensor]) -> _Limb:
     )
 
 
-def _dead(sensors: Iterable[str]) -> str | None:
+def _failed(sensors: Iterable[str]) -> str | None:
     first = next(iter(sensors), None)
     return first and f"sensor:{first}"
 
 
-def _also(one: str, other: str | None) -> str | None:
+def _compound(one: str, other: str | None) -> str | None:
     return other and f"{one}+{other}"

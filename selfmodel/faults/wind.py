@@ -1,4 +1,4 @@
-"""Wind: the medium, air where the model has none, moves along forward, or across it."""
+"""Wind: the medium moves along forward, or across; it is air if the model has no medium."""
 
 from typing import TYPE_CHECKING
 
@@ -9,10 +9,10 @@ if TYPE_CHECKING:
     from selfmodel.robot.embodiment import Embodiment
 
 AIR_DENSITY = 1.2
-"""Of air at 20 degrees Celsius, kg/m^3; a model that says no medium is in a vacuum."""
+"""Density of air at 20 degrees Celsius, kg/m^3; MuJoCo's default medium is a vacuum."""
 
 AIR_VISCOSITY = 1.8e-5
-"""Of the same air, Pa s."""
+"""Viscosity of air at 20 degrees Celsius, Pa s."""
 
 _BOUNDS = uniform_bounds(-40.0, 40.0)
 _LEVELS = uniform_levels(
@@ -22,7 +22,7 @@ _LEVELS = uniform_levels(
 
 def _blow(embodiment: "Embodiment", axis: int, speed: float) -> None:
     option = embodiment.model.opt
-    if option.density == option.viscosity == 0:  # what swims stays in its water
+    if option.density == option.viscosity == 0:  # a swimmer's model has its own medium
         option.density, option.viscosity = AIR_DENSITY, AIR_VISCOSITY
     option.wind[axis] = speed
 
@@ -41,10 +41,10 @@ WIND = FaultKind(
     apply=_along,
     severity_bounds=_BOUNDS,
     levels=_LEVELS,
-    special={0.0: None},
+    degenerates_to={0.0: None},
     unit="m/s",
 )
-"""Along forward: positive wind blows from behind, -5 is against the robot."""
+"""Wind speed along the world's x axis: positive from behind, negative against the robot."""
 
 CROSSWIND = FaultKind(
     name="crosswind",
@@ -52,7 +52,7 @@ CROSSWIND = FaultKind(
     apply=_across,
     severity_bounds=_BOUNDS,
     levels=_LEVELS,
-    special={0.0: None},
+    degenerates_to={0.0: None},
     unit="m/s",
 )
-"""Along the world's y axis: positive wind blows from the right to the left."""
+"""Wind speed along the world's y axis: positive from right to left."""

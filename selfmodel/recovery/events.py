@@ -1,21 +1,21 @@
-"""What happens in a recovery or a diagnosis, told as it happens."""
+"""Events of a recovery or a diagnosis, reported to a callback as they happen."""
 
 from dataclasses import dataclass
 
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.evolution import Generation
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.simulation.calibrate import Calibration
+from selfmodel.simulation.calibration import Calibration
 from selfmodel.trials.trial import Trial
 
 
 @dataclass(frozen=True)
 class SearchBegins:
-    """A search begins.
+    """Start of a search.
 
     Attributes:
-        kind: Which of the two EAs.
-        hypothesis: What a repair takes to be wrong; None for a diagnosis.
+        kind: Name of the EA: ``repair`` or ``diagnostic``.
+        hypothesis: Hypothesis that a repair compensates; None for a diagnosis.
     """
 
     kind: str
@@ -23,16 +23,16 @@ class SearchBegins:
 
 
 @dataclass(frozen=True)
-class Question:
-    """The next trial is to tell hypotheses apart.
+class DiscriminatingTrial:
+    """Start of a search for the controller whose trial separates hypotheses.
 
     Attributes:
-        hypotheses: Those that are still in the running, the best first.
+        hypotheses: Hypotheses to separate, best first.
     """
 
     hypotheses: tuple[Hypothesis, ...]
 
 
-Event = SearchBegins | Generation | Calibration | Question | Trial | Diagnosis
-"""Of a search that goes on, of a calibration, of what the next trial is for, a trial that ended, a
-diagnosis that was made."""
+Event = SearchBegins | Generation | Calibration | DiscriminatingTrial | Trial | Diagnosis
+"""Start or generation of a search, calibration, start of the choice of a discriminating trial,
+finished trial, or diagnosis."""

@@ -1,4 +1,4 @@
-"""Diagnosis from logged trials alone, as a recovery makes it trial by trial."""
+"""Diagnosis from logged trials only, trial by trial as in a recovery."""
 
 from collections.abc import Callable, Collection, Sequence
 
@@ -18,21 +18,21 @@ def diagnose_trials(
     on_event: Callable[[Event], None],
     after: Collection[int] | None = None,
 ) -> Diagnosis:
-    """Returns the hypotheses that explain all trials, ranked.
+    """Returns the diagnosis of all trials.
 
-    The trials are taken one by one, and each diagnosis seeds the next with its best hypotheses. So
-    the trials and the seed of a recovery give the rankings that the recovery found.
+    The trials are added one by one, and the best hypotheses of each diagnosis seed the next
+    search. The trials and the seed of a recovery therefore reproduce the recovery's rankings.
 
     Args:
-        trials: Those since something is wrong, in the order in which they were run.
-        diagnose: The diagnostic EA.
-        seed: Every random choice comes from it.
-        on_event: Is told what happens.
-        after: After how many trials a diagnosis is made, the last one included; after each, if none
-            are given.
+        trials: Trials since the failure, in the order in which they were run.
+        diagnose: Diagnostic EA.
+        seed: Seed of all random choices.
+        on_event: Callback, called with each event as it happens.
+        after: Numbers of trials after which to diagnose, including the number of all trials; after
+            each trial, if not given.
 
     Raises:
-        InputError: There are no trials, or the comparator cannot judge one.
+        InputError: There are no trials, or a trial lacks signals that the comparator needs.
     """
     if not trials:
         raise InputError("expected at least one trial to explain, got none")

@@ -1,4 +1,4 @@
-"""What a run is worth: the fitness of the repair EA."""
+"""Fitness functions for the repair EA."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,14 +11,14 @@ from selfmodel.trials.behaviour import Behaviour, Signal, forward_displacement
 
 @dataclass(frozen=True)
 class Score:
-    """A measure of runs; more is better.
+    """A fitness function of rollouts, to be maximised.
 
     Attributes:
-        name: What it is called.
-        record: The signals that it is computed from.
-        of: Computes it, from a robot with nothing wrong, what is wrong with it, and what a batch
-            of runs looked like, ``(n, steps, width)`` each signal: ``(n,)``, each the same
-            whatever the others are.
+        name: Name of the score.
+        record: Signals that the score is computed from.
+        of: Function of a healthy robot, a hypothesis and the behaviour of a batch of rollouts,
+            ``(n, steps, width)`` per signal, that returns the scores, ``(n,)``. The score of a
+            rollout does not depend on the other rollouts of the batch.
     """
 
     name: str
@@ -26,9 +26,9 @@ class Score:
     of: Callable[[Robot, Hypothesis, Behaviour], FloatArray]
 
 
-def _way(_robot: Robot, _hypothesis: Hypothesis, behaviour: Behaviour) -> FloatArray:
+def _displacement(_robot: Robot, _hypothesis: Hypothesis, behaviour: Behaviour) -> FloatArray:
     return forward_displacement(behaviour)
 
 
-DISPLACEMENT = Score("displacement", ("base_position",), _way)
-"""The forward displacement, m. Source: the paper, section III."""
+DISPLACEMENT = Score("displacement", ("base_position",), _displacement)
+"""Forward displacement, m. Source: the paper, section III."""

@@ -1,4 +1,4 @@
-"""How the next physical trial is chosen: to restore the function, or to tell hypotheses apart."""
+"""Choice of the next physical trial: a repair, or a trial that separates hypotheses."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -12,30 +12,30 @@ from selfmodel.evolution import reproduce
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.recovery.database import Database
 from selfmodel.recovery.disagreement import Disagreement
-from selfmodel.recovery.events import Event, Question
+from selfmodel.recovery.events import DiscriminatingTrial, Event
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 
 GENERATIONS = 8
-"""How often offspring is bred of the controllers on which hypotheses disagree most. A gait's first
-children walk as it does."""
+"""Generations of offspring of the controllers with the largest disagreement: the first offspring of
+a gait moves almost as the gait does."""
 
-MOST = 5
-"""Hypotheses that a trial is to tell apart at most: the time grows with their number."""
+MAX_HYPOTHESES = 5
+"""Maximum hypotheses that a trial separates: the time of the choice grows with their number."""
 
 
 @dataclass(frozen=True, eq=False)
 class Situation:
-    """What a choice of the next trial is made from.
+    """Input of a choice of the next trial.
 
     Attributes:
-        known: The trials and diagnoses so far, the last of them of all trials.
-        trials_left: How many trials may still be run, this one included.
-        simulator: The self-model.
+        known: Trials and diagnoses so far; the last diagnosis is of all trials.
+        trials_left: Number of trials that remain, including the trial to choose.
+        simulator: Self-model.
         settings: The paper's numbers.
-        rng: Every random choice comes from it.
-        repaired: Evolves the controller that compensates for what the last diagnosis says.
-        on_event: Is told what happens.
+        rng: Random number generator of all random choices.
+        repaired: Evolves a controller that compensates for the last diagnosis.
+        on_event: Callback, called with each event as it happens.
     """
 
     known: Database
@@ -48,27 +48,27 @@ class Situation:
 
 
 NextTrial = Callable[[Situation], Controller]
-"""A way to choose the controller of the next physical trial."""
+"""Chooses the controller of the next physical trial."""
 
 
 def by_repair(situation: Situation) -> Controller:
-    """Chooses the controller that compensates for the best hypothesis, as the paper does."""
+    """Returns a controller that compensates for the best hypothesis, as in the paper."""
     return situation.repaired()
 
 
 def by_disagreement(situation: Situation) -> Controller:
-    """Chooses the controller on which hypotheses disagree, and a repair when that is over.
+    """Returns the controller with the largest disagreement of hypotheses, or finally a repair.
 
-    It is over once a diagnosis is ``explained``, and nothing may be wrong unseen besides or the
-    trial before could not show it either; and when only one trial is left: the trials are spent to
-    bring the robot back, and what is never tried restores nothing.
+    A repair is returned once the diagnosis is ``explained`` and either has no undetectable fault
+    or has the same undetectable faults as the diagnosis before, which the last trial did not
+    resolve. The last trial is always a repair: only a repair that is tried restores the robot.
     """
     *earlier, diagnosis = situation.known.diagnoses
-    asked = bool(earlier) and earlier[-1].undetectable == diagnosis.undetectable
-    sure = diagnosis.verdict == "explained" and (asked or not diagnosis.undetectable)
-    if sure or situation.trials_left == 1:
+    unresolved = bool(earlier) and earlier[-1].undetectable == diagnosis.undetectable
+    certain = diagnosis.verdict == "explained" and (unresolved or not diagnosis.undetectable)
+    if certain or situation.trials_left == 1:
         return situation.repaired()
-    situation.on_event(Question(candidates_to_separate(diagnosis)))
+    situation.on_event(DiscriminatingTrial(candidates_to_separate(diagnosis)))
     return discriminating_controller(
         diagnosis,
         situation.known.controllers,
@@ -85,54 +85,61 @@ def discriminating_controller(
     settings: Settings,
     rng: np.random.Generator,
 ) -> Controller:
-    """Returns the controller on which the hypotheses that are in the running disagree most.
+    """Returns the controller with the largest disagreement of the hypotheses to separate.
 
     Args:
-        diagnosis: What is known of them.
-        known: Controllers that were tried, the newest first; the newest is not tried again.
-        simulator: The self-model.
+        diagnosis: Last diagnosis.
+        known: Controllers of earlier trials, newest first; the newest is not tried again.
+        simulator: Self-model.
         settings: The paper's numbers.
-        rng: Every random choice comes from it.
+        rng: Random number generator of all random choices.
     """
-    dispute = Disagreement(candidates_to_separate(diagnosis), simulator, settings.steps)
+    disagreement = Disagreement(candidates_to_separate(diagnosis), simulator, settings.steps)
     pool = candidates(known, settings, rng)
     for _ in range(GENERATIONS):
-        best = dispute.most_discriminative_first(pool)[: settings.survivors]
+        best = disagreement.most_discriminative_first(pool)[: settings.survivors]
         children = offspring(best, settings, rng)
-        pool = [one for one in dict.fromkeys([*best, *children]) if one != known[0]]
-    return dispute.most_discriminative(pool)
+        distinct = dict.fromkeys([*best, *children])
+        pool = [controller for controller in distinct if controller != known[0]]
+    return disagreement.most_discriminative(pool)
 
 
 def candidates_to_separate(diagnosis: Diagnosis) -> tuple[Hypothesis, ...]:
-    """Returns the best hypothesis and those that a trial should tell from it, five at most.
+    """Returns the best hypothesis and the hypotheses to separate from it, at most five in all.
 
-    They are its rivals, or where it has none and explains too little those that follow it in the
-    ranking; then what may be wrong besides. Where that is nothing, they are those that follow it.
+    These are the indistinguishable hypotheses or, if there are none and the diagnosis is
+    ``unexplained``, the next in the ranking; then the hypotheses with an undetectable fault. If all
+    of these are missing, they are the next in the ranking.
     """
-    followers = tuple(one.hypothesis for one in diagnosis.ranked[1:] if math.isfinite(one.distance))
+    followers = tuple(
+        candidate.hypothesis
+        for candidate in diagnosis.ranked[1:]
+        if math.isfinite(candidate.distance)
+    )
     others = diagnosis.indistinguishable or (
         followers if diagnosis.verdict == "unexplained" else ()
     )
-    untold = dict.fromkeys([*others, *diagnosis.undetectable]) or followers
-    return (diagnosis.best, *untold)[:MOST]
+    to_separate = dict.fromkeys([*others, *diagnosis.undetectable]) or followers
+    return (diagnosis.best, *to_separate)[:MAX_HYPOTHESES]
 
 
 def candidates(
     known: Sequence[Controller], settings: Settings, rng: np.random.Generator
 ) -> list[Controller]:
-    """Returns the controllers that a choice is made from, each once, the tried ones first.
+    """Returns the distinct controllers to choose from, those of earlier trials first.
 
     Args:
-        known: Controllers that were tried, the newest first. Those of its design are candidates,
-            but for the newest; and so are their offspring, as many as an EA has genomes.
-        settings: How offspring is bred.
-        rng: Every random choice comes from it.
+        known: Controllers of earlier trials, newest first. Candidates are those of the newest
+            one's design, except the newest, and one population of their offspring.
+        settings: Numbers of the EA.
+        rng: Random number generator of all random choices.
     """
     newest = known[0]
-    alike = [controller for controller in known if controller.design == newest.design]
-    bred = offspring(alike, settings, rng)
-    found = [one for one in dict.fromkeys([*alike, *bred]) if one != newest]
-    if not found:  # no child is another than its parent, as where nothing mutates
+    same_design = [controller for controller in known if controller.design == newest.design]
+    bred = offspring(same_design, settings, rng)
+    distinct = dict.fromkeys([*same_design, *bred])
+    found = [controller for controller in distinct if controller != newest]
+    if not found:  # every child equals its parent, as without mutation
         found = [Controller(newest.design, draw_genomes(rng, newest.genome.shape))]
     return found
 
@@ -140,12 +147,12 @@ def candidates(
 def offspring(
     parents: Sequence[Controller], settings: Settings, rng: np.random.Generator
 ) -> list[Controller]:
-    """Returns as many children as an EA has genomes.
+    """Returns one population of children.
 
     Args:
-        parents: At least one, all of one design; each is one in turn.
-        settings: How offspring is bred.
-        rng: Every random choice comes from it.
+        parents: At least one controller, all of one design, used in turn.
+        settings: Numbers of the EA.
+        rng: Random number generator of all random choices.
     """
     genomes = np.array([parent.genome for parent in parents])
     bred = reproduce(

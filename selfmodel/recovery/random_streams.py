@@ -1,42 +1,42 @@
-"""The streams of random numbers of a recovery: one for each search, from one seed.
+"""Independent random number streams of a recovery, from one seed: one per search.
 
-What one search draws does not move the others, so each can be made again alone. What the physical
-robot is like has streams of its own.
+The draws of a search do not affect the other streams, so each search can be repeated alone. The
+reality gap of a simulated physical robot has streams of its own.
 """
 
 import numpy as np
 
 
 def repair_stream(seed: int, number: int) -> np.random.Generator:
-    """Returns the stream of a recovery's repairs: 0 is the gait, 1 follows the first diagnosis."""
+    """Returns the stream of a repair: number 0 evolves the gait, 1 follows the first diagnosis."""
     return _stream(seed, 2 * number)
 
 
 def diagnosis_stream(seed: int, number: int) -> np.random.Generator:
-    """Returns the stream of a recovery's diagnoses: 1 is the first."""
+    """Returns the stream of a diagnosis, numbered from 1."""
     return _stream(seed, 2 * number - 1)
 
 
 def choice_stream(seed: int, number: int) -> np.random.Generator:
-    """Returns the stream of a recovery's choices of trials: 1 follows the first diagnosis."""
+    """Returns the stream of a choice of the next trial: number 1 follows the first diagnosis."""
     return _stream(seed, _CHOICES + number)
 
 
 def gap_stream(seed: int) -> np.random.Generator:
-    """Returns the stream that the physical robot's reality gap is drawn from."""
+    """Returns the stream of the reality gap of a simulated physical robot."""
     return _stream(seed, _PHYSICAL)
 
 
 def structure_stream(seed: int) -> np.random.Generator:
-    """Returns the stream that the physical robot's mismatches of structure are drawn from."""
+    """Returns the stream of the structural mismatch of a simulated physical robot."""
     return _stream(seed, _PHYSICAL + 1)
 
 
 _CHOICES = 2**30
-"""The first key of the choices' streams: no recovery has so many searches."""
+"""First key of the streams of choices, above the keys of any number of searches."""
 
 _PHYSICAL = 2**31
-"""The first key of the physical robot's streams: no recovery has so many searches."""
+"""First key of the streams of the physical robot, above the keys of any number of searches."""
 
 
 def _stream(seed: int, key: int) -> np.random.Generator:

@@ -1,19 +1,21 @@
-"""The paper's algorithm: act, log, diagnose, repair, with as few physical trials as possible."""
+"""The paper's algorithm: run and log a trial, diagnose, repair, with few physical trials."""
 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 from selfmodel.controllers.controller import Controller, Design
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
-from selfmodel.faults.registry import PAPER_KINDS, applicable_kinds
+from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.physical.interface import PhysicalRobot
-from selfmodel.recovery.database import Journal
+from selfmodel.recovery.database import Database, Journal, RunTrial
 from selfmodel.recovery.events import Event, SearchBegins
 from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.next_trial import NextTrial, Situation, by_repair
@@ -21,23 +23,24 @@ from selfmodel.recovery.random_streams import choice_stream, diagnosis_stream, r
 from selfmodel.recovery.repair import RepairSearch
 from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
-from selfmodel.simulation.calibrate import Calibration
+from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.data_frame import data_frame
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
 
 
 @dataclass(frozen=True)
 class Recovery:
-    """How a recovery went.
+    """Result of a recovery.
 
     Attributes:
-        trials: Every physical trial, in order: ``before``, ``after``, then the recoveries.
-        tried: The best hypothesis when each trial's controller was chosen.
-        diagnosis: The last one, which explains all trials.
-        repair_evaluations: Controllers that the repair EA asked about.
-        diagnostic_evaluations: Hypotheses that the diagnostic EA asked about.
-        distinct_hypotheses: How many of those differ.
-        calibration: How the self-model was fitted to the trials before the failure, if it was.
+        trials: Physical trials, in order: ``before``, ``after``, then those of stage ``recovery``.
+        tried: Best hypothesis at the time when the controller was chosen, one per trial.
+        diagnosis: Last diagnosis, which explains all trials.
+        repair_evaluations: Number of controllers that the repair EA evaluated.
+        diagnostic_evaluations: Number of hypotheses that the diagnostic EA evaluated.
+        distinct_hypotheses: Number of distinct hypotheses among them.
+        calibration: Fit of the self-model to the trials before the failure; None without one.
     """
 
     trials: tuple[Trial, ...]
@@ -60,12 +63,54 @@ class Recovery:
 
     @property
     def recovered(self) -> float:
-        """Forward displacement of the best of the recovery trials, m.
+        """Largest forward displacement of the recovery trials, m; NaN if unobserved in all."""
+        displacements = [trial.displacement for trial in self.trials[2:]]
+        return max((value for value in displacements if not math.isnan(value)), default=math.nan)
 
-        NaN if it was observed in none of them.
+    def __repr__(self) -> str:
+        lines = [f"<Recovery: {self.diagnosis.best}, {self.diagnosis.verdict}"]
+        lines += [
+            f"  {row['trial']:14} {row['displacement']:8.3f} m  {row['hypothesis']}"
+            for row in self._rows()
+        ]
+        return "\n".join(lines) + ">"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns the result as JSON values: trials, displacements in m, diagnosis, evaluations."""
+        return {
+            "trials": self._rows(),
+            "displacement": {
+                "before": self.before,
+                "after": self.after,
+                "recovered": None if math.isnan(self.recovered) else self.recovered,
+            },
+            "diagnosis": self.diagnosis.to_dict(),
+            "evaluations": {
+                "repair": self.repair_evaluations,
+                "diagnostic": self.diagnostic_evaluations,
+                "distinct_hypotheses": self.distinct_hypotheses,
+            },
+        }
+
+    def to_pandas(self) -> Any:  # noqa: ANN401  # pandas is optional
+        """Returns the physical trials as a ``pandas.DataFrame``, one row per trial.
+
+        Raises:
+            InputError: pandas is not installed.
         """
-        ways = [trial.displacement for trial in self.trials[2:]]
-        return max((way for way in ways if not math.isnan(way)), default=math.nan)
+        return data_frame(self._rows())
+
+    def _rows(self) -> list[dict[str, Any]]:
+        return [
+            {
+                "trial": trial.plan.name,
+                "stage": trial.plan.stage,
+                "hypothesis": str(tried),
+                "displacement": trial.displacement,
+                "log": trial.path,
+            }
+            for trial, tried in zip(self.trials, self.tried, strict=True)
+        ]
 
 
 def recover(
@@ -74,6 +119,7 @@ def recover(
     damaged: PhysicalRobot,
     simulator: Simulator,
     comparator: Comparator,
+    run_trial: RunTrial,
     journal: Journal,
     settings: Settings,
     seed: int,
@@ -85,88 +131,92 @@ def recover(
     next_trial: NextTrial = by_repair,
     score: Score = DISPLACEMENT,
 ) -> Recovery:
-    """Lets a robot walk until it fails, then finds out what is wrong and how it walks again.
+    """Runs the recovery of a robot: a healthy trial, a failing one, then diagnosis and repair.
 
     Args:
-        healthy: The physical robot before it fails.
-        damaged: The same robot afterwards.
-        simulator: The self-model.
-        comparator: Judges hypotheses by the logged trials.
-        journal: Keeps the trials and diagnoses; everything about the past is read back from it.
+        healthy: Physical robot before the failure.
+        damaged: Physical robot after the failure.
+        simulator: Self-model.
+        comparator: Distance between the predictions of hypotheses and the logged trials.
+        run_trial: Runs and logs a physical trial. The trial that ``run_trial`` returns is all that
+            the algorithm observes of the robot.
+        journal: Storage of the diagnoses.
         settings: The paper's numbers.
-        seed: Every random choice comes from it.
-        on_event: Is told what happens.
-        gait: How the robot walks before it fails; evolved if there is none. The rest of the
-            recovery is the same whether a gait was evolved here, or earlier from the same seed.
-        design: The kind of controller to evolve; the paper's network if none is given.
-        kinds: What a diagnosis considers.
-        calibrate: Fits the self-model to the trials before the failure; without it, the self-model
-            stays as it is.
+        seed: Seed of all random choices.
+        on_event: Callback, called with each event as it happens.
+        gait: Controller of the robot before the failure; evolved if not given. The rest of the
+            recovery is the same for a gait that was evolved here and for the same gait, given.
+        design: Design of the controllers to evolve; the paper's network if not given.
+        kinds: Fault kinds that a diagnosis searches.
+        calibrate: Fits the self-model to the trials before the failure; no fit if not given.
         next_trial: Chooses the controller of each trial after the failing one.
-        score: What controllers are evolved for.
+        score: Fitness of the repair EA.
 
     Returns:
-        What the journal says at the end.
+        The trials, the last diagnosis and the number of evaluations.
     """
-    # As the robot's own model says: a fitted one is written with fewer digits.
+    # Not of the calibrated model, which is written with fewer digits.
     design = network_for(simulator.robot) if design is None else design
     repair = RepairSearch(simulator, settings, design, score=score)
     tried: list[Hypothesis] = []
+    database = Database()
 
     def evolve_controller(hypothesis: Hypothesis) -> Controller:
         on_event(SearchBegins("repair", hypothesis))
-        known = journal.read()
-        rng = repair_stream(seed, len(known.diagnoses))
-        return repair(hypothesis, known.controllers, rng, on_event)
+        rng = repair_stream(seed, len(database.diagnoses))
+        return repair(hypothesis, database.controllers, rng, on_event)
 
-    def diagnose_trials() -> Diagnosis:
+    def diagnose() -> Diagnosis:
+        nonlocal database
         on_event(SearchBegins("diagnostic"))
-        known = journal.read()
-        rng = diagnosis_stream(seed, len(known.diagnoses) + 1)
-        diagnosis = diagnose(known.evidence, known.hypotheses, rng, on_event)
-        journal.note(diagnosis)
+        rng = diagnosis_stream(seed, len(database.diagnoses) + 1)
+        diagnosis = search(database.evidence, database.hypotheses, rng, on_event)
+        journal.add(diagnosis)
+        database = database.with_diagnosis(diagnosis)
         on_event(diagnosis)
         return diagnosis
 
-    def act(robot: PhysicalRobot, stage: Stage, believed: Hypothesis, by: Controller) -> None:
-        plan = TrialPlan(f"{len(tried):02d}-{stage}", stage, by, settings.steps, seed)
-        tried.append(believed)
-        on_event(journal.record(robot, plan))
+    def act(robot: PhysicalRobot, stage: Stage, best: Hypothesis, controller: Controller) -> None:
+        nonlocal database
+        plan = TrialPlan(f"{len(tried):02d}-{stage}", stage, controller, settings.steps, seed)
+        tried.append(best)
+        trial = run_trial(robot, plan)
+        database = database.with_trial(trial)
+        on_event(trial)
 
-    applicable_kinds(kinds, simulator.robot.anatomy)  # before any trial is spent
+    HypothesisSpace.of(kinds, simulator.robot.anatomy)  # before any physical trial
     if gait is None:
         gait = evolve_controller(INTACT)
     act(healthy, "before", INTACT, gait)
-    intact = journal.read().trials
-    calibration = calibrate(intact) if calibrate else None
+    healthy_trials = database.trials
+    calibration = calibrate(healthy_trials) if calibrate else None
     if calibration is not None:
         on_event(calibration)
         if calibration.robot is not simulator.robot:
             simulator = Simulator(calibration.robot, simulator.threads, simulator.stats)
             repair = RepairSearch(simulator, settings, design, repair.evaluations, score)
-    diagnose = DiagnosticSearch(simulator, comparator, settings, kinds, intact=intact)
+    search = DiagnosticSearch(simulator, comparator, settings, kinds, intact=healthy_trials)
     act(damaged, "after", INTACT, gait)
     for trials_left in range(settings.trials, 0, -1):
-        believed = diagnose_trials().best
-        known = journal.read()
+        best = diagnose().best
         situation = Situation(
-            known=known,
+            known=database,
             trials_left=trials_left,
             simulator=simulator,
             settings=settings,
-            rng=choice_stream(seed, len(known.diagnoses)),
-            repaired=partial(evolve_controller, believed),
+            rng=choice_stream(seed, len(database.diagnoses)),
+            repaired=partial(evolve_controller, best),
             on_event=on_event,
         )
-        act(damaged, "recovery", believed, next_trial(situation))
-    diagnosis = diagnose_trials()
+        act(damaged, "recovery", best, next_trial(situation))
+    diagnosis = diagnose()
 
     return Recovery(
-        trials=journal.read().trials,
+        trials=database.trials,
         tried=tuple(tried),
         diagnosis=diagnosis,
         repair_evaluations=repair.evaluations,
-        diagnostic_evaluations=diagnose.evaluations,
-        distinct_hypotheses=diagnose.distinct_hypotheses,
+        diagnostic_evaluations=search.evaluations,
+        distinct_hypotheses=search.distinct_hypotheses,
         calibration=calibration,
     )

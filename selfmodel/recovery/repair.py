@@ -1,4 +1,4 @@
-"""The repair EA: evolves a controller that makes a robot with a given hypothesis walk."""
+"""Repair EA: evolves a controller for a robot with the faults of a hypothesis."""
 
 from collections.abc import Sequence
 
@@ -17,17 +17,18 @@ from selfmodel.trials.behaviour import Behaviour
 
 
 class RepairSearch:
-    """Evolves controllers in simulation; it remembers the fitness of every run.
-
-    Fitness is the forward displacement in metres, or another score. Source: the paper, section III.
+    """Repair EA, with a cache of the fitness of all rollouts. Source: the paper, section III.
 
     Args:
-        simulator: The self-model.
-        settings: The numbers of the search.
-        design: The kind of controller to evolve; the paper's network for the simulator's robot if
-            none is given.
-        evaluations: Controllers that were asked about before.
-        score: The fitness.
+        simulator: Self-model.
+        settings: The paper's numbers.
+        design: Design of the controllers to evolve; the paper's network for the simulator's robot
+            if not given.
+        evaluations: Number of controllers evaluated by an earlier search, to continue its count.
+        score: Fitness; the forward displacement in metres if not given.
+
+    Attributes:
+        evaluations: Number of controllers evaluated so far.
     """
 
     def __init__(
@@ -55,11 +56,11 @@ class RepairSearch:
         """Returns the best controller found.
 
         Args:
-            hypothesis: What is taken to be wrong with the robot.
-            seeds: Controllers to start from, beside random ones; those of another design are left
-                out.
-            rng: Every random choice comes from it.
-            on_generation: Is told of every generation.
+            hypothesis: Faults of the simulated robot.
+            seeds: Initial controllers beside random ones; controllers of another design are
+                ignored.
+            rng: Random number generator of all random choices.
+            on_generation: Callback, called after each generation.
         """
         design = self._design
 
@@ -79,12 +80,12 @@ class RepairSearch:
         return Controller(design, search.best)
 
     def _simulate(self, runs: list[Run]) -> FloatArray:
-        """The fitness of runs with one hypothesis; the worst for those that diverge."""
+        """Fitness of rollouts with one hypothesis; negative infinity for a diverged rollout."""
         outcome = self._simulator.run(runs, self._settings.steps, self._score.record)
-        fitness, sound = np.full(len(runs), -np.inf), ~outcome.diverged
-        if sound.any():
-            all_of = outcome.behaviour
-            signals = {signal: values[sound] for signal, values in all_of.signals.items()}
-            behaviour = Behaviour(all_of.names, all_of.time, signals)
-            fitness[sound] = self._score.of(self._simulator.robot, runs[0][0], behaviour)
+        fitness, finite = np.full(len(runs), -np.inf), ~outcome.diverged
+        if finite.any():
+            simulated = outcome.behaviour
+            signals = {signal: values[finite] for signal, values in simulated.signals.items()}
+            behaviour = Behaviour(simulated.names, simulated.time, signals)
+            fitness[finite] = self._score.of(self._simulator.robot, runs[0][0], behaviour)
         return fitness

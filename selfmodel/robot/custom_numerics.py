@@ -6,12 +6,10 @@ the controller in the log contains the number of hidden neurons.
 
 import mujoco
 
+from selfmodel.robot.control_delay import MAX_CONTROL_DELAY
+
 CONTROL_DELAY = "selfmodel_control_delay"
 """Name of the custom numeric that contains the control delay, in control steps; 0 by default."""
-
-MAX_CONTROL_DELAY = 5
-"""Largest control delay, in control steps: segments contain that many commands before their
-start."""
 
 
 def control_delay(model: mujoco.MjModel) -> int:

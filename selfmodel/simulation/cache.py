@@ -1,11 +1,12 @@
-"""What is computed once.
+"""Cache of computed rows of numbers, by key.
 
-Each of the EAs has its own: a repair keeps the way that a run went, a diagnosis the losses of a
-hypothesis in one trial. Behaviours are not kept, so a controller that was tried is simulated once
-more for each trial it is compared with. Whatever else one of them has computed, it does not again.
+Each search has caches of its own: a repair search keeps the outcome of each run, a diagnostic
+search the losses of each hypothesis on each trial. Behaviours are not kept, so a controller of the
+repair search is simulated again for each trial that it is compared with. Within a search nothing
+else is computed twice.
 """
 
-from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from typing import Any, Generic, TypeVar
 
 from selfmodel.arrays import FloatArray
@@ -14,27 +15,10 @@ Key = TypeVar("Key", bound=Hashable)
 
 
 class Cache(Generic[Key]):
-    """Remembers a row of numbers for every key it was ever asked for."""
+    """A cache with one row of numbers per key."""
 
     def __init__(self) -> None:
-        self._known: dict[Key, Any] = {}
-
-    def __len__(self) -> int:
-        return len(self._known)
-
-    def __iter__(self) -> Iterator[Key]:
-        return iter(self._known)
-
-    def __contains__(self, key: Key) -> bool:
-        return key in self._known
-
-    def __getitem__(self, key: Key) -> FloatArray:
-        row: FloatArray = self._known[key]
-        return row
-
-    def update_from(self, other: "Cache[Key]", keys: Iterable[Key]) -> None:
-        """Takes the rows of those keys that another knows."""
-        self._known.update((key, other[key]) for key in keys if key in other)
+        self._rows: dict[Key, Any] = {}
 
     def get_or_compute(
         self, keys: Sequence[Key], compute: Callable[[list[Key]], FloatArray]
@@ -42,10 +26,10 @@ class Cache(Generic[Key]):
         """Returns the row of each key.
 
         Args:
-            keys: What is asked for; repetitions are fine.
-            compute: From the keys not known yet, each once, to their rows, ``(n, ...)``.
+            keys: Keys in any order, with or without repetitions.
+            compute: Returns the rows, ``(n, ...)``, of the distinct keys that are not cached.
         """
-        unknown = list(dict.fromkeys(key for key in keys if key not in self._known))
-        if unknown:
-            self._known.update(zip(unknown, compute(unknown), strict=True))
-        return [self._known[key] for key in keys]
+        missing = list(dict.fromkeys(key for key in keys if key not in self._rows))
+        if missing:
+            self._rows.update(zip(missing, compute(missing), strict=True))
+        return [self._rows[key] for key in keys]

@@ -1,4 +1,4 @@
-"""The stretches of a trial that calibration predicts, and what was observed in them."""
+"""Segments of a trial for calibration, with the observed states that they are compared with."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,30 +7,30 @@ import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.errors import InputError
-from selfmodel.robot.custom_numerics import MAX_CONTROL_DELAY
-from selfmodel.simulation.requests import Past, Segments
+from selfmodel.simulation.requests import LEAD, Segments, command_steps, cut_segments
 from selfmodel.trials.behaviour import Behaviour, Signal
 from selfmodel.trials.state_estimation import ONBOARD, STATE, estimated_states
 from selfmodel.trials.trial import Trial
 
-SEGMENTS, HORIZON, LEAD = 40, 10, MAX_CONTROL_DELAY
-"""Stretches of a trial in which the base was seen, the length of one, and the commands from before
-it that a delay may need."""
+MAX_SEGMENTS = 40
+"""Segments of a trial in which the base was observed, at most."""
 
-SEEN = 0.25
-"""In how many of those with all of the rest the base must have been seen to be looked at."""
+HORIZON = 10
+"""Control steps of a segment."""
+
+MIN_BASE_SHARE = 0.25
+"""Share of the usable segments in which the base must have been observed to be used."""
 
 
 @dataclass(frozen=True, eq=False)
 class CalibrationSegments:
-    """A trial cut into stretches.
+    """A trial cut into segments for calibration.
 
     Attributes:
-        segments: Where they begin and what was commanded.
-        observed: The state after each of their steps, as well as the log tells it,
-            ``(segments, horizon, width)``.
-        judged: Whether a prediction of it can be judged, ``(segments, horizon)``: it is known, and
-            so is what led there.
+        segments: Initial states and commands.
+        observed: Estimated state after each step, ``(segments, horizon, width)`` for each signal.
+        judged: Mask of the steps whose prediction has an error, ``(segments, horizon)``: the state
+            after the step is known, and so are the commands that led there.
     """
 
     segments: Segments
@@ -38,16 +38,16 @@ class CalibrationSegments:
     judged: BoolArray
 
 
-def cut_segments(trial: Trial) -> CalibrationSegments:
-    """Returns stretches of a trial in which the state and the commands are known.
+def calibration_segments_of(trial: Trial) -> CalibrationSegments:
+    """Returns segments of a trial in which the state and the commands are known.
 
-    They are spread over the trial, and all of each is known. Where the base's position and linear
-    velocity are known in less than a quarter of those in which all the rest is, these are left out,
-    and stretches follow each other from the start of the trial, in the model's start pose, on: each
-    goes on from where the one before it left the base.
+    The segments are spread over the trial and known completely. If the base's position and linear
+    velocity are known in less than a quarter of the segments in which all other signals are, both
+    are left out, and segments follow each other from the start of the trial, in the model's initial
+    pose: each begins with the base in the predicted state at the end of the segment before.
 
     Raises:
-        InputError: There is too little to judge without them either.
+        InputError: Too little is known for either.
     """
     if trial.behaviour.steps <= LEAD + HORIZON:
         raise _useless(trial, f"the trial has {trial.behaviour.steps}")
@@ -59,70 +59,62 @@ def cut_segments(trial: Trial) -> CalibrationSegments:
 
 
 def _spread(behaviour: Behaviour) -> CalibrationSegments | None:
-    """Stretches of the whole state, each by itself; None where there are too few."""
+    """Returns independent segments of the whole state; None if there are too few."""
     last = behaviour.steps - 1 - HORIZON
-    begins = np.unique(np.linspace(LEAD, last, SEGMENTS).round().astype(np.intp))
+    begins = np.unique(np.linspace(LEAD, last, MAX_SEGMENTS).round().astype(np.intp))
     states = estimated_states(behaviour, STATE)
-    on_board = _known({signal: states[signal] for signal in ONBOARD}) & _steady(behaviour)
-    whole = _all_known(on_board & _known(states), begins)
-    if not whole.any() or whole.sum() < SEEN * _all_known(on_board, begins).sum():
+    onboard = _known({signal: states[signal] for signal in ONBOARD}) & _steady(behaviour)
+    whole = _all_known(onboard & _known(states), begins)
+    if not whole.any() or whole.sum() < MIN_BASE_SHARE * _all_known(onboard, begins).sum():
         return None
-    return _calibration_segments(behaviour, states, begins[whole])
+    return _with_observed(behaviour, states, begins[whole])
 
 
 def _sequential(behaviour: Behaviour) -> CalibrationSegments | None:
-    """Stretches of what is on board, one after another; None where too little can be judged.
+    """Returns consecutive segments of the onboard state; None if too few steps can be judged.
 
-    What can be simulated is, for the sake of what goes on from it: all that begins in a known state
-    under known commands. It is judged until a command stands for other than a time step, if none
-    did just before, and where it was observed.
+    Every segment with a known initial state and known commands is simulated, because later segments
+    continue from its end. A step is judged if its state was observed and no command before it, in
+    the segment or in its lead, was held for other than a control time step.
     """
     begins = np.arange(0, behaviour.steps - HORIZON, HORIZON)
     states = estimated_states(behaviour, ONBOARD)
     commanded = np.asarray(np.isfinite(behaviour["commands"]).all(axis=1))
     starts = begins[_known(states)[begins] & _all_known(commanded, begins)]
-    found = _calibration_segments(behaviour, states, starts)
+    found = _with_observed(behaviour, states, starts)
     return found if found.judged.sum() >= HORIZON else None
 
 
 def _known(signals: Mapping[Signal, FloatArray]) -> BoolArray:
-    """At which steps all of them are known, ``(steps,)``."""
+    """Returns a mask of the steps at which all signals are known, ``(steps,)``."""
     return np.asarray(np.isfinite(np.hstack(list(signals.values()))).all(axis=1))
 
 
 def _steady(behaviour: Behaviour) -> BoolArray:
-    """Whether each command is known to have stood for a control time step, ``(steps,)``."""
+    """Returns a mask of the known commands held for one control time step, ``(steps,)``."""
     return np.asarray(np.isfinite(behaviour.steady_commands).all(axis=1))
 
 
 def _all_known(known: BoolArray, begins: IndexArray) -> BoolArray:
-    """Whether all of a stretch is known, and the commands from before it."""
+    """Returns a mask of the segments that are known with their lead, ``(segments,)``."""
     return np.array([known[max(k - LEAD, 0) : k + HORIZON + 1].all() for k in begins.tolist()])
 
 
-def _calibration_segments(
+def _with_observed(
     behaviour: Behaviour, states: Mapping[Signal, FloatArray], starts: IndexArray
 ) -> CalibrationSegments:
-    commands = behaviour["commands"]
-    padded = np.concatenate([np.zeros((LEAD, commands.shape[1])), commands])
-    before = starts[:, np.newaxis] + np.arange(-LEAD, HORIZON)
+    before = np.maximum(command_steps(starts, HORIZON), 0)
     after = starts[:, np.newaxis] + np.arange(1, HORIZON + 1)
-    steady = np.logical_and.accumulate(_steady(behaviour)[np.maximum(before, 0)], axis=1)
+    steady = np.logical_and.accumulate(_steady(behaviour)[before], axis=1)
     return CalibrationSegments(
-        Segments(
-            states={signal: values[starts] for signal, values in states.items()},
-            commands=padded[before + LEAD],
-            lead=LEAD,
-            record=tuple(states),
-            past=Past(commands, starts),
-        ),
+        segments=cut_segments(behaviour, states, starts, HORIZON, record=tuple(states)),
         observed={signal: values[after] for signal, values in states.items()},
         judged=steady[:, LEAD:] & _known(states)[after],
     )
 
 
 def _never_known(behaviour: Behaviour) -> str:
-    """What of that which is needed was never observed, by its columns where only some were not."""
+    """Returns the required signals that were never observed, with columns if only some are."""
     found = []
     signals: tuple[Signal, ...] = (*ONBOARD, "commands")
     for signal in signals:
@@ -135,8 +127,7 @@ def _never_known(behaviour: Behaviour) -> str:
 
 
 def _useless(trial: Trial, has: str) -> InputError:
-    """Says of a trial in which nothing can be predicted what it has instead."""
     return InputError(
-        f"{trial.path}: calibration needs stretches of {LEAD + HORIZON + 1} steps or more, none of "
+        f"{trial.path}: calibration needs segments of {LEAD + HORIZON + 1} steps or more, none of "
         f"them late, with {', '.join(ONBOARD)} and the commands, and {has}: leave this log out"
     )

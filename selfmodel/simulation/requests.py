@@ -1,18 +1,24 @@
-"""Simulation requests: rollouts, segments and ensembles that a comparator needs."""
+"""Simulation requests: closed-loop rollouts, segments and ensembles."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from selfmodel.arrays import FloatArray, IndexArray
-from selfmodel.trials.behaviour import SIGNALS, Signal
+from selfmodel.robot.control_delay import MAX_CONTROL_DELAY
+from selfmodel.trials.behaviour import SIGNALS, Behaviour, Signal
+
+LEAD = MAX_CONTROL_DELAY
+"""Commands before a segment that ``cut_segments`` includes: enough for every control delay."""
 
 
 @dataclass(frozen=True)
 class ClosedLoop:
-    """A request to simulate the whole trial: its controller, from the start, for all its steps.
+    """A request for a rollout of the whole trial: its controller, from the initial pose.
 
     Attributes:
-        record: The signals that the comparator looks at, ``(n, steps, width)`` each.
+        record: The signals to record, ``(n, steps, width)`` each.
     """
 
     record: tuple[Signal, ...]
@@ -20,11 +26,11 @@ class ClosedLoop:
 
 @dataclass(frozen=True, eq=False)
 class Past:
-    """What was commanded before segments begin, for motors that remember it.
+    """Commands before segments, for motors with activation dynamics.
 
     Attributes:
-        commands: Of the whole trial, ``(steps, motors)``; NaN where it is not known.
-        starts: The step of the trial at which each segment begins, ``(segments,)``.
+        commands: Commands of the whole trial, ``(steps, motors)``; NaN where unknown.
+        starts: Step of the trial at which each segment begins, ``(segments,)``.
     """
 
     commands: FloatArray
@@ -33,20 +39,19 @@ class Past:
 
 @dataclass(frozen=True, eq=False)
 class Segments:
-    """A request to predict short stretches of the trial, each from a state that was logged.
+    """A request for short predictions, each from a logged state under logged commands.
 
     Attributes:
-        states: The state at the beginning of each segment, ``(segments, width)`` for each signal
-            of the joints' and the base's positions and velocities.
-        commands: What was commanded then, ``(segments, lead + horizon, motors)``: the first
-            ``lead`` rows were commanded before the segment begins, and matter to a model whose
-            commands take effect late.
-        lead: Rows of ``commands`` from before the segment: at least the robot's control delay,
-            which is at most ``custom_numerics.MAX_CONTROL_DELAY``.
-        record: The signals that the comparator looks at, ``(n, segments, horizon + 1, width)``
-            each; row 0 is the beginning. Any but ``commands``, which are given.
-        past: What motors remember that have a state of their own, such as a filter; None: only
-            what stands in ``commands``.
+        states: State at the beginning of each segment, ``(segments, width)`` for each signal of
+            the joints' and the base's positions and velocities.
+        commands: Logged commands, ``(segments, lead + horizon, motors)``: the first ``lead`` rows
+            precede the segment, for models with a control delay.
+        lead: Rows of ``commands`` before the segment: at least the robot's control delay, which is
+            at most ``control_delay.MAX_CONTROL_DELAY``.
+        record: The signals to record, ``(n, segments, horizon + 1, width)`` each; row 0 is the
+            beginning. Any signal but ``commands``, which are inputs.
+        past: Commands since the beginning of the trial, for motors with a state of their own, such
+            as a filter; None if only ``commands`` are known.
     """
 
     states: Mapping[Signal, FloatArray]
@@ -57,20 +62,20 @@ class Segments:
 
     @property
     def horizon(self) -> int:
-        """Control steps that a segment lasts."""
+        """Control steps of a segment."""
         return int(self.commands.shape[1]) - self.lead
 
 
 @dataclass(frozen=True)
 class Ensemble:
-    """A request to simulate the whole trial many times, each with a self-model a little different.
+    """A request for rollouts of the whole trial with several perturbed self-models.
 
     The members are the same for every hypothesis (common random numbers).
 
     Attributes:
-        record: The signals that the comparator looks at, ``(n, members, steps, width)`` each.
-        members: Simulations of each hypothesis.
-        level: The level of the reality gap that the members are drawn from.
+        record: The signals to record, ``(n, members, steps, width)`` each.
+        members: Simulations per hypothesis.
+        level: Level of the reality gap from which the members are drawn.
     """
 
     record: tuple[Signal, ...]
@@ -79,14 +84,54 @@ class Ensemble:
 
 
 Request = ClosedLoop | Segments | Ensemble
-"""What may be simulated to judge a trial."""
+"""A simulation that a comparison with a trial requires."""
 
 
 def recordable(request: Request) -> tuple[Signal, ...]:
-    """Returns the signals that what was requested can record.
+    """Returns the signals that a request can record.
 
-    A segment is given its commands, so there is nothing to record of them.
+    The commands of a segment are inputs, so they cannot be recorded.
     """
     if isinstance(request, Segments):
         return tuple(signal for signal in SIGNALS if signal != "commands")
     return SIGNALS
+
+
+def command_steps(starts: IndexArray, horizon: int) -> IndexArray:
+    """Returns the steps whose commands a segment includes.
+
+    Args:
+        starts: Step at which each segment begins, ``(segments,)``.
+        horizon: Control steps of a segment.
+
+    Returns:
+        ``(segments, LEAD + horizon)``; negative for steps before the trial.
+    """
+    return starts[:, np.newaxis] + np.arange(-LEAD, horizon)
+
+
+def cut_segments(
+    behaviour: Behaviour,
+    states: Mapping[Signal, FloatArray],
+    starts: IndexArray,
+    horizon: int,
+    record: tuple[Signal, ...],
+) -> Segments:
+    """Returns segments of a trial, with ``LEAD`` commands before each.
+
+    Args:
+        behaviour: The logged behaviour of the trial.
+        states: State at each step, ``(steps, width)`` for each signal.
+        starts: Step at which each segment begins, ``(segments,)``.
+        horizon: Control steps of a segment.
+        record: The signals to record.
+    """
+    commands, steps = behaviour["commands"], command_steps(starts, horizon)
+    return Segments(
+        states={signal: values[starts] for signal, values in states.items()},
+        # Before the trial the motors hold 0.
+        commands=np.where(steps[..., np.newaxis] < 0, 0.0, commands[np.maximum(steps, 0)]),
+        lead=LEAD,
+        record=record,
+        past=Past(commands, starts),
+    )

@@ -10,16 +10,17 @@ from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.comparator_contract import check_comparator, shown
 from selfmodel.diagnosis.evidence import Evidence, simulate
-from selfmodel.diagnosis.significance import NEGLIGIBLE
+from selfmodel.diagnosis.significance import NEGLIGIBLE_LOSS
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import SIGNALS, Behaviour
+from selfmodel.trials.behaviour import SIGNALS, Behaviour, Signal
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.conftest import random_controllers
+from tests.helpers.comparators import Prepared, PreparedPieces
+from tests.helpers.drivers import random_controllers
 
 Both = tuple[Trial, Behaviour]
 
@@ -33,7 +34,7 @@ def hypotheses_about(robot: Robot) -> list[str]:
 @pytest.fixture(scope="module")
 def logged_and_simulated(robot: Robot) -> Both:
     """A trial of a damaged robot, and runs of its controller: with the same damage, and others."""
-    # One that does not tremble: trembling joints are taken for noisy ones, and averaged.
+    # No joint oscillates at every step: such joints are taken for noisy, and averaged.
     controller = random_controllers(robot, 5)[4]
     runs = [(parse(text, robot.anatomy), controller) for text in hypotheses_about(robot)]
     simulated = Simulator(robot, 2).run(runs, 300, SIGNALS).behaviour
@@ -57,18 +58,19 @@ def with_the_perfect_one(outcome: Behaviour, perfect: Behaviour) -> Behaviour:
 def test_a_comparator_keeps_its_contract(name: str, robot: Robot, logged_and_simulated: Both):
     trial, _ = logged_and_simulated
     comparator = COMPARATORS[name]
-    request = comparator.request(trial)
+    prepared = comparator.prepare(trial)
+    request = prepared.request
     hypotheses = [parse(text, robot.anatomy) for text in hypotheses_about(robot)]
     outcome = simulate(Simulator(robot, 2), request, trial, hypotheses).behaviour
 
     check_comparator(comparator, trial, with_the_perfect_one(outcome, shown(request, trial)))
-    distances = comparator.distances(outcome, trial)
-    assert np.all(distances[1:] > distances[0]), "it does not tell the truth from other damage"
+    distances = prepared.distances(outcome)
+    assert np.all(distances[1:] > distances[0]), "other damage is as close as the truth"
     if isinstance(request, ClosedLoop):
         assert distances[0] == 0
     # No member of an ensemble is the robot, and a base that is carried on drifts.
     elif isinstance(request, Segments) and "base_position" in request.states:
-        assert distances[0] < NEGLIGIBLE
+        assert distances[0] < NEGLIGIBLE_LOSS
     assert comparator.name == name
     assert isinstance(comparator, Comparator)
 
@@ -79,7 +81,7 @@ def test_forward_displacement_is_the_difference_of_the_ways(logged_and_simulated
     ways = x[:, -1] - x[:, 0]
 
     np.testing.assert_array_equal(
-        FORWARD_DISPLACEMENT.distances(simulated, trial), np.abs(ways - ways[0])
+        FORWARD_DISPLACEMENT.prepare(trial).distances(simulated), np.abs(ways - ways[0])
     )
 
 
@@ -92,41 +94,67 @@ class Broken:
         self.way = way
         self.calls = 0
 
-    def request(self, _trial: Trial) -> ClosedLoop:
-        """Asks for nothing in one way, for what it needs in all others."""
-        return ClosedLoop(record=() if self.way == "request" else ("base_position",))
+        self.prepared = 0
 
-    def distances(self, simulated: Behaviour, trial: Trial) -> FloatArray:
-        """Is forward displacement, spoilt."""
-        self.calls += 1
-        right = FORWARD_DISPLACEMENT.distances(simulated, trial)
-        return {
-            "shape": right[:, np.newaxis],
-            "sign": -right,
-            "nan": np.where(right > 0, np.nan, right),
-            "offset": right + 1,
-            "impure": right * self.calls,
-            "crowd": right * len(right),
-        }[self.way]
+    def prepare(self, trial: Trial) -> object:
+        """Prepares as forward displacement, spoilt."""
+        self.prepared += 1
+        sound, time = FORWARD_DISPLACEMENT.prepare(trial), self.prepared
+        if self.way == "nothing":
+            return None
+        if self.way == "trial":
+            trial.behaviour["base_position"][0] = 0
+
+        def distances(simulated: Behaviour) -> FloatArray:
+            self.calls += 1
+            right = sound.distances(simulated)
+            if self.way == "simulated":
+                simulated["base_position"][:, 1] = 0
+            return {
+                "shape": right[:, np.newaxis],
+                "sign": -right,
+                "nan": np.where(right > 0, np.nan, right),
+                "offset": right + 1,
+                "impure": right * self.calls,
+                "crowd": right * len(right),
+                "again": right * time,
+            }.get(self.way, right)
+
+        record: tuple[Signal, ...] = () if self.way == "request" else ("base_position",)
+        if self.way == "unsteady" and time > 1:
+            record = ("base_position", "sensors")
+        return Prepared(ClosedLoop(record), distances)
 
 
 @pytest.mark.parametrize(
-    ("way", "said"),
+    ("way", "message"),
     [
+        ("nothing", "prepare must return an object with request and distances, got None"),
         ("request", "a request of ClosedLoop must record some of"),
+        ("unsteady", "the same trial must be prepared with the same request"),
         ("shape", "expected a distance for each of 4 runs"),
         ("sign", "must be finite and at least 0"),
         ("nan", "must be finite and at least 0"),
         ("offset", "must be at 0, got 1"),
         ("impure", "the same arguments must give the same distances"),
         ("crowd", "must not depend on the other runs"),
+        ("again", "a trial that is prepared again must give the same distances"),
+        ("simulated", "a comparator must not change what it is given"),
+        ("trial", "a comparator must not change the trial"),
     ],
 )
 def test_the_contract_kit_sees_each_way_to_break_it(
-    way: str, said: str, logged_and_simulated: Both
+    way: str, message: str, logged_and_simulated: Both
 ):
-    with pytest.raises(ValueError, match=said):
-        check_comparator(Broken(way), *logged_and_simulated)
+    trial, simulated = logged_and_simulated
+    own = replace(trial, behaviour=copied(trial.behaviour))
+    with pytest.raises(ValueError, match=message):
+        check_comparator(Broken(way), own, copied(simulated))
+
+
+def copied(behaviour: Behaviour) -> Behaviour:
+    signals = {signal: values.copy() for signal, values in behaviour.signals.items()}
+    return Behaviour(behaviour.names, behaviour.time, signals)
 
 
 class Pieces:
@@ -139,16 +167,13 @@ class Pieces:
         self.way = way
         self.calls = 0
 
-    def request(self, _trial: Trial) -> Request:
-        """Asks for what it was made with."""
-        return self.asks
+    def prepare(self, _trial: Trial) -> PreparedPieces:
+        """Requests what it was made with."""
+        distances = lambda simulated: self._sound(simulated).mean(axis=1)  # noqa: E731  # short
+        return PreparedPieces(self.asks, distances, self._losses)
 
-    def distances(self, simulated: Behaviour, _trial: Trial) -> FloatArray:
-        """Is the mean of the sound losses."""
-        return self._sound(simulated).mean(axis=1)
-
-    def losses(self, simulated: Behaviour, _trial: Trial) -> FloatArray:
-        """Is how far each joint is from the first run's, spoilt."""
+    def _losses(self, simulated: Behaviour) -> FloatArray:
+        """Returns how far each joint is from the first run's, spoilt."""
         self.calls += 1
         right = self._sound(simulated)
         return {
@@ -225,13 +250,13 @@ def test_the_contract_kit_sees_a_request_that_cannot_be_met(logged_and_simulated
         (fewer, "the states of joint_positions must have shape"),
         (replace(segments(trial), record=("commands",)), "Segments must record some of"),
     ]
-    for asks, said in broken:
-        with pytest.raises(ValueError, match=said):
+    for asks, message in broken:
+        with pytest.raises(ValueError, match=message):
             check_comparator(Pieces(asks), trial, simulated)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
-    ("way", "said"),
+    ("way", "message"),
     [
         ("shape", "expected losses of shape"),
         ("none", "expected losses of shape"),
@@ -242,12 +267,12 @@ def test_the_contract_kit_sees_a_request_that_cannot_be_met(logged_and_simulated
     ],
 )
 def test_the_contract_kit_sees_each_way_to_break_it_in_pieces(
-    way: str, said: str, logged_and_simulated: Both
+    way: str, message: str, logged_and_simulated: Both
 ):
     trial, _ = logged_and_simulated
     comparator = Pieces(ClosedLoop(("joint_positions",)), way)
 
-    with pytest.raises(ValueError, match=said):
+    with pytest.raises(ValueError, match=message):
         check_comparator(comparator, trial, runs_of_shape(trial, 300))
 
 
@@ -280,7 +305,7 @@ def test_what_a_trial_shows_is_cut_where_its_segments_begin(logged_and_simulated
         )
 
 
-def test_what_no_trial_shows_is_said(logged_and_simulated: Both):
+def test_a_segment_that_no_trial_contains_is_named(logged_and_simulated: Both):
     trial, _ = logged_and_simulated
 
     with pytest.raises(ValueError, match="no step at which segment 0 could begin"):

@@ -2,17 +2,16 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from selfmodel.comparators import GAIT_PATTERN
-from selfmodel.comparators.gait_features import GROUPS
+from selfmodel.comparators.gait_features import LARGE_DIFFERENCES
 from selfmodel.diagnosis.comparator_contract import check_comparator
 from selfmodel.errors import InputError
 from selfmodel.trials.behaviour import Behaviour
 from tests.helpers.gaits import TROT, WALK, batch, changed, gait, logged
 
-GROUP = list(GROUPS)
+GROUP = list(LARGE_DIFFERENCES)
 
 
 @settings(deadline=None)
@@ -30,7 +29,7 @@ def test_when_the_strides_begin_does_not_matter(
         gait(phases, frequency=frequency - 0.3, late=late),
     )
 
-    shifted, other = GAIT_PATTERN.distances(batch(same, slower), trial)
+    shifted, other = GAIT_PATTERN.prepare(trial).distances(batch(same, slower))
 
     # A reading comes on at a step, so a duty is known to a step in a stride.
     assert shifted < 0.035
@@ -49,8 +48,8 @@ def test_when_the_strides_begin_does_not_matter(
     ],
 )
 def test_each_group_sees_what_it_is_there_for(group: str, different: Behaviour):
-    losses = GAIT_PATTERN.losses(batch(gait(), different), logged(gait()))
-    by_group = losses.reshape(2, -1, len(GROUPS))
+    losses = GAIT_PATTERN.prepare(logged(gait())).losses(batch(gait(), different))
+    by_group = losses.reshape(2, -1, len(LARGE_DIFFERENCES))
 
     assert np.all(by_group[0] == 0)
     assert np.all(by_group[1, :, GROUP.index(group)] > 0.2)
@@ -58,7 +57,11 @@ def test_each_group_sees_what_it_is_there_for(group: str, different: Behaviour):
 
 def test_posture_alone_is_no_change_of_rhythm():
     leaning = changed(gait(), joint_positions=gait()["joint_positions"] + 0.2)
-    losses = GAIT_PATTERN.losses(batch(leaning), logged(gait())).reshape(-1, len(GROUPS))
+    losses = (
+        GAIT_PATTERN.prepare(logged(gait()))
+        .losses(batch(leaning))
+        .reshape(-1, len(LARGE_DIFFERENCES))
+    )
 
     for group in ("duty", "sequence", "phase", "rhythm", "excursion"):
         assert np.all(losses[:, GROUP.index(group)] < 1e-12)
@@ -84,8 +87,8 @@ def test_degenerate_trials_keep_the_contract(shown: Behaviour):
 
 
 def test_a_robot_that_lies_still_is_far_from_one_that_walks():
-    to_walk = GAIT_PATTERN.distances(batch(gait(), still()), logged(still()))
-    to_lie = GAIT_PATTERN.distances(batch(gait(), still()), logged(gait()))
+    to_walk = GAIT_PATTERN.prepare(logged(still())).distances(batch(gait(), still()))
+    to_lie = GAIT_PATTERN.prepare(logged(gait())).distances(batch(gait(), still()))
 
     assert to_walk[0] > 0.3
     assert to_lie[1] > 0.3
@@ -96,8 +99,8 @@ def test_a_robot_without_touch_is_compared_by_its_joints():
     unknown = changed(walking, sensors=np.full_like(walking["sensors"], np.nan))
     trial = logged(unknown)
 
-    assert GAIT_PATTERN.request(trial).record == ("joint_positions",)
-    same, trot = GAIT_PATTERN.distances(batch(gait(late=0.2), gait(TROT)), trial)
+    assert GAIT_PATTERN.prepare(trial).request.record == ("joint_positions",)
+    same, trot = GAIT_PATTERN.prepare(trial).distances(batch(gait(late=0.2), gait(TROT)))
     assert same < trot / 10
 
 
@@ -117,7 +120,7 @@ def test_what_was_not_observed_is_not_compared():
     )
 
     check_comparator(GAIT_PATTERN, trial, runs)
-    distances = GAIT_PATTERN.distances(runs, trial)
+    distances = GAIT_PATTERN.prepare(trial).distances(runs)
     assert distances[1] == 0
     assert distances[2] > 0
 
@@ -129,8 +132,8 @@ def test_a_window_that_was_not_observed_does_not_dilute_the_others():
         for signal in ("sensors", "joint_positions")
     }
 
-    whole = GAIT_PATTERN.distances(batch(trot), logged(walking))
-    part = GAIT_PATTERN.distances(batch(trot), logged(changed(walking, **half)))
+    whole = GAIT_PATTERN.prepare(logged(walking)).distances(batch(trot))
+    part = GAIT_PATTERN.prepare(logged(changed(walking, **half))).distances(batch(trot))
 
     np.testing.assert_allclose(part, whole, rtol=0.1)
 
@@ -142,4 +145,4 @@ def test_a_log_without_readings_and_joints_is_refused():
     }
 
     with pytest.raises(InputError, match="needs one at least of sensors, joint_positions"):
-        GAIT_PATTERN.request(logged(changed(walking, **unknown)))
+        GAIT_PATTERN.prepare(logged(changed(walking, **unknown)))

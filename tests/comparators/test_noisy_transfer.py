@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from selfmodel.comparators import NOISY_TRANSFER
 from selfmodel.comparators.noisy_transfer import WINDOW
@@ -36,14 +35,17 @@ def around(middle: float, spread: float) -> list[Behaviour]:
 
 
 def distances(*groups: list[Behaviour]) -> np.ndarray:
-    return NOISY_TRANSFER.distances(ensembles(*groups), logged(gait()))
+    return NOISY_TRANSFER.prepare(logged(gait())).distances(ensembles(*groups))
 
 
 def test_it_asks_for_a_small_ensemble_of_what_the_trial_has():
     walking = gait()
     blind = logged(changed(walking, sensors=np.full_like(walking["sensors"], np.nan)))
 
-    whole, rest = NOISY_TRANSFER.request(logged(walking)), NOISY_TRANSFER.request(blind)
+    whole, rest = (
+        NOISY_TRANSFER.prepare(logged(walking)).request,
+        NOISY_TRANSFER.prepare(blind).request,
+    )
     assert whole == Ensemble(whole.record, members=MEMBERS, level=0.05)
     assert set(whole.record) - set(rest.record) == {"sensors"}
 
@@ -60,7 +62,7 @@ def test_an_ensemble_that_all_did_what_the_trial_shows_is_at_exactly_zero(
     joints = np.where(hidden, np.nan, walking["joint_positions"])
     trial = logged(changed(walking, joint_positions=joints))
 
-    losses = NOISY_TRANSFER.losses(ensembles([walking] * MEMBERS), trial)
+    losses = NOISY_TRANSFER.prepare(trial).losses(ensembles([walking] * MEMBERS))
     assert np.array_equal(losses, np.zeros((1, -(-steps // WINDOW))))
 
 
@@ -100,8 +102,8 @@ def test_a_piece_is_a_window_of_the_trial():
     walking = gait(steps=210)
     joints = walking["joint_positions"].copy()
     joints[60:65] += 1
-    losses = NOISY_TRANSFER.losses(
-        ensembles([changed(walking, joint_positions=joints)] * MEMBERS), logged(walking)
+    losses = NOISY_TRANSFER.prepare(logged(walking)).losses(
+        ensembles([changed(walking, joint_positions=joints)] * MEMBERS)
     )
 
     assert losses.shape == (1, 9)
@@ -113,7 +115,7 @@ def test_motion_about_the_same_mean_is_told_from_stillness():
     walking = gait(frequency=100 / WINDOW)
     still = changed(walking, joint_positions=np.zeros_like(walking["joint_positions"]))
 
-    assert NOISY_TRANSFER.distances(ensembles([still] * MEMBERS), logged(walking))[0] > 0.1
+    assert NOISY_TRANSFER.prepare(logged(walking)).distances(ensembles([still] * MEMBERS))[0] > 0.1
 
 
 def test_what_was_observed_now_and_then_counts_as_what_was_observed_throughout():
@@ -122,7 +124,7 @@ def test_what_was_observed_now_and_then_counts_as_what_was_observed_throughout()
     glimpsed[::3] = np.nan
     runs = ensembles(turned(still, *np.linspace(0.2, 0.4, MEMBERS)))
     throughout, now_and_then = (
-        NOISY_TRANSFER.distances(runs, logged(changed(still, joint_positions=joints)))
+        NOISY_TRANSFER.prepare(logged(changed(still, joint_positions=joints))).distances(runs)
         for joints in (still["joint_positions"], glimpsed)
     )
 
@@ -147,7 +149,7 @@ def test_what_was_not_observed_is_not_compared():
     elsewhere = changed(walking, sensors=1 - walking["sensors"])
 
     runs = ensembles(*([run] * MEMBERS for run in (walking, strange, lost, elsewhere)))
-    found = NOISY_TRANSFER.distances(runs, trial)
+    found = NOISY_TRANSFER.prepare(trial).distances(runs)
     assert np.array_equal(found[:3], [0, 0, 0])
     assert found[3] > 0
 
@@ -160,13 +162,13 @@ def test_a_window_of_which_nothing_was_observed_is_no_piece():
     trial = logged(changed(walking, **signals))
 
     # Of steps 25 to 49 and 100 to 124 something was seen, of the two windows between nothing.
-    assert NOISY_TRANSFER.losses(ensembles([walking] * MEMBERS), trial).shape == (1, 6)
+    assert NOISY_TRANSFER.prepare(trial).losses(ensembles([walking] * MEMBERS)).shape == (1, 6)
 
 
 @pytest.mark.parametrize("steps", [1, 24, 26, 130])
 def test_trials_of_any_length_keep_the_contract(steps: int):
     trial = logged(gait(steps=steps))
-    perfect = shown(NOISY_TRANSFER.request(trial), trial)
+    perfect = shown(NOISY_TRANSFER.prepare(trial).request, trial)
     walks = [gait(late=0.05 * late, steps=steps) for late in range(MEMBERS)]
     trots = [gait(TROT, swing=0.1 * swing, steps=steps) for swing in range(MEMBERS)]
     others = ensembles(walks, trots)
@@ -183,4 +185,4 @@ def test_a_log_with_nothing_to_compare_is_refused():
     nothing = {signal: np.full_like(walking[signal], np.nan) for signal in walking.signals}
 
     with pytest.raises(InputError, match="noisy-transfer needs one at least of sensors"):
-        NOISY_TRANSFER.request(logged(changed(walking, **nothing)))
+        NOISY_TRANSFER.prepare(logged(changed(walking, **nothing)))

@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from selfmodel.comparators import PAPER_SENSORS, SENSOR_SERIES
-from selfmodel.diagnosis.comparator import Piecewise
+from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.comparator_contract import check_comparator
 from selfmodel.errors import InputError
 from selfmodel.trials.behaviour import Behaviour
@@ -30,14 +29,14 @@ def test_the_unit_of_a_column_does_not_matter(factor: float):
     def scaled(run: Behaviour) -> Behaviour:
         return changed(run, joint_positions=run["joint_positions"] * factor)
 
-    plain = SENSOR_SERIES.distances(batch(trot), logged(walking))
-    in_other_units = SENSOR_SERIES.distances(batch(scaled(trot)), logged(scaled(walking)))
+    plain = SENSOR_SERIES.prepare(logged(walking)).distances(batch(trot))
+    in_other_units = SENSOR_SERIES.prepare(logged(scaled(walking))).distances(batch(scaled(trot)))
 
     np.testing.assert_allclose(in_other_units, plain, rtol=1e-9)
 
 
 @pytest.mark.parametrize("comparator", BOTH)
-def test_no_difference_is_too_large_to_be_bounded(comparator: Piecewise):
+def test_no_difference_is_too_large_to_be_bounded(comparator: Comparator):
     walking = gait()
     away = changed(
         walking,
@@ -47,21 +46,21 @@ def test_no_difference_is_too_large_to_be_bounded(comparator: Piecewise):
         },
     )
     # A still column has no spread to be scaled by, and all of the motion is far away.
-    assert 0 < comparator.distances(batch(away), logged(walking))[0] <= 1
+    assert 0 < comparator.prepare(logged(walking)).distances(batch(away))[0] <= 1
 
 
 def test_early_steps_count_more_than_late_ones():
     trial = logged(gait())
-    early, middle, late = SENSOR_SERIES.distances(
-        batch(disturbed(100, 150), disturbed(500, 550), disturbed(900, 950)), trial
+    early, middle, late = SENSOR_SERIES.prepare(trial).distances(
+        batch(disturbed(100, 150), disturbed(500, 550), disturbed(900, 950))
     )
 
     assert early > 2 * middle > 4 * late > 0
 
 
 def test_a_stride_that_begins_a_little_late_is_nearly_the_same():
-    little, much, trot = SENSOR_SERIES.distances(
-        batch(gait(late=0.1), gait(late=0.3), gait(TROT)), logged(gait())
+    little, much, trot = SENSOR_SERIES.prepare(logged(gait())).distances(
+        batch(gait(late=0.1), gait(late=0.3), gait(TROT))
     )
 
     assert little < 0.1 * trot
@@ -72,7 +71,7 @@ def test_a_base_that_was_logged_with_the_other_sign_is_the_same():
     walking = gait()
     turned = changed(walking, base_orientation=-walking["base_orientation"])
 
-    assert SENSOR_SERIES.distances(batch(turned), logged(walking))[0] == 0
+    assert SENSOR_SERIES.prepare(logged(walking)).distances(batch(turned))[0] == 0
 
 
 @pytest.mark.parametrize("axis", [1, 2, 3])
@@ -84,19 +83,19 @@ def test_turns_to_either_side_of_each_axis_are_told_apart(axis: int):
     trial = logged(changed(gait(), base_orientation=one))
 
     runs = batch(changed(gait(), base_orientation=other), gait())
-    assert np.all(SENSOR_SERIES.distances(runs, trial) > 0.02)
+    assert np.all(SENSOR_SERIES.prepare(trial).distances(runs) > 0.02)
 
 
 @pytest.mark.parametrize("comparator", BOTH)
 @pytest.mark.parametrize("steps", [1, 2, 24, 26, 130])
-def test_short_trials_keep_the_contract(comparator: Piecewise, steps: int):
+def test_short_trials_keep_the_contract(comparator: Comparator, steps: int):
     runs = batch(gait(steps=steps), gait(TROT, steps=steps), gait(late=0.2, steps=steps))
 
     check_comparator(comparator, logged(gait(steps=steps)), runs)
 
 
 @pytest.mark.parametrize("comparator", BOTH)
-def test_what_was_not_observed_is_not_compared(comparator: Piecewise):
+def test_what_was_not_observed_is_not_compared(comparator: Comparator):
     walking = gait()
     known = walking["sensors"].copy()
     known[:120] = np.nan
@@ -108,7 +107,7 @@ def test_what_was_not_observed_is_not_compared(comparator: Piecewise):
     runs = batch(walking, changed(walking, sensors=strange), changed(walking, sensors=elsewhere))
 
     check_comparator(comparator, trial, runs)
-    distances = comparator.distances(runs, trial)
+    distances = comparator.prepare(trial).distances(runs)
     assert distances[1] < 0.01 * distances[2] or distances[1] == 0
     assert distances[2] > 0
 
@@ -117,18 +116,18 @@ def test_a_signal_that_the_log_lacks_is_neither_asked_for_nor_compared():
     walking = gait()
     trial = logged(changed(walking, base_position=np.full((1000, 3), np.nan)))
 
-    assert "base_position" not in SENSOR_SERIES.request(trial).record
+    assert "base_position" not in SENSOR_SERIES.prepare(trial).request.record
     away = changed(walking, base_position=walking["base_position"] + 1)
-    assert SENSOR_SERIES.distances(batch(away), trial)[0] == 0
+    assert SENSOR_SERIES.prepare(trial).distances(batch(away))[0] == 0
 
 
 @pytest.mark.parametrize("comparator", BOTH)
-def test_a_log_with_nothing_to_compare_is_refused(comparator: Piecewise):
+def test_a_log_with_nothing_to_compare_is_refused(comparator: Comparator):
     walking = gait()
     nothing = {signal: np.full_like(walking[signal], np.nan) for signal in walking.signals}
 
     with pytest.raises(InputError, match="needs one at least of"):
-        comparator.request(logged(changed(walking, **nothing)))
+        comparator.prepare(logged(changed(walking, **nothing)))
 
 
 def test_the_papers_sensors_are_the_readings_and_the_displacement():
@@ -136,11 +135,10 @@ def test_the_papers_sensors_are_the_readings_and_the_displacement():
     further = gait()["base_position"] * 1.5
     joints = gait()["joint_positions"] + 1
 
-    assert set(PAPER_SENSORS.request(trial).record) == {"sensors", "base_position"}
-    windows = SENSOR_SERIES.losses(batch(gait()), trial).shape[1]
-    losses = PAPER_SENSORS.losses(
-        batch(changed(gait(), base_position=further), changed(gait(), joint_positions=joints)),
-        trial,
+    assert set(PAPER_SENSORS.prepare(trial).request.record) == {"sensors", "base_position"}
+    windows = SENSOR_SERIES.prepare(trial).losses(batch(gait())).shape[1]
+    losses = PAPER_SENSORS.prepare(trial).losses(
+        batch(changed(gait(), base_position=further), changed(gait(), joint_positions=joints))
     )
     assert losses.shape == (2, windows + 1)
     assert np.all(losses[0, :-1] == 0)
@@ -151,5 +149,5 @@ def test_the_papers_sensors_are_the_readings_and_the_displacement():
 def test_without_a_displacement_the_papers_sensors_are_the_readings():
     trial = logged(changed(gait(), base_position=np.full((1000, 3), np.nan)))
 
-    assert PAPER_SENSORS.losses(batch(gait(), gait(TROT)), trial).shape[1] == 40
-    assert PAPER_SENSORS.distances(batch(gait(), gait(TROT)), trial)[1] > 0
+    assert PAPER_SENSORS.prepare(trial).losses(batch(gait(), gait(TROT))).shape[1] == 40
+    assert PAPER_SENSORS.prepare(trial).distances(batch(gait(), gait(TROT)))[1] > 0

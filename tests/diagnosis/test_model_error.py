@@ -1,4 +1,4 @@
-"""Promises about what only mends the self-model: it is no fault, and no rival lives by it."""
+"""Tests of model error: it is no fault, and no indistinguishable hypothesis depends on it."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -15,14 +15,15 @@ from selfmodel.diagnosis.model_error import any_fault_is_model_error, is_model_e
 from selfmodel.experiments.reality import draw_reality
 from selfmodel.faults import FRICTION
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
-from tests.conftest import random_controllers
-from tests.helpers.memory import MemoryJournal
+from tests.helpers.drivers import random_controllers
+from tests.helpers.memory import in_memory
 
 PIECES = 60
 SMALL = dataclasses.replace(Settings().scaled(12), generations=2, steps=400)
@@ -30,7 +31,7 @@ SLIPPERY, KNEE = "friction=0.2", "break:front_left_knee"
 
 
 def of(robot: Robot, means: Mapping[str, float]) -> Losses:
-    """Losses with some scatter: of most hypotheses a mean of 1, of those named another."""
+    """Losses with scatter: mean 1, but for the named hypotheses."""
     scatter = 0.01 * np.random.default_rng(0).normal(size=PIECES)
     known = {parse(text, robot.anatomy): mean for text, mean in means.items()}
     return lambda hypotheses: np.array([known.get(one, 1.0) * (1 + scatter) for one in hypotheses])
@@ -40,14 +41,15 @@ def test_a_fault_that_alone_would_have_helped_before_mends(quadruped: Robot):
     anatomy = quadruped.anatomy
     both, knee = (parse(text, anatomy) for text in (f"{KNEE}+{SLIPPERY}", KNEE))
     slippery = parse(SLIPPERY, anatomy)
+    space = HypothesisSpace(anatomy, PAPER_KINDS)
     after = of(quadruped, {str(both): 0.5, KNEE: 0.7, SLIPPERY: 0.8})
-    looks = LossFunctions(after, after, of(quadruped, {SLIPPERY: 0.8, KNEE: 2.0}))
+    losses = LossFunctions(after, after, of(quadruped, {SLIPPERY: 0.8, KNEE: 2.0}))
 
-    assert is_model_error(both, knee, looks, anatomy)
-    assert not is_model_error(both, slippery, looks, anatomy)
-    assert any_fault_is_model_error(both, looks, anatomy)
-    assert not any_fault_is_model_error(knee, looks, anatomy)
-    assert not any_fault_is_model_error(INTACT, looks, anatomy)
+    assert is_model_error(both, knee, losses, space)
+    assert not is_model_error(both, slippery, losses, space)
+    assert any_fault_is_model_error(both, losses, space)
+    assert not any_fault_is_model_error(knee, losses, space)
+    assert not any_fault_is_model_error(INTACT, losses, space)
 
 
 def never(_: Sequence[Hypothesis]) -> np.ndarray:
@@ -57,21 +59,25 @@ def never(_: Sequence[Hypothesis]) -> np.ndarray:
 def test_where_nothing_from_before_can_be_compared_nothing_mends(quadruped: Robot):
     knee = parse(KNEE, quadruped.anatomy)
 
-    assert not is_model_error(knee, INTACT, LossFunctions(never, never, None), quadruped.anatomy)
+    space = HypothesisSpace(quadruped.anatomy, PAPER_KINDS)
+
+    assert not is_model_error(knee, INTACT, LossFunctions(never, never, None), space)
 
 
 def test_of_what_would_have_done_harm_nothing_else_is_asked(quadruped: Robot):
-    looks = LossFunctions(never, never, of(quadruped, {KNEE: 2.0}))
+    losses = LossFunctions(never, never, of(quadruped, {KNEE: 2.0}))
 
-    assert not is_model_error(parse(KNEE, quadruped.anatomy), INTACT, looks, quadruped.anatomy)
+    space = HypothesisSpace(quadruped.anatomy, PAPER_KINDS)
+
+    assert not is_model_error(parse(KNEE, quadruped.anatomy), INTACT, losses, space)
 
 
 def trial(robot: Robot, truth: str, gait: Controller, stage: Stage, number: int) -> Trial:
-    """A trial across a small gap, on ground that is slippery before the failure and after."""
+    """A trial across a small reality gap, on slippery ground before and after the failure."""
     reality = draw_reality(robot, 3, 0.02, structure=False)
     hidden = parse("+".join({truth, SLIPPERY} - {"intact"}), robot.anatomy)
     plan = TrialPlan(f"{number:02d}-{stage}", stage, gait, SMALL.steps, 0)
-    return MemoryJournal(robot).record(reality.robot(robot, hidden, stream=number), plan)
+    return in_memory(robot)(reality.robot(robot, hidden, stream=number), plan)
 
 
 def diagnosed(robot: Robot, truth: str, *, looks_back: bool) -> Diagnosis:
@@ -87,6 +93,7 @@ def diagnosed(robot: Robot, truth: str, *, looks_back: bool) -> Diagnosis:
     return search(after, [], np.random.default_rng(0), lambda _: None)
 
 
+@pytest.mark.search
 @pytest.mark.parametrize("truth", ["intact", "jam:front_left_knee"])
 def test_ground_that_always_was_slippery_is_no_change_nor_part_of_a_rival(
     quadruped: Robot, truth: str

@@ -1,4 +1,4 @@
-"""Promises of the fit of degrees: found between the levels, never worse, nothing that is not."""
+"""Tests of fitted severities: between the levels, never worse, without nominal severities."""
 
 from collections.abc import Mapping, Sequence
 
@@ -7,28 +7,24 @@ import pytest
 
 from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
 from selfmodel.diagnosis.refine import refined
-from selfmodel.diagnosis.severity import (
-    COARSE,
-    coarse_candidates,
-    with_fitted_severities,
-    with_mean_severities,
-)
-from selfmodel.faults import FRICTION, WIND
+from selfmodel.diagnosis.severity import with_fitted_severities, with_mean_severities
+from selfmodel.faults import FRICTION, WIND, FaultKind
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.hypothesis_space import COARSE_LEVELS, HypothesisSpace
 from selfmodel.faults.kind import ENVIRONMENT, Fault
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import KINDS, PAPER_KINDS
-from tests.diagnosis.test_refine import ANATOMY, FAULTS, PIECES, find
+from tests.diagnosis.test_refine import ANATOMY, FAULTS, PIECES, SPACE, find
 
 WEAK_MOTOR = KINDS["motor"]
 
 
 def bowl(truth: Mapping[str, float], floor: float = 0.01) -> Losses:
-    """A world in which a motor and the ground have degrees; losses grow with the distance to them.
+    """Losses that grow with the distance to true severities of a motor and of the ground.
 
     Args:
-        truth: The degree of each term that the truth has.
-        floor: What is left at the truth.
+        truth: True severity by term.
+        floor: Loss at the truth.
     """
     ripple = np.linspace(0.9, 1.1, PIECES)
 
@@ -45,7 +41,11 @@ def bowl(truth: Mapping[str, float], floor: float = 0.01) -> Losses:
     return losses
 
 
-DEGREES = coarse_candidates([WEAK_MOTOR, FRICTION], ANATOMY)
+def space_of(*kinds: FaultKind) -> HypothesisSpace:
+    return HypothesisSpace(ANATOMY, kinds)
+
+
+DEGREES = space_of(WEAK_MOTOR, FRICTION).coarse_candidates
 BOTH = {"motor front_left_knee": 0.37, "friction ": 0.62}
 
 
@@ -61,9 +61,9 @@ def test_every_part_is_proposed_at_few_degrees_of_the_whole_range():
     proposed = {fault.severity for fault in DEGREES if fault.part == "front_left_knee"}
     levels = WEAK_MOTOR.levels(ANATOMY, "front_left_knee")
 
-    assert len(proposed) <= COARSE
+    assert len(proposed) <= COARSE_LEVELS
     assert {min(levels), max(levels)} <= proposed <= set(levels)
-    assert coarse_candidates(PAPER_KINDS, ANATOMY) == list(FAULTS)
+    assert space_of(*PAPER_KINDS).coarse_candidates == FAULTS
 
 
 def test_a_fit_of_degrees_never_makes_it_worse_and_a_degree_that_is_nothing_goes():
@@ -71,7 +71,7 @@ def test_a_fit_of_degrees_never_makes_it_worse_and_a_degree_that_is_nothing_goes
     useless = Hypothesis(
         (Fault(FRICTION, ENVIRONMENT, 0.9), Fault(WEAK_MOTOR, "back_left_knee", 0.9))
     )
-    fitted = with_fitted_severities(useless, losses, ANATOMY)
+    fitted = with_fitted_severities(useless, losses, SPACE)
 
     assert losses([fitted]).sum() < losses([useless]).sum()
     assert find(losses, useless, faults=DEGREES) == find(losses, faults=DEGREES)
@@ -79,12 +79,12 @@ def test_a_fit_of_degrees_never_makes_it_worse_and_a_degree_that_is_nothing_goes
 
 
 def rugged(truth: float, noise: float, lucky: float) -> Losses:
-    """Losses of frictions: a bowl in noise of its own for every degree, and one that is lucky.
+    """Losses of frictions: a bowl with noise per severity, and one lucky severity.
 
     Args:
-        truth: Where the bowl is lowest.
-        noise: Standard deviation of what a piece differs by from one degree to another.
-        lucky: A degree that predicts a little better than the truth.
+        truth: Position of the minimum.
+        noise: Standard deviation of the noise per segment and severity.
+        lucky: A severity with a lower loss than the truth.
     """
 
     def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
@@ -115,8 +115,8 @@ def degree_of(hypothesis: Hypothesis) -> float:
 
 def test_a_lucky_degree_does_not_win_where_its_neighbours_cannot_be_told_from_it():
     losses = rugged(truth=0.4, noise=0.3, lucky=0.32)
-    fitted = with_fitted_severities(friction(0.6), losses, ANATOMY)
-    mean = with_mean_severities(fitted, losses, ANATOMY)
+    fitted = with_fitted_severities(friction(0.6), losses, SPACE)
+    mean = with_mean_severities(fitted, losses, SPACE)
 
     assert degree_of(fitted) == 0.32
     assert degree_of(mean) == pytest.approx(0.4, abs=0.04)
@@ -125,11 +125,11 @@ def test_a_lucky_degree_does_not_win_where_its_neighbours_cannot_be_told_from_it
 def test_a_degree_that_is_told_from_its_neighbours_stays():
     losses = rugged(truth=0.4, noise=1e-6, lucky=0.4)
 
-    assert with_mean_severities(friction(0.4), losses, ANATOMY) == friction(0.4)
+    assert with_mean_severities(friction(0.4), losses, SPACE) == friction(0.4)
 
 
 def valleys(*bottoms: float, noise: float, pieces: int = PIECES) -> Losses:
-    """Losses of frictions that are lowest at several degrees, in noise of their own for each."""
+    """Losses of frictions with several minima and noise per severity."""
 
     def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
         rows = []
@@ -144,7 +144,7 @@ def valleys(*bottoms: float, noise: float, pieces: int = PIECES) -> Losses:
 
 
 def test_a_mean_is_not_taken_across_what_predicts_worse():
-    mean = with_mean_severities(friction(0.2), valleys(0.2, 1.2, noise=0.2), ANATOMY)
+    mean = with_mean_severities(friction(0.2), valleys(0.2, 1.2, noise=0.2), SPACE)
 
     assert degree_of(mean) == pytest.approx(0.2, abs=0.05)
 
@@ -152,13 +152,13 @@ def test_a_mean_is_not_taken_across_what_predicts_worse():
 def test_without_pieces_to_compare_the_best_degree_stays():
     losses = valleys(0.4, noise=0.0, pieces=1)
 
-    assert with_mean_severities(friction(0.4), losses, ANATOMY) == friction(0.4)
+    assert with_mean_severities(friction(0.4), losses, SPACE) == friction(0.4)
 
 
 def test_where_nothing_can_be_told_the_mean_is_that_of_all_degrees():
     means = [
         degree_of(
-            with_mean_severities(friction(start), lambda asked: np.ones((len(asked), 9)), ANATOMY)
+            with_mean_severities(friction(start), lambda asked: np.ones((len(asked), 9)), SPACE)
         )
         for start in (0.2, 0.5, 0.9)
     ]
@@ -169,26 +169,26 @@ def test_where_nothing_can_be_told_the_mean_is_that_of_all_degrees():
 
 def test_classes_of_what_reshapes_the_model_have_no_mean():
     rough = Hypothesis((Fault(KINDS["roughness"], ENVIRONMENT, 0.02),))
-    flat = with_mean_severities(rough, lambda asked: np.ones((len(asked), PIECES)), ANATOMY)
+    flat = with_mean_severities(rough, lambda asked: np.ones((len(asked), PIECES)), SPACE)
 
     assert flat == rough
 
 
 def test_a_degree_that_is_not_needed_becomes_the_fault_without_one():
-    """A sensor with a gain that is next to none has failed, as far as anybody can tell."""
+    """A gain close to 0 is indistinguishable from a failed sensor."""
     dead, faint = (parse(f"sensor:front_left_touch{of}", ANATOMY) for of in ("", "=gain0.1"))
-    gains = coarse_candidates((KINDS["sensor-gain"],), ANATOMY)
+    gains = space_of(KINDS["sensor-gain"])
     ripple = np.linspace(0.95, 1.05, PIECES)
 
     def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
         known = {dead: 0.1 * ripple, faint: 0.1 * ripple[::-1] - 0.0003}
         return np.array([known.get(one, 1 + ripple) for one in hypotheses])
 
-    assert refined([faint], gains, 1, LossFunctions(losses, losses, None), ANATOMY) == dead
+    assert refined([faint], gains, 1, LossFunctions(losses, losses, None)) == dead
 
 
 def test_a_mean_that_no_longer_needs_the_fault_leaves_the_best_degree_as_it_is():
-    """All winds but one predict as well as none, and not significantly worse than that one."""
+    """One wind is better than none, and no other wind is significantly worse than that wind."""
     rng = np.random.default_rng(0)
     noise = rng.normal(size=PIECES)
     noise -= noise.mean()
@@ -197,9 +197,9 @@ def test_a_mean_that_no_longer_needs_the_fault_leaves_the_best_degree_as_it_is()
         rows = {"intact": np.full(PIECES, 1.0), "wind=8.0": np.linspace(0.85, 0.95, PIECES)}
         return np.array([rows.get(str(one), 1.0 + noise) for one in hypotheses])
 
-    winds = coarse_candidates((WIND,), ANATOMY)
+    winds = space_of(WIND)
     wind = parse("wind=8", ANATOMY)
-    mean = with_mean_severities(wind, losses, ANATOMY)
+    mean = with_mean_severities(wind, losses, SPACE)
 
     assert mean not in (wind, INTACT)
-    assert refined([wind], winds, 1, LossFunctions(losses, losses, None), ANATOMY) == wind
+    assert refined([wind], winds, 1, LossFunctions(losses, losses, None)) == wind

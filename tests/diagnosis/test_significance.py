@@ -1,17 +1,16 @@
-"""Promises of the tests between hypotheses: paired, above rounding, and at ease with infinity."""
+"""Tests of the significance tests: pairing, rounding errors, infinite losses."""
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy import stats
 
 from selfmodel.diagnosis.significance import (
-    NEGLIGIBLE,
-    RATIO,
-    WORSE,
-    Z,
+    LOSS_RATIO,
+    MIN_Z,
+    MIN_Z_ACROSS_TRIALS,
+    NEGLIGIBLE_LOSS,
     exceeds_healthy_loss,
     gain_exceeds_healthy_gain,
     gain_is_model_error,
@@ -24,7 +23,7 @@ DIVERGED = np.full(5, np.inf)
 
 
 def of_mean_and_error(mean: float, error: float, pieces: int = 100) -> np.ndarray:
-    """Losses of exactly this mean and this standard error of the mean."""
+    """Losses with a given mean and standard error of the mean."""
     swing = np.tile([-1.0, 1.0], pieces // 2)
     return mean + swing / swing.std(ddof=1) * error * np.sqrt(pieces)
 
@@ -52,16 +51,16 @@ def test_what_makes_a_piece_hard_for_both_does_not_count():
     assert not is_better(hard + 1, np.roll(hard, 50) + 1 + by_two_percent)
 
 
-@pytest.mark.parametrize(("errors", "told"), [(Z * 1.01, True), (Z * 0.99, False)])
+@pytest.mark.parametrize(("errors", "told"), [(MIN_Z * 1.01, True), (MIN_Z * 0.99, False)])
 def test_a_difference_counts_from_three_standard_errors_on(errors: float, told: bool):  # noqa: FBT001  # what is expected
     one = np.full(100, 10.0)
 
     assert is_better(one, one + of_mean_and_error(errors * 0.1, 0.1)) == told
 
 
-@pytest.mark.parametrize(("times", "told"), [(RATIO * 1.01, True), (RATIO * 0.99, False)])
+@pytest.mark.parametrize(("times", "told"), [(LOSS_RATIO * 1.01, True), (LOSS_RATIO * 0.99, False)])
 def test_three_times_the_loss_counts_whatever_the_errors(times: float, told: bool):  # noqa: FBT001  # what is expected
-    # All of the difference is in one piece of a hundred: z is 1.
+    # The whole difference is in one segment of a hundred: z is 1.
     one = np.full(100, 0.01)
     other = one.copy()
     other[7] += (times - 1) * one.sum()
@@ -72,13 +71,13 @@ def test_three_times_the_loss_counts_whatever_the_errors(times: float, told: boo
 
 
 def test_the_rounding_of_arithmetic_is_no_reason():
-    perfect, rounded = np.zeros(2), np.array([0.0, 1.9 * NEGLIGIBLE])
+    perfect, rounded = np.zeros(2), np.array([0.0, 1.9 * NEGLIGIBLE_LOSS])
 
     assert not is_better(perfect, rounded)
     assert not exceeds_healthy_loss(rounded, perfect)
     assert is_better(perfect, 2 * rounded)
-    assert exceeds_healthy_loss(np.full(50, 1.01 * NEGLIGIBLE), np.zeros(50))
-    assert not exceeds_healthy_loss(np.full(50, 0.99 * NEGLIGIBLE), np.zeros(50))
+    assert exceeds_healthy_loss(np.full(50, 1.01 * NEGLIGIBLE_LOSS), np.zeros(50))
+    assert not exceeds_healthy_loss(np.full(50, 0.99 * NEGLIGIBLE_LOSS), np.zeros(50))
 
 
 def test_of_a_single_piece_nothing_but_the_ratio_can_tell():
@@ -120,7 +119,7 @@ def test_losses_of_other_trials_are_compared_as_welch_did():
     rng = np.random.default_rng(1)
     usual, losses = rng.normal(10, 1, 40), rng.normal(11, 3, 80)
     z = stats.ttest_ind(losses, usual, equal_var=False).statistic
-    lift = (WORSE - z) * (losses.mean() - usual.mean()) / z
+    lift = (MIN_Z_ACROSS_TRIALS - z) * (losses.mean() - usual.mean()) / z
 
     assert not exceeds_healthy_loss(losses + 0.99 * lift, usual)
     assert exceeds_healthy_loss(losses + 1.01 * lift, usual)
@@ -140,11 +139,13 @@ def test_of_two_at_most_one_is_better(pair: np.ndarray):
 def test_the_order_of_the_pieces_does_not_matter(pair: np.ndarray, order: list[int]):
     one, other = pair
     z = paired_z(other, one) if np.isfinite(pair).all() else 0.0
-    if abs(z - Z) > 1e-6:  # where rounding does not decide
+    if abs(z - MIN_Z) > 1e-6:  # where the result does not depend on rounding
         assert is_better(one[order], other[order]) == is_better(one, other)
 
 
-@pytest.mark.parametrize(("errors", "told"), [(WORSE * 1.01, True), (WORSE * 0.99, False)])
+@pytest.mark.parametrize(
+    ("errors", "told"), [(MIN_Z_ACROSS_TRIALS * 1.01, True), (MIN_Z_ACROSS_TRIALS * 0.99, False)]
+)
 def test_what_became_better_did_so_by_five_standard_errors(errors: float, told: bool):  # noqa: FBT001  # what is expected
     one, before = np.full(100, 10.0), np.full(100, 10.0)
     other = one + of_mean_and_error(errors * 0.1, 0.1)
@@ -154,7 +155,7 @@ def test_what_became_better_did_so_by_five_standard_errors(errors: float, told: 
 
 
 def at_the_edge(errors: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Losses, what was gained before, and what would have to be gained since for so many errors."""
+    """Losses, gains on healthy trials, and gains that exceed them by some standard errors."""
     rng = np.random.default_rng(2)
     one, gain, earlier = rng.normal(10, 1, 80), rng.normal(1, 0.3, 80), rng.normal(0.9, 0.3, 40)
     z = stats.ttest_ind(gain, earlier, equal_var=False).statistic
@@ -166,9 +167,9 @@ BEFORE = np.full(40, 10.0)
 
 
 def test_what_was_better_before_has_to_be_better_by_more_since():
-    one, earlier, gain = at_the_edge(WORSE)
+    one, earlier, gain = at_the_edge(MIN_Z_ACROSS_TRIALS)
 
-    assert paired_z(one + gain, one) > WORSE
+    assert paired_z(one + gain, one) > MIN_Z_ACROSS_TRIALS
     assert not gain_exceeds_healthy_gain(one, one + gain - 0.002, BEFORE, BEFORE + earlier)
     assert gain_exceeds_healthy_gain(one, one + gain + 0.002, BEFORE, BEFORE + earlier)
 
@@ -187,28 +188,28 @@ def test_what_diverged_or_has_a_single_piece_has_not_become_better():
     assert not gain_exceeds_healthy_gain(one, DIVERGED, one, one)
     assert not gain_exceeds_healthy_gain(one, other, one, DIVERGED)
     assert not gain_exceeds_healthy_gain(one[:1], other[:1], one, one)
-    assert not gain_exceeds_healthy_gain(one, other * NEGLIGIBLE / 2, one, one)
+    assert not gain_exceeds_healthy_gain(one, other * NEGLIGIBLE_LOSS / 2, one, one)
 
 
 def test_what_helped_before_only_mends_unless_it_helps_significantly_more_since():
-    one, earlier, gain = at_the_edge(Z)
+    one, earlier, gain = at_the_edge(MIN_Z)
 
     assert gain_is_model_error(one, one + gain - 0.002, BEFORE, BEFORE + earlier)
     assert not gain_is_model_error(one, one + gain + 0.002, BEFORE, BEFORE + earlier)
 
 
-@pytest.mark.parametrize("harm", [0.0, NEGLIGIBLE / 2, 1.0])
+@pytest.mark.parametrize("harm", [0.0, NEGLIGIBLE_LOSS / 2, 1.0])
 def test_what_did_not_help_before_does_not_mend_however_little_it_helps_since(harm: float):
     one, before = np.full(100, 10.0), np.full(100, 10.0)
     hardly = one + of_mean_and_error(0.2, 0.1)
 
     assert not gain_is_model_error(one, hardly, before, before - harm)
-    assert gain_is_model_error(one, hardly, before, before + 2 * NEGLIGIBLE)
+    assert gain_is_model_error(one, hardly, before, before + 2 * NEGLIGIBLE_LOSS)
 
 
 @pytest.mark.parametrize(("error", "told"), [(0.19, True), (0.21, False)])
 def test_trials_that_would_not_have_shown_the_harm_say_nothing(error: float, told: bool):  # noqa: FBT001  # of a table
-    # As much harm as it helps would have been 0.6 below what it helps: Z errors of 0.2.
+    # A harm as large as the gain is 0.6 below the gain: MIN_Z standard errors of 0.2.
     one, before = np.full(100, 10.0), np.full(100, 10.0)
 
     assert (

@@ -1,15 +1,17 @@
-"""Promises about what may be wrong besides: neither shown by the trials nor ruled out."""
+"""Tests of undetectable faults: the trials neither require them nor rule them out."""
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pytest
 
-from selfmodel.cli.output.ranking import as_values, in_words, sureness
+from selfmodel.cli.output.ranking import in_words
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
 from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
+from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
 from selfmodel.diagnosis.undetectable import undetectable_faults
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import ALL_KINDS, PAPER_KINDS
 from selfmodel.robot.robot import Robot
@@ -18,7 +20,7 @@ PIECES = 60
 
 
 def of(robot: Robot, means: Mapping[str, float], otherwise: float) -> Losses:
-    """Losses with some scatter: a mean for some hypotheses, another for the rest."""
+    """Losses with scatter: a mean per named hypothesis, another mean for the rest."""
     scatter = 0.01 * np.random.default_rng(0).normal(size=PIECES)
     known = {parse(text, robot.anatomy): mean for text, mean in means.items()}
 
@@ -35,7 +37,7 @@ TOUCH, KNEE = "sensor:front_left_touch", "break:front_left_knee"
 def test_what_makes_no_difference_is_unseen_and_what_makes_one_is_not(quadruped: Robot):
     losses = of(quadruped, {"intact": 1.0, TOUCH: 1.0, KNEE: 0.5}, otherwise=2.0)
     found = undetectable_faults(
-        INTACT, PAPER_KINDS, quadruped.anatomy, LossFunctions(losses, losses, None)
+        INTACT, HypothesisSpace(quadruped.anatomy, PAPER_KINDS), LossFunctions(losses, losses, None)
     )
 
     assert [str(one) for one in found] == [TOUCH]
@@ -46,7 +48,9 @@ def test_what_diverges_is_ruled_out(quadruped: Robot):
 
     assert (
         undetectable_faults(
-            INTACT, PAPER_KINDS, quadruped.anatomy, LossFunctions(losses, losses, None)
+            INTACT,
+            HypothesisSpace(quadruped.anatomy, PAPER_KINDS),
+            LossFunctions(losses, losses, None),
         )
         == []
     )
@@ -57,7 +61,9 @@ def test_beside_what_diverges_nothing_is_unseen(quadruped: Robot):
 
     assert (
         undetectable_faults(
-            INTACT, PAPER_KINDS, quadruped.anatomy, LossFunctions(losses, losses, None)
+            INTACT,
+            HypothesisSpace(quadruped.anatomy, PAPER_KINDS),
+            LossFunctions(losses, losses, None),
         )
         == []
     )
@@ -65,7 +71,7 @@ def test_beside_what_diverges_nothing_is_unseen(quadruped: Robot):
 
 def test_the_closest_comes_first_and_each_says_one_fault_more(quadruped: Robot):
     best = parse(KNEE, quadruped.anatomy)
-    # The difference is below what counts as one.
+    # The difference is below NEGLIGIBLE_LOSS.
     means = {
         KNEE: 1.0,
         f"{KNEE}+sensor:back_left_touch": 1.0,
@@ -73,7 +79,7 @@ def test_the_closest_comes_first_and_each_says_one_fault_more(quadruped: Robot):
     }
     losses = of(quadruped, means, otherwise=2.0)
     found = undetectable_faults(
-        best, PAPER_KINDS, quadruped.anatomy, LossFunctions(losses, losses, None)
+        best, HypothesisSpace(quadruped.anatomy, PAPER_KINDS), LossFunctions(losses, losses, None)
     )
 
     assert [str(one) for one in found] == [
@@ -92,7 +98,9 @@ def test_only_what_the_screen_cannot_tell_is_looked_at_closely(quadruped: Robot)
 
     assert (
         undetectable_faults(
-            INTACT, PAPER_KINDS, quadruped.anatomy, LossFunctions(losses, screen, None)
+            INTACT,
+            HypothesisSpace(quadruped.anatomy, PAPER_KINDS),
+            LossFunctions(losses, screen, None),
         )
         == []
     )
@@ -102,7 +110,7 @@ def test_only_what_the_screen_cannot_tell_is_looked_at_closely(quadruped: Robot)
 def test_faults_of_degree_are_left_out(quadruped: Robot):
     same = of(quadruped, {}, otherwise=1.0)
     found = undetectable_faults(
-        INTACT, ALL_KINDS, quadruped.anatomy, LossFunctions(same, same, None)
+        INTACT, HypothesisSpace(quadruped.anatomy, ALL_KINDS), LossFunctions(same, same, None)
     )
 
     assert {fault.kind for one in found for fault in one.faults} == set(PAPER_KINDS)
@@ -121,7 +129,7 @@ def test_a_report_names_what_is_unseen(quadruped: Robot, best: str, besides: lis
     diagnosis = Diagnosis(
         (Candidate(known, 0.1),), 1, 0.2, (), "explained", "by eye", undetectable=tuple(more)
     )
-    found = {"diagnosis": as_values(diagnosis.ranked), **sureness(diagnosis)}
+    found = {"diagnosis": ranking_to_list(diagnosis.ranked), **confidence_to_dict(diagnosis)}
 
     assert found["unseen"] == besides
     sure = ", and nothing else as well." if not besides else "."

@@ -16,7 +16,8 @@ from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log
-from selfmodel.logs.frames import Kinematics, body_names
+from selfmodel.logs.kinematics import Kinematics, body_names
+from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.robots import robot_of
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.reality_gap import draw_gap
@@ -26,7 +27,7 @@ from selfmodel.robot.anatomy import Joint
 from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.calibrate import prediction_error
+from selfmodel.simulation.calibration import prediction_error
 from selfmodel.simulation.requests import Past, Segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import suite_bodies, walking
@@ -34,8 +35,8 @@ from selfmodel.trials.behaviour import SIGNALS, Behaviour, collect
 from selfmodel.trials.rotation import rotation_between
 from selfmodel.trials.state_estimation import BASE, STATE
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.conftest import lacking
-from tests.helpers.bodies import BODIES, swinging, swung
+from tests.helpers.bodies import BODIES, EVERY_BODY, swinging, swung
+from tests.helpers.hostile import lacking
 from tests.logs.conftest import plan_of
 
 STEPS, HORIZON = 50, 10
@@ -46,7 +47,7 @@ solver stops at its tolerance with 79 degrees of freedom, and begins a segment w
 of the step before, the paths of light bones part a little."""
 
 
-@pytest.fixture(params=sorted(BODIES))
+@pytest.fixture(params=EVERY_BODY)
 def body(request: pytest.FixtureRequest) -> Robot:
     return BODIES[request.param]()
 
@@ -148,7 +149,7 @@ def test_a_log_holds_the_robot_and_its_trial(body: Robot, tmp_path: Path):
         body = suite_bodies.robot(body.name, "walk")
     samples = list(SimulatedRobot(body).run(plan_of(body, 20).controller, 20))
     path = tmp_path / "a.mcap"
-    write_trial(path, body, plan_of(body, 20), samples, settings=Settings())
+    write_trial(path, body, plan_of(body, 20), samples, TrialHeader(Settings()))
     log = read_log(path)
     again, logged = robot_of(log), collect(body.anatomy.names, samples)
 

@@ -7,8 +7,9 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 
-from selfmodel.diagnosis.comparator import Piecewise
+from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.comparator_contract import check_comparator
 from tests.helpers.command import SMALL, selfmodel
 from tests.helpers.gaits import batch, changed, gait, logged
@@ -22,6 +23,7 @@ def run(name: str, *arguments: str, cwd: Path) -> str:
     return subprocess.run(command, cwd=cwd, check=True, capture_output=True, text=True).stdout
 
 
+@pytest.mark.process
 def test_a_recovery_in_python_is_drawn_from_its_logs(tmp_path: Path):
     told = run("recover_in_python.py", "run", cwd=tmp_path)
     run("plot_recovery.py", "run", "figure.png", cwd=tmp_path)
@@ -31,7 +33,7 @@ def test_a_recovery_in_python_is_drawn_from_its_logs(tmp_path: Path):
     assert len(list((tmp_path / "run" / "trials").glob("*.mcap"))) == 5
 
 
-def heading_comparator() -> Piecewise:
+def heading_comparator() -> Comparator:
     """The example's comparator, imported as its user's own file would be."""
     spec = importlib.util.spec_from_file_location("heading", EXAMPLES / "heading_comparator.py")
     module = importlib.util.module_from_spec(spec)
@@ -57,10 +59,11 @@ def test_a_comparator_of_ones_own_keeps_the_contract():
     check_comparator(heading_comparator(), trial, runs)
     # A mean over 10 s of turning 0.1 rad/s apart.
     np.testing.assert_allclose(
-        heading_comparator().distances(runs, logged(left)), [0, 0.4995, 0.999], rtol=1e-6
+        heading_comparator().prepare(logged(left)).distances(runs), [0, 0.4995, 0.999], rtol=1e-6
     )
 
 
+@pytest.mark.process
 def test_a_comparator_of_ones_own_plugs_in_from_the_folder_that_the_command_runs_in(tmp_path: Path):
     command = [
         *(Path(sys.executable).with_name("selfmodel"), "recover", "quadruped", "--case", "2"),
@@ -82,6 +85,7 @@ def test_plugins_of_ones_own_are_checked_in_python(tmp_path: Path):
     assert "payload: 12 faults that may be proposed" in told
 
 
+@pytest.mark.process
 def test_an_ablation_in_python_goes_on_where_it_was(tmp_path: Path):
     first = run("ablation.py", "folder", cwd=tmp_path)
     again = run("ablation.py", "folder", cwd=tmp_path)

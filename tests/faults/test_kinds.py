@@ -1,4 +1,4 @@
-"""The contract of every kind of fault and of environment: add one, and it is tested."""
+"""Contract tests of every kind of fault and of environment, parametrised over the registry."""
 
 import dataclasses
 import importlib.util
@@ -10,23 +10,23 @@ import numpy as np
 import pytest
 
 from selfmodel.controllers.playback import Playback
-from selfmodel.diagnosis.kind_contract import check_kind
+from selfmodel.diagnosis.kind_contract import check_fault_kind
 from selfmodel.errors import InputError
 from selfmodel.experiments import plugins, robots
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
 from selfmodel.faults.notation import parse
-from selfmodel.faults.registry import ALL_KINDS, KINDS, PAPER_KINDS, known
+from selfmodel.faults.registry import ALL_KINDS, KINDS, PAPER_KINDS, notation_kinds
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
-from tests.conftest import random_motion
+from tests.helpers.drivers import random_motion
 
 
 def example(name: str) -> ModuleType:
-    """An example, imported as its user would import it."""
+    """A module of examples/, imported by path."""
     path = Path(__file__).parents[2] / "examples" / f"{name}.py"
     spec = importlib.util.spec_from_file_location(name, path)
     module = importlib.util.module_from_spec(spec)
@@ -39,7 +39,7 @@ PAYLOAD = example("payload").PAYLOAD
 
 @pytest.mark.parametrize("kind", [*KINDS.values(), PAYLOAD], ids=lambda kind: kind.name)
 def test_a_kind_keeps_its_contract(kind: FaultKind, robot: Robot):
-    check_kind(kind, robot)
+    check_fault_kind(kind, robot)
 
 
 def test_the_registry_knows_each_kind_by_its_name():
@@ -59,7 +59,7 @@ def test_a_kind_of_degree_proposes_a_few_levels(name: str, robot: Robot):
 
 
 def test_what_a_joint_absorbs_would_not_move_the_robot(robot: Robot):
-    """The pair, built as it is said, moves like the canonical form."""
+    """Checks that the pair of faults moves like its canonical form."""
     anatomy = robot.anatomy
     driver = Playback(anatomy.motors, random_motion(robot, 60))
     first = anatomy.joints[0]
@@ -73,7 +73,7 @@ def test_what_a_joint_absorbs_would_not_move_the_robot(robot: Robot):
         (one, other)
         for one, other in permutations(faults, 2)
         if one.kind.absorbs(one, other, anatomy)
-        # These contradict each other: the canonical form decides which is meant.
+        # The two faults contradict each other, and the canonical form keeps one.
         and (one.kind.name, other.kind.name) != ("jam", "jam-angle")
     ]
     assert {one.kind.name for one, _ in absorbed} == {"break", "jam", "jam-angle", "sensor"}
@@ -87,11 +87,11 @@ def test_what_a_joint_absorbs_would_not_move_the_robot(robot: Robot):
 
 
 def nothing(_embodiment: Embodiment, _anatomy: Anatomy, _fault: Fault) -> None:
-    """Strikes nothing."""
+    """Edits nothing."""
 
 
 def heavier_each_time(_embodiment: Embodiment, _anatomy: Anatomy, _fault: Fault) -> None:
-    """Is another fault each time."""
+    """Edits the model differently at each call."""
     heavier_each_time.times += 1
     _embodiment.model.body_mass[1] += heavier_each_time.times
 
@@ -111,24 +111,27 @@ GRADED = FaultKind(
     ("change", "said"),
     [
         ({"name": "two words"}, "needs a name without spaces"),
-        ({"keyword": "a:b"}, "needs a word without spaces"),
+        ({"keyword": "a:b"}, "needs a keyword without spaces"),
         ({"parts": lambda _anatomy: ()}, "nothing can be proposed"),
         ({"levels": uniform_levels()}, "nothing can be proposed"),
         ({"levels": uniform_levels(3.0)}, "not between 0 and 2"),
-        ({"severity_bounds": None}, "the kind no degrees"),
-        ({"special": {1.0: None}}, "alone it means intact"),
-        ({"keyword": "friction"}, "is read back as friction=1.0"),
+        ({"severity_bounds": None}, "its kind has no severity_bounds"),
+        ({"degenerates_to": {1.0: None}}, "its canonical form is intact"),
+        ({"keyword": "friction"}, "is parsed as friction=1.0"),
         ({"absorbs": lambda _fault, _other, _anatomy: True}, "absorbs itself"),
         ({"apply": nothing}, "changes nothing about a robot"),
         ({"apply": heavier_each_time}, "does not make the same robot every time"),
-        ({"feel": lambda _own, _fault, points: points.fill(0)}, "changes the points"),
+        (
+            {"adapt_to_contacts": lambda _own, _fault, points: points.fill(0)},
+            "changes the contact points",
+        ),
     ],
 )
 def test_the_contract_kit_sees_each_way_to_break_it(change: dict, said: str, quadruped: Robot):
-    check_kind(GRADED, quadruped)
+    check_fault_kind(GRADED, quadruped)
 
     with pytest.raises((ValueError, InputError), match=said):
-        check_kind(dataclasses.replace(GRADED, **change), quadruped)
+        check_fault_kind(dataclasses.replace(GRADED, **change), quadruped)
 
 
 def test_the_contract_kit_sees_a_kind_that_edits_the_robot_itself():
@@ -138,7 +141,7 @@ def test_the_contract_kit_sees_a_kind_that_edits_the_robot_itself():
         robot.model.body_mass[1] = 5.0
 
     with pytest.raises(ValueError, match=r"does not make the same robot|changes the robot itself"):
-        check_kind(dataclasses.replace(GRADED, apply=wrong), robot)
+        check_fault_kind(dataclasses.replace(GRADED, apply=wrong), robot)
 
 
 def test_kinds_are_chosen_by_name(monkeypatch: pytest.MonkeyPatch):
@@ -174,7 +177,7 @@ OTHER_JAM = dataclasses.replace(GRADED, name="jam", keyword="cling")
 
 
 def test_notation_names_a_third_party_s_kind_where_it_is_considered(quadruped: Robot):
-    said = parse("break:front_left_knee+payload=2.5", quadruped.anatomy, known([PAYLOAD]))
+    said = parse("break:front_left_knee+payload=2.5", quadruped.anatomy, notation_kinds([PAYLOAD]))
 
     assert str(said) == "break:front_left_knee+payload=2.5"
     torso = build(quadruped, said).model.body("torso")

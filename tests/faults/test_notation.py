@@ -1,8 +1,7 @@
-"""Promises of the notation: it reads back what it writes, and says which term is wrong."""
+"""Tests of the notation: round trips, and messages that contain the malformed term."""
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from selfmodel.errors import InputError
 from selfmodel.faults.notation import parse
@@ -37,7 +36,7 @@ def test_what_a_hypothesis_prints_parses_back_to_it(name: str, data: st.DataObje
         ("jam:front_left_knee=x", "got 'x'"),
         ("jam:front_left_knee=nan", "got 'nan'"),
         ("jam:front_left_knee=1", "got '1'"),
-        ("break:front_left_knee=1", "break knows none: write no '='"),
+        ("break:front_left_knee=1", "break has none: write no '='"),
         ("friction", "cannot read the term 'friction'|needs a number from 0.01 to 3"),
         ("friction=", "needs a number from 0.01 to 3 .* after '=', got ''"),
         ("friction=-1", "got '-1'"),
@@ -48,9 +47,9 @@ def test_what_a_hypothesis_prints_parses_back_to_it(name: str, data: st.DataObje
         ("sensor:front_left_angle=gain", "after '=gain', got ''"),
         ("sensor:front_left_angle=bias2", "after '=bias', got '2'"),
         ("sensor:front_left_touch=noise0.1", "for sensor 'front_left_touch'"),
-        ("slope=0.1+slope=0.2", "gives slope two degrees, 0.1 and 0.2"),
-        ("jam:front_left_knee+jam:front_left_knee=0.2", "two degrees, 0.0 and 0.2"),
-        ("jam:front_left_knee=0.1+jam:front_left_knee=0.2", "two degrees, 0.1 and 0.2"),
+        ("slope=0.1+slope=0.2", "gives slope two severities, 0.1 and 0.2"),
+        ("jam:front_left_knee+jam:front_left_knee=0.2", "two severities, 0.0 and 0.2"),
+        ("jam:front_left_knee=0.1+jam:front_left_knee=0.2", "two severities, 0.1 and 0.2"),
     ],
 )
 def test_a_malformed_notation_says_which_term_and_why(text: str, said: str):

@@ -1,4 +1,4 @@
-"""Promises of what a diagnosis considers: what can strike the robot, under whatever name."""
+"""Tests of the kinds of a search: those that apply to the robot, and those they degenerate to."""
 
 import dataclasses
 from pathlib import Path
@@ -7,11 +7,16 @@ import pytest
 
 from selfmodel.comparators import SEGMENT_PREDICTION
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
-from selfmodel.diagnosis.kind_contract import check_kind
+from selfmodel.diagnosis.kind_contract import check_fault_kind
 from selfmodel.errors import InputError
+from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
 from selfmodel.faults.notation import parse
-from selfmodel.faults.registry import ALL_KINDS, KINDS, PAPER_KINDS, applicable_kinds, known
+from selfmodel.faults.registry import (
+    ALL_KINDS,
+    KINDS,
+    PAPER_KINDS,
+)
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.recovery.explain import diagnose_trials
 from selfmodel.robot.anatomy import Anatomy
@@ -20,9 +25,9 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import TrialPlan
-from tests.conftest import random_controllers
 from tests.helpers.command import selfmodel
-from tests.helpers.memory import MemoryJournal
+from tests.helpers.drivers import random_controllers
+from tests.helpers.memory import in_memory
 
 SMALL = dataclasses.replace(Settings().scaled(12), generations=2, steps=300)
 ANGLES = (KINDS["break"], KINDS["jam-angle"])
@@ -36,32 +41,32 @@ BARE = """\
 </worldbody>
 <actuator><position name="hip" joint="hip" kp="50" ctrlrange="-1 1"/></actuator></mujoco>
 """
-"""A robot without a sensor."""
+"""A robot without sensors."""
 
 
 def test_what_strikes_a_robot_stays_in_its_order_and_brings_its_other_names(robot: Robot):
-    assert applicable_kinds(PAPER_KINDS, robot.anatomy) == PAPER_KINDS
-    assert applicable_kinds(ALL_KINDS, robot.anatomy) == ALL_KINDS
-    assert applicable_kinds(ANGLES, robot.anatomy) == (*ANGLES, KINDS["jam"])
+    assert HypothesisSpace.of(PAPER_KINDS, robot.anatomy).kinds == PAPER_KINDS
+    assert HypothesisSpace.of(ALL_KINDS, robot.anatomy).kinds == ALL_KINDS
+    assert HypothesisSpace.of(ANGLES, robot.anatomy).kinds == (*ANGLES, KINDS["jam"])
     gains = (KINDS["sensor-gain"], KINDS["motor"])
-    assert applicable_kinds(gains, robot.anatomy) == (*gains, KINDS["sensor"])
+    assert HypothesisSpace.of(gains, robot.anatomy).kinds == (*gains, KINDS["sensor"])
 
 
 def test_a_kind_that_cannot_strike_a_robot_is_passed_over_and_alone_refused():
     anatomy = Robot("bare", BARE, 0.02).anatomy
 
-    assert applicable_kinds(PAPER_KINDS, anatomy) == (KINDS["break"], KINDS["jam"])
-    with pytest.raises(InputError, match="no part that sensor, sensor-gain can strike"):
-        applicable_kinds((KINDS["sensor"], KINDS["sensor-gain"]), anatomy)
+    assert HypothesisSpace.of(PAPER_KINDS, anatomy).kinds == (KINDS["break"], KINDS["jam"])
+    with pytest.raises(InputError, match="sensor, sensor-gain cannot affect any part"):
+        HypothesisSpace.of((KINDS["sensor"], KINDS["sensor-gain"]), anatomy)
 
 
 def test_a_kind_that_no_diagnosis_may_propose_is_refused(robot: Robot):
     with pytest.raises(InputError, match="no diagnosis may propose neuron: leave it out"):
-        applicable_kinds((KINDS["break"], KINDS["neuron"]), robot.anatomy)
+        HypothesisSpace.of((KINDS["break"], KINDS["neuron"]), robot.anatomy)
 
 
 def test_kinds_that_a_fault_is_of_at_some_degree_can_be_named(quadruped: Robot):
-    """What a diagnosis says is read back from its log."""
+    """Diagnoses in a journal are parsed with these kinds."""
     sticky = FaultKind(name="sticky", keyword="sticky", apply=apply)
     stick = FaultKind(
         name="stick",
@@ -69,19 +74,19 @@ def test_kinds_that_a_fault_is_of_at_some_degree_can_be_named(quadruped: Robot):
         apply=apply,
         severity_bounds=uniform_bounds(0, 2),
         levels=uniform_levels(1.0, 2.0),
-        special={0.0: sticky, 0.5: None},
+        degenerates_to={0.0: sticky, 0.5: None},
     )
 
-    check_kind(stick, quadruped)
-    assert applicable_kinds((stick,), quadruped.anatomy) == (stick, sticky)
-    assert str(parse("stick=0", quadruped.anatomy, known((stick,)))) == "sticky"
+    check_fault_kind(stick, quadruped)
+    assert HypothesisSpace.of((stick,), quadruped.anatomy).kinds == (stick, sticky)
+    assert str(HypothesisSpace(quadruped.anatomy, (stick,)).parse("stick=0")) == "sticky"
     for wrong in (KINDS["neuron"], KINDS["slope"]):
-        with pytest.raises(ValueError, match=f"stick is {wrong.name} at some degree"):
-            check_kind(dataclasses.replace(stick, special={0.0: wrong}), quadruped)
+        with pytest.raises(ValueError, match=f"stick degenerates to {wrong.name}"):
+            check_fault_kind(dataclasses.replace(stick, degenerates_to={0.0: wrong}), quadruped)
 
 
 def apply(embodiment: Embodiment, _anatomy: Anatomy, fault: Fault) -> None:
-    """More friction in every joint."""
+    """Adds friction to every joint."""
     embodiment.model.dof_frictionloss[6:] += 0.1 + fault.severity
 
 
@@ -95,17 +100,18 @@ def test_a_recovery_of_a_robot_with_nothing_to_strike_is_refused_before_any_tria
     )
 
     assert done.returncode == 2
-    assert "no part that sensor can strike" in done.stderr
+    assert "sensor cannot affect any part" in done.stderr
     assert list(tmp_path.rglob("*.mcap*")) == []
 
 
+@pytest.mark.search
 def test_a_joint_that_turns_out_to_be_jammed_at_0_is_found_among_angles_trial_after_trial(
     quadruped: Robot,
 ):
     hidden = parse("jam:front_left_shoulder", quadruped.anatomy)
-    journal, physical = MemoryJournal(quadruped), SimulatedRobot(quadruped, hidden)
+    run_trial, physical = in_memory(quadruped), SimulatedRobot(quadruped, hidden)
     trials = [
-        journal.record(physical, TrialPlan(f"{number:02d}-after", "after", gait, SMALL.steps, 0))
+        run_trial(physical, TrialPlan(f"{number:02d}-after", "after", gait, SMALL.steps, 0))
         for number, gait in enumerate(random_controllers(quadruped, 4)[1:])
     ]
     search = DiagnosticSearch(Simulator(quadruped, 1), SEGMENT_PREDICTION, SMALL, ANGLES)

@@ -5,13 +5,14 @@ from pathlib import Path
 import dm_env
 import numpy as np
 
+from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.environment_robot import EnvironmentRobot
 from selfmodel.settings import Settings
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import SIGNALS, Behaviour, collect
 from selfmodel.trials.trial import TrialPlan
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 
 STEPS = 30
 QUADRUPED = ROBOTS["quadruped"].robot()
@@ -97,6 +98,5 @@ def logged(bench: Bench, folder: Path, steps: int = STEPS, **options: object) ->
         QUADRUPED,
         TrialPlan("trial", "single", CONTROLLER, steps, 0),
         physical.run(CONTROLLER, steps),
-        timed=True,
-        settings=Settings(),
+        TrialHeader(Settings(), timed=True),
     )

@@ -1,32 +1,29 @@
-"""A journal that keeps a recovery in memory, for tests of the algorithm alone."""
+"""Physical trials and a journal in memory, for tests of the algorithm without files."""
 
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.physical.interface import PhysicalRobot
-from selfmodel.recovery.database import Database
+from selfmodel.recovery.database import RunTrial
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import collect
 from selfmodel.trials.trial import Trial, TrialPlan
 
 
-class MemoryJournal:
-    """Keeps trials and diagnoses of one robot; see ``selfmodel.recovery.database.Journal``."""
+def in_memory(robot: Robot) -> RunTrial:
+    """Returns a function that runs a physical trial of a robot and keeps no log."""
 
-    def __init__(self, robot: Robot) -> None:
-        self._robot = robot
-        self._database = Database()
-
-    def record(self, physical: PhysicalRobot, plan: TrialPlan) -> Trial:
-        """Runs a trial and keeps it."""
+    def run_trial(physical: PhysicalRobot, plan: TrialPlan) -> Trial:
         samples = physical.run(plan.controller, plan.steps)
-        behaviour = collect(self._robot.anatomy.names, samples)
-        trial = Trial(plan, self._robot.name, behaviour, plan.name)
-        self._database = Database((*self._database.trials, trial), self._database.diagnoses)
-        return trial
+        return Trial(plan, robot.name, collect(robot.anatomy.names, samples), plan.name)
 
-    def note(self, diagnosis: Diagnosis) -> None:
-        """Keeps a diagnosis."""
-        self._database = Database(self._database.trials, (*self._database.diagnoses, diagnosis))
+    return run_trial
 
-    def read(self) -> Database:
-        """Returns what was kept."""
-        return self._database
+
+class MemoryJournal:
+    """Journal that keeps diagnoses in memory; see ``selfmodel.recovery.database.Journal``."""
+
+    def __init__(self) -> None:
+        self.diagnoses: list[Diagnosis] = []
+
+    def add(self, diagnosis: Diagnosis) -> None:
+        """Stores a diagnosis."""
+        self.diagnoses.append(diagnosis)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from selfmodel.controllers.controller import Controller, draw_genomes
+from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import write_trial
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
@@ -77,7 +78,7 @@ def log(biped: Robot, plan: TrialPlan, tmp_path: Path) -> Path:
     """A finished log of a made-up trial."""
     path = tmp_path / "trial.mcap"
     samples = made_up(biped, STEPS)
-    return write_trial(path, biped, plan, samples, settings=Settings(), hidden="intact")
+    return write_trial(path, biped, plan, samples, TrialHeader(Settings(), hidden="intact"))
 
 
 def plan_of(robot: Robot, steps: int, name: str = "00-before") -> TrialPlan:

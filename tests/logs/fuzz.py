@@ -25,9 +25,10 @@ from mcap.writer import CompressionType, Writer
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError, TrialLog, read_log
 from selfmodel.logs.budget import Budget
+from selfmodel.logs.checksums import verified_records
 from selfmodel.logs.framing import Frame, frames, parse, unpack
+from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.salvage import salvage
-from selfmodel.logs.scan import scan
 from selfmodel.logs.writer import write_trial
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
@@ -97,7 +98,7 @@ def packed(data: bytes, compression: CompressionType, chunk_size: int | None) ->
     writer.start("ros2")
     schemas: dict[int, int] = {}
     channels: dict[int, int] = {}
-    for record in scan(data):
+    for record in verified_records(data):
         match record:
             case Schema(id=number) if number not in schemas:
                 schemas[number] = writer.register_schema(record.name, record.encoding, record.data)
@@ -261,9 +262,7 @@ def main() -> None:
                     robot,
                     plan_of(robot, STEPS),
                     samples,
-                    timed=clock,
-                    settings=Settings(),
-                    hidden="intact",
+                    TrialHeader(Settings(), timed=clock, hidden="intact"),
                 )
             )
         ]

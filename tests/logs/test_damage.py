@@ -17,11 +17,11 @@ from selfmodel.logs import (
     TruncatedError,
     UnsupportedError,
     read_log,
+    reader as reader_module,
 )
-from selfmodel.logs import reader as reader_module
+from selfmodel.logs.checksums import verified_records
 from selfmodel.logs.contents import Contents, read_contents
 from selfmodel.logs.records import HIDDEN, RESULT, TRIAL, with_digest, without_digest
-from selfmodel.logs.scan import scan
 
 CASES = Path(__file__).parents[3] / "shared" / "samples" / "mcap-conformance"
 Change = Callable[[McapRecord], McapRecord | None]
@@ -58,7 +58,7 @@ def test_a_file_that_is_not_there_is_said_so(tmp_path: Path):
 
 def rewritten(path: Path, change: Change) -> None:
     """Writes a sound file of what ``change`` makes of each record, None for nothing."""
-    records = list(scan(path.read_bytes()))
+    records = list(verified_records(path.read_bytes()))
     output = io.BytesIO()
     writer = Writer(output, enable_data_crcs=True)
     writer.start("ros2")
@@ -170,7 +170,11 @@ def retyped(record: McapRecord) -> McapRecord:
             "120 messages on /joint_states for 119 steps",
         ),
         (metadata(RESULT, steps="119"), IncompleteError, "after 119 of 120 steps"),
-        (metadata(RESULT, displacement="1.5"), CorruptError, r"says 1\.5 m of displacement"),
+        (
+            metadata(RESULT, displacement="1.5"),
+            CorruptError,
+            r"displacement is 1\.5 m in its result",
+        ),
         (without(Attachment, "model.xml"), SchemaMismatchError, r"no attachment model\.xml"),
         (attachment("model.xml", b"0.6", b"0.7"), CorruptError, r"model\.xml is not the one"),
         (attachment("controller.npz", b"<f8", b"<f4"), CorruptError, r"controller\.npz is not"),
@@ -182,7 +186,7 @@ def retyped(record: McapRecord) -> McapRecord:
         (attachment("settings.json", b"1000", b"true"), SchemaMismatchError, "must be a number"),
         (attachment("settings.json", b"{", b"["), SchemaMismatchError, "cannot be read"),
         (later, SchemaMismatchError, "times on /joint_states are not the multiples"),
-        (forged, CorruptError, r"selfmodel\.trial does not have the digest"),
+        (forged, CorruptError, r"digest of the record selfmodel\.trial is missing or wrong"),
         (stamped, SchemaMismatchError, "times on /joint_states are not the multiples"),
         (missing, CorruptError, "119 messages on /joint_states for 120 steps"),
         (renamed, SchemaMismatchError, "its controller is for the sensors"),
@@ -237,11 +241,11 @@ def test_a_file_without_checksums_is_refused(log: Path):
 @pytest.mark.parametrize(
     ("count", "match"),
     [
-        ("message_count", "624 messages, it holds 625"),
-        ("attachment_count", "2 attachments, it holds 3"),
-        ("metadata_count", "3 metadata records, it holds 4"),
-        ("schema_count", "5 schemas, it holds 6"),
-        ("channel_count", "6 channels, it holds 7"),
+        ("message_count", "624 messages, its records 625"),
+        ("attachment_count", "2 attachments, its records 3"),
+        ("metadata_count", "3 metadata records, its records 4"),
+        ("schema_count", "5 schemas, its records 6"),
+        ("channel_count", "6 channels, its records 7"),
     ],
 )
 def test_counts_that_do_not_agree_are_refused(
@@ -255,7 +259,7 @@ def test_counts_that_do_not_agree_are_refused(
 
     monkeypatch.setattr(Statistics, "write", wrong)
     rewritten(log, lambda record: record)
-    with pytest.raises(CorruptError, match=f"its statistics say {match}"):
+    with pytest.raises(CorruptError, match=f"its statistics have {match}"):
         read_log(log)
 
 

@@ -132,8 +132,8 @@ def message(data: bytes = b"") -> bytes:
         (TRIAL, {"stage": "../../etc/passwd"}, "stage must be one of"),
         (RESULT, {"steps": "9" * 5000}, "its record selfmodel.result is wrong"),
         (RESULT, {"steps": "-1"}, "after -1 of 120 steps"),
-        (RESULT, {"displacement": "nan"}, "says nan m of displacement"),
-        (RESULT, {"displacement": "1e999"}, "says inf m of displacement"),
+        (RESULT, {"displacement": "nan"}, "displacement is nan m in its result"),
+        (RESULT, {"displacement": "1e999"}, "displacement is inf m in its result"),
     ],
 )
 def test_what_a_record_may_not_say_is_refused(
@@ -228,11 +228,19 @@ UNSIZED = zstandard.ZstdCompressor(write_content_size=False)
 @pytest.mark.parametrize(
     ("more", "match"),
     [
-        ([chunk(message() * 500_000)] * 3, "more than a log may: 1000000 messages"),
+        pytest.param(
+            [chunk(message() * 500_000)] * 3,
+            "more than a log may: 1000000 messages",
+            marks=pytest.mark.fuzz,
+        ),
         ([chunk(record(0x80, b"") * 10**6)] * 9, "more than a log may: "),
         ([chunk(channel(1, "/odom") * 250_000)], "200000 records and chunks"),
         ([chunk(message(bytes(2**24 - 99)))] * 30, "bytes, unpacked"),
-        ([note(f"n{k}") for k in range(210_000)], "200000 records and chunks"),
+        pytest.param(
+            [note(f"n{k}") for k in range(210_000)],
+            "200000 records and chunks",
+            marks=pytest.mark.fuzz,
+        ),
         ([note("n", bytes(33 * 2**20))], "33554432 bytes beside its messages"),
         ([attachment("a", bytes(33 * 2**20))], "33554432 bytes attached"),
         ([attachment("a", b"x"), attachment("a", b"y")], "it has 'a' twice"),
@@ -284,6 +292,6 @@ def test_names_are_harmless_in_a_terminal_and_as_paths(log: Path):
         result = CliRunner().invoke(app, [command, str(log)])
         assert result.exit_code == 0
         assert all(char.isprintable() or char == "\n" for char in result.output)
-    with pytest.raises(InputError, match="is sound"):
+    with pytest.raises(InputError, match="is valid"):
         salvage(log, log.with_name("new.mcap"))
     assert [path.name for path in log.parent.iterdir()] == ["trial.mcap"]

@@ -12,6 +12,7 @@ import pytest
 
 from selfmodel.errors import InputError
 from selfmodel.logs import IncompleteError, LogWriteError, TruncatedError, files, logfile, read_log
+from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.rescue import rescue
 from selfmodel.logs.signals import topics
 from selfmodel.logs.writer import FLUSH_STEPS, write_trial
@@ -23,8 +24,9 @@ from tests.logs.conftest import STEPS, made_up, plan_of
 SCRIPT = """
 import sys, time
 from pathlib import Path
+from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import write_trial
-from selfmodel.robot import Robot
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from tests.logs.conftest import MJCF, made_up, plan_of
 
@@ -38,7 +40,7 @@ def samples():
             time.sleep(60)
         yield sample
 
-write_trial(Path(sys.argv[1]), robot, plan_of(robot, 1000), samples(), settings=Settings())
+write_trial(Path(sys.argv[1]), robot, plan_of(robot, 1000), samples(), TrialHeader(Settings()))
 """
 
 
@@ -73,7 +75,7 @@ def test_what_ends_a_trial_passes_on_and_every_step_until_then_stays(
     path = tmp_path / "a.mcap"
     samples = stopping(biped, at, error)
     with pytest.raises(type(error)) as caught:
-        write_trial(path, biped, plan_of(biped, STEPS), samples, settings=Settings())
+        write_trial(path, biped, plan_of(biped, STEPS), samples, TrialHeader(Settings()))
     assert caught.value is error
     assert [file.name for file in tmp_path.iterdir()] == ["a.mcap.part"]
     assert steps_kept(tmp_path / "a.mcap.part", biped) == at
@@ -88,7 +90,7 @@ def test_a_trial_that_ends_before_its_first_step_leaves_what_was_planned(
             biped,
             plan_of(biped, STEPS),
             stopping(biped, 0, RuntimeError("gone")),
-            settings=Settings(),
+            TrialHeader(Settings()),
         )
     contents = rescue(tmp_path / "a.mcap.part")
     assert contents.metadata["selfmodel.trial"]["name"] == "00-before"
@@ -116,7 +118,7 @@ def test_a_robot_that_stops_early_has_not_finished(biped: Robot, tmp_path: Path)
     path = tmp_path / "a.mcap"
     samples = made_up(biped, 70)
     with pytest.raises(IncompleteError, match=r"a\.mcap\.part: the robot stopped after 70 of 120"):
-        write_trial(path, biped, plan_of(biped, STEPS), samples, settings=Settings())
+        write_trial(path, biped, plan_of(biped, STEPS), samples, TrialHeader(Settings()))
     assert not path.exists()
     assert steps_kept(tmp_path / "a.mcap.part", biped) == 70
     with pytest.raises(TruncatedError, match="selfmodel logs salvage"):
@@ -134,7 +136,7 @@ def test_an_existing_file_is_neither_overwritten_nor_run_for(
             biped,
             plan_of(biped, STEPS),
             stopping(biped, 0, AssertionError("the robot was run")),
-            settings=Settings(),
+            TrialHeader(Settings()),
         )
     assert [file.name for file in tmp_path.iterdir()] == [name]
     assert (tmp_path / name).read_text() == "precious"
@@ -154,7 +156,7 @@ def test_a_file_that_comes_to_exist_meanwhile_is_not_overwritten(biped: Robot, t
             yield sample
 
     with pytest.raises(InputError, match=r"the finished file is .*a\.mcap\.part"):
-        write_trial(path, biped, plan_of(biped, STEPS), intruding(), settings=Settings())
+        write_trial(path, biped, plan_of(biped, STEPS), intruding(), TrialHeader(Settings()))
     assert path.read_text() == "precious"
     assert read_log(tmp_path / "a.mcap.part").status == "finished"
 
@@ -162,7 +164,7 @@ def test_a_file_that_comes_to_exist_meanwhile_is_not_overwritten(biped: Robot, t
 def test_a_folder_that_is_not_there_is_said_so(biped: Robot, tmp_path: Path):
     path = tmp_path / "no" / "a.mcap"
     with pytest.raises(InputError, match="there is no folder"):
-        write_trial(path, biped, plan_of(biped, 1), made_up(biped, 1), settings=Settings())
+        write_trial(path, biped, plan_of(biped, 1), made_up(biped, 1), TrialHeader(Settings()))
 
 
 class FullDisk(io.FileIO):
@@ -187,11 +189,11 @@ def test_a_full_disk_is_said_as_such_with_the_name_of_the_file(
     folder.mkdir()
 
     def create(path: Path) -> io.BufferedWriter:
-        raw = FullDisk(files.part_of(path), "xb")
+        raw = FullDisk(files.partial_path(path), "xb")
         raw.room = room
         return io.BufferedWriter(raw)
 
-    monkeypatch.setattr(logfile, "create_part", create)
+    monkeypatch.setattr(logfile, "create_partial", create)
     plan = plan_of(biped, STEPS)
     with pytest.raises(LogWriteError, match=r"a\.mcap\.part: the disk is full") as caught:
         write_trial(
@@ -199,8 +201,7 @@ def test_a_full_disk_is_said_as_such_with_the_name_of_the_file(
             biped,
             plan,
             made_up(biped, STEPS),
-            settings=Settings(),
-            hidden="intact",
+            TrialHeader(Settings(), hidden="intact"),
         )
     assert caught.value.errno == errno.ENOSPC
     assert [file.name for file in folder.iterdir()] == ["a.mcap.part"]
@@ -233,6 +234,6 @@ def test_a_disk_that_fills_while_a_trial_is_interrupted_does_not_hide_why(
 
     with pytest.raises(KeyboardInterrupt) as caught:
         write_trial(
-            tmp_path / "a.mcap", biped, plan_of(biped, STEPS), samples(), settings=Settings()
+            tmp_path / "a.mcap", biped, plan_of(biped, STEPS), samples(), TrialHeader(Settings())
         )
     assert "the disk is full" in caught.value.__notes__[0]

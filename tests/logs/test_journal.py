@@ -1,7 +1,7 @@
 import dataclasses
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -12,13 +12,13 @@ from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, canonical
 from selfmodel.faults.kind import ENVIRONMENT, Fault, FaultKind
 from selfmodel.faults.notation import parse
-from selfmodel.faults.registry import known
 from selfmodel.logs import CorruptError, LogError, SchemaMismatchError, read_truth
-from selfmodel.logs.journal import FolderJournal, open_journal, read_database
+from selfmodel.logs.journal import FolderJournal, create_journal, read_database
+from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Sample
-from selfmodel.trials.trial import TrialPlan
+from selfmodel.trials.trial import Trial, TrialPlan
 from tests.logs.conftest import made_up, plan_of
 
 HEAD = '[{"trials": 1, "ranked": [{"hypothesis": "intact", "distance": 1}], "intact_distance": 1, '
@@ -38,9 +38,20 @@ class MadeUpRobot:
         return made_up(self._robot, min(steps, self._steps), seed)
 
 
+Run = Callable[..., Trial]
+"""A made-up robot's trial of a plan, and the step after which the robot stops."""
+
+
 @pytest.fixture
 def journal(biped: Robot, tmp_path: Path) -> FolderJournal:
-    return open_journal(tmp_path / "run", biped, Settings(), {"before": "neuron:0"})
+    return create_journal(tmp_path / "run", biped.anatomy)
+
+
+@pytest.fixture
+def run(biped: Robot, journal: FolderJournal) -> Run:
+    """Runs and logs a trial of the biped in the journal's folder."""
+    runner = TrialRunner(journal.trials, biped, Settings(), {"before": "neuron:0"})
+    return lambda plan, stops_after=10**6: runner(MadeUpRobot(biped, stops_after), plan)
 
 
 def diagnosis(robot: Robot) -> Diagnosis:
@@ -56,10 +67,8 @@ def diagnosis(robot: Robot) -> Diagnosis:
     )
 
 
-def test_a_journal_reads_what_it_recorded(journal: FolderJournal, biped: Robot):
-    trials = [
-        journal.record(MadeUpRobot(biped), plan_of(biped, 30, f"{k:02d}-before")) for k in range(3)
-    ]
+def test_a_journal_reads_what_it_recorded(journal: FolderJournal, biped: Robot, run: Run):
+    trials = [run(plan_of(biped, 30, f"{k:02d}-before")) for k in range(3)]
     first = diagnosis(biped)
     second = dataclasses.replace(
         first,
@@ -71,8 +80,8 @@ def test_a_journal_reads_what_it_recorded(journal: FolderJournal, biped: Robot):
         unsearched=UnsearchedFault(parse("wind=12", biped.anatomy), "wind"),
         undetectable=(parse("break:left_hip+jam:right_hip", biped.anatomy),),
     )
-    journal.note(first)
-    journal.note(second)
+    journal.add(first)
+    journal.add(second)
     for database in (journal.read(), read_database(journal.folder, biped.anatomy)):
         assert [trial.plan for trial in database.trials] == [trial.plan for trial in trials]
         assert database.diagnoses == (first, second)
@@ -89,35 +98,39 @@ def test_a_new_journal_is_empty(journal: FolderJournal):
     assert (database.trials, database.diagnoses) == ((), ())
 
 
-def test_the_hundredth_trial_comes_after_the_ninety_ninth(journal: FolderJournal, biped: Robot):
+def test_the_hundredth_trial_comes_after_the_ninety_ninth(
+    journal: FolderJournal, biped: Robot, run: Run
+):
     for name in ("100-before", "99-before", "09-before"):
-        journal.record(MadeUpRobot(biped), plan_of(biped, 3, name))
+        run(plan_of(biped, 3, name))
     names = [trial.plan.name for trial in journal.read().trials]
     assert names == ["09-before", "99-before", "100-before"]
 
 
-def test_a_stage_without_a_truth_is_logged_without(journal: FolderJournal, biped: Robot):
+def test_a_stage_without_a_truth_is_logged_without(biped: Robot, run: Run):
     plan = plan_of(biped, 3)
     other = TrialPlan("01-after", "after", plan.controller, plan.steps, plan.seed)
-    assert read_truth(journal.record(MadeUpRobot(biped), other).path) is None
+    assert read_truth(run(other).path) is None
 
 
-def test_an_interrupted_trial_stays_and_is_passed_over(journal: FolderJournal, biped: Robot):
-    journal.record(MadeUpRobot(biped), plan_of(biped, 30))
+def test_an_interrupted_trial_stays_and_is_passed_over(
+    journal: FolderJournal, biped: Robot, run: Run
+):
+    run(plan_of(biped, 30))
     with pytest.raises(LogError, match="stopped after 12 of 30 steps"):
-        journal.record(MadeUpRobot(biped, 12), plan_of(biped, 30, "01-before"))
+        run(plan_of(biped, 30, "01-before"), 12)
     assert (journal.folder / "trials" / "01-before.mcap.part").exists()
     assert len(journal.read().trials) == 1
 
 
-def test_a_trial_is_not_recorded_twice(journal: FolderJournal, biped: Robot):
-    journal.record(MadeUpRobot(biped), plan_of(biped, 3))
+def test_a_trial_is_not_recorded_twice(biped: Robot, run: Run):
+    run(plan_of(biped, 3))
     with pytest.raises(InputError, match=r"00-before\.mcap exists, and is not overwritten"):
-        journal.record(MadeUpRobot(biped), plan_of(biped, 3))
+        run(plan_of(biped, 3))
 
 
-def test_a_damaged_log_is_not_passed_over(journal: FolderJournal, biped: Robot):
-    path = Path(journal.record(MadeUpRobot(biped), plan_of(biped, 30)).path)
+def test_a_damaged_log_is_not_passed_over(journal: FolderJournal, biped: Robot, run: Run):
+    path = Path(run(plan_of(biped, 30)).path)
     data = bytearray(path.read_bytes())
     data[len(data) // 2] ^= 1
     path.write_bytes(data)
@@ -130,20 +143,22 @@ def test_a_folder_that_holds_something_is_refused(biped: Robot, tmp_path: Path, 
     (tmp_path / held).parent.mkdir(exist_ok=True)
     (tmp_path / held).write_text("precious")
     with pytest.raises(InputError, match=f"holds another run or other files.*{held[:6]}"):
-        open_journal(tmp_path, biped, Settings(), {})
+        create_journal(tmp_path, biped.anatomy)
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == [tmp_path / held]
 
 
 def test_an_empty_folder_will_do_and_a_file_will_not(biped: Robot, tmp_path: Path):
     (tmp_path / "empty").mkdir()
-    open_journal(tmp_path / "empty", biped, Settings(), {})
+    create_journal(tmp_path / "empty", biped.anatomy)
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="is a file"):
-        open_journal(tmp_path / "file", biped, Settings(), {})
+        create_journal(tmp_path / "file", biped.anatomy)
 
 
-def test_a_run_of_another_robot_is_refused(journal: FolderJournal, biped: Robot, quadruped: Robot):
-    journal.record(MadeUpRobot(biped), plan_of(biped, 3))
+def test_a_run_of_another_robot_is_refused(
+    journal: FolderJournal, biped: Robot, run: Run, quadruped: Robot
+):
+    run(plan_of(biped, 3))
     with pytest.raises(SchemaMismatchError, match="it is of the robot 'biped'"):
         read_database(journal.folder, quadruped.anatomy)
 
@@ -178,7 +193,7 @@ def test_damaged_diagnoses_are_said_so(journal: FolderJournal, text: str):
 
 
 def test_diagnoses_are_json_without_surprises(journal: FolderJournal, biped: Robot):
-    journal.note(diagnosis(biped))
+    journal.add(diagnosis(biped))
     [item] = json.loads((journal.folder / "diagnoses.json").read_text())
     assert item["ranked"] == [
         {"hypothesis": "intact", "distance": 0.1 + 0.2},
@@ -193,8 +208,8 @@ def test_diagnoses_are_json_without_surprises(journal: FolderJournal, biped: Rob
 def test_rivals_of_a_third_party_s_kind_are_read_back(biped: Robot, tmp_path: Path):
     load = FaultKind(name="load", keyword="load", apply=lambda *_: None)
     loaded = canonical([Fault(load, ENVIRONMENT)], biped.anatomy)
-    journal = open_journal(tmp_path / "run", biped, Settings(), {}, kinds=known([load]))
+    journal = create_journal(tmp_path / "run", biped.anatomy, [load])
     told = dataclasses.replace(diagnosis(biped), indistinguishable=(loaded,))
-    journal.note(told)
+    journal.add(told)
 
     assert journal.read().diagnoses == (told,)

@@ -4,17 +4,17 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from hypothesis.extra.numpy import arrays
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from selfmodel.arrays import FloatArray
 from selfmodel.logs import read_log
-from selfmodel.logs.cdr import names_of
+from selfmodel.logs.cdr import decode_names
 from selfmodel.logs.contents import read_contents
-from selfmodel.logs.frames import body_names
+from selfmodel.logs.kinematics import body_names
+from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.schemas import schema_text
 from selfmodel.logs.topics import Topic, description, topics, transforms
 from selfmodel.logs.writer import write_trial
@@ -117,7 +117,7 @@ def test_messages_are_rosbags_messages_to_the_byte(
         assert read_values.tobytes() == values.tobytes()
         if topic.name in ("/joint_states", "/sensors"):
             expected = names.hinges if topic.name == "/joint_states" else names.sensors
-            assert names_of(payloads[0]) == expected
+            assert decode_names(payloads[0]) == expected
 
 
 @given(text=NAME)
@@ -152,7 +152,7 @@ def test_any_bytes_in_the_place_of_names_are_refused_or_read():
     for size in rng.integers(0, 60, 500):
         payload = b"\0\1\0\0" + rng.integers(0, 3, size, dtype=np.uint8).tobytes()
         try:
-            names_of(payload)
+            decode_names(payload)
         except ValueError:
             continue
 
@@ -181,7 +181,7 @@ def test_viewers_are_told_where_each_body_is_and_how_the_base_moves(
 ):
     plan = plan_of(biped, 80)
     samples = list(SimulatedRobot(biped).run(plan.controller, 80))
-    path = write_trial(tmp_path / "b.mcap", biped, plan, samples, settings=Settings())
+    path = write_trial(tmp_path / "b.mcap", biped, plan, samples, TrialHeader(Settings()))
     topics_read = read_contents(path).topics
     data = mujoco.MjData(biped.model)
     for step in (5, 40, 75):

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from hypothesis.extra.numpy import arrays
 
 from selfmodel.errors import InputError
 from selfmodel.logs import read_log, read_truth
+from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import TrialWriter, write_trial
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot
@@ -23,7 +23,7 @@ ANYTHING = st.floats(allow_nan=True, allow_infinity=True, width=64)
 
 def write_and_read(path: Path, robot: Robot, samples: list[Sample]):
     path.unlink(missing_ok=True)
-    write_trial(path, robot, plan_of(robot, len(samples)), samples, settings=Settings())
+    write_trial(path, robot, plan_of(robot, len(samples)), samples, TrialHeader(Settings()))
     return read_log(path).trial.behaviour
 
 
@@ -89,7 +89,7 @@ def test_the_same_trial_gives_the_same_bytes(
 ):
     again = tmp_path / "again.mcap"
     samples = made_up(biped, STEPS)
-    write_trial(again, biped, plan, samples, settings=Settings(), hidden="intact")
+    write_trial(again, biped, plan, samples, TrialHeader(Settings(), hidden="intact"))
     assert again.read_bytes() == log.read_bytes()
 
 
@@ -101,7 +101,7 @@ def test_the_truth_is_read_only_by_who_asks_for_it(
     for hidden, path in paths.items():
         path.parent.mkdir()
         samples = made_up(biped, STEPS)
-        write_trial(path, biped, plan, samples, settings=Settings(), hidden=hidden)
+        write_trial(path, biped, plan, samples, TrialHeader(Settings(), hidden=hidden))
         logs[hidden] = read_log(path)
         assert read_truth(path) == hidden
     assert read_truth(log) == "intact"
@@ -128,7 +128,7 @@ def test_a_writer_asks_for_no_more_samples_than_planned(biped: Robot, tmp_path: 
             asked.append(sample)
             yield sample
 
-    write_trial(tmp_path / "a.mcap", biped, plan_of(biped, 3), watched(), settings=Settings())
+    write_trial(tmp_path / "a.mcap", biped, plan_of(biped, 3), watched(), TrialHeader(Settings()))
     assert len(asked) == 3
 
 
@@ -149,16 +149,16 @@ def test_a_sample_that_does_not_fit_is_refused(
     first, second = made_up(biped, 2)
     samples = [first, spoil(second)]
     with pytest.raises(InputError, match=match):
-        write_trial(tmp_path / "a.mcap", biped, plan_of(biped, 3), samples, settings=Settings())
+        write_trial(tmp_path / "a.mcap", biped, plan_of(biped, 3), samples, TrialHeader(Settings()))
     assert not (tmp_path / "a.mcap").exists()
 
 
 def test_a_controller_of_another_robot_is_refused(biped: Robot, quadruped: Robot, tmp_path: Path):
     with pytest.raises(InputError, match="expected a controller for quadruped"):
-        TrialWriter(tmp_path / "a.mcap", quadruped, plan_of(biped, 3), settings=Settings())
+        TrialWriter(tmp_path / "a.mcap", quadruped, plan_of(biped, 3), TrialHeader(Settings()))
 
 
 @pytest.mark.parametrize("name", ["", "../evil", "a/b", "a.b", "ä", "x" * 101, "a\n"])
 def test_a_name_that_cannot_name_a_file_is_refused(biped: Robot, tmp_path: Path, name: str):
     with pytest.raises(InputError, match="letters, digits and '-'"):
-        TrialWriter(tmp_path / "a.mcap", biped, plan_of(biped, 3, name), settings=Settings())
+        TrialWriter(tmp_path / "a.mcap", biped, plan_of(biped, 3, name), TrialHeader(Settings()))

@@ -17,7 +17,7 @@ from selfmodel.logs import CorruptError, LogError, LogWriteError, read_log, read
 from selfmodel.logs.contents import read_contents
 from selfmodel.logs.framing import FRAME, frames
 from selfmodel.logs.logfile import LogFile
-from selfmodel.logs.records import HIDDEN, SALVAGE
+from selfmodel.logs.records import HIDDEN, SALVAGE, TrialHeader
 from selfmodel.logs.salvage import salvage, salvageable_steps
 from selfmodel.logs.writer import write_trial
 from selfmodel.robot.robot import Robot
@@ -186,7 +186,7 @@ def test_the_original_is_left_alone_and_the_truth_goes_along_unseen(log: Path, s
 
 
 def test_a_sound_log_is_not_salvaged(log: Path, saved: Path):
-    with pytest.raises(InputError, match="is sound, and the trial in it is finished: there"):
+    with pytest.raises(InputError, match="is valid, and the trial in it is finished: there"):
         salvage(log, saved)
     spoiled(log, Opcode.CHUNK, 2)
     salvage(log, saved)
@@ -222,7 +222,7 @@ def test_two_different_messages_of_one_time_are_not_chosen_from(
     other = tmp_path / "other" / "trial.mcap"
     other.parent.mkdir()
     plan = plan_of(biped, STEPS)
-    write_trial(other, biped, plan, made_up(biped, STEPS, seed=1), settings=Settings())
+    write_trial(other, biped, plan, made_up(biped, STEPS, seed=1), TrialHeader(Settings()))
     data, foreign = log.read_bytes(), other.read_bytes()
     chunk = [frame for frame in frames(foreign) if frame.opcode == Opcode.CHUNK][2]
     first = next(frame for frame in frames(data) if frame.opcode == Opcode.DATA_END)

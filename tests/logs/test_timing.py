@@ -12,7 +12,7 @@ from mcap.opcode import Opcode
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError, SchemaMismatchError, UnsupportedError, logfile, read_log
 from selfmodel.logs.contents import read_contents
-from selfmodel.logs.records import LONGEST_TEXT, RESULT, TRIAL
+from selfmodel.logs.records import MAX_TEXT, RESULT, TRIAL, TrialHeader
 from selfmodel.logs.salvage import salvage
 from selfmodel.logs.topics import TIMING
 from selfmodel.logs.writer import write_trial
@@ -26,7 +26,7 @@ from tests.logs.test_salvage import spoiled
 
 def write(path: Path, robot: Robot, samples: Iterator[Sample], **options: object) -> Path:
     plan = plan_of(robot, STEPS)
-    return write_trial(path, robot, plan, samples, settings=Settings(), **options)
+    return write_trial(path, robot, plan, samples, TrialHeader(Settings(), **options))
 
 
 @pytest.fixture
@@ -149,7 +149,7 @@ def test_a_reason_may_be_long(biped: Robot, tmp_path: Path):
     with pytest.raises(FallError):
         write(tmp_path / "a.mcap", biped, stopped(biped, 9, FallError("x" * 9999)), timed=True)
 
-    assert len(read_log(tmp_path / "a.mcap").reason) == LONGEST_TEXT
+    assert len(read_log(tmp_path / "a.mcap").reason) == MAX_TEXT
 
 
 def test_a_reason_that_is_no_text_does_not_cost_the_log(biped: Robot, tmp_path: Path):
@@ -160,7 +160,7 @@ def test_a_reason_that_is_no_text_does_not_cost_the_log(biped: Robot, tmp_path: 
 
 
 def test_a_reason_that_is_too_long_is_refused(clocked: Path):
-    rewritten(clocked, metadata(RESULT, reason="x" * (LONGEST_TEXT + 1)))
+    rewritten(clocked, metadata(RESULT, reason="x" * (MAX_TEXT + 1)))
     with pytest.raises(SchemaMismatchError, match="at most 1000 characters in reason"):
         read_log(clocked)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from selfmodel.logs.contents import read_contents
-from selfmodel.logs.frames import body_names
+from selfmodel.logs.kinematics import body_names
 from selfmodel.logs.urdf import _roll_pitch_yaw, urdf
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import ROBOTS

@@ -6,22 +6,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT
-from selfmodel.comparators.arithmetic import command_errors
+from selfmodel.comparators.command_errors import command_errors
 from selfmodel.controllers.command_source import make_batch
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError, TrialError
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log
-from selfmodel.logs.journal import open_journal
+from selfmodel.logs.journal import create_journal
+from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.physical.environment_robot import EnvironmentRobot
 from selfmodel.physical.interface import PhysicalRobot, TimedRobot
 from selfmodel.physical.simulated_robot import SimulatedRobot
-from selfmodel.physical.step_timing import Stopwatch
+from selfmodel.physical.step_timing import StepTimer
 from selfmodel.recovery.recover import Recovery, recover
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
@@ -30,7 +30,6 @@ from selfmodel.tasks import load
 from selfmodel.tasks.walking import motion_capture
 from selfmodel.trials.behaviour import SIGNALS, collect
 from selfmodel.trials.trial import TrialPlan
-from tests.conftest import random_controllers
 from tests.helpers.bench import (
     CONTROLLER,
     NAMES,
@@ -43,6 +42,7 @@ from tests.helpers.bench import (
     logged,
     observation,
 )
+from tests.helpers.drivers import random_controllers
 
 
 @pytest.mark.parametrize("text", ["intact", "break:{0}", "sensor:{1}+friction=0.5"])
@@ -137,7 +137,7 @@ def test_a_caller_that_stops_iterating_stops_the_robot():
 
 def test_a_robot_that_cannot_be_read_at_the_start_is_not_driven():
     bench = Bench({0: None})
-    with pytest.raises(TrialError, match=r"nothing was read of front_left_touch, .* at step 0"):
+    with pytest.raises(TrialError, match=r"no reading of front_left_touch, .* at step 0"):
         driven(bench)
     assert bench.done == ["stop", "reset", "stop"]
 
@@ -224,22 +224,20 @@ def test_an_infinite_time_is_none_and_leaves_a_log_that_can_be_read(tmp_path: Pa
 def test_a_step_is_late_exactly_where_its_time_is_off_by_more_than_the_tolerance(
     took: list[float],
 ):
-    on_event, now = Stopwatch(1.0, 0.25), 7.0
-    assert not on_event.look(now, {}).late
+    timer, now = StepTimer(1.0, 0.25), 7.0
+    assert not timer.update(now, {}).late
     for each in took:
         before, now = now, now + each
-        moment = on_event.look(now, {})
+        moment = timer.update(now, {})
         if abs(abs(now - before - 1) - 0.25) > 1e-9:
             assert moment.late == (abs(now - before - 1) > 0.25)
         assert moment.elapsed == now - 7.0
 
 
-def test_a_recovery_s_journal_keeps_the_clock_of_a_robot_that_has_one(tmp_path: Path):
-    journal = open_journal(tmp_path / "run", QUADRUPED, Settings(), {})
+def test_the_log_of_a_recovery_s_trial_has_the_timing_of_a_robot_with_a_clock(tmp_path: Path):
+    run_trial = TrialRunner(tmp_path, QUADRUPED, Settings())
     bench = Bench({5: 2 * TIMESTEP, 8: None})
-    trial = journal.record(
-        bench_robot(bench), TrialPlan("00-before", "before", CONTROLLER, STEPS, 0)
-    )
+    trial = run_trial(bench_robot(bench), TrialPlan("00-before", "before", CONTROLLER, STEPS, 0))
     timing = read_log(trial.path).timing
 
     assert timing is not None
@@ -256,12 +254,14 @@ def test_a_recovery_is_the_same_through_environments(tmp_path: Path):
     settings = replace(Settings(generations=1).scaled(6), steps=80, trials=1)
 
     def recovery(folder: str, healthy: PhysicalRobot, damaged: PhysicalRobot) -> Recovery:
+        journal = create_journal(tmp_path / folder, QUADRUPED.anatomy)
         return recover(
             healthy=healthy,
             damaged=damaged,
             simulator=Simulator(QUADRUPED, 2),
             comparator=FORWARD_DISPLACEMENT,
-            journal=open_journal(tmp_path / folder, QUADRUPED, settings, {}),
+            run_trial=TrialRunner(journal.trials, QUADRUPED, settings),
+            journal=journal,
             settings=settings,
             seed=0,
             on_event=lambda _event: None,

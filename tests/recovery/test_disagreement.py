@@ -6,8 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.spatial.transform import Rotation
 
 from selfmodel.controllers.controller import Controller
@@ -15,10 +14,10 @@ from selfmodel.controllers.network import Network
 from selfmodel.controllers.playback import Playback
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
+from selfmodel.recovery import disagreement
 from selfmodel.recovery.disagreement import (
-    EARLY,
-    LOWEST,
-    SCALES,
+    EARLY_STEPS,
+    FALLEN_HEIGHT,
     Disagreement,
     disagreements,
     first_falls,
@@ -28,7 +27,8 @@ from selfmodel.robot.robot import Robot
 from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.trials.behaviour import Behaviour, Names, Signal
-from tests.conftest import random_controllers
+from selfmodel.trials.signal_scales import DISAGREEMENT_SCALES
+from tests.helpers.drivers import random_controllers
 
 NAMES = Names(sensors=("touch",), motors=("motor",), hinges=("hinge",))
 UP = np.array([0.0, 0.0, 1.0])
@@ -55,9 +55,7 @@ class Fate:
 class Oracle:
     """A simulator that knows the fate of each controller."""
 
-    robot = SimpleNamespace(
-        standing_height=HEIGHT, build=lambda _hypothesis: SimpleNamespace(normal=UP)
-    )
+    robot = SimpleNamespace(standing_height=HEIGHT)
 
     def __init__(self, fates: Sequence[Fate]) -> None:
         network = Network(NAMES.sensors, NAMES.motors)
@@ -82,7 +80,7 @@ class Oracle:
             fate = self._fates[controller]
             if hypothesis == INTACT:
                 continue
-            signals["joint_positions"][row, EARLY if fate.late else 0 :] = fate.spread
+            signals["joint_positions"][row, EARLY_STEPS if fate.late else 0 :] = fate.spread
             if fate.falls is not None:
                 signals["base_position"][row, fate.falls :, 2] = 0.4 * HEIGHT
             if fate.diverges:
@@ -96,7 +94,10 @@ def chosen(quadruped: Robot, fates: Sequence[Fate], steps: int = 400) -> int:
     """Which of the controllers with these fates is chosen."""
     oracle = Oracle(fates)
     hypotheses = [INTACT, parse("break:front_left_knee", quadruped.anatomy)]
-    one = Disagreement(hypotheses, oracle, steps).most_discriminative(oracle.controllers)
+    with pytest.MonkeyPatch.context() as patch:
+        level = SimpleNamespace(normal=UP)
+        patch.setattr(disagreement, "build", lambda _robot, _hypothesis: level)
+        one = Disagreement(hypotheses, oracle, steps).most_discriminative(oracle.controllers)
     return oracle.controllers.index(one)
 
 
@@ -123,12 +124,12 @@ def test_a_dead_sensor_is_asked_for_where_it_would_read_most(quadruped: Robot):
     hypotheses = [INTACT, parse("sensor:front_left_touch", quadruped.anatomy)]
     pool = random_controllers(quadruped, 12)
     touch = [sensor.name for sensor in quadruped.anatomy.sensors].index("front_left_touch")
-    runs = simulator.run([(INTACT, one) for one in pool], EARLY, ("sensors",))
+    runs = simulator.run([(INTACT, one) for one in pool], EARLY_STEPS, ("sensors",))
     touches = runs.behaviour["sensors"][..., touch].mean(axis=1)
 
     assert len(set(touches)) > 4
     assert (
-        Disagreement(hypotheses, simulator, EARLY).most_discriminative(pool)
+        Disagreement(hypotheses, simulator, EARLY_STEPS).most_discriminative(pool)
         == pool[int(np.argmax(touches))]
     )
 
@@ -141,7 +142,7 @@ def test_what_differs_only_later_counts_for_nothing(quadruped: Robot):
     assert chosen(quadruped, [Fate(0.01), Fate(0.3, late=True)]) == 0
 
 
-@pytest.mark.parametrize("step", [0, EARLY - 1, EARLY, 399])
+@pytest.mark.parametrize("step", [0, EARLY_STEPS - 1, EARLY_STEPS, 399])
 def test_a_controller_with_which_the_robot_falls_at_any_time_is_out(quadruped: Robot, step: int):
     assert chosen(quadruped, [Fate(0.05), Fate(0.2, falls=step), Fate(0.1)]) == 2
 
@@ -204,8 +205,8 @@ def test_a_base_has_fallen_when_it_is_near_the_ground_however_far_up_or_down_a_s
     signals = {"base_position": position, "base_orientation": np.tile([1.0, 0, 0, 0], (2, 1))}
     falls = first_falls(Behaviour(NAMES, np.array([0, 0.01]), signals), normal, HEIGHT)
 
-    if abs(height - LOWEST * HEIGHT) > 1e-6:
-        assert falls == (1 if height < LOWEST * HEIGHT else 2)
+    if abs(height - FALLEN_HEIGHT * HEIGHT) > 1e-6:
+        assert falls == (1 if height < FALLEN_HEIGHT * HEIGHT else 2)
 
 
 @settings(deadline=None)
@@ -215,7 +216,10 @@ def test_disagreement_is_a_part_of_one_and_knows_no_order_of_the_hypotheses(
 ):
     rng = np.random.default_rng(seed)
     shape = (2, hypotheses, 7)
-    signals = {signal: size * rng.normal(size=(*shape, NAMES.width(signal))) for signal in SCALES}
+    signals = {
+        signal: size * rng.normal(size=(*shape, NAMES.width(signal)))
+        for signal in DISAGREEMENT_SCALES
+    }
     turned = Rotation.from_rotvec(size * rng.normal(size=(np.prod(shape), 3)))
     signals["base_orientation"] = turned.as_quat(scalar_first=True).reshape(*shape, 4)
     order = rng.permutation(hypotheses)

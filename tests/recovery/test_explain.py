@@ -13,6 +13,7 @@ from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.errors import InputError
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log
+from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.recovery.events import Event, SearchBegins
@@ -22,7 +23,7 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 from tests.helpers.gaits import changed, gait, logged
 
 SMALL = dataclasses.replace(Settings().scaled(20), generations=4, steps=200)
@@ -34,7 +35,7 @@ def trials(robot: Robot, folder: Path, truth: str, count: int) -> list[Trial]:
     for number, controller in enumerate(random_controllers(robot, count, seed=2)):
         plan = TrialPlan(f"trial-{number}", "single", controller, SMALL.steps, 0)
         samples = SimulatedRobot(robot, parse(truth, robot.anatomy)).run(controller, SMALL.steps)
-        path = write_trial(folder / f"{number}.mcap", robot, plan, samples, settings=SMALL)
+        path = write_trial(folder / f"{number}.mcap", robot, plan, samples, TrialHeader(SMALL))
         found.append(read_log(path).trial)
     return found
 
@@ -100,7 +101,7 @@ def test_a_trial_that_other_software_drove_is_explained_by_its_commands(
 def test_a_comparator_says_what_a_trial_lacks(name: str, quadruped: Robot, tmp_path: Path):
     (trial,) = trials(quadruped, tmp_path, "intact", 1)
     with pytest.raises(InputError, match=r"0\.mcap: .* needs \w+"):
-        COMPARATORS[name].request(unobserved(trial))
+        COMPARATORS[name].prepare(unobserved(trial))
 
 
 def test_what_only_the_screen_cannot_judge_is_said_before_any_search(quadruped: Robot):

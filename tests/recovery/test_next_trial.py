@@ -6,16 +6,15 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, Verdict
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.recovery.database import Database
-from selfmodel.recovery.disagreement import EARLY, Disagreement
-from selfmodel.recovery.events import Event, Question
+from selfmodel.recovery.disagreement import EARLY_STEPS, Disagreement
+from selfmodel.recovery.events import DiscriminatingTrial, Event
 from selfmodel.recovery.next_trial import (
     GENERATIONS,
     Situation,
@@ -31,7 +30,7 @@ from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.trials.behaviour import Behaviour, Signal
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 
 SMALL = dataclasses.replace(Settings().scaled(12), steps=150)
 
@@ -145,7 +144,7 @@ def test_what_is_asked_is_bred_to_ask_more(quadruped: Robot):
     bred = discriminating_controller(found, known, simulator, SMALL, np.random.default_rng(1))
 
     column = [sensor.name for sensor in quadruped.anatomy.sensors].index("front_left_touch")
-    runs = simulator.run([(INTACT, one) for one in (best, bred)], EARLY, ("sensors",))
+    runs = simulator.run([(INTACT, one) for one in (best, bred)], EARLY_STEPS, ("sensors",))
     less, more = runs.behaviour["sensors"][..., column].mean(axis=1)
     assert more > less
     assert bred not in first
@@ -230,4 +229,4 @@ def test_hypotheses_are_told_apart_until_one_explains_all_or_asking_is_in_vain(
 
     assert by_repair(situation) == compensating
     assert (by_disagreement(situation) != compensating) == asks
-    assert events == ([Question(candidates_to_separate(found))] if asks else [])
+    assert events == ([DiscriminatingTrial(candidates_to_separate(found))] if asks else [])

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
 
@@ -13,14 +13,16 @@ from numpy.random import Generator
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.diagnosis import Diagnosis
-from selfmodel.diagnosis.genome import encode
 from selfmodel.evolution import Draw, Evolution, Generation
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.notation import parse
-from selfmodel.logs import read_truth
-from selfmodel.logs.journal import open_journal
+from selfmodel.faults.registry import PAPER_KINDS
+from selfmodel.logs import read_truth, reader
+from selfmodel.logs.contents import Contents
+from selfmodel.logs.journal import FolderJournal, create_journal
+from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.physical.simulated_robot import SimulatedRobot
-from selfmodel.recovery.database import Journal
 from selfmodel.recovery.events import Event, SearchBegins
 from selfmodel.recovery.next_trial import NextTrial, Situation, by_repair, discriminating_controller
 from selfmodel.recovery.recover import Recovery, recover
@@ -29,11 +31,25 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.trials.behaviour import Sample, Signal
-from selfmodel.trials.trial import Trial
-from tests.conftest import random_controllers
-from tests.helpers.memory import MemoryJournal
+from selfmodel.trials.trial import Stage, Trial
+from tests.helpers.drivers import random_controllers
+from tests.helpers.memory import MemoryJournal, in_memory
 
+TINY = dataclasses.replace(Settings().scaled(6), generations=2, steps=60)
 SMALL = dataclasses.replace(Settings().scaled(20), generations=5, steps=200)
+BUDGET = TINY
+"""The settings of every recovery here: each test runs with both budgets."""
+
+
+@pytest.fixture(
+    autouse=True,
+    params=[
+        pytest.param(TINY, id="tiny"),
+        pytest.param(SMALL, id="small", marks=pytest.mark.search),
+    ],
+)
+def _budget(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(globals(), "BUDGET", request.param)
 
 
 class CountingSimulator(Simulator):
@@ -87,8 +103,9 @@ def recovery(
         damaged=damaged,
         simulator=simulator,
         comparator=FORWARD_DISPLACEMENT,
-        journal=MemoryJournal(robot),
-        settings=dataclasses.replace(SMALL, trials=trials),
+        run_trial=in_memory(robot),
+        journal=MemoryJournal(),
+        settings=dataclasses.replace(BUDGET, trials=trials),
         seed=seed,
         on_event=events.append,
         gait=gait,
@@ -117,7 +134,9 @@ def test_a_recovery_tells_the_papers_story(robot: Robot):
     diagnoses = [event for event in events if isinstance(event, Diagnosis)]
     assert [diagnosis.trials for diagnosis in diagnoses] == [1, 2, 3, 4]
     assert [diagnosis.best for diagnosis in diagnoses[:3]] == list(outcome.tried[2:])
-    assert outcome.repair_evaluations == outcome.diagnostic_evaluations == 4 * (20 + 4 * 10)
+    children = BUDGET.population // 2
+    evaluations = BUDGET.population + (BUDGET.generations - 1) * children
+    assert outcome.repair_evaluations == outcome.diagnostic_evaluations == 4 * evaluations
     assert outcome.recovered == max(trial.displacement for trial in outcome.trials[2:])
 
 
@@ -175,8 +194,9 @@ def test_the_truth_changes_a_diagnosis_only_through_what_the_robot_did(quadruped
             damaged=damaged,
             simulator=Simulator(quadruped, 2),
             comparator=FORWARD_DISPLACEMENT,
-            journal=MemoryJournal(quadruped),
-            settings=dataclasses.replace(SMALL, trials=1),
+            run_trial=in_memory(quadruped),
+            journal=MemoryJournal(),
+            settings=dataclasses.replace(BUDGET, trials=1),
             seed=1,
             on_event=events.append,
         )
@@ -213,9 +233,9 @@ def test_every_search_starts_from_what_the_database_holds(
     outcome = recovery(quadruped, truth, Simulator(quadruped, 2), events)
     diagnoses = [event for event in events if isinstance(event, Diagnosis)]
     genomes = [trial.plan.controller.genome.tobytes() for trial in outcome.trials]
+    space = HypothesisSpace(quadruped.anatomy, PAPER_KINDS)
     encoded = [
-        [encode(c.hypothesis, SMALL.genes, quadruped.anatomy).tobytes() for c in d.ranked]
-        for d in diagnoses
+        [space.encode(c.hypothesis, BUDGET.genes).tobytes() for c in d.ranked] for d in diagnoses
     ]
 
     def newest_first(count: int) -> list[bytes]:
@@ -262,33 +282,65 @@ def test_a_gait_that_is_given_changes_nothing_but_the_search_for_it(quadruped: R
     assert given.repair_evaluations < evolved.repair_evaluations
 
 
-def test_a_journal_of_files_shows_the_algorithm_no_more_than_its_three_methods(
-    quadruped: Robot, tmp_path: Path
-):
-    class SealedJournal:
-        def __init__(self, journal: Journal) -> None:
-            self.record, self.note, self.read = journal.record, journal.note, journal.read
+def recovery_in_files(
+    robot: Robot, truth: Hypothesis, folder: Path, hidden: dict[Stage, str]
+) -> tuple[Recovery, FolderJournal]:
+    """A small recovery with logs, of which the algorithm reaches no more than it is given."""
+    journal = create_journal(folder, robot.anatomy)
 
+    class SealedJournal:
+        add = staticmethod(journal.add)
+
+    outcome = recover(
+        healthy=SimulatedRobot(robot),
+        damaged=SimulatedRobot(robot, truth),
+        simulator=Simulator(robot, 2),
+        comparator=FORWARD_DISPLACEMENT,
+        run_trial=TrialRunner(journal.trials, robot, BUDGET, hidden).__call__,
+        journal=SealedJournal(),
+        settings=dataclasses.replace(BUDGET, trials=1),
+        seed=1,
+        on_event=lambda _: None,
+    )
+    return outcome, journal
+
+
+def test_what_the_logs_hide_changes_no_diagnosis(quadruped: Robot, tmp_path: Path):
     truth = parse("break:back_left_knee", quadruped.anatomy)
-    outcomes = []
-    for name, hidden in (("told", {"after": str(truth)}), ("not-told", {})):
-        journal = open_journal(tmp_path / name, quadruped, SMALL, hidden)
-        outcomes.append(
-            recover(
-                healthy=SimulatedRobot(quadruped),
-                damaged=SimulatedRobot(quadruped, truth),
-                simulator=Simulator(quadruped, 2),
-                comparator=FORWARD_DISPLACEMENT,
-                journal=SealedJournal(journal),
-                settings=dataclasses.replace(SMALL, trials=1),
-                seed=1,
-                on_event=lambda _: None,
-            )
-        )
+    outcomes = [
+        recovery_in_files(quadruped, truth, tmp_path / name, hidden)[0]
+        for name, hidden in (("told", {"after": str(truth)}), ("not-told", {}))
+    ]
 
     assert outcomes[0].diagnosis == outcomes[1].diagnosis
     assert read_truth(tmp_path / "told" / "trials" / "01-after.mcap") == str(truth)
     assert read_truth(tmp_path / "not-told" / "trials" / "01-after.mcap") is None
+
+
+def test_each_trial_is_read_from_its_log_once_and_is_all_that_is_known(
+    quadruped: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    reads: Counter[str] = Counter()
+    read_contents = reader.read_contents
+
+    def counted(path: Path, unread: Collection[str] = ()) -> Contents:
+        reads[path.name] += 1
+        return read_contents(path, unread)
+
+    monkeypatch.setattr(reader, "read_contents", counted)
+    truth = parse("break:back_left_knee", quadruped.anatomy)
+    outcome, journal = recovery_in_files(quadruped, truth, tmp_path / "run", {})
+    names = ["00-before.mcap", "01-after.mcap", "02-recovery.mcap"]
+
+    assert reads == dict.fromkeys(names, 1)
+    kept = journal.read()
+    assert [trial.path for trial in kept.trials] == [trial.path for trial in outcome.trials]
+    assert [trial.plan for trial in kept.trials] == [trial.plan for trial in outcome.trials]
+    for trial, again in zip(outcome.trials, kept.trials, strict=True):
+        for signal, rows in trial.behaviour.signals.items():
+            assert rows.tobytes() == again.behaviour[signal].tobytes()
+    assert kept.diagnoses[-1] == outcome.diagnosis
+    assert len(kept.diagnoses) == 2
 
 
 def test_the_way_to_choose_is_asked_before_each_trial_and_obeyed(quadruped: Robot):
@@ -311,6 +363,7 @@ def test_the_way_to_choose_is_asked_before_each_trial_and_obeyed(quadruped: Robo
     assert not [e for e in events if isinstance(e, SearchBegins) and e.kind == "repair"][1:]
 
 
+@pytest.mark.search
 def test_trials_that_tell_apart_differ_from_the_one_before_and_are_the_same_at_any_threads(
     quadruped: Robot,
 ):

@@ -8,6 +8,7 @@ import pytest
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log
+from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.robots import robot_of
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.simulated_robot import SimulatedRobot
@@ -15,11 +16,11 @@ from selfmodel.robot.designs import network_for
 from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.replay import replay
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.simulation.trial_replay import replay
 from selfmodel.trials.behaviour import SIGNALS
 from selfmodel.trials.trial import TrialPlan
-from tests.conftest import random_controllers, random_of
+from tests.helpers.drivers import random_controllers, random_of
 
 
 def of_0_1(robot: Robot, hidden: str) -> Robot:
@@ -54,7 +55,7 @@ def test_a_log_of_0_1_replays_with_the_neurons_of_its_controller(quadruped: Robo
     (controller,) = random_of(network_for(quadruped, 5), 1)
     plan = TrialPlan("trial", "single", controller, 60, 0)
     samples = SimulatedRobot(old, parse("neuron:4", old.anatomy)).run(controller, 60)
-    write_trial(path, old, plan, samples, settings=Settings())
+    write_trial(path, old, plan, samples, TrialHeader(Settings()))
     log = read_log(path)
     robot = robot_of(log)
 

@@ -1,4 +1,4 @@
-"""Promises of the stretches that calibration predicts: what is known all along, and no more."""
+"""Promises of the segments of calibration: known completely, and no more of them."""
 
 from dataclasses import replace
 
@@ -11,17 +11,18 @@ from selfmodel.physical.reality_gap import draw_gap
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.simulation.calibration_segments import (
     HORIZON,
-    LEAD,
-    SEEN,
-    SEGMENTS,
+    MAX_SEGMENTS,
+    MIN_BASE_SHARE,
     CalibrationSegments,
-    cut_segments,
+    calibration_segments_of,
 )
+from selfmodel.simulation.requests import LEAD
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import Signal, collect
 from selfmodel.trials.state_estimation import BASE, ONBOARD, STATE, estimated_states
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.conftest import lacking, random_motion
+from tests.helpers.drivers import random_motion
+from tests.helpers.hostile import lacking
 
 STEPS = 201
 QUADRUPED = ROBOTS["quadruped"].robot()
@@ -59,9 +60,9 @@ def starts(found: CalibrationSegments) -> np.ndarray:
 
 
 def test_where_the_base_was_seen_they_are_spread_over_the_trial_with_all_of_the_state(whole: Trial):
-    found = cut_segments(whole)
+    found = calibration_segments_of(whole)
 
-    assert len(starts(found)) == SEGMENTS
+    assert len(starts(found)) == MAX_SEGMENTS
     assert (starts(found)[0], starts(found)[-1]) == (LEAD, STEPS - 1 - HORIZON)
     assert set(found.segments.states) == set(found.observed) == set(STATE)
 
@@ -70,7 +71,7 @@ def test_where_the_base_was_seen_they_are_spread_over_the_trial_with_all_of_the_
 def test_where_it_was_not_they_follow_each_other_from_the_start_on(
     whole: Trial, lost: tuple[Signal, ...]
 ):
-    found = cut_segments(lacking(whole, lost))
+    found = calibration_segments_of(lacking(whole, lost))
 
     np.testing.assert_array_equal(starts(found), np.arange(0, STEPS - HORIZON, HORIZON))
     assert set(found.segments.states) == set(found.observed) == set(ONBOARD)
@@ -78,7 +79,7 @@ def test_where_it_was_not_they_follow_each_other_from_the_start_on(
 
 @pytest.mark.parametrize("lost", [(), BASE], ids=["seen", "unseen"])
 def test_they_say_what_was_logged_and_commanded(whole: Trial, lost: tuple[Signal, ...]):
-    run, found = whole.behaviour, cut_segments(lacking(whole, lost))
+    run, found = whole.behaviour, calibration_segments_of(lacking(whole, lost))
 
     for number, k in enumerate(starts(found)):
         for signal, values in found.observed.items():
@@ -96,7 +97,7 @@ def test_they_say_what_was_logged_and_commanded(whole: Trial, lost: tuple[Signal
 def test_all_that_they_say_can_be_recorded_and_they_know_what_was_commanded_before(
     whole: Trial, lost: tuple[Signal, ...]
 ):
-    segments = cut_segments(lacking(whole, lost)).segments
+    segments = calibration_segments_of(lacking(whole, lost)).segments
 
     assert set(segments.record) == set(segments.states)
     assert segments.lead == LEAD
@@ -107,7 +108,7 @@ def test_all_that_they_say_can_be_recorded_and_they_know_what_was_commanded_befo
 @pytest.mark.parametrize("lost", [(), BASE], ids=["seen", "unseen"])
 def test_their_state_is_the_estimated_one(lost: tuple[Signal, ...]):
     run = lacking(trial(SimulatedRobot(QUADRUPED, gap=GAP)), lost)
-    found = cut_segments(run)
+    found = calibration_segments_of(run)
     estimated = estimated_states(run.behaviour, tuple(found.segments.states))
 
     for signal, values in found.segments.states.items():
@@ -120,7 +121,7 @@ def test_their_state_is_the_estimated_one(lost: tuple[Signal, ...]):
 def test_where_the_base_was_seen_they_touch_nothing_that_was_not_observed_or_came_late(
     whole: Trial,
 ):
-    found = starts(cut_segments(lost_and_late(whole)))
+    found = starts(calibration_segments_of(lost_and_late(whole)))
 
     for first, last in ((60, 79), (149, 149)):
         assert np.all((found + HORIZON < first) | (found - LEAD > last))
@@ -129,7 +130,7 @@ def test_where_the_base_was_seen_they_touch_nothing_that_was_not_observed_or_cam
 
 
 def test_where_it_was_not_they_are_judged_up_to_a_late_step_and_where_observed(whole: Trial):
-    found = cut_segments(lost_and_late(lacking(whole, BASE)))
+    found = calibration_segments_of(lost_and_late(lacking(whole, BASE)))
     begins = starts(found)
     rows = begins[:, np.newaxis] + np.arange(1, HORIZON + 1)
 
@@ -144,7 +145,9 @@ def test_where_it_was_not_they_are_judged_up_to_a_late_step_and_where_observed(w
 def test_none_is_predicted_under_commands_that_are_not_known(
     whole: Trial, lost: tuple[Signal, ...], fewest: int
 ):
-    found = starts(cut_segments(lacking(lacking(whole, lost), ("commands",), slice(60, 62))))
+    found = starts(
+        calibration_segments_of(lacking(lacking(whole, lost), ("commands",), slice(60, 62)))
+    )
 
     assert np.all((found + HORIZON < 60) | (found - LEAD > 61))
     assert len(found) >= fewest
@@ -155,51 +158,55 @@ def test_a_log_that_is_late_every_twentieth_step_serves():
     for phase in range(20):
         late = np.arange(STEPS) % 20 == phase
         late[0] = False
-        judged = cut_segments(replace(noisy, behaviour=replace(noisy.behaviour, late=late))).judged
+        judged = calibration_segments_of(
+            replace(noisy, behaviour=replace(noisy.behaviour, late=late))
+        ).judged
 
         assert judged.sum() >= STEPS // 10
 
 
 def test_a_base_that_was_seen_is_looked_at_however_much_else_is_missing(whole: Trial):
-    found = cut_segments(lacking(whole, ("joint_velocities",), slice(25, 190)))
+    found = calibration_segments_of(lacking(whole, ("joint_velocities",), slice(25, 190)))
 
     assert set(found.observed) == set(STATE)
-    assert len(starts(found)) < SEEN * SEGMENTS
+    assert len(starts(found)) < MIN_BASE_SHARE * MAX_SEGMENTS
 
 
 def test_a_base_that_was_seen_for_a_while_is_looked_at_then(whole: Trial):
-    found = cut_segments(lacking(whole, BASE, slice(100, None)))
+    found = calibration_segments_of(lacking(whole, BASE, slice(100, None)))
 
     assert set(found.observed) == set(STATE)
     assert starts(found).max() + HORIZON < 100
 
 
 def test_a_base_that_was_seen_for_a_moment_is_not_looked_at(whole: Trial):
-    found = cut_segments(lacking(lacking(whole, BASE, slice(0, 100)), BASE, slice(130, None)))
+    found = calibration_segments_of(
+        lacking(lacking(whole, BASE, slice(0, 100)), BASE, slice(130, None))
+    )
 
     assert set(found.observed) == set(ONBOARD)
 
 
 @pytest.mark.parametrize("steps", [16, 17, 40])
-def test_a_short_trial_has_each_stretch_once(steps: int):
+def test_a_short_trial_has_each_segment_once(steps: int):
     whole = trial(SimulatedRobot(QUADRUPED), steps)
 
-    assert starts(cut_segments(whole)).tolist() == list(range(LEAD, steps - HORIZON))
-    assert starts(cut_segments(lacking(whole, BASE))).tolist() == list(
+    assert starts(calibration_segments_of(whole)).tolist() == list(range(LEAD, steps - HORIZON))
+    assert starts(calibration_segments_of(lacking(whole, BASE))).tolist() == list(
         range(0, steps - HORIZON, HORIZON)
     )
 
 
 def test_a_trial_that_is_too_short_is_refused():
     with pytest.raises(InputError, match=r"16 steps or more.* and the trial has 15: leave"):
-        cut_segments(trial(SimulatedRobot(QUADRUPED), 15))
+        calibration_segments_of(trial(SimulatedRobot(QUADRUPED), 15))
 
 
 def test_a_trial_of_nothing_but_late_steps_is_refused(whole: Trial):
     run = replace(whole.behaviour, late=np.arange(STEPS) > 0)
 
     with pytest.raises(InputError, match=r"none of them late, .* the log has none of use"):
-        cut_segments(replace(whole, behaviour=run))
+        calibration_segments_of(replace(whole, behaviour=run))
 
 
 def test_a_trial_of_which_too_little_can_be_judged_is_refused(whole: Trial):
@@ -207,7 +214,7 @@ def test_a_trial_of_which_too_little_can_be_judged_is_refused(whole: Trial):
     blinking = lacking(whole, (*BASE, "base_orientation"), slice(6, None))
 
     with pytest.raises(InputError, match=r"the log has none of use: leave"):
-        cut_segments(blinking)
+        calibration_segments_of(blinking)
 
 
 def test_what_was_never_observed_is_named_by_its_column_where_only_some_was_not(whole: Trial):
@@ -218,4 +225,4 @@ def test_what_was_never_observed_is_named_by_its_column_where_only_some_was_not(
     name = run.names.hinges[3]
 
     with pytest.raises(InputError, match=f"never has joint_positions of {name}, base_angular_vel"):
-        cut_segments(replace(whole, behaviour=broken))
+        calibration_segments_of(replace(whole, behaviour=broken))

@@ -11,11 +11,18 @@ from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.evidence import Evidence
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.notation import parse
-from selfmodel.faults.terrain import CELL, HALF_EXTENT, PLACES, TOUCHES, felt_heights, unit_heights
+from selfmodel.faults.terrain import (
+    CELL_SIZE,
+    HALF_EXTENT,
+    MIN_CELL_CONTACTS,
+    MIN_CELLS,
+    estimated_heights,
+    unit_heights,
+)
 from selfmodel.physical.simulated_robot import OWN_SEED, SimulatedRobot
 from selfmodel.robot.designs import cpg_for
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.ground_contacts import felt_points
+from selfmodel.simulation.ground_contacts import ground_contact_points
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import suite_bodies
 from selfmodel.trials.behaviour import Behaviour, collect
@@ -31,7 +38,7 @@ SHAPE = unit_heights(OWN_SEED)
 def height(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Of the terrain of roughness 1 at some places."""
     return map_coordinates(
-        SHAPE, [(y + HALF_EXTENT[1]) / CELL, (x + HALF_EXTENT[0]) / CELL], order=1
+        SHAPE, [(y + HALF_EXTENT[1]) / CELL_SIZE, (x + HALF_EXTENT[0]) / CELL_SIZE], order=1
     )
 
 
@@ -54,7 +61,7 @@ def observed(robot: Robot, truth: str, walk: Controller) -> Behaviour:
 
 @pytest.mark.parametrize("roughness", [0.02, 0.04])
 def test_feet_feel_the_ground_where_they_are(quadruped: Robot, walk: Controller, roughness: float):
-    points = felt_points(quadruped, observed(quadruped, f"roughness={roughness}", walk))
+    points = ground_contact_points(quadruped, observed(quadruped, f"roughness={roughness}", walk))
     x, y, z = points.T
 
     assert len(points) > STEPS / 2
@@ -63,7 +70,7 @@ def test_feet_feel_the_ground_where_they_are(quadruped: Robot, walk: Controller,
 
 
 def test_on_level_ground_they_feel_no_height(quadruped: Robot, walk: Controller):
-    z = felt_points(quadruped, observed(quadruped, "intact", walk))[:, 2]
+    z = ground_contact_points(quadruped, observed(quadruped, "intact", walk))[:, 2]
 
     assert np.median(np.abs(z - MARGIN)) < 0.001
 
@@ -90,31 +97,35 @@ def test_the_shape_that_was_felt_is_that_of_the_terrain_however_high():
     rng = np.random.default_rng(1)
     places = rng.uniform((-4, -1), (4, 1), (20_000, 2))
     z = 0.03 * height(*places.T) + 0.01
-    shape = felt_heights(np.column_stack([places, z]))
-    row, column = np.round((places[:, ::-1] + HALF_EXTENT[::-1]) / CELL).astype(int).T
+    shape = estimated_heights(np.column_stack([places, z]))
+    row, column = np.round((places[:, ::-1] + HALF_EXTENT[::-1]) / CELL_SIZE).astype(int).T
 
     assert np.corrcoef(shape[row, column], SHAPE[row, column])[0, 1] > 0.97
     assert np.median(np.abs(shape[row, column] - SHAPE[row, column])) < 0.15
 
 
 def test_where_too_little_was_felt_the_ground_is_level():
-    few = np.array([[2 + 0.2 * k, 0, 0.01 * k] for k in range(PLACES - 1)]).repeat(TOUCHES, axis=0)
+    few = np.array([[2 + 0.2 * k, 0, 0.01 * k] for k in range(MIN_CELLS - 1)]).repeat(
+        MIN_CELL_CONTACTS, axis=0
+    )
     near = np.random.default_rng(2).uniform(-0.5, 0.5, (5000, 3))
     beyond = np.random.default_rng(2).uniform(50, 60, (5000, 3))
 
     for points in (np.empty((0, 3)), few, near, beyond):
-        assert not felt_heights(points).any()
+        assert not estimated_heights(points).any()
 
 
 def test_a_touch_that_errs_does_not_raise_the_ground():
     rng = np.random.default_rng(3)
-    cells = np.round(rng.uniform((-30, -10), (30, 10), (500, 2))) * CELL
+    cells = np.round(rng.uniform((-30, -10), (30, 10), (500, 2))) * CELL_SIZE
     right = np.column_stack([cells, 0.03 * height(*cells.T)]).repeat(9, axis=0)
     wrong, once = right.copy(), np.array([[3.4, 1.4, 5.0]])
     wrong[: len(wrong) // 2 : 9, 2] += 0.5
 
-    np.testing.assert_array_equal(felt_heights(wrong), felt_heights(right))
-    np.testing.assert_array_equal(felt_heights(np.vstack([right, once])), felt_heights(right))
+    np.testing.assert_array_equal(estimated_heights(wrong), estimated_heights(right))
+    np.testing.assert_array_equal(
+        estimated_heights(np.vstack([right, once])), estimated_heights(right)
+    )
 
 
 def test_what_was_not_observed_is_not_felt(quadruped: Robot, walk: Controller):
@@ -124,8 +135,13 @@ def test_what_was_not_observed_is_not_felt(quadruped: Robot, walk: Controller):
     silent = {signal: values.copy() for signal, values in whole.signals.items()}
     silent["sensors"][:, :4] = np.nan
 
-    assert 0 < len(felt_points(quadruped, dataclasses.replace(whole, signals=blind))) <= 400
-    assert felt_points(quadruped, dataclasses.replace(whole, signals=silent)).shape == (0, 3)
+    assert (
+        0 < len(ground_contact_points(quadruped, dataclasses.replace(whole, signals=blind))) <= 400
+    )
+    assert ground_contact_points(quadruped, dataclasses.replace(whole, signals=silent)).shape == (
+        0,
+        3,
+    )
 
 
 def test_a_robot_on_its_back_or_far_away_feels_nothing_and_is_diagnosed_all_the_same(
@@ -143,7 +159,7 @@ def test_a_robot_on_its_back_or_far_away_feels_nothing_and_is_diagnosed_all_the_
         evidence = Evidence(Simulator(quadruped, 1), SEGMENT_PREDICTION)
         rough = parse("roughness=0.02", quadruped.anatomy)
 
-        assert felt_points(quadruped, behaviour).shape == (0, 3)
+        assert ground_contact_points(quadruped, behaviour).shape == (0, 3)
         assert np.isfinite(evidence.distances([rough], [trial])).all()
 
 
@@ -153,7 +169,9 @@ def test_the_ground_is_the_plane_that_lies_level_not_a_wall(quadruped: Robot, wa
     behaviour = observed(quadruped, "intact", walk)
 
     np.testing.assert_allclose(
-        felt_points(walled, behaviour), felt_points(quadruped, behaviour), atol=1e-9
+        ground_contact_points(walled, behaviour),
+        ground_contact_points(quadruped, behaviour),
+        atol=1e-9,
     )
 
 
@@ -161,4 +179,4 @@ def test_a_robot_without_touch_feels_nothing():
     swimmer = suite_bodies.robot("swimmer", "swimmer6")
     behaviour = Behaviour(swimmer.anatomy.names, np.arange(2.0), {})
 
-    assert felt_points(swimmer, behaviour).shape == (0, 3)
+    assert ground_contact_points(swimmer, behaviour).shape == (0, 3)

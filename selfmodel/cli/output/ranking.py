@@ -1,48 +1,17 @@
-"""A diagnosis as plain values and as a table."""
+"""A diagnosis as sentences and as a table, from its JSON values."""
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rich.table import Table
 
-from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
-from selfmodel.faults.hypothesis import Hypothesis
-
-
-def as_values(ranked: Sequence[Candidate]) -> list[dict[str, Any]]:
-    """Returns hypotheses with their distances, as JSON has them: null where one diverged."""
-    return [
-        {
-            "hypothesis": str(candidate.hypothesis),
-            "distance": candidate.distance if math.isfinite(candidate.distance) else None,
-        }
-        for candidate in ranked
-    ]
-
-
-def sureness(diagnosis: Diagnosis) -> dict[str, Any]:
-    """Returns how sure a diagnosis is, as JSON has it."""
-    intact = diagnosis.intact_distance
-    return {
-        "verdict": diagnosis.verdict,
-        "rivals": [str(rival) for rival in diagnosis.indistinguishable],
-        "unseen": [_besides(one, diagnosis.best) for one in diagnosis.undetectable],
-        "test": diagnosis.test,
-        "outside": diagnosis.unsearched.as_object() if diagnosis.unsearched else None,
-        "intact_distance": intact if math.isfinite(intact) else None,
-    }
-
-
-def _besides(one: Hypothesis, best: Hypothesis) -> str:
-    return str(Hypothesis(tuple(fault for fault in one.faults if fault not in best.faults)))
-
 
 def in_words(found: Mapping[str, Any]) -> str:
-    """Returns how sure a diagnosis is, as a sentence or two.
+    """Returns the verdict and the alternatives to the best hypothesis, in one or two sentences.
 
     Args:
-        found: What ``sureness`` says, and under ``diagnosis`` what ``as_values`` does.
+        found: Values of ``confidence_to_dict``, and under ``diagnosis`` those of
+            ``ranking_to_list``.
     """
     besides = ", ".join(found["unseen"])
     return _verdict(found) + (f" Not ruled out besides: {besides}." if besides else "")
@@ -71,7 +40,7 @@ def _verdict(found: Mapping[str, Any]) -> str:
 
 
 def ranking_table(values: Sequence[dict[str, Any]], truth: str | None = None) -> Table:
-    """Returns hypotheses as a table, best first, the truth marked where it is known."""
+    """Returns hypotheses as a table, best first; the truth is marked where it is given."""
     table = Table("", "hypothesis", "distance", title="diagnosis")
     table.columns[1].overflow = "fold"
     table.columns[2].justify = "right"

@@ -6,19 +6,19 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from selfmodel import __version__
 from selfmodel.controllers.controller import Controller
 from selfmodel.experiments import robots, trial_logs
 from selfmodel.experiments.ablation.plan import Ablation, Cell, model_digest
 from selfmodel.experiments.grid import GridBegins, Job, PartEnds, run_grid
 from selfmodel.experiments.keys import key_of
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.logs.atomic import put
+from selfmodel.logs.atomic import write_atomic
 from selfmodel.logs.controllers import controller_bytes
 from selfmodel.recovery.random_streams import repair_stream
 from selfmodel.recovery.repair import RepairSearch
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.version import __version__
 
 OF_DIAGNOSIS = ("trials", "genes", "kept")
 """Settings that no gait depends on."""
@@ -86,7 +86,7 @@ def evolve_gait(job: Job, _part: str, run: Path) -> Any:  # noqa: ANN401  # JSON
     robot = robots.robot_entry(job.parameters["robot"]).robot()
     repair = RepairSearch(Simulator(robot, threads=1), Settings(**job.parameters["settings"]))
     found = repair(INTACT, (), repair_stream(job.seed, 0), lambda _generation: None)
-    put(_path(run.parent, job.parameters["robot"], job.seed), controller_bytes(found))
+    write_atomic(_path(run.parent, job.parameters["robot"], job.seed), controller_bytes(found))
     return {"evaluations": repair.evaluations}
 
 

@@ -9,16 +9,17 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from selfmodel import __version__
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.experiments import plugins, robots
 from selfmodel.experiments.grid import Job, check_shared
 from selfmodel.experiments.keys import check_keys, key_of
+from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.notation import parse
-from selfmodel.faults.registry import PAPER_KINDS, applicable_kinds, known
-from selfmodel.physical.reality_gap import WIDEST
+from selfmodel.faults.registry import PAPER_KINDS, notation_kinds
+from selfmodel.physical.reality_gap import MAX_GAP_LEVEL
 from selfmodel.settings import Settings
+from selfmodel.version import __version__
 
 NEXT_TRIAL = ("bank", "repair", "disagreement")
 """How the controllers of the trials are chosen: gaits from the bank, the same for every comparator;
@@ -120,8 +121,10 @@ def check(ablation: Ablation) -> None:
         raise InputError("an ablation needs at least one case or one damage, got neither")
     _check_names(ablation)
     for gap in ablation.gaps:
-        if not 0 <= gap <= WIDEST:
-            raise InputError(f"a gap is a number from 0 to {WIDEST}, such as 0.05, got {gap}")
+        if not 0 <= gap <= MAX_GAP_LEVEL:
+            raise InputError(
+                f"a gap is a number from 0 to {MAX_GAP_LEVEL}, such as 0.05, got {gap}"
+            )
     _check_trials(ablation)
     check_shared(ablation.folder, _shared(ablation), "an ablation")
 
@@ -205,7 +208,7 @@ def _failures(ablation: Ablation, robot: str) -> list[tuple[int | None, str]]:
 
 def _named(ablation: Ablation) -> tuple[FaultKind, ...]:
     """What notation may name: also a third party's kinds, where they are considered."""
-    return known(plugins.kinds(ablation.kinds))
+    return notation_kinds(plugins.kinds(ablation.kinds))
 
 
 def model_digest(robot: str) -> str:
@@ -221,7 +224,7 @@ def _check_names(ablation: Ablation) -> None:
             if case not in entry.cases:
                 raise unknown_name(f"case of {robot}", str(case), map(str, entry.cases))
         anatomy = entry.robot().anatomy
-        applicable_kinds(plugins.kinds(ablation.kinds), anatomy)
+        HypothesisSpace.of(plugins.kinds(ablation.kinds), anatomy)
         for damage in ablation.damages:
             parse(damage, anatomy, _named(ablation))
     for comparator in ablation.comparators:

@@ -12,7 +12,7 @@ from selfmodel.experiments.ablation.figures import draw
 from selfmodel.experiments.ablation.rows import Row, as_csv, as_objects
 from selfmodel.experiments.ablation.scores import Score, summarise
 from selfmodel.experiments.grid import finished
-from selfmodel.logs.atomic import alone, put
+from selfmodel.logs.atomic import lock_folder, write_atomic
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ def write_results(folder: Path) -> Results:
         OSError: They cannot be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    with alone(folder):  # on a cluster several may end at once
+    with lock_folder(folder):  # on a cluster several may end at once
         rows = collect(folder)
         scores = summarise(rows)
         found = json.dumps(as_object(rows, scores), indent=1, allow_nan=False)
@@ -56,7 +56,7 @@ def write_results(folder: Path) -> Results:
         files |= {f"figures/{name}": data for name, data in draw(rows, scores)}
         for name, data in files.items():
             (folder / name).parent.mkdir(exist_ok=True)
-            put(folder / name, data)
+            write_atomic(folder / name, data)
     return Results(rows, scores, tuple(folder / name for name in files))
 
 

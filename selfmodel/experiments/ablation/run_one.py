@@ -21,8 +21,7 @@ from selfmodel.experiments.ablation.trials import (
     calibrated_robot,
 )
 from selfmodel.experiments.experiment import Experiment, run
-from selfmodel.faults.notation import parse
-from selfmodel.faults.registry import known
+from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.recovery.events import Event
 from selfmodel.recovery.explain import diagnose_trials
 from selfmodel.robot.robot import Robot
@@ -67,7 +66,7 @@ def setting_of(
         comparator=plugins.comparator(comparator),
         name=comparator,
         robot=robot,
-        truth=parse(spec.cell.truth, robot.anatomy, known(plugins.kinds(spec.kinds))),
+        truth=HypothesisSpace(robot.anatomy, plugins.kinds(spec.kinds)).parse(spec.cell.truth),
         gaits=gaits,
         folder=folder,
     )

@@ -10,11 +10,12 @@ from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.experiments.ablation.plan import HEALTHY_TRIALS, Spec
 from selfmodel.experiments.reality import draw_reality
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
-from selfmodel.logs.atomic import part_of, put
+from selfmodel.logs.atomic import partial_path, write_atomic
+from selfmodel.logs.physical_trial import run_trial
 from selfmodel.logs.reader import read_log
-from selfmodel.logs.writer import write_trial
+from selfmodel.logs.records import TrialHeader
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.calibrate import calibrate
+from selfmodel.simulation.calibration import calibrate
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
 
 
@@ -61,7 +62,7 @@ def calibrated_robot(setting: Setting, intact: Sequence[Trial]) -> Robot:
     """
     path, robot = setting.folder / "calibrated.xml", setting.robot
     if not path.exists():
-        put(path, calibrate(robot, intact, threads=1).robot.mjcf.encode())
+        write_atomic(path, calibrate(robot, intact, threads=1).robot.mjcf.encode())
     return dataclasses.replace(robot, mjcf=path.read_text(encoding="utf-8"))
 
 
@@ -70,20 +71,14 @@ def _trial(setting: Setting, number: int, stage: Stage, gait: Controller) -> Tri
     steps, seed = setting.spec.settings.steps, setting.spec.cell.seed
     plan = TrialPlan(f"{number:02d}-{stage}", stage, gait, steps, seed)
     path = setting.folder / "trials" / f"{plan.name}.mcap"
-    if not path.exists():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part_of(path).unlink(missing_ok=True)  # of a run that was killed
-        hidden = INTACT if stage == "before" else setting.truth
-        cell, robot = setting.spec.cell, setting.robot
-        reality = draw_reality(robot, cell.seed, cell.gap, structure=setting.spec.structure)
-        write_trial(
-            path,
-            robot,
-            plan,
-            # Each trial has noise of its own, the same for every comparator.
-            reality.robot(robot, hidden, stream=number).run(plan.controller, plan.steps),
-            settings=setting.spec.settings,
-            hidden=str(hidden),
-            gap=reality.text,
-        )
-    return read_log(path).trial
+    if path.exists():
+        return read_log(path).trial
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial_path(path).unlink(missing_ok=True)  # of a run that was killed
+    hidden = INTACT if stage == "before" else setting.truth
+    cell, robot = setting.spec.cell, setting.robot
+    reality = draw_reality(robot, cell.seed, cell.gap, structure=setting.spec.structure)
+    # Each trial has noise of its own, the same for every comparator.
+    physical = reality.robot(robot, hidden, stream=number)
+    header = TrialHeader(setting.spec.settings, hidden=str(hidden), gap=reality.text)
+    return run_trial(physical, plan, path, robot, header)

@@ -7,7 +7,7 @@ from typing import Any
 
 from selfmodel.experiments.grid import finished
 from selfmodel.experiments.suite.rows import Row, Summary, as_csv, as_objects, summarise
-from selfmodel.logs.atomic import alone, put
+from selfmodel.logs.atomic import lock_folder, write_atomic
 
 
 @dataclass(frozen=True)
@@ -37,12 +37,12 @@ def write_results(folder: Path) -> Results:
         OSError: They cannot be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    with alone(folder):  # several may end at once
+    with lock_folder(folder):  # several may end at once
         found = [Row(**row) for part in finished(folder / "runs") for row in part.result]
         rows = tuple(sorted(found, key=lambda row: (row.robot, row.case, row.seed)))
         files = (folder / "results.csv", folder / "results.json")
         results = Results(rows, summarise(rows), files)
-        put(files[0], as_csv(rows).encode())
+        write_atomic(files[0], as_csv(rows).encode())
         text = json.dumps(results.as_object(), indent=1, allow_nan=False)
-        put(files[1], f"{text}\n".encode())
+        write_atomic(files[1], f"{text}\n".encode())
     return results

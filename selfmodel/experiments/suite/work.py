@@ -9,15 +9,15 @@ import numpy as np
 
 from selfmodel.controllers.controller import check_silent_neurons
 from selfmodel.experiments import plugins, robots, trial_logs
-from selfmodel.experiments.experiment import Experiment
-from selfmodel.experiments.experiment import run as run_experiment
+from selfmodel.experiments.experiment import Experiment, run as run_experiment
 from selfmodel.experiments.grid import GridBegins, Job, PartEnds, run_grid
 from selfmodel.experiments.suite.plan import Study, check, gait_jobs, gait_path, recovery_jobs
 from selfmodel.experiments.suite.rows import Row, as_objects
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.neuron import silent_neurons
 from selfmodel.faults.notation import parse
-from selfmodel.logs.atomic import put
+from selfmodel.faults.registry import PAPER_KINDS
+from selfmodel.logs.atomic import write_atomic
 from selfmodel.logs.controllers import controller_bytes
 from selfmodel.recovery.events import Event
 from selfmodel.recovery.fitness import Score
@@ -31,7 +31,11 @@ from selfmodel.trials.trial import Trial
 
 
 def run_study(
-    study: Study, *, workers: int, on_event: Callable[[GridBegins | PartEnds], None]
+    study: Study,
+    *,
+    workers: int,
+    on_event: Callable[[GridBegins | PartEnds], None],
+    only: tuple[int, int] = (1, 1),
 ) -> tuple[PartEnds, ...]:
     """Runs what has not been run yet, and returns what failed.
 
@@ -39,15 +43,16 @@ def run_study(
         study: What to run.
         workers: Processes at a time, each with one thread of physics.
         on_event: Is told what happens, of the gaits' grid and then of the recoveries'.
+        only: ``(i, n)``: the recoveries of every n-th gait, from the i-th, counted from 1.
 
     Raises:
         InputError: Something about it is wrong, or its folder holds another.
     """
     check(study)
     no_gait = run_grid(
-        study.folder / "gaits", gait_jobs(study), _evolve, workers=workers, on_event=on_event
+        study.folder / "gaits", gait_jobs(study, only), _evolve, workers=workers, on_event=on_event
     )
-    jobs = recovery_jobs(study)
+    jobs = recovery_jobs(study, only)
     failed = run_grid(study.folder / "runs", jobs, _recover, workers=workers, on_event=on_event)
     return no_gait + failed
 
@@ -60,11 +65,11 @@ def _evolve(job: Job, _part: str, run: Path) -> Any:  # noqa: ANN401  # JSON
     repair = RepairSearch(
         Simulator(robot, threads=1),
         Settings(**said["settings"]),
-        plugins.design(said["controller"], robot),
+        plugins.design(said["controller"], robot, said.get("neurons")),
         score=plugins.score(said["score"], said["body"], entry),
     )
     found = repair(INTACT, (), repair_stream(job.seed, 0), _ignore)
-    put(run.parent / f"{job.key}.npz", controller_bytes(found))
+    write_atomic(run.parent / f"{job.key}.npz", controller_bytes(found))
     return {"evaluations": repair.evaluations}
 
 
@@ -74,7 +79,7 @@ def _recover(job: Job, _part: str, run: Path) -> Any:  # noqa: ANN401  # JSON
     entry = robots.robot_entry(said["body"])
     robot = entry.robot()
     truth = parse(said["truth"], robot.anatomy)
-    design = plugins.design(shared["controller"], robot)
+    design = plugins.design(shared["controller"], robot, shared.get("neurons"))
     check_silent_neurons(design, silent_neurons(truth))
     folder = run / "recovery"
     shutil.rmtree(folder, ignore_errors=True)  # what is left of a run that was killed
@@ -83,6 +88,9 @@ def _recover(job: Job, _part: str, run: Path) -> Any:  # noqa: ANN401  # JSON
         case=said["case"],
         truth=truth,
         comparator=plugins.comparator(shared["comparator"]),
+        kinds=plugins.kinds(shared["kinds"]) if "kinds" in shared else PAPER_KINDS,
+        gap=shared.get("gap", 0.0),
+        structure=shared.get("structure", False),
         settings=Settings(**shared["settings"]),
         seed=job.seed,
         threads=1,

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from selfmodel.errors import InputError
+from selfmodel.files import read_file
 from selfmodel.robot.mjcf.command_ranges import add_command_ranges
 from selfmodel.robot.mjcf.document import Document, read_document
 from selfmodel.robot.mjcf.expand import check_loggable, expand
-from selfmodel.robot.mjcf.files import Folder, InMemory, read_file
+from selfmodel.robot.mjcf.files import Folder, InMemory
 from selfmodel.robot.mjcf.forward import turn_forward
 from selfmodel.robot.mjcf.ground import add_ground
 from selfmodel.robot.mjcf.keyframe import bake_keyframe

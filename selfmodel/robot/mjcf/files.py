@@ -1,6 +1,5 @@
 """Reads the files of an MJCF from its own folder, or from memory."""
 
-import stat
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,32 +7,7 @@ from posixpath import basename, normpath
 from typing import Protocol
 
 from selfmodel.errors import InputError
-
-
-def read_file(path: Path, what: str, limit: int) -> bytes:
-    """Returns the content of a regular file of bounded size.
-
-    Args:
-        path: The file.
-        what: Description of the expected file in an error message, such as "an MJCF file".
-        limit: Largest size, in bytes.
-
-    Raises:
-        InputError: The file cannot be read, is a folder, a pipe or a device, or is larger.
-    """
-    try:
-        if not stat.S_ISREG(path.stat().st_mode):
-            raise InputError(f"{path}: expected {what}, got a folder, a pipe or a device")
-        with path.open("rb") as file:
-            data = file.read(limit + 1)
-    except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
-        if isinstance(error, InputError):
-            raise
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{path}: expected {what} that can be read, got: {reason}") from error
-    if len(data) > limit:
-        raise InputError(f"{path}: expected {what} of at most {limit} bytes, got more")
-    return data
+from selfmodel.files import read_file
 
 
 class Files(Protocol):

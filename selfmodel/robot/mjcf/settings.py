@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.robot.mjcf.files import read_file
+from selfmodel.files import read_file
 
 MAX_SETTINGS_BYTES = 2**16
 """Largest settings file, in bytes."""

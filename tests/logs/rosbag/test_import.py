@@ -175,7 +175,7 @@ def test_without_odometry_the_imu_tells_the_orientation_if_it_knows_it(
     assert np.allclose(orientation, [1, 0, 0, 0]) if known else np.isnan(orientation).all()
     assert np.allclose(recording.behaviour["base_angular_velocity"], [0, 0, 1])
     assert np.isnan(recording.behaviour["base_position"]).all()
-    assert "the position of the base was not observed, so" in " ".join(recording.notes)
+    assert "where the base was is not known" in " ".join(recording.notes)
 
 
 def test_stamps_of_another_clock_are_refused_unless_told_so(biped: Robot, tmp_path: Path):

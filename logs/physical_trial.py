@@ -1,0 +1,68 @@
+"""Physical trials with a log: run, written while they run, then read back and verified once."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from selfmodel.logs.reader import read_log
+from selfmodel.logs.records import TrialHeader, checked_name
+from selfmodel.logs.writer import write_trial
+from selfmodel.physical.interface import PhysicalRobot, TimedRobot
+from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.trials.trial import Stage, Trial, TrialPlan
+
+
+def run_trial(
+    physical: PhysicalRobot, plan: TrialPlan, path: Path, robot: Robot, header: TrialHeader
+) -> Trial:
+    """Runs a physical trial, logs it while it runs, and returns the trial read from the log.
+
+    Args:
+        physical: Physical robot.
+        plan: Plan of the trial.
+        path: Name of the log; it must not exist.
+        robot: Robot as its model describes it.
+        header: Other content of the log's preamble; ``timed`` is taken from the physical robot.
+
+    Raises:
+        InputError: The file exists, or the plan does not fit the robot.
+        LogError: The robot stopped early, or the log failed its verification.
+        LogWriteError: The disk is full, or failed.
+    """
+    timed = isinstance(physical, TimedRobot)
+    samples = physical.run(plan.controller, plan.steps)
+    write_trial(path, robot, plan, samples, replace(header, timed=timed))
+    return read_log(path).trial
+
+
+@dataclass(frozen=True, eq=False)
+class TrialRunner:
+    """Runs the physical trials of a recovery, each with a log of the plan's name in one folder.
+
+    Attributes:
+        folder: Existing folder for the logs.
+        robot: Robot as its model describes it.
+        settings: The paper's numbers, for the record.
+        hidden: Faults of a simulated physical robot per stage, in notation, for scoring: the logs
+            contain them, and nothing else does. A stage may be missing.
+        gap: Reality gap of a simulated physical robot at every stage, as JSON, for scoring.
+    """
+
+    folder: Path
+    robot: Robot
+    settings: Settings
+    hidden: Mapping[Stage, str] = field(default_factory=dict, repr=False)
+    gap: str | None = field(default=None, repr=False)
+
+    def __call__(self, physical: PhysicalRobot, plan: TrialPlan) -> Trial:
+        """Runs a physical trial; see ``run_trial``.
+
+        Raises:
+            InputError: The plan's name is no file name, or the name of an existing log.
+            LogError: The robot stopped early, or the log failed its verification.
+            LogWriteError: The disk is full, or failed.
+        """
+        path = self.folder / f"{checked_name(plan.name)}.mcap"
+        header = TrialHeader(self.settings, hidden=self.hidden.get(plan.stage), gap=self.gap)
+        return run_trial(physical, plan, path, self.robot, header)

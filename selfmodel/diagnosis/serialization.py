@@ -1,0 +1,74 @@
+"""JSON forms of a diagnosis: of a run's ``diagnoses.json`` and of ``--json`` output.
+
+The keys are a published format, in this order. Both forms have the same values but for ``unseen``,
+the undetectable faults: ``diagnoses.json`` contains whole hypotheses, which can be parsed back, and
+``--json`` output only the faults that the best hypothesis lacks.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, get_args
+
+from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, UnsearchedFault, Verdict
+from selfmodel.faults.hypothesis import Hypothesis
+
+
+def confidence_to_dict(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Returns the verdict and the alternatives to the best hypothesis, as in ``--json`` output."""
+    values = diagnosis.to_dict()
+    extra = [_extra(hypothesis, diagnosis.best) for hypothesis in diagnosis.undetectable]
+    keys = ("verdict", "rivals", "unseen", "test", "outside", "intact_distance")
+    return {key: extra if key == "unseen" else values[key] for key in keys}
+
+
+def ranking_to_list(ranked: Sequence[Candidate]) -> list[dict[str, Any]]:
+    """Returns hypotheses with their distances as JSON values; None where a simulation diverged."""
+    return [candidate.to_dict() for candidate in ranked]
+
+
+def diagnosis_from_dict(values: Mapping[str, Any], parse: Callable[[str], Hypothesis]) -> Diagnosis:
+    """Returns the diagnosis of the values that ``Diagnosis.to_dict`` returned.
+
+    Args:
+        values: JSON values. ``outside`` and ``unseen`` are optional: earlier files lack them.
+        parse: Reads the notation of a hypothesis.
+
+    Raises:
+        ValueError: A hypothesis, a number or the verdict is invalid.
+        KeyError: A key is missing.
+        TypeError: A value has another type.
+        AttributeError: A hypothesis is not a string.
+    """
+    outside = values.get("outside")
+    return Diagnosis(
+        ranked=tuple(
+            Candidate(parse(item["hypothesis"]), _from_json(item["distance"]))
+            for item in values["ranked"]
+        ),
+        trials=int(values["trials"]),
+        intact_distance=_from_json(values["intact_distance"]),
+        indistinguishable=tuple(parse(text) for text in values["rivals"]),
+        verdict=_verdict(values["verdict"]),
+        test=str(values["test"]),
+        unsearched=outside
+        if outside is None
+        else UnsearchedFault(parse(outside["hypothesis"]), str(outside["kind"])),
+        undetectable=tuple(parse(text) for text in values.get("unseen", ())),
+    )
+
+
+def _extra(hypothesis: Hypothesis, best: Hypothesis) -> str:
+    """The faults of a hypothesis that the best one lacks, in notation."""
+    return str(Hypothesis(tuple(fault for fault in hypothesis.faults if fault not in best.faults)))
+
+
+def _from_json(distance: float | None) -> float:
+    return math.inf if distance is None else float(distance)
+
+
+def _verdict(text: str) -> Verdict:
+    verdicts: tuple[Verdict, ...] = get_args(Verdict)
+    found = next((verdict for verdict in verdicts if verdict == text), None)
+    if found is None:
+        raise ValueError(f"verdict must be one of {', '.join(verdicts)}, got {text!r}")
+    return found

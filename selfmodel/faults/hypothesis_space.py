@@ -1,0 +1,209 @@
+"""The hypotheses about one robot: notation, canonical form, genomes, candidates and neighbours."""
+
+import dataclasses
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from selfmodel.arrays import FloatArray
+from selfmodel.errors import InputError
+from selfmodel.faults import notation
+from selfmodel.faults.hypothesis import Hypothesis, canonical
+from selfmodel.faults.kind import Fault, FaultKind
+from selfmodel.faults.registry import notation_kinds
+from selfmodel.robot.anatomy import Anatomy
+
+GENE_VALUES = 4
+"""Values per gene, each in [0, 1): active from 0.5 on, kind, part, severity."""
+
+COARSE_LEVELS = 4
+"""Levels per part among the coarse candidates; the severity is fitted once the part is known."""
+
+
+@dataclass(frozen=True)
+class HypothesisSpace:
+    """Hypotheses of some fault kinds about one robot.
+
+    Every method that returns hypotheses returns them in canonical form. The genome is that of the
+    paper, section III (diagnostic EA): genes of four values, which encode whether the gene is
+    active, the kind of failure, its part and its severity; the paper leaves the severity unused.
+
+    Attributes:
+        anatomy: The robot's parts.
+        kinds: Fault kinds, in the order of the second value of a gene.
+    """
+
+    anatomy: Anatomy
+    kinds: tuple[FaultKind, ...]
+
+    @classmethod
+    def of(cls, kinds: Iterable[FaultKind], anatomy: Anatomy) -> "HypothesisSpace":
+        """Returns the search space of the kinds that apply to a robot.
+
+        The kinds that a fault degenerates to at some severities are included: ``jam-angle``
+        implies ``jam``, and ``sensor-gain`` implies ``sensor``.
+
+        Args:
+            kinds: Requested kinds; they come first, in their order.
+            anatomy: The robot's parts.
+
+        Raises:
+            InputError: No kind applies to the robot, or a kind is not searchable.
+        """
+        requested = tuple(kinds)
+        hidden = [kind.name for kind in requested if not kind.searchable]
+        if hidden:
+            raise InputError(f"no diagnosis may propose {', '.join(hidden)}: leave it out")
+        implied = [other for kind in requested for other in kind.degenerate_kinds]
+        candidates = dict.fromkeys((*requested, *implied))
+        applicable = tuple(kind for kind in candidates if kind.candidates(anatomy))
+        if not applicable:
+            raise InputError(
+                f"{', '.join(kind.name for kind in requested)} cannot affect any part of the "
+                f"robot, so there is nothing to diagnose: choose other kinds, or name its limbs "
+                f"and sensors"
+            )
+        return cls(anatomy, applicable)
+
+    def parse(self, text: str) -> Hypothesis:
+        """Returns the hypothesis of a notation; it may name ``kinds`` and all built-in kinds.
+
+        Raises:
+            InputError: See ``notation.parse``.
+        """
+        return notation.parse(text, self.anatomy, notation_kinds(self.kinds))
+
+    def canonical(self, faults: Iterable[Fault]) -> Hypothesis:
+        """Returns the canonical form of a set of faults; see ``hypothesis.canonical``."""
+        return canonical(faults, self.anatomy)
+
+    def levels(self, fault: Fault) -> tuple[float, ...]:
+        """Returns the severity levels of a fault's kind at its part."""
+        return fault.kind.levels(self.anatomy, fault.part)
+
+    def severity_bounds(self, fault: Fault) -> tuple[float, float] | None:
+        """Returns the lowest and highest severity at a fault's part; None without severities."""
+        bounds = fault.kind.severity_bounds
+        return bounds(self.anatomy, fault.part) if bounds else None
+
+    @cached_property
+    def coarse_candidates(self) -> tuple[Fault, ...]:
+        """Every kind at every part, at ``COARSE_LEVELS`` evenly spaced levels or fewer."""
+        return tuple(
+            Fault(kind, part, levels[i])
+            for kind in self.kinds
+            for part in kind.parts(self.anatomy)
+            for levels in (kind.levels(self.anatomy, part),)
+            for i in _evenly_spaced(len(levels))
+        )
+
+    def decode(self, genome: FloatArray) -> Hypothesis:
+        """Returns the hypothesis that a genome encodes.
+
+        Args:
+            genome: Values in [0, 1), ``(genes * GENE_VALUES,)``.
+        """
+        faults = []
+        for active, kind_value, part_value, severity_value in genome.reshape(-1, GENE_VALUES):
+            if active >= 0.5:
+                kind = self.kinds[int(kind_value * len(self.kinds))]
+                parts = kind.parts(self.anatomy)
+                part = parts[int(part_value * len(parts))]
+                levels = kind.levels(self.anatomy, part)
+                faults.append(Fault(kind, part, levels[int(severity_value * len(levels))]))
+        return self.canonical(faults)
+
+    def encode(self, hypothesis: Hypothesis, genes: int) -> FloatArray:
+        """Returns a genome that decodes to a hypothesis, ``(genes * GENE_VALUES,)``.
+
+        A severity between two levels is rounded to the nearest level, so a hypothesis with fitted
+        severities can seed a search.
+
+        Raises:
+            InputError: The hypothesis has more faults than genes, or a fault of another kind.
+        """
+        if len(hypothesis) > genes:
+            raise InputError(
+                f"a genome of {genes} genes has no room for the {len(hypothesis)} faults of "
+                f"{hypothesis}"
+            )
+        genome = np.full((genes, GENE_VALUES), 0.25)
+        for gene, fault in zip(genome, hypothesis.faults, strict=False):
+            if fault.kind not in self.kinds:
+                raise InputError(
+                    f"no diagnostic genome can express {fault}: the kinds searched are "
+                    f"{', '.join(kind.name for kind in self.kinds)}"
+                )
+            parts, levels = fault.kind.parts(self.anatomy), self.levels(fault)
+            nearest = int(np.argmin(np.abs(np.array(levels) - fault.severity)))
+            gene[:] = (
+                0.75,
+                _interval_middle(self.kinds.index(fault.kind), len(self.kinds)),
+                _interval_middle(parts.index(fault.part), len(parts)),
+                _interval_middle(nearest, len(levels)),
+            )
+        return genome.ravel()
+
+    def with_severity(self, hypothesis: Hypothesis, index: int, severity: float) -> Hypothesis:
+        """Returns a hypothesis with another severity of the fault at an index."""
+        faults = list(hypothesis.faults)
+        faults[index] = dataclasses.replace(faults[index], severity=severity)
+        return self.canonical(faults)
+
+    def with_one_more(self, hypothesis: Hypothesis) -> list[Hypothesis]:
+        """Returns the hypotheses with one coarse candidate added."""
+        return self._others(
+            hypothesis, [(*hypothesis.faults, fault) for fault in self.coarse_candidates]
+        )
+
+    def with_one_replaced(self, hypothesis: Hypothesis) -> list[Hypothesis]:
+        """Returns the hypotheses with a coarse candidate in the place of one fault."""
+        faults = hypothesis.faults
+        return self._others(
+            hypothesis,
+            [
+                (*faults[:i], *faults[i + 1 :], fault)
+                for i in range(len(faults))
+                for fault in self.coarse_candidates
+            ],
+        )
+
+    def with_one_less(self, hypothesis: Hypothesis) -> list[Hypothesis]:
+        """Returns the hypotheses with one fault removed, or degenerated to a simpler kind."""
+        faults = hypothesis.faults
+        fewer = [faults[:i] + faults[i + 1 :] for i in range(len(faults))]
+        simpler = [
+            (*faults[:i], dataclasses.replace(fault, severity=severity), *faults[i + 1 :])
+            for i, fault in enumerate(faults)
+            if fault.severity not in fault.kind.degenerates_alone_to
+            for severity in fault.kind.degenerate_severities
+        ]
+        return self._others(hypothesis, [*fewer, *simpler])
+
+    def neighbours(self, hypothesis: Hypothesis) -> list[Hypothesis]:
+        """Returns the hypotheses that differ by one fault: one more, one replaced, one less."""
+        return (
+            self.with_one_more(hypothesis)
+            + self.with_one_replaced(hypothesis)
+            + self.with_one_less(hypothesis)
+        )
+
+    def _others(
+        self, hypothesis: Hypothesis, changed: Iterable[Sequence[Fault]]
+    ) -> list[Hypothesis]:
+        """The distinct canonical forms, without the hypothesis itself."""
+        distinct = dict.fromkeys(self.canonical(faults) for faults in changed)
+        return [other for other in distinct if other != hypothesis]
+
+
+def _evenly_spaced(count: int) -> Iterable[int]:
+    """Indices of at most ``COARSE_LEVELS`` of some levels, with the first and the last."""
+    indices = np.linspace(0, count - 1, COARSE_LEVELS).round().astype(int).tolist()
+    return dict.fromkeys(indices)
+
+
+def _interval_middle(index: int, count: int) -> float:
+    """The middle of an index's interval of [0, 1), exact under ``int(value * count)``."""
+    return (index + 0.5) / count

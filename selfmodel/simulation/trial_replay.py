@@ -1,0 +1,88 @@
+"""Replay: a logged trial is simulated again and compared with its log."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from selfmodel.arrays import BoolArray, FloatArray
+from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.behaviour import SIGNALS, Behaviour, Signal
+from selfmodel.trials.trial import Trial
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """Comparison of a logged trial with its simulation, on the observed numbers.
+
+    Attributes:
+        simulated: Simulated signals, ``(steps, width)`` each.
+        identical: Whether all observed numbers are bit-identical to the simulated ones.
+        first_divergence_step: First step at which a signal differs by more than the tolerance;
+            None without such a step.
+        errors: Root mean square error of each signal over its columns, ``(steps,)`` in the signal's
+            unit; NaN where nothing was observed.
+        diverged: Whether the simulation diverged; its signals are then invalid.
+    """
+
+    simulated: Behaviour
+    identical: bool
+    first_divergence_step: int | None
+    errors: Mapping[Signal, FloatArray]
+    diverged: bool
+
+    def rms(self, signal: Signal, steps: slice = slice(None)) -> float:
+        """Returns the root mean square error of a signal over some steps; NaN if not observed."""
+        squares = self.errors[signal][steps] ** 2
+        observed = squares[~np.isnan(squares)]
+        return float(np.sqrt(observed.mean())) if len(observed) else np.nan
+
+
+def replay(
+    trial: Trial, hypothesis: Hypothesis, simulator: Simulator, tolerance: float = 0.0
+) -> Replay:
+    """Simulates a logged trial under a hypothesis and compares the simulation with the log.
+
+    Args:
+        trial: The logged trial.
+        hypothesis: Assumed faults of the robot.
+        simulator: Simulator of the trial's robot.
+        tolerance: Largest difference of two equal numbers, in the unit of the signal; a log of
+            another MuJoCo version requires a tolerance above 0.
+    """
+    logged = trial.behaviour
+    outcome = simulator.run([(hypothesis, trial.plan.controller)], logged.steps, SIGNALS)
+    batch = outcome.behaviour
+    simulated = Behaviour(batch.names, batch.time, {signal: batch[signal][0] for signal in SIGNALS})
+    differs = np.zeros(logged.steps, dtype=bool)
+    identical = True
+    errors: dict[Signal, FloatArray] = {}
+    for signal in SIGNALS:
+        recorded, predicted = logged[signal], simulated[signal]
+        observed = ~np.isnan(recorded)
+        with np.errstate(invalid="ignore", over="ignore"):  # of a simulation that diverged
+            difference = np.where(observed, predicted - recorded, 0.0)
+            differs |= (~(np.abs(difference) <= tolerance) & observed).any(axis=1)
+            errors[signal] = _rms_of_rows(difference, observed)
+        identical &= bool(np.all((_bits(predicted) == _bits(recorded)) | ~observed))
+    steps = np.flatnonzero(differs)
+    return Replay(
+        simulated=simulated,
+        identical=identical,
+        first_divergence_step=int(steps[0]) if len(steps) else None,
+        errors=errors,
+        diverged=bool(outcome.diverged[0]),
+    )
+
+
+def _bits(values: FloatArray) -> FloatArray:
+    return np.ascontiguousarray(values).view(np.int64)
+
+
+def _rms_of_rows(difference: FloatArray, observed: BoolArray) -> FloatArray:
+    counts = observed.sum(axis=1)
+    total = np.sum(np.square(difference), axis=1)
+    mean: FloatArray = np.full(len(total), np.nan)
+    np.divide(total, counts, out=mean, where=counts > 0)
+    return np.sqrt(mean)

@@ -1,0 +1,106 @@
+"""Scales of signals, side by side: one table per purpose, in each signal's unit.
+
+The tables differ on purpose; the comment before each gives the reason. The units are those of
+``behaviour.SIGNALS``; an orientation is compared as a rotation angle, rad, or as directions.
+"""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from selfmodel.trials.behaviour import Signal
+
+# About three times the scales of calibration: the model of a damaged robot is judged, and a
+# hypothesis that is right but for the reality gap must not count as wrong.
+PREDICTION_ERROR_SCALES: Mapping[Signal, float] = MappingProxyType(
+    {
+        "joint_positions": 0.1,
+        "joint_velocities": 3.0,
+        "base_position": 0.03,
+        "base_orientation": 0.1,
+        "base_linear_velocity": 0.3,
+        "base_angular_velocity": 1.0,
+        "sensors": 0.3,
+        "commands": 0.05,
+    }
+)
+"""Error of a short prediction that counts as large (``segment-prediction``).
+
+The scale of commands is for the paper's command range, and is multiplied by a motor's own range
+over the paper's."""
+
+# Smaller than the scales of diagnosis: a healthy robot differs from its model by parameters only,
+# and the fit is to find small differences.
+CALIBRATION_ERROR_SCALES: Mapping[Signal, float] = MappingProxyType(
+    {
+        "joint_positions": 0.03,
+        "joint_velocities": 1.0,
+        "base_position": 0.01,
+        "base_orientation": 0.03,
+        "base_linear_velocity": 0.1,
+        "base_angular_velocity": 0.3,
+    }
+)
+"""Error of a short prediction above which calibration counts it linearly, below quadratically.
+
+An impact that is predicted a step early or late has a large error and contains no information
+about masses."""
+
+# As large as the scales of diagnosis or larger, because two predictions are compared over 100 steps
+# instead of 12: a difference must be visible beside what the reality gap makes of it.
+DISAGREEMENT_SCALES: Mapping[Signal, float] = MappingProxyType(
+    {
+        "sensors": 1.0,
+        "joint_positions": 0.3,
+        "base_position": 0.1,
+        "base_orientation": 0.3,
+        "base_linear_velocity": 0.3,
+        "base_angular_velocity": 1.0,
+    }
+)
+"""Difference of two predictions that counts as full disagreement.
+
+Larger differences count no more, so that a single outlier does not decide."""
+
+# Lower bounds of a spread measured in the trial, and not scales of errors: a column that hardly
+# moves in the trial must not make a small difference infinite.
+SERIES_SPREAD_FLOORS: Mapping[Signal, float] = MappingProxyType(
+    {
+        "sensors": 0.1,
+        "joint_positions": 0.05,
+        "base_orientation": 0.1,
+        "base_linear_velocity": 0.1,
+        "base_position": 0.05,
+    }
+)
+"""Lower bound of the standard deviation that scales a column (``sensor-series``)."""
+
+# Equal to the floors of the series where both have the signal. The base's position is left out: it
+# grows over the trial, so members of an ensemble differ in it by their history.
+ENSEMBLE_DEVIATION_FLOORS: Mapping[Signal, float] = MappingProxyType(
+    {
+        "sensors": 0.1,
+        "joint_positions": 0.05,
+        "base_orientation": 0.1,
+        "base_linear_velocity": 0.1,
+    }
+)
+"""Standard deviation added in squares to that of the members (``noisy-transfer``).
+
+It represents variation that no member is drawn with, such as measurement noise."""
+
+# Amplitudes of the signals of a walking robot, which measurement noise is a fraction of; not errors
+# of predictions.
+MEASUREMENT_FULL_SCALES: Mapping[Signal, float] = MappingProxyType(
+    {
+        "joint_velocities": 2.0,
+        "joint_efforts": 5.0,
+        "base_position": 0.1,
+        "base_orientation": 0.1,
+        "base_linear_velocity": 0.5,
+        "base_angular_velocity": 0.5,
+    }
+)
+"""Full scale of each logged signal; the level of measurement noise is a fraction of it.
+
+The full scale of a joint position is half the range of its hinge. Commands have no noise: they are
+known."""

@@ -1,0 +1,136 @@
+"""The diagnostic search: rank of the truth, of diverged models and of ties, and refusals."""
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from selfmodel.comparators import FORWARD_DISPLACEMENT
+from selfmodel.controllers.controller import Controller
+from selfmodel.diagnosis.diagnose import DiagnosticSearch
+from selfmodel.errors import InputError
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.faults.notation import parse
+from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.recovery.repair import RepairSearch
+from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.simulation.requests import ClosedLoop
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.trial import Trial, TrialPlan
+from tests.helpers.comparators import Prepared
+from tests.helpers.drivers import random_controllers
+from tests.helpers.hostile import exploding
+from tests.helpers.memory import in_memory
+
+SMALL = dataclasses.replace(Settings().scaled(20), generations=5, steps=200)
+
+
+def logged(robot: Robot, truth: str, controller: Controller, steps: int = 300) -> Trial:
+    """A trial of a damaged robot."""
+    physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
+    return in_memory(robot)(physical, TrialPlan(truth, "after", controller, steps, 0))
+
+
+@pytest.mark.parametrize(
+    "truth",
+    [
+        "break:front_left_knee",
+        pytest.param("jam:back_right_shoulder", marks=pytest.mark.search),
+        pytest.param("intact", marks=pytest.mark.search),
+    ],
+)
+def test_the_truth_is_at_distance_zero_and_ranks_first(quadruped: Robot, truth: str):
+    trials = [logged(quadruped, truth, c) for c in random_controllers(quadruped, 2)]
+    diagnose = DiagnosticSearch(Simulator(quadruped, 2), FORWARD_DISPLACEMENT, Settings())
+    seeds = [parse(truth, quadruped.anatomy), parse("jam:front_right_knee", quadruped.anatomy)]
+    diagnosis = diagnose(trials, seeds, np.random.default_rng(0), lambda _: None)
+
+    assert str(diagnosis.best) == truth
+    assert diagnosis.ranked[0].distance == 0
+    distances = [candidate.distance for candidate in diagnosis.ranked]
+    assert len(distances) == 10
+    assert distances == sorted(distances)
+
+
+def test_a_diverging_hypothesis_is_infinitely_far_and_a_diverging_gait_is_worst(quadruped: Robot):
+    simulator = Simulator(quadruped, 2)
+    bad = exploding(simulator, "jam:front_left_knee")
+    (controller,) = random_controllers(quadruped, 1)
+    trial = logged(quadruped, "break:front_left_knee", controller)
+    diagnose = DiagnosticSearch(simulator, FORWARD_DISPLACEMENT, SMALL)
+
+    distances = diagnose.evidence.distances([bad, INTACT], [trial])
+    assert distances[0] == np.inf
+    assert np.isfinite(distances[1])
+    ways = RepairSearch(simulator, SMALL)._simulate([(bad, controller), (INTACT, controller)])
+    assert ways[0] == -np.inf
+    assert np.isfinite(ways[1])
+    assert simulator.stats.diverged == 2
+
+
+def test_the_distance_to_several_trials_is_the_sum_of_the_distances(quadruped: Robot):
+    trials = [
+        logged(quadruped, "break:front_left_knee", controller)
+        for controller in random_controllers(quadruped, 3)
+    ]
+    trials = [dataclasses.replace(t, path=str(i)) for i, t in enumerate(trials)]
+    hypotheses = [INTACT, parse("jam:back_left_knee", quadruped.anatomy)]
+    diagnose = DiagnosticSearch(Simulator(quadruped, 2), FORWARD_DISPLACEMENT, SMALL)
+    alone = [diagnose.evidence.distances(hypotheses, [trial]) for trial in trials]
+
+    assert np.all(np.array(alone) > 0)
+    np.testing.assert_allclose(
+        diagnose.evidence.distances(hypotheses, trials), sum(alone), rtol=1e-12
+    )
+
+
+class Indifferent:
+    """A comparator to which every hypothesis is as good as any other, or that breaks the rules."""
+
+    name = "indifferent"
+
+    def __init__(self, distances: Callable[[int], object] = np.zeros) -> None:
+        self._distances = distances
+
+    def prepare(self, _trial: Trial) -> Prepared:
+        """Prepares nothing of the trial."""
+        return Prepared(
+            ClosedLoop(record=("base_position",)),
+            lambda simulated: self._distances(len(simulated["base_position"])),
+        )
+
+
+def test_of_hypotheses_that_explain_as_well_the_one_with_fewer_faults_ranks_first(
+    quadruped: Robot,
+):
+    (controller,) = random_controllers(quadruped, 1)
+    trial = logged(quadruped, "break:front_left_knee", controller)
+    diagnose = DiagnosticSearch(Simulator(quadruped, 2), Indifferent(), SMALL)
+    ranked = diagnose([trial], [], np.random.default_rng(0), lambda _: None).ranked
+    faults = [len(candidate.hypothesis) for candidate in ranked]
+
+    assert faults == sorted(faults)
+    assert faults[0] < faults[-1]
+
+
+@pytest.mark.parametrize(
+    ("distances", "said"),
+    [
+        (lambda _: 0.0, r"gave \(\) distances for 2 simulations"),
+        (lambda n: np.zeros((n, 1)), r"gave \(2, 1\) distances for 2"),
+        (lambda n: np.full(n, -1.0), "gave a distance that is not a number of at least 0"),
+        (lambda n: np.full(n, np.nan), "gave a distance that is not a number of at least 0"),
+    ],
+)
+def test_a_comparator_that_breaks_its_contract_is_named(
+    distances: Callable[[int], object], said: str, quadruped: Robot
+):
+    (controller,) = random_controllers(quadruped, 1)
+    trial = logged(quadruped, "intact", controller)
+    diagnose = DiagnosticSearch(Simulator(quadruped, 2), Indifferent(distances), SMALL)
+    both = [INTACT, parse("jam:back_left_knee", quadruped.anatomy)]
+
+    with pytest.raises(InputError, match=f"the comparator 'indifferent' {said}"):
+        diagnose.evidence.distances(both, [trial])

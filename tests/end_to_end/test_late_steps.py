@@ -1,0 +1,177 @@
+"""Promises about steps that were late or lost: nothing is predicted or averaged across one."""
+
+from collections.abc import Collection
+from dataclasses import replace
+from pathlib import Path
+
+import dm_env
+import numpy as np
+import pytest
+
+from selfmodel.comparators.segment_prediction import SEGMENT_PREDICTION, SEGMENT_PREDICTION_ONBOARD
+from selfmodel.controllers.playback import played_back
+from selfmodel.errors import InputError
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.faults.notation import parse
+from selfmodel.logs import read_log
+from selfmodel.logs.records import TrialHeader
+from selfmodel.logs.robots import robot_of
+from selfmodel.logs.writer import write_trial
+from selfmodel.physical.environment_robot import EnvironmentRobot
+from selfmodel.settings import Settings
+from selfmodel.simulation.calibration import EXACT_ERROR, prediction_error
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.tasks import ROBOTS, load
+from selfmodel.tasks.walking import motion_capture
+from selfmodel.trials.behaviour import SIGNALS, Behaviour, collect
+from selfmodel.trials.state_estimation import estimated_states
+from selfmodel.trials.trial import Trial, TrialPlan
+from tests.helpers.drivers import random_motion
+
+QUADRUPED = ROBOTS["quadruped"].robot()
+NAMES = QUADRUPED.anatomy.names
+STEPS, LATE = 250, (70, 71, 160)
+
+
+class Stuttering(dm_env.Environment):
+    """A robot whose targets stand three times as long before some steps.
+
+    Args:
+        env: The robot as it should be.
+        silent: Steps after which nothing is observed.
+    """
+
+    def __init__(self, env: dm_env.Environment, silent: Collection[int] = ()) -> None:
+        self._env, self._steps, self._silent = env, 0, silent
+
+    def reset(self) -> dm_env.TimeStep:
+        """Starts again."""
+        self._steps = 0
+        return self._env.reset()
+
+    def step(self, action: np.ndarray) -> dm_env.TimeStep:
+        """Takes one step, or three."""
+        self._steps += 1
+        for _ in range(2 if self._steps in LATE else 0):
+            self._env.step(action)
+        told = self._env.step(action)
+        if self._steps in self._silent:
+            raise TimeoutError
+        return told
+
+    def action_spec(self) -> dm_env.specs.Array:
+        """Returns the robot's."""
+        return self._env.action_spec()
+
+    def observation_spec(self) -> dict[str, dm_env.specs.Array]:
+        """Returns the robot's."""
+        return self._env.observation_spec()
+
+
+@pytest.fixture(scope="module")
+def trial() -> Trial:
+    """A trial of a quadruped that stutters."""
+    env = load("quadruped", "walk")
+    physical = EnvironmentRobot(Stuttering(env), QUADRUPED, observe=motion_capture(env))
+    driver = played_back(NAMES.motors, random_motion(QUADRUPED, STEPS))
+    behaviour = collect(NAMES, physical.run(driver, STEPS))
+    return Trial(TrialPlan("00", "after", driver, STEPS, 0), "quadruped", behaviour, "nowhere.mcap")
+
+
+def without_marks(trial: Trial) -> Trial:
+    return replace(trial, behaviour=replace(trial.behaviour, late=None))
+
+
+def test_a_command_is_steady_unless_the_step_after_it_was_late(trial: Trial):
+    behaviour = trial.behaviour
+    stood_longer = np.flatnonzero(np.isnan(behaviour.steady_commands).all(axis=1))
+    steady = ~np.isin(np.arange(STEPS), stood_longer)
+
+    assert stood_longer.tolist() == [k - 1 for k in LATE]
+    assert np.array_equal(behaviour.steady_commands[steady], behaviour["commands"][steady])
+    unmarked = without_marks(trial).behaviour
+    assert unmarked.steady_commands is unmarked["commands"]
+
+
+@pytest.mark.parametrize("comparator", [SEGMENT_PREDICTION, SEGMENT_PREDICTION_ONBOARD])
+def test_what_moves_as_the_model_says_is_predicted_although_steps_were_late(
+    trial: Trial, comparator: object
+):
+    def distance(judged: Trial) -> float:
+        asked = comparator.prepare(judged).request
+        outcome = Simulator(QUADRUPED, 1).predict([INTACT], asked).behaviour
+        return float(comparator.prepare(judged).distances(outcome)[0])
+
+    if comparator is SEGMENT_PREDICTION:
+        assert distance(trial) < 1e-20
+    assert distance(trial) < distance(without_marks(trial))
+
+
+def test_a_log_with_late_and_lost_steps_fits_the_robot_as_it_was_and_no_fault(tmp_path: Path):
+    env = load("quadruped", "walk")
+    physical = EnvironmentRobot(Stuttering(env, {90}), QUADRUPED, observe=motion_capture(env))
+    driver = played_back(NAMES.motors, random_motion(QUADRUPED, STEPS))
+    plan = TrialPlan("00", "after", driver, STEPS, 0)
+    path = tmp_path / "trial.mcap"
+    write_trial(
+        path, QUADRUPED, plan, physical.run(driver, STEPS), TrialHeader(Settings(), timed=True)
+    )
+    log = read_log(path)
+    self_model = robot_of(log)
+    texts = ("intact", "break:front_left_knee", "jam:back_right_shoulder")
+    hypotheses = [parse(text, self_model.anatomy) for text in texts]
+
+    asked = SEGMENT_PREDICTION.prepare(log.trial).request
+    predicted = Simulator(self_model, 1).predict(hypotheses, asked).behaviour
+    intact, *others = SEGMENT_PREDICTION.prepare(log.trial).distances(predicted)
+    assert log.timing is not None
+    assert np.flatnonzero(log.timing.missing).tolist() == [90]
+    assert np.flatnonzero(log.timing.late).tolist() == list(LATE)
+    assert intact < 1e-12
+    assert min(others) > 0.1
+
+
+def test_a_model_that_is_exact_predicts_it_exactly_for_calibration_too(trial: Trial):
+    assert prediction_error(QUADRUPED, [trial], 1) < EXACT_ERROR
+    assert prediction_error(QUADRUPED, [without_marks(trial)], 1) > EXACT_ERROR
+
+
+def noisy(behaviour: Behaviour) -> Behaviour:
+    noise = np.random.default_rng(0).normal(0, 3e-3, behaviour["base_position"].shape)
+    position = behaviour["base_position"] + noise
+    return replace(behaviour, signals={**behaviour.signals, "base_position": position})
+
+
+def test_positions_are_not_averaged_across_a_step_that_was_late(trial: Trial):
+    run = noisy(trial.behaviour)
+    marked = estimated_states(run)["base_position"]
+    unmarked = estimated_states(replace(run, late=None))["base_position"]
+    # Six steps to either side: from the sixth row before the late one to the fifth after it.
+    across = np.zeros(STEPS, dtype=bool)
+    for k in LATE:
+        across[k - 6 : k + 6] = True
+
+    assert not np.array_equal(marked, run["base_position"])
+    assert np.isnan(marked[across]).all()
+    np.testing.assert_allclose(marked[~across], unmarked[~across], atol=1e-12)
+
+
+def test_a_trial_of_nothing_but_late_steps_is_refused(trial: Trial):
+    late = np.ones(STEPS, dtype=bool)
+    hurried = replace(trial, behaviour=replace(trial.behaviour, late=late))
+    with pytest.raises(InputError, match="needs 4 or more segments of 12 steps in which none was"):
+        SEGMENT_PREDICTION.prepare(hurried)
+
+
+def test_late_fits_the_steps(trial: Trial):
+    with pytest.raises(ValueError, match=r"late must be \(steps,\) = \(250,\), got \(3,\)"):
+        Behaviour(
+            NAMES,
+            trial.behaviour.time,
+            {signal: trial.behaviour[signal] for signal in SIGNALS},
+            np.zeros(3, dtype=bool),
+        )
+
+
+def test_the_marks_are_those_of_the_environment_that_stuttered(trial: Trial):
+    assert np.flatnonzero(trial.behaviour.late).tolist() == list(LATE)

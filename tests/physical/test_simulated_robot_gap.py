@@ -1,0 +1,278 @@
+"""Promises of trials across a gap: their noise, their delay, and what their logs hide."""
+
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from selfmodel.controllers.playback import played_back
+from selfmodel.faults.build import build
+from selfmodel.faults.notation import parse
+from selfmodel.logs import LogError, read_gap, read_log, read_truth
+from selfmodel.logs.records import TrialHeader
+from selfmodel.logs.writer import write_trial
+from selfmodel.physical.measurement_noise import NoisyMeasurement
+from selfmodel.physical.reality_gap import RealityGap, draw_gap
+from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.behaviour import SIGNALS, Behaviour, collect
+from selfmodel.trials.signal_scales import MEASUREMENT_FULL_SCALES
+from selfmodel.trials.trial import TrialPlan
+from tests.helpers.command import SMALL, selfmodel
+from tests.helpers.drivers import random_controllers, random_motion
+
+STEPS = 60
+
+
+def drawn(robot: Robot, level: float, seed: int = 0) -> RealityGap:
+    return draw_gap(robot, level, np.random.default_rng(seed))
+
+
+def ran(physical: SimulatedRobot, robot: Robot, steps: int = STEPS) -> Behaviour:
+    (controller,) = random_controllers(robot, 1)
+    return collect(robot.anatomy.names, physical.run(controller, steps))
+
+
+def same(one: Behaviour, other: Behaviour) -> bool:
+    return all(one[signal].tobytes() == other[signal].tobytes() for signal in SIGNALS)
+
+
+@pytest.mark.parametrize("text", ["intact", "break:{joint}", "jam:{joint}=0.2"])
+def test_a_trial_at_gap_0_is_the_simulators_to_the_bit(robot: Robot, text: str):
+    truth = parse(text.format(joint=robot.anatomy.joints[0].name), robot.anatomy)
+    (controller,) = random_controllers(robot, 1)
+    simulated = Simulator(robot, 1).run([(truth, controller)], STEPS, SIGNALS).behaviour
+    for gap in (None, drawn(robot, 0.0)):
+        found = ran(SimulatedRobot(robot, truth, gap), robot)
+
+        assert all(found[s].tobytes() == simulated[s][0].tobytes() for s in SIGNALS)
+
+
+def test_the_same_seed_gives_the_same_trials_and_no_two_of_one_robot(robot: Robot):
+    truth = parse(f"break:{robot.anatomy.joints[0].name}", robot.anatomy)
+    gap = drawn(robot, 0.1)
+    first, again = (SimulatedRobot(robot, truth, gap) for _ in range(2))
+    trials = [ran(first, robot) for _ in range(2)]
+
+    assert same(trials[0], ran(again, robot))
+    assert same(trials[1], ran(again, robot))
+    assert not same(trials[0], trials[1])
+    assert not same(trials[0], ran(SimulatedRobot(robot, truth, gap, stream=1), robot))
+
+
+@pytest.mark.parametrize("delay", [0, 1, 2])
+def test_a_command_reaches_the_motors_so_many_steps_later(quadruped: Robot, delay: int):
+    """A late robot does what a prompt one does whose commands come later, and zeros at first."""
+    gap = dataclasses.replace(drawn(quadruped, 0.0), level=1e-12)
+    motion = random_motion(quadruped, STEPS)
+    later = np.concatenate([np.zeros((delay, motion.shape[1])), motion])[:STEPS]
+
+    def trial(commands: np.ndarray, late: int) -> Behaviour:
+        playback = played_back(quadruped.anatomy.motors, commands)
+        physical = SimulatedRobot(quadruped, gap=dataclasses.replace(gap, delay=late))
+        return collect(quadruped.anatomy.names, physical.run(playback, STEPS))
+
+    late, prompt = trial(motion, delay), trial(later, 0)
+    undelayed = trial(motion, 0)
+
+    np.testing.assert_array_equal(late["commands"], motion)
+    np.testing.assert_allclose(late["joint_positions"], prompt["joint_positions"], atol=1e-9)
+    apart = np.abs(late["joint_positions"] - undelayed["joint_positions"]).max()
+    assert (apart > 0.01) == (delay > 0)
+
+
+def test_readings_have_the_noise_of_the_level(quadruped: Robot):
+    level, steps = 0.1, 4000
+    noise = NoisyMeasurement(
+        level,
+        quadruped.anatomy,
+        build(quadruped, parse("intact", quadruped.anatomy)),
+        np.random.default_rng(0),
+    )
+    rows = np.tile([1.0, 0, 1, 0, 0.3, -0.3, 0, 0], (steps, 1))
+    clean = rows.copy()
+    for row in rows:
+        noise.corrupt_readings(row)
+    error = rows - clean
+
+    assert set(np.unique(rows[:, :4])) == {0.0, 1.0}
+    np.testing.assert_allclose(np.abs(error[:, :4]).mean(axis=0), level / 2, atol=0.02)
+    np.testing.assert_allclose(error[:, 4:].std(axis=0), level, rtol=0.06)
+    np.testing.assert_allclose(error[:, 4:].mean(axis=0), 0, atol=5 * level / np.sqrt(steps))
+
+
+def test_logged_signals_have_noise_of_their_full_scale(quadruped: Robot):
+    level, draws = 0.1, 4000
+    noise = NoisyMeasurement(
+        level,
+        quadruped.anatomy,
+        build(quadruped, parse("intact", quadruped.anatomy)),
+        np.random.default_rng(0),
+    )
+    half = quadruped.anatomy.sensors[-1].half_range
+    for signal in SIGNALS:
+        clean = np.zeros(quadruped.anatomy.names.width(signal))
+        if signal == "base_orientation":
+            clean = Rotation.from_euler("xyz", [0.3, -0.2, 1.0]).as_quat(scalar_first=True)
+        rows = np.array([noise.measure(signal, clean) for _ in range(draws)])
+        if signal in ("sensors", "commands"):
+            np.testing.assert_array_equal(rows, np.tile(clean, (draws, 1)))
+            continue
+        if signal == "base_orientation":
+            np.testing.assert_allclose(np.linalg.norm(rows, axis=1), 1, rtol=1e-12)
+            turns = Rotation.from_quat(clean, scalar_first=True).inv() * Rotation.from_quat(
+                rows, scalar_first=True
+            )
+            error = turns.as_rotvec()
+        else:
+            error = rows - clean
+        scale = half if signal == "joint_positions" else MEASUREMENT_FULL_SCALES[signal]
+        np.testing.assert_allclose(error.std(axis=0), level * scale, rtol=0.06)
+
+
+def test_a_noisy_sensor_has_another_noise_in_every_trial(quadruped: Robot):
+    """Three trials are to show what it does three times, not one draw three times."""
+    truth = parse("sensor:back_left_angle=noise0.3", quadruped.anatomy)
+    driver = played_back(quadruped.anatomy.motors, np.zeros((400, len(quadruped.anatomy.motors))))
+    column = quadruped.anatomy.names.sensors.index("back_left_angle")
+
+    def heard(level: float) -> list[np.ndarray]:
+        physical = SimulatedRobot(quadruped, truth, drawn(quadruped, level))
+        runs = [collect(quadruped.anatomy.names, physical.run(driver, 400)) for _ in range(2)]
+        return [run["sensors"][200:, column] for run in runs]
+
+    assert abs(np.corrcoef(heard(0.05))[0, 1]) < 0.3
+    assert np.array_equal(*heard(0.0))
+
+
+def test_the_controllers_angle_and_the_logged_one_are_two_instruments(quadruped: Robot):
+    trial = ran(SimulatedRobot(quadruped, gap=drawn(quadruped, 0.1)), quadruped, 400)
+    sensor = quadruped.anatomy.sensor("back_left_angle")
+    column = quadruped.anatomy.hinges.index(sensor.hinge)
+    received = trial["sensors"][:, quadruped.anatomy.sensors.index(sensor)]
+    difference = received - trial["joint_positions"][:, column] / sensor.half_range
+
+    np.testing.assert_allclose(difference.std(), 0.1 * np.sqrt(2), rtol=0.2)
+
+
+@pytest.mark.parametrize(
+    ("text", "dead"),
+    [
+        ("sensor:back_left_angle", {"back_left_angle"}),
+        ("sensor:back_left_touch", {"back_left_touch"}),
+        ("break:front_left_shoulder", {"front_left_touch", "front_left_angle"}),
+        ("jam:front_left_shoulder", set()),
+        ("jam:front_left_shoulder=0.2", set()),
+    ],
+)
+def test_a_dead_sensor_reads_exactly_0_and_any_other_has_noise(
+    quadruped: Robot, text: str, dead: set[str]
+):
+    gap = drawn(quadruped, 0.2)
+    truth = parse(text, quadruped.anatomy)
+    trial = ran(SimulatedRobot(quadruped, truth, gap), quadruped, 200)
+    for sensor, column in zip(quadruped.anatomy.sensors, trial["sensors"].T, strict=True):
+        if sensor.name in dead:
+            assert not column.any()
+        elif sensor.kind == "angle":
+            assert np.abs(np.diff(column)).min() > 0
+
+
+def test_the_log_hides_the_gap_where_only_scoring_looks(quadruped: Robot, tmp_path: Path):
+    gap = drawn(quadruped, 0.1)
+    (controller,) = random_controllers(quadruped, 1)
+    plan = TrialPlan("trial", "single", controller, STEPS, 0)
+    samples = list(SimulatedRobot(quadruped, gap=gap).run(controller, STEPS))
+    texts = {
+        "told": json.dumps(gap.as_dict()),
+        "other": "{}",
+        "not": None,
+        "bad": "[1",
+        "list": "[]",
+    }
+    for name, text in texts.items():
+        write_trial(
+            tmp_path / f"{name}.mcap",
+            quadruped,
+            plan,
+            samples,
+            TrialHeader(Settings(), hidden="intact", gap=text),
+        )
+    assert read_gap(tmp_path / "told.mcap") == gap.as_dict()
+    assert read_gap(tmp_path / "other.mcap") == {}
+    assert read_gap(tmp_path / "not.mcap") is None
+    for name in ("bad", "list"):
+        with pytest.raises(LogError, match="its gap"):
+            read_gap(tmp_path / f"{name}.mcap")
+    for name in texts:
+        path = tmp_path / f"{name}.mcap"
+        assert read_truth(path) == "intact"
+        log = read_log(path)
+        assert same(log.trial.behaviour, collect(quadruped.anatomy.names, samples))
+        assert "delay" not in repr(log)
+
+
+@pytest.mark.process
+def test_a_trial_across_a_gap_from_the_command_line(tmp_path: Path):
+    def trial(name: str, *options: str) -> dict:
+        done = selfmodel(
+            "trial", "quadruped", "--damage", "break:front_left_knee", "--out", name, *options,
+            "--json", cwd=tmp_path,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        return json.loads(done.stdout)
+
+    plain, zero = trial("plain.mcap"), trial("zero.mcap", "--gap", "0")
+    wide, both = (
+        trial("wide.mcap", "--gap", "0.1"),
+        trial("both.mcap", "--gap", "0.1", "--structure"),
+    )
+
+    assert (tmp_path / "plain.mcap").read_bytes() == (tmp_path / "zero.mcap").read_bytes()
+    assert read_gap(tmp_path / "plain.mcap") is None
+    assert (plain["gap"], plain["structure"]) == (zero["gap"], zero["structure"]) == (0, False)
+    hidden = [read_gap(tmp_path / name) for name in ("wide.mcap", "both.mcap")]
+    assert hidden[0] | {"structure": 1} == hidden[1] | {"structure": 1}
+    assert hidden[0]["level"] == wide["gap"] == both["gap"] == 0.1
+    assert hidden[0]["structure"] is None
+    assert both["structure"]
+    assert hidden[1]["structure"]["saturation"] == 0.6
+    assert len({told["displacement"] for told in (plain, wide, both)}) == 3
+
+
+@pytest.mark.parametrize("command", ["trial", "recover"])
+@pytest.mark.parametrize("level", ["0.6", "-0.1", "nan"])
+def test_a_level_out_of_range_is_refused_by_the_command_line(
+    command: str, level: str, tmp_path: Path
+):
+    done = selfmodel(
+        command, "quadruped", "--damage", "intact", "--gap", level, "--out", "x.mcap", cwd=tmp_path
+    )
+
+    assert done.returncode == 2
+    assert "level from 0 (none) to 0.5" in done.stderr
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.search
+def test_a_recovery_across_a_gap_is_of_one_robot_whose_trials_all_differ(tmp_path: Path):
+    done = selfmodel(
+        "recover", "quadruped", "--damage", "intact", *SMALL, "--trials", "1", "--gap", "0.1",
+        "--structure", "--out", "run", "--json", cwd=tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    paths = [tmp_path / trial["log"] for trial in told["trials"]]
+    hidden = [read_gap(path) for path in paths]
+
+    assert (told["gap"], told["structure"]) == (0.1, True)
+    assert len(paths) == 3
+    assert hidden[0] == hidden[1] == hidden[2]
+    assert hidden[0]["level"] == 0.1
+    starts = {read_log(path).trial.behaviour["joint_positions"][0].tobytes() for path in paths}
+    assert len(starts) == 3

@@ -1,0 +1,393 @@
+"""Promises of the copy that a robot is made of: it moves as the user's file says."""
+
+import warnings
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given, strategies as st
+
+from selfmodel.errors import InputError
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.robot.actuator_ranges import command_ranges
+from selfmodel.robot.mjcf.adaptation import adapt
+from selfmodel.robot.mjcf.load import load_mjcf
+from selfmodel.robot.mjcf.settings import MjcfSettings, parse_setting, read_settings
+from selfmodel.simulation.simulator import Simulator
+from tests.helpers.drivers import random_controllers
+from tests.robot.mjcf.awkward import GROUND, LEGS, MOTORS, TORSO, mjcf
+from tests.robot.mjcf.samples import SAMPLES
+
+SPRUNG = """<tendon><spatial name="band" stiffness="40"><site site="a"/><site site="b"/></spatial>
+</tendon>"""
+SPRUNG_LEGS = LEGS.replace("</body>", '<site name="a" pos="0 .02 -.2"/></body>', 1)
+
+
+def theirs(path: Path) -> mujoco.MjModel:
+    """What MuJoCo makes of the user's own file."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return mujoco.MjModel.from_xml_path(str(path))
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "robot.xml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def moved(model: mujoco.MjModel, qpos: np.ndarray, steps: int = 60) -> mujoco.MjData:
+    """Where a model goes from a pose, with motors that swing."""
+    data = mujoco.MjData(model)
+    data.qpos = qpos
+    for step in range(steps):
+        data.ctrl = 0.5 * np.sin(0.2 * step + np.arange(model.nu))
+        mujoco.mj_step(model, data)
+    return data
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_a_robot_moves_as_its_file_says(name: str):
+    model, robot = theirs(SAMPLES[name]), load_mjcf(SAMPLES[name])
+
+    if not model.nkey:
+        before, after = (moved(m, m.qpos0) for m in (model, robot.model))
+        if "cheetah" in name:  # its masses are scaled to a sum, which is written out
+            assert np.allclose(before.qpos, after.qpos, atol=1e-6)
+        else:
+            assert np.array_equal(before.qpos, after.qpos)
+    assert robot.anatomy.joints
+    assert {s.hinge for s in robot.anatomy.sensors if s.kind == "angle"} >= {
+        hinge
+        for joint in robot.anatomy.joints
+        for hinge in joint.hinges
+        if any(motor in robot.anatomy.motors for motor in joint.motors) and len(joint.hinges) == 1
+    }
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_what_is_ready_is_left_as_it_is(name: str, tmp_path: Path):
+    first = load_mjcf(SAMPLES[name])
+    again = load_mjcf(written(tmp_path, first.mjcf))
+
+    assert again.anatomy == first.anatomy
+    one, other = (moved(robot.model, robot.model.qpos0) for robot in (first, again))
+    assert np.array_equal(one.qpos, other.qpos)
+
+
+TINY = 1e-300
+"""Below it, MuJoCo calls a number too large to read."""
+
+
+def angles(most: float) -> st.SearchStrategy[float]:
+    return st.floats(-most, most).filter(lambda angle: angle == 0 or abs(angle) > TINY)
+
+
+@given(
+    height=st.floats(2, 3),  # in the air: contacts are as soft as the reference pose makes them
+    turn=st.tuples(*[angles(1)] * 4).filter(lambda q: np.linalg.norm(q) > 0.1),
+    hips=st.tuples(angles(0.6), angles(0.6)),
+    unit=st.sampled_from(["", '<compiler angle="radian"/>']),
+)
+def test_a_robot_starts_and_goes_on_as_from_its_keyframe(
+    tmp_path_factory: pytest.TempPathFactory,
+    height: float,
+    turn: tuple[float, ...],
+    hips: tuple[float, float],
+    unit: str,
+):
+    pose = " ".join(map(repr, (0.1, -0.2, height, *turn, *hips)))
+    legs = SPRUNG_LEGS.replace('range="-40 40"', 'pos="0 0 .02" ref=".1" limited="false"')
+    text = mjcf(
+        more=f'{unit}{SPRUNG}<keyframe><key name="home" qpos="{pose}"/></keyframe>',
+        world=GROUND + '<site name="b" pos="0 0 3"/>',
+        legs=legs,
+    )
+    path = written(tmp_path_factory.mktemp("key"), text)
+    model, robot = theirs(path), load_mjcf(path)
+    key = model.key("home").qpos
+
+    assert robot.model.nkey == 0
+    assert np.allclose(robot.model.qpos0, key, atol=1e-9)
+    before, after = (moved(m, q, 20) for m, q in ((model, key), (robot.model, robot.model.qpos0)))
+    assert np.allclose(before.xpos, after.xpos, atol=1e-5)
+
+
+def test_a_keyframe_is_chosen_by_name_or_not_at_all(tmp_path: Path):
+    keys = "".join(f'<key name="{n}" qpos="0 0 {z} 1 0 0 0 0 0"/>' for n, z in (("a", 1), ("b", 2)))
+    path = written(tmp_path, mjcf(more=f"<keyframe>{keys}</keyframe>"))
+
+    heights = [
+        load_mjcf(path, MjcfSettings(keyframe=name)).standing_height
+        for name in ("", "a", "b", "none")
+    ]
+
+    assert heights == [1, 1, 2, 0.35]
+    with pytest.raises(InputError, match=r"unknown keyframe 'c'.* a, b, none"):
+        load_mjcf(path, MjcfSettings(keyframe="c"))
+
+
+def test_a_keyframe_that_breaks_an_equality_is_refused(tmp_path: Path):
+    equality = '<equality><joint joint1="left_hip" joint2="right_hip"/></equality>'
+    key = '<keyframe><key qpos="0 0 .4 1 0 0 0 {}"/></keyframe>'
+
+    assert load_mjcf(written(tmp_path, mjcf(more=equality + key.format(".2 .2"))))
+    with pytest.raises(InputError, match=r"equality constraints.*keyframe=none"):
+        load_mjcf(written(tmp_path, mjcf(more=equality + key.format(".2 -.2"))))
+
+
+@pytest.mark.parametrize(("forward", "axis"), [("x", 0), ("y", 1), ("-x", 0), ("-y", 1)])
+def test_forward_is_the_way_that_was_said(forward: str, axis: int):
+    path = SAMPLES["gymnasium ant"]
+    went = moved(theirs(path), theirs(path).qpos0).qpos[axis] * (-1 if "-" in forward else 1)
+    robot = load_mjcf(path, MjcfSettings(forward=forward))
+
+    assert moved(robot.model, robot.model.qpos0).qpos[0] == pytest.approx(went, abs=1e-4)
+
+
+def test_a_planar_robot_is_not_turned():
+    with pytest.raises(InputError, match="forward=y needs a root body with a free joint"):
+        load_mjcf(SAMPLES["gymnasium walker2d"], MjcfSettings(forward="y"))
+
+
+STEP = '<geom type="box" size="1 1 .1" pos="3 0 0"/>'
+SLOPE = '<body euler="0 3 0"><geom type="plane" size="0 0 1"/></body>'
+
+
+@pytest.mark.parametrize("steps", [STEP, f"<body>{STEP}</body>", SLOPE])
+def test_uneven_ground_is_not_turned_under_a_robot(steps: str, tmp_path: Path):
+    with pytest.raises(InputError, match="not the same from all sides"):
+        load_mjcf(written(tmp_path, mjcf(world=GROUND + steps)), MjcfSettings(forward="y"))
+
+
+def test_ground_is_laid_where_the_robot_stands(tmp_path: Path):
+    robot = load_mjcf(written(tmp_path, mjcf(world="")))
+    data = mujoco.MjData(robot.model)
+    mujoco.mj_kinematics(robot.model, data)
+    floor = robot.model.geom("ground").id
+    gaps = [
+        mujoco.mj_geomDistance(robot.model, data, floor, geom, 10, None)
+        for geom in range(robot.model.ngeom)
+        if geom != floor
+    ]
+
+    assert min(gaps) == pytest.approx(0, abs=1e-9)
+
+
+PAIRED = """<default><geom contype="0" conaffinity="0"/></default>
+<contact><pair geom1="floor" geom2="left_geom"/>
+<pair geom1="right_geom" geom2="floor"/></contact>"""
+
+
+def test_ground_may_be_met_by_pairs_alone(tmp_path: Path):
+    path = written(tmp_path, mjcf(more=PAIRED))
+    robot = load_mjcf(path)
+
+    assert robot.model.ngeom == theirs(path).ngeom, "there is ground already"
+    touching = [sensor.name for sensor in robot.anatomy.sensors if sensor.kind == "touch"]
+    assert touching == ["left_touch", "right_touch"]
+
+    sloping = mjcf(more=PAIRED, world=GROUND.replace("/>", ' euler="0 3 0"/>'))
+    with pytest.raises(InputError, match="not the same from all sides"):
+        load_mjcf(written(tmp_path, sloping), MjcfSettings(forward="y"))
+
+
+@pytest.mark.parametrize("swims", ['<flag contact="disable"/>', ""])
+def test_who_swims_gets_no_ground(swims: str, tmp_path: Path):
+    option = f'<option density="1000" viscosity=".1">{swims}</option>'
+    text = mjcf(world="", more=option)
+
+    assert not np.any(load_mjcf(written(tmp_path, text)).model.geom_bodyid == 0)
+
+
+def bodies_in_contact(model: mujoco.MjModel, data: mujoco.MjData) -> set[str]:
+    found, force = set(), np.empty(6)
+    for number, contact in enumerate(data.contact):
+        mujoco.mj_contactForce(model, data, number, force)
+        if force[0] > 0:
+            found |= {model.body(model.geom_bodyid[geom]).name for geom in contact.geom}
+    return found
+
+
+@pytest.mark.parametrize("name", [name for name in SAMPLES if "humanoid" not in name])
+def test_a_touch_sensor_feels_its_limb_meet_the_ground(name: str):
+    robot = load_mjcf(SAMPLES[name])
+    model, touched = robot.model, set()
+    data = mujoco.MjData(model)
+    for step in range(400):
+        data.ctrl = 0.5 * np.sin(0.2 * step + np.arange(model.nu))
+        mujoco.mj_step(model, data)
+        mujoco.mj_forward(model, data)
+        pushed = bodies_in_contact(model, data)
+        for sensor in robot.anatomy.sensors:
+            if sensor.kind == "touch" and sensor.name.endswith(f"{sensor.body}_touch"):
+                felt = data.sensordata[model.sensor(sensor.name).adr[0]] > 0
+                assert felt == (sensor.body in pushed)
+                touched |= {sensor.name} if felt else set()
+
+    own = [s for s in robot.anatomy.sensors if s.kind == "touch" and s.name in adapted_names(name)]
+    assert touched or not own
+
+
+def adapted_names(name: str) -> set[str]:
+    """The touch sensors that a file did not have itself."""
+    model = theirs(SAMPLES[name])
+    own = {model.sensor(s).name for s in range(model.nsensor)}
+    return {s.name for s in load_mjcf(SAMPLES[name]).anatomy.sensors} - own
+
+
+def test_names_are_those_of_neighbours_where_there_are_none(tmp_path: Path):
+    anatomy = load_mjcf(SAMPLES["gymnasium ant"]).anatomy
+
+    assert [joint.name for joint in anatomy.joints][:2] == ["hip_1", "ankle_1"]
+    assert anatomy.motors[:2] == ("hip_4", "ankle_4")
+    assert anatomy.joint("ankle_1").bodies == {"ankle_1"}
+    assert anatomy.sensor("ankle_1_touch").body == "ankle_1"
+    bare = mjcf().replace('name="left_hip"', "").replace('joint="left_hip"', 'joint="right_hip"')
+    assert load_mjcf(written(tmp_path, bare)).anatomy.hinges == ("left", "right_hip")
+
+
+def test_odd_names_are_replaced_wherever_they_stand(tmp_path: Path):
+    odd = mjcf(
+        motors=MOTORS,
+        more='<contact><exclude body1="torso" body2="left"/></contact>'
+        '<sensor><framepos objtype="body" objname="left"/><contact subtree1="left"/></sensor>',
+    ).replace("left", "le+ft")
+    robot = load_mjcf(written(tmp_path, odd))
+
+    assert robot.anatomy.hinges == ("le_ft_hip", "right_hip")
+    assert robot.model.nexclude == 1
+    assert any("le+ft_hip" in note for note in adapt(tmp_path / "robot.xml", MjcfSettings()).notes)
+
+
+def test_the_user_says_which_sensors_there_are(tmp_path: Path):
+    path = written(tmp_path, mjcf())
+    robot = load_mjcf(path, MjcfSettings(touch=("left",), angle=()))
+
+    assert [sensor.name for sensor in robot.anatomy.sensors] == ["left_touch"]
+    with pytest.raises(InputError, match="'lft': did you mean left"):
+        load_mjcf(path, MjcfSettings(touch=("lft",)))
+
+
+def test_sensors_of_what_no_motor_drives_are_left_out(tmp_path: Path):
+    text = mjcf(
+        root='<joint name="x" type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>',
+        more='<sensor><jointpos joint="x"/><jointpos joint="left_hip" name="own"/></sensor>',
+    )
+
+    sensors = load_mjcf(written(tmp_path, text)).anatomy.sensors
+
+    assert [s.name for s in sensors if s.kind == "angle"] == ["own", "right_hip_angle"]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("forwards = 'x'", "unknown setting 'forwards': did you mean forward"),
+        ("forward = 'z'", "forward needs one of x, y, -x, -y, got 'z'"),
+        ("forward = ['-x']", "got ['-x']"),
+        (f"control_timestep = 1{'0' * 400}", "from above 0 to 10 s, got 1000"),
+        (f"control_timestep = 1{'0' * 5000}", "in TOML"),
+        (f"touch = {'[' * 3000}", "in TOML"),
+        ("control_timestep = -1", "from above 0 to 10 s, got -1"),
+        ("control_timestep = true", "got True"),
+        ("touch = 'left'", "needs a list of names"),
+        ("neurons = 5", "leave it out, and give --neurons N to the command"),
+        ("ctrlrange = [1, -1]", "lower end first"),
+        ("keyframe = 3", "name of a keyframe"),
+        ("forward", "in TOML"),
+    ],
+)
+def test_a_setting_that_means_nothing_is_refused(text: str, said: str, tmp_path: Path):
+    path = written(tmp_path, mjcf())
+    path.with_suffix(".toml").write_text(text, encoding="utf-8")
+
+    with pytest.raises(InputError, match=r"robot\.toml") as refusal:
+        load_mjcf(path)
+
+    assert said in str(refusal.value)
+
+
+def test_brackets_without_end_are_no_list_of_names(tmp_path: Path):
+    with pytest.raises(InputError, match="needs a list of names"):
+        read_settings(written(tmp_path, mjcf()), parse_setting(f"touch={'[' * 3000}"))
+
+
+def test_the_file_beside_is_read_and_options_count_before_it(tmp_path: Path):
+    path = written(tmp_path, mjcf(motors=MOTORS.replace('ctrlrange="-1 1"', "")))
+    beside = 'forward = "y"\ncontrol_timestep = 0.02\nctrlrange = [-2, 2]\n'
+    path.with_suffix(".toml").write_text(beside, encoding="utf-8")
+
+    robot = load_mjcf(path)
+
+    assert robot.control_timestep == 0.02
+    assert robot.model.actuator_ctrlrange.tolist() == [[-2, 2], [-2, 2]]
+    extra = parse_setting("forward=-x") | parse_setting("touch=['left']")
+    assert read_settings(path, extra).forward == "-x"
+    assert read_settings(path, extra).touch == ("left",)
+    assert read_settings(path).forward == "y"
+
+
+def test_a_motor_that_says_its_range_in_another_way_keeps_it(tmp_path: Path):
+    motors = '<motor joint="left_hip"/><position joint="right_hip" kp="5"/>'
+    path = written(tmp_path, mjcf(motors=motors))
+
+    model = load_mjcf(path, MjcfSettings(ctrlrange=(-1, 1))).model
+
+    assert model.actuator_ctrllimited.tolist() == [1, 0]
+    (_, left), (_, right) = command_ranges(model)
+    assert (left, right) == (1, pytest.approx(np.radians(40)))
+
+
+def test_a_control_step_is_a_multiple_of_the_physics_step(tmp_path: Path):
+    path = written(tmp_path, mjcf(more='<option timestep="0.003"/>'))
+
+    assert load_mjcf(path).control_timestep == pytest.approx(0.012)
+    with pytest.raises(InputError, match=r"multiple of the physics time step 0\.003"):
+        load_mjcf(path, MjcfSettings(control_timestep=0.01))
+
+
+def test_copies_and_frames_are_written_out(tmp_path: Path):
+    legs = (
+        '<replicate count="3" euler="0 0 120" sep="-"><frame pos=".1 0 0"><body name="leg">'
+        '<joint name="hip" axis="0 1 0" range="-40 40"/><geom size=".03" pos="0 0 -.2"/>'
+        "</body></frame></replicate>"
+    )
+    motors = "".join(f'<motor joint="hip-{k}" ctrlrange="-1 1"/>' for k in range(3))
+    robot = load_mjcf(written(tmp_path, mjcf(legs=legs, motors=motors)))
+
+    assert robot.anatomy.hinges == ("hip-0", "hip-1", "hip-2")
+    assert "<replicate" not in robot.mjcf
+
+
+@pytest.mark.parametrize("inertia", ["true", "false", "auto"])
+def test_masses_that_are_written_out_are_those_of_the_model(inertia: str, tmp_path: Path):
+    given = '<inertial pos="0 0 0" mass="2" diaginertia=".01 .01 .01"/>'
+    limbs = LEGS.replace('<joint name="left', f'{given}<joint name="left')
+    limbs = limbs.replace('<joint name="right', f'{given}<joint name="right')
+    # Bodies that may be without mass: they cannot move by themselves.
+    plate = '<body><geom size=".1" pos="0 .2 0"/></body>'
+    hollow = '<body><inertial pos="0 0 0" mass="0"/><geom size=".1" pos="0 .2 0"/></body>'
+    ghost = f'<body>{given}<geom size=".1" mass="0"/></body>'
+    text = mjcf(
+        torso=given + TORSO + plate + hollow + ghost,
+        legs=limbs,
+        more=f'<compiler settotalmass="7" inertiafromgeom="{inertia}"/>',
+    )
+    path = written(tmp_path, text)
+
+    model, robot = theirs(path), load_mjcf(path)
+
+    assert robot.model.body_mass == pytest.approx(model.body_mass, rel=1e-9)
+    assert robot.model.body_inertia == pytest.approx(model.body_inertia, rel=1e-9)
+
+
+def test_a_broken_limb_of_somebodys_robot_is_lost():
+    robot = load_mjcf(SAMPLES["gymnasium half_cheetah"])
+    (controller,) = random_controllers(robot, 1)
+    simulator = Simulator(robot, 1)
+
+    ran = simulator.run([(INTACT, controller)], 30, ("base_position",)).behaviour
+
+    assert np.isfinite(ran["base_position"]).all()

@@ -1,0 +1,66 @@
+"""Promises about awkward files: each gives a robot that moves, or is refused in one sentence."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from selfmodel.errors import InputError
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.robot.mjcf.load import load_mjcf
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.behaviour import SIGNALS
+from tests.helpers.drivers import random_controllers
+from tests.robot.mjcf.awkward import AWKWARD
+
+SECONDS_EACH = 5
+
+
+@pytest.mark.parametrize("what", [what for what, case in AWKWARD.items() if not case.sentence])
+def test_what_is_awkward_but_sound_gives_a_robot_that_moves(what: str, tmp_path: Path):
+    path = AWKWARD[what].write(tmp_path)
+    before = {file: file.read_bytes() for file in tmp_path.rglob("*") if file.is_file()}
+
+    robot = load_mjcf(path)
+    runs = [(INTACT, controller) for controller in random_controllers(robot, 2)]
+    outcome = Simulator(robot, 1).run(runs, 20, SIGNALS)
+
+    assert not outcome.diverged.any()
+    assert np.isfinite(outcome.behaviour["base_position"]).all()
+    assert before == {file: file.read_bytes() for file in tmp_path.rglob("*") if file.is_file()}
+
+
+@pytest.mark.parametrize("what", [what for what, case in AWKWARD.items() if case.sentence])
+def test_what_cannot_be_used_is_refused_in_one_sentence(what: str, tmp_path: Path):
+    path = AWKWARD[what].write(tmp_path)
+
+    with pytest.raises(InputError) as refusal:
+        load_mjcf(path)
+
+    said = str(refusal.value)
+    assert said.startswith(str(path.parent))
+    assert AWKWARD[what].sentence in said
+    assert "\n" not in said
+    assert len(said) < 500
+
+
+def test_there_are_enough_of_them():
+    assert len(AWKWARD) >= 30
+
+
+def test_none_takes_long_or_ends_the_process(tmp_path: Path):
+    code = (
+        "import sys\nfrom pathlib import Path\n"
+        "from selfmodel.errors import InputError\nfrom selfmodel.robot.mjcf.load import load_mjcf\n"
+        "from tests.robot.mjcf.awkward import AWKWARD\n"
+        "for number, case in enumerate(AWKWARD.values()):\n"
+        "    folder = Path(sys.argv[1]) / str(number)\n"
+        "    try:\n        load_mjcf(case.write(folder))\n"
+        "    except InputError:\n        pass\n"
+    )
+    root = Path(__file__).parents[3]
+    command = [sys.executable, "-c", code, str(tmp_path)]
+
+    subprocess.run(command, check=True, cwd=root, timeout=SECONDS_EACH * len(AWKWARD))

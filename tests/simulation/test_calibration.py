@@ -1,0 +1,219 @@
+"""Promises of calibration: it finds what a robot has, and leaves alone what is right."""
+
+import dataclasses
+from functools import cache
+
+import numpy as np
+import pytest
+
+from selfmodel.controllers.playback import played_back
+from selfmodel.errors import InputError
+from selfmodel.physical.reality_gap import draw_gap
+from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.robot.parameters import Parameters, factor_names, nominal, with_parameters
+from selfmodel.robot.robot import Robot
+from selfmodel.simulation.calibration import (
+    MAX_LOG_FACTOR,
+    PRIOR_DEVIATION,
+    Calibration,
+    calibrate,
+    prediction_error,
+)
+from selfmodel.tasks import ROBOTS
+from selfmodel.trials.behaviour import SIGNALS, Signal, collect
+from selfmodel.trials.state_estimation import BASE
+from selfmodel.trials.trial import Trial, TrialPlan
+from tests.helpers.drivers import random_motion
+from tests.helpers.hostile import lacking
+
+STEPS = 400
+QUADRUPED = ROBOTS["quadruped"].robot()
+TRUE = Parameters(1.25, 0.9, 0.8, 1.3, (1.2, 1.0, 0.85, 1.0, 1.0, 0.8, 1.0, 1.15), delay=2)
+
+
+def trial(robot: Robot, physical: SimulatedRobot, seed: int, steps: int = STEPS) -> Trial:
+    """A trial in which every joint moves."""
+    driver = played_back(robot.anatomy.motors, random_motion(robot, steps, seed))
+    behaviour = collect(robot.anatomy.names, physical.run(driver, steps))
+    return Trial(
+        TrialPlan("made-up", "before", driver, steps, 0), robot.name, behaviour, f"{seed}.mcap"
+    )
+
+
+def trials(robot: Robot, count: int = 2) -> list[Trial]:
+    """Trials of a physical robot that is as that model says."""
+    return [trial(robot, SimulatedRobot(robot), seed) for seed in range(count)]
+
+
+@cache
+def fitted() -> Calibration:
+    """The quadruped, calibrated from trials of one that has ``TRUE``."""
+    return calibrate(QUADRUPED, trials(with_parameters(QUADRUPED, TRUE)), threads=1)
+
+
+def test_the_delay_is_found_exactly():
+    assert fitted().parameters.delay == TRUE.delay
+    assert fitted().robot.control_delay == TRUE.delay
+
+
+def test_the_factors_go_from_nominal_towards_the_truth():
+    found, true = np.log(fitted().parameters.factors), np.log(TRUE.factors)
+
+    assert found @ true / (np.linalg.norm(found) * np.linalg.norm(true)) > 0.5
+    assert np.linalg.norm(found - true) < 0.9 * np.linalg.norm(true)
+
+
+@pytest.mark.search
+def test_with_a_weak_prior_the_factors_of_a_robot_without_noise_are_found(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """As calibration is set, the prior keeps factors near nominal, for the sake of noisy logs."""
+    monkeypatch.setattr("selfmodel.simulation.calibration.PRIOR_WEIGHT", 0.005)
+    monkeypatch.setattr("selfmodel.simulation.calibration.MAX_ITERATIONS", 20)
+    found = calibrate(QUADRUPED, trials(with_parameters(QUADRUPED, TRUE)), threads=2)
+    off = np.abs(np.log(found.parameters.factors) - np.log(TRUE.factors))
+
+    assert off.max() < 0.05, dict(zip(factor_names(QUADRUPED), off, strict=True))
+
+
+def test_what_is_found_predicts_a_trial_that_was_not_seen():
+    real = with_parameters(QUADRUPED, TRUE)
+    unseen = [trial(real, SimulatedRobot(real), 7)]
+
+    before, after = (prediction_error(r, unseen, 1) for r in (QUADRUPED, fitted().robot))
+    assert after < 0.7 * before
+    assert prediction_error(real, unseen, 1) < 1e-4
+
+
+def test_the_errors_told_are_those_of_the_models():
+    seen = trials(with_parameters(QUADRUPED, TRUE))
+
+    assert fitted().error_before == pytest.approx(prediction_error(QUADRUPED, seen, 1))
+    assert fitted().error == pytest.approx(prediction_error(fitted().robot, seen, 1), rel=0.02)
+    assert (fitted().error, fitted().parameters.delay) == (fitted().error, 2)
+
+
+def test_a_model_that_is_exact_is_left_as_it_is_to_the_bit(robot: Robot):
+    found = calibrate(robot, trials(robot), threads=1)
+
+    assert found.robot is robot
+    assert found.parameters == nominal(robot)
+    assert set(found.deviations) == {PRIOR_DEVIATION}
+
+
+@pytest.mark.search
+def test_the_number_of_threads_does_not_matter():
+    again = calibrate(QUADRUPED, trials(with_parameters(QUADRUPED, TRUE)), threads=3)
+
+    assert again.robot.mjcf == fitted().robot.mjcf
+    assert again.parameters == fitted().parameters
+    assert again.deviations.tobytes() == fitted().deviations.tobytes()
+
+
+@pytest.mark.search
+def test_under_noise_factors_stay_near_nominal_and_within_bounds():
+    gap = draw_gap(QUADRUPED, 0.1, np.random.default_rng(1))
+    physical = SimulatedRobot(QUADRUPED, gap=gap)
+    found = calibrate(QUADRUPED, [trial(QUADRUPED, physical, 0)], threads=1)
+
+    assert found.parameters.delay == gap.delay
+    assert np.abs(np.log(found.parameters.factors)).max() <= MAX_LOG_FACTOR
+    assert found.error < found.error_before
+    assert ((found.deviations > 0) & (found.deviations <= PRIOR_DEVIATION)).all()
+
+
+@pytest.mark.search
+def test_what_the_trials_do_not_show_is_as_uncertain_as_before_them_however_many_they_are():
+    """A robot that floats shows nothing of the ground's friction."""
+    mjcf = QUADRUPED.mjcf.replace("<option ", '<option gravity="0 0 0" ', 1)
+    adrift = dataclasses.replace(QUADRUPED, mjcf=mjcf.replace('pos="0 0 0.3245"', 'pos="0 0 3"'))
+    gap = draw_gap(adrift, 0.02, np.random.default_rng(0))
+    friction = factor_names(adrift).index("friction")
+    several = [trial(adrift, SimulatedRobot(adrift, gap=gap, stream=k), k) for k in range(3)]
+    found = [calibrate(adrift, several[:count], threads=1).deviations for count in (1, 3)]
+
+    np.testing.assert_allclose([each[friction] for each in found], PRIOR_DEVIATION, rtol=1e-3)
+    assert all((np.delete(each, friction) < PRIOR_DEVIATION).all() for each in found)
+
+
+def test_what_the_trials_show_is_less_uncertain_than_before_them():
+    motors = slice(factor_names(QUADRUPED).index("damping") + 1, None)
+
+    assert (fitted().deviations[motors] < 0.7 * PRIOR_DEVIATION).all()
+    assert (fitted().deviations > 0.2 * PRIOR_DEVIATION).all()
+
+
+@pytest.mark.search
+def test_a_robot_that_nobody_sees_is_calibrated_from_what_it_has_on_board():
+    real = with_parameters(QUADRUPED, TRUE)
+    seen = [trial(real, SimulatedRobot(real), 7)]
+    found = calibrate(QUADRUPED, [lacking(one, BASE) for one in trials(real)], threads=1)
+    off, true = np.log(found.parameters.factors), np.log(TRUE.factors)
+
+    assert found.parameters.delay == TRUE.delay
+    assert off @ true / (np.linalg.norm(off) * np.linalg.norm(true)) > 0.5
+    assert found.error < found.error_before
+    before, after = (prediction_error(r, seen, 1) for r in (QUADRUPED, found.robot))
+    assert after < 0.75 * before
+    # It knows no more of the factors than one that is seen.
+    assert np.median(found.deviations / fitted().deviations) > 0.7
+    assert (found.deviations < PRIOR_DEVIATION).all()
+
+
+def test_an_exact_model_of_a_robot_that_nobody_sees_is_left_as_it_is(robot: Robot):
+    found = calibrate(robot, [lacking(one, BASE) for one in trials(robot, 1)], threads=1)
+
+    assert found.robot is robot
+    assert set(found.deviations) == {PRIOR_DEVIATION}
+
+
+@pytest.mark.search
+def test_trials_in_which_the_base_was_seen_and_others_are_fitted_to_together():
+    real = with_parameters(QUADRUPED, TRUE)
+    one, other = trials(real)
+    found = calibrate(QUADRUPED, [one, lacking(other, BASE)], threads=1)
+    apart = [prediction_error(QUADRUPED, [each], 1) for each in (one, lacking(other, BASE))]
+
+    assert min(apart) < found.error_before < max(apart)
+    assert found.error < found.error_before
+    assert found.parameters.delay == TRUE.delay
+
+
+def test_a_trial_that_lacks_part_of_the_state_is_refused_by_what_it_lacks():
+    (whole,) = trials(QUADRUPED, 1)
+    numb = lacking(whole, (*BASE, "base_angular_velocity"))
+    expected = (
+        r"0\.mcap: calibration needs segments of 16 steps or more, none of them late, with "
+        r"joint_positions, .* and the log never has base_angular_velocity: leave this log out"
+    )
+    with pytest.raises(InputError, match=expected):
+        calibrate(QUADRUPED, [whole, numb], 1)
+
+
+def test_a_trial_with_no_stretch_of_all_of_it_is_refused():
+    (whole,) = trials(QUADRUPED, 1)
+    early = lacking(whole, ("base_orientation",), slice(STEPS // 2))
+    never_both = lacking(early, ("joint_velocities",), slice(STEPS // 2 - 1, None))
+
+    with pytest.raises(InputError, match="the log has none of use: leave"):
+        calibrate(QUADRUPED, [never_both], 1)
+
+
+def test_no_trials_are_refused():
+    with pytest.raises(InputError, match="at least one trial of the healthy robot, got none"):
+        calibrate(QUADRUPED, [], 1)
+
+
+@pytest.mark.parametrize("lost", ["base_position", "joint_velocities"])
+def test_moments_that_were_not_observed_are_passed_over(lost: Signal):
+    (whole,) = trials(QUADRUPED, 1)
+    assert set(whole.behaviour.signals) == set(SIGNALS)
+
+    assert prediction_error(QUADRUPED, [lacking(whole, (lost,), slice(100, 200))], 1) < 1e-4
+
+
+def test_moments_that_were_not_observed_lead_no_unseen_robot_astray_if_no_stretch_begins_there():
+    (whole,) = trials(QUADRUPED, 1)
+    blinks = lacking(lacking(whole, BASE), ("joint_velocities",), slice(102, 108))
+
+    assert prediction_error(QUADRUPED, [blinks], 1) < 1e-4
