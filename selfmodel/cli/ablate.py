@@ -16,8 +16,8 @@ from selfmodel.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from selfmodel.experiments.ablation import Results
-    from selfmodel.experiments.ablation.scores import Score
+    from selfmodel.experiments.ablation import AblationResults
+    from selfmodel.experiments.ablation.scores import ComparatorScore
     from selfmodel.experiments.confidence_intervals import Interval
 
 
@@ -65,7 +65,7 @@ def ablate(
         int, typer.Option(min=0, max=1024, help="Processes; 0 means one for each processor.")
     ] = 0,
     only: Annotated[
-        str, typer.Option(metavar="i/n", help="Only the i-th of every n runs, for a cluster.")
+        str, typer.Option(metavar="i/n", help="Only share i of n of the runs, for n machines.")
     ] = "1/1",
     as_json: Json = False,
 ) -> None:
@@ -76,7 +76,7 @@ def ablate(
     from selfmodel.comparators import COMPARATORS  # noqa: PLC0415
     from selfmodel.experiments.ablation import Ablation, write_results  # noqa: PLC0415
     from selfmodel.experiments.ablation import ablate as run  # noqa: PLC0415
-    from selfmodel.experiments.ablation.results import as_object  # noqa: PLC0415
+    from selfmodel.experiments.ablation.results import as_dict  # noqa: PLC0415
     from selfmodel.settings import Settings  # noqa: PLC0415
     from selfmodel.simulation.threads import thread_count  # noqa: PLC0415
     from selfmodel.tasks import ROBOTS  # noqa: PLC0415
@@ -99,13 +99,15 @@ def ablate(
     )
     part = lists.share("--only", only)
     failed = grid_command.run_shown(
-        lambda on_event: run(ablation, workers=thread_count(workers), on_event=on_event, only=part),
+        lambda on_progress: run(
+            ablation, workers=thread_count(workers), on_progress=on_progress, only=part
+        ),
         out,
     )
     results = write_results(out)
     if as_json:
         found = {
-            **as_object(results.rows, results.scores),
+            **as_dict(results.rows, results.scores),
             "failures": grid_command.as_objects(failed),
         }
         typer.echo(json.dumps(found, indent=1, allow_nan=False))
@@ -114,7 +116,7 @@ def ablate(
     grid_command.end(failed)
 
 
-def _print(results: "Results") -> None:
+def _print(results: "AblationResults") -> None:
     from selfmodel.cli.output.tables import show  # noqa: PLC0415  # only where a table is drawn
 
     ends = {score.trials for score in results.scores}
@@ -129,7 +131,7 @@ def _print(results: "Results") -> None:
         typer.echo(str(path))
 
 
-def _texts(score: "Score") -> list[str]:
+def _texts(score: "ComparatorScore") -> list[str]:
     share = score.correct
     return [
         score.robot,

@@ -52,7 +52,7 @@ def diagnose(
         ranking_to_list,
     )
     from selfmodel.experiments import plugins, trial_logs  # noqa: PLC0415
-    from selfmodel.experiments.fitting import calibration_values, fitted  # noqa: PLC0415
+    from selfmodel.experiments.fitting import calibration_to_dict, fitted  # noqa: PLC0415
     from selfmodel.recovery.explain import diagnose_trials  # noqa: PLC0415
     from selfmodel.simulation.simulator import Simulator  # noqa: PLC0415
     from selfmodel.simulation.threads import thread_count  # noqa: PLC0415
@@ -84,7 +84,7 @@ def diagnose(
         "logs": [log.trial.path for log in used],
         "played_back": [log.trial.path for log in used if _is_played_back(log)],
         "intact": [trial.path for trial in intact],
-        "calibration": calibration_values(fit),
+        "calibration": calibration_to_dict(fit),
         "diagnosis": ranking_to_list(diagnosis.ranked),
         **confidence_to_dict(diagnosis),
         "evaluations": search.evaluations,

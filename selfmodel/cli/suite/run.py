@@ -93,11 +93,14 @@ def run(
         comparator=comparator,
     )
     failed = grid_command.run_shown(
-        lambda on_event: run_study(study, workers=thread_count(workers), on_event=on_event), out
+        lambda on_progress: run_study(
+            study, workers=thread_count(workers), on_progress=on_progress
+        ),
+        out,
     )
     results = write_results(out)
     if as_json:
-        found = {**results.as_object(), "failures": grid_command.as_objects(failed)}
+        found = {**results.as_dict(), "failures": grid_command.as_objects(failed)}
         typer.echo(json.dumps(found, indent=1, allow_nan=False))
     else:
         _print(results.summaries)
