@@ -6,7 +6,7 @@ VIEWERS := .viewers
 NODE_READY := .ci/viewers/node_modules/.ready
 
 help: ## show this list
-	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
 
 setup: $(READY) ## make .venv with the locked versions
 
@@ -20,8 +20,11 @@ $(READY): pyproject.toml constraints.txt
 demo: $(READY) ## recover a quadruped from a lost lower leg, showing what it does
 	$(BIN)/selfmodel recover quadruped --case 1
 
-test: $(READY) ## run the whole test suite
-	$(BIN)/pytest
+test: $(READY) ## run the fast tests: every promise, in at most two minutes on two cores
+	$(BIN)/pytest --numprocesses auto --dist loadfile --durations 10
+
+test-all: $(READY) ## run every test, with every case; in about ten minutes on two cores
+	$(BIN)/pytest -m "" --numprocesses auto --dist loadfile --no-loadscope-reorder --durations 30
 
 docs: $(READY) ## build the documentation site in docs/_build; warnings are errors
 	$(BIN)/sphinx-build -W --keep-going -E -q -b html docs docs/_build/html
@@ -69,4 +72,4 @@ bench: $(READY) ## measure speed and memory; on a quiet machine
 results: $(READY) ## run Table I on both robots and write docs/results.md; takes over an hour
 	$(BIN)/python -m benchmarks.table_one
 
-.PHONY: help setup demo test docs lint types wheel viewers fuzz bench results
+.PHONY: help setup demo test test-all docs lint types wheel viewers fuzz bench results

@@ -21,14 +21,14 @@ from benchmarks.onboard import without_base
 from selfmodel.controllers.controller import Controller
 from selfmodel.experiments.ablation.bank import gait
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.physical.reality_gap import Gap, draw_gap, perturbed
+from selfmodel.physical.reality_gap import RealityGap, draw_gap, perturbed_model
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.recovery.random_streams import gap_stream, repair_stream
 from selfmodel.recovery.repair import RepairSearch
 from selfmodel.robot.parameters import Parameters, with_model, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.calibrate import calibrate, prediction_error
+from selfmodel.simulation.calibration import calibrate, prediction_error
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import collect
@@ -88,7 +88,7 @@ def _peer() -> dict[str, Way]:
 
 
 def _compare(
-    robot: Robot, gaits: Sequence[Controller], gap: Gap, ways: dict[str, Way]
+    robot: Robot, gaits: Sequence[Controller], gap: RealityGap, ways: dict[str, Way]
 ) -> list[Facts]:
     """Returns a row per method, for the nominal model, and for the physical robot's own model."""
     noisy = SimulatedRobot(robot, gap=gap)
@@ -120,11 +120,13 @@ def _compare(
                 **_against_truth(robot, gap, found, deviations),
             )
         )
-    true = with_model(robot, perturbed(robot.model, gap), gap.delay)
+    true = with_model(robot, perturbed_model(robot.model, gap), gap.delay)
     return [*rows, row("the robot's own model", true)]
 
 
-def _against_truth(robot: Robot, gap: Gap, found: Parameters, deviations: Sequence[float]) -> Facts:
+def _against_truth(
+    robot: Robot, gap: RealityGap, found: Parameters, deviations: Sequence[float]
+) -> Facts:
     """Returns the errors of the factors' logarithms, and the errors divided by their deviations.
 
     Each limb has its own factor, so no common one is true: the limbs' mass is left out.

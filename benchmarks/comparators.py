@@ -25,7 +25,7 @@ from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.calibrate import calibrate
+from selfmodel.simulation.calibration import calibrate
 from selfmodel.simulation.requests import Ensemble
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS

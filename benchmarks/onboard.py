@@ -23,7 +23,7 @@ from selfmodel.experiments.ablation.scores import ComparatorScore
 from selfmodel.experiments.grid import GridBegins, Job, PartEnds, finished, run_grid
 from selfmodel.experiments.study_files import as_dicts
 from selfmodel.logs.reader import read_log
-from selfmodel.simulation.calibrate import calibrate
+from selfmodel.simulation.calibration import calibrate
 from selfmodel.trials.state_estimation import BASE
 from selfmodel.trials.trial import Trial
 

@@ -19,7 +19,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.robot.parameters import Parameters, edited_model, factor_names, from_factors
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state_access import signal_fields, writer
-from selfmodel.simulation.calibrate import BOUND, DELAYS
+from selfmodel.simulation.calibration import CANDIDATE_DELAYS, MAX_LOG_FACTOR
 from selfmodel.simulation.calibration_segments import HORIZON, MAX_SEGMENTS
 from selfmodel.simulation.requests import LEAD
 from selfmodel.trials.behaviour import Signal
@@ -42,7 +42,7 @@ def sysid_parameters(robot: Robot, trials: Sequence[Trial]) -> Parameters:
     logging.set_verbosity(logging.ERROR)  # it warns of missing sensors, which are not compared
     names = factor_names(robot)
     parameters = sysid.ParameterDict(
-        {name: sysid.Parameter(name, 0.0, -BOUND, BOUND) for name in names}
+        {name: sysid.Parameter(name, 0.0, -MAX_LOG_FACTOR, MAX_LOG_FACTOR) for name in names}
     )
 
     def residual_at(delay: int) -> Theirs:
@@ -58,7 +58,7 @@ def sysid_parameters(robot: Robot, trials: Sequence[Trial]) -> Parameters:
         residuals, _, _ = residual_at(delay)(np.zeros(len(names)), parameters)
         return float(np.sum(np.square(np.concatenate(residuals))))
 
-    delay = min(DELAYS, key=cost)
+    delay = min(CANDIDATE_DELAYS, key=cost)
     progress = io.StringIO()  # it has no option to be silent
     found, _ = sysid.optimize(parameters, residual_at(delay), verbose=False, output=progress)
     return from_factors(np.exp(found.as_vector()), delay)

@@ -21,7 +21,6 @@ import numpy as np
 
 from benchmarks.results import Facts, write_results
 from benchmarks.walking import walk
-from selfmodel import __version__
 from selfmodel.cli.output.report import facts
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.experiments.experiment import Experiment, run
@@ -33,6 +32,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
+from selfmodel.version import __version__
 
 SEEDS = range(10)
 TOLD_APART_BY_WAY = (1, 2, 3, 5, 6, 9)

@@ -39,15 +39,16 @@ class SegmentPrediction:
     controller's arithmetic, the logged commands against the network's output for these readings.
 
     Source: prediction over a short horizon is multiple shooting (Bock & Plitt 1984) without the
-    fit. Its use here answers the paper's future work, section V: displacement says too little.
+    fit. Its use here answers the paper's future work, section V: displacement contains too little
+    information.
 
-    Limits: the state is required, so encoders and the base's pose and velocity; ``segment-
-    prediction-onboard`` requires neither the base's position nor its linear velocity, and continues
-    each segment from the base's predicted state at the end of the segment before, which makes it
-    less sharp. Slow effects, such as a light wind, hardly show within an eighth of a second. The
-    network is taken to be known: without one (a recording of other software) its arithmetic is not
-    compared. Segments with a late step (``Behaviour.late``) have no loss: the effect of a command
-    in a quarter of a second is not its effect in an eighth.
+    Limits: the state is required, so encoders and the base's pose and velocity.
+    ``segment-prediction-onboard`` requires neither the base's position nor its linear velocity, and
+    continues each segment from the base's predicted state at the end of the segment before, which
+    makes it less sharp. Slow effects, such as a light wind, hardly show within an eighth of a
+    second. The network is taken to be known: without one (a recording of other software) its
+    arithmetic is not compared. Segments with a late step (``Behaviour.late``) have no loss: the
+    effect of a command in a quarter of a second is not its effect in an eighth.
 
     Attributes:
         name: The comparator's name.

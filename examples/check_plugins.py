@@ -12,7 +12,7 @@ from payload import PAYLOAD
 
 from selfmodel.diagnosis.comparator_contract import check_comparator, shown
 from selfmodel.diagnosis.evidence import simulate
-from selfmodel.diagnosis.kind_contract import check_kind
+from selfmodel.diagnosis.kind_contract import check_fault_kind
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log
@@ -30,5 +30,5 @@ simulated = simulate(Simulator(robot, threads=2), prepared.request, trial, [INTA
 check_comparator(HEADING, trial, simulated.behaviour)
 print(f"{HEADING.name}: {prepared.distances(simulated.behaviour)}")
 
-check_kind(PAYLOAD, robot)
+check_fault_kind(PAYLOAD, robot)
 print(f"{PAYLOAD.name}: {len(PAYLOAD.candidates(robot.anatomy))} faults that may be proposed")

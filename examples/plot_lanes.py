@@ -82,7 +82,7 @@ def _rendered(
             model = film.model
             model.geom_rgba[:] = (*colour, 1.0)
             model.geom_rgba[model.geom_bodyid == 0, 3] = 0.0
-            model.geom_rgba[np.isin(model.geom_bodyid, list(film.lost)), 3] = 0.0
+            model.geom_rgba[np.isin(model.geom_bodyid, list(film.detached)), 3] = 0.0
             model.site_rgba[:, 3] = 0.0
             for qpos in film.shots[0].qpos:
                 _add(renderer.scene, model, qpos + _offset(model.nq, (1 - row) * LANE))

@@ -27,11 +27,7 @@ class Budget:
     """Counters of the records and bytes of one file, with their limits."""
 
     def __init__(self) -> None:
-        self._frames = _Counter(FRAME_LIMIT, "records and chunks")
-        self._records = _Counter(RECORD_LIMIT, "messages")
-        self._unpacked = _Counter(UNPACKED_LIMIT, "bytes, unpacked")
-        self._attached = _Counter(ATTACHED_LIMIT, "bytes attached")
-        self._other = _Counter(OTHER_LIMIT, "bytes beside its messages and attachments")
+        self._frames = self._records = self._unpacked = self._attached = self._other = 0
 
     def frame(self, opcode: int, size: int) -> None:
         """Counts a record outside a chunk, or one within a chunk that is not a message.
@@ -43,11 +39,17 @@ class Budget:
         Raises:
             ExcessError: The file exceeds a limit.
         """
-        self._frames.add(1)
+        self._frames += 1
+        if self._frames > FRAME_LIMIT:
+            raise _excess(FRAME_LIMIT, "records and chunks")
         if opcode == Opcode.ATTACHMENT:
-            self._attached.add(size)
+            self._attached += size
         elif opcode not in (Opcode.CHUNK, Opcode.MESSAGE):
-            self._other.add(size)
+            self._other += size
+        if self._attached > ATTACHED_LIMIT:
+            raise _excess(ATTACHED_LIMIT, "bytes attached")
+        if self._other > OTHER_LIMIT:
+            raise _excess(OTHER_LIMIT, "bytes beside its messages and attachments")
 
     def chunk(self, size: int) -> None:
         """Counts a chunk before it is decompressed.
@@ -58,7 +60,9 @@ class Budget:
         Raises:
             ExcessError: The file exceeds a limit.
         """
-        self._unpacked.add(size)
+        self._unpacked += size
+        if self._unpacked > UNPACKED_LIMIT:
+            raise _excess(UNPACKED_LIMIT, "bytes, unpacked")
 
     def record(self, opcode: int, size: int) -> None:
         """Counts a record within a chunk.
@@ -70,19 +74,12 @@ class Budget:
         Raises:
             ExcessError: The file exceeds a limit.
         """
-        self._records.add(1)
+        self._records += 1
+        if self._records > RECORD_LIMIT:
+            raise _excess(RECORD_LIMIT, "messages")
         if opcode != Opcode.MESSAGE:
             self.frame(opcode, size)
 
 
-class _Counter:
-    """A running total with an upper limit."""
-
-    def __init__(self, limit: int, unit: str) -> None:
-        self._limit, self._unit = limit, unit
-        self._total = 0
-
-    def add(self, amount: int) -> None:
-        self._total += amount
-        if self._total > self._limit:
-            raise ExcessError(f"it holds more than a log may: {self._limit} {self._unit}")
+def _excess(limit: int, unit: str) -> ExcessError:
+    return ExcessError(f"it holds more than a log may: {limit} {unit}")

@@ -132,4 +132,6 @@ class _Counts:
         }
         for what, (expected, got) in pairs.items():
             if expected != got:
-                raise ContradictionError(f"its statistics say {expected} {what}, it holds {got}")
+                raise ContradictionError(
+                    f"its statistics have {expected} {what}, its records {got}"
+                )

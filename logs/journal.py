@@ -3,16 +3,14 @@
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from selfmodel.diagnosis.diagnosis import Diagnosis
-from selfmodel.diagnosis.serialization import diagnosis_from_dict, diagnosis_to_dict
+from selfmodel.diagnosis.serialization import diagnosis_from_dict
 from selfmodel.errors import InputError
+from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
-from selfmodel.faults.notation import parse
-from selfmodel.faults.registry import KINDS
 from selfmodel.logs.errors import CorruptError, SchemaMismatchError
 from selfmodel.logs.files import replace_file
 from selfmodel.logs.reader import read_log
@@ -21,9 +19,6 @@ from selfmodel.robot.anatomy import Anatomy
 
 TRIALS = "trials"
 DIAGNOSES = "diagnoses.json"
-
-EVERY_KIND = tuple(KINDS.values())
-"""Fault kinds that diagnoses may name, if none of a third party is among them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,13 +29,11 @@ class FolderJournal:
 
     Attributes:
         folder: Folder with ``trials/NAME.mcap`` for each trial, and ``diagnoses.json``.
-        anatomy: Parts of the robot, to read hypotheses.
-        kinds: Fault kinds that the diagnoses may name.
+        space: Hypotheses that the diagnoses may name.
     """
 
     folder: Path
-    anatomy: Anatomy = field(repr=False)
-    kinds: Sequence[FaultKind] = field(default=EVERY_KIND, repr=False)
+    space: HypothesisSpace = field(repr=False)
 
     @property
     def trials(self) -> Path:
@@ -54,8 +47,8 @@ class FolderJournal:
             CorruptError: The file of the earlier diagnoses is damaged.
             LogWriteError: The disk is full, or failed.
         """
-        earlier = _read_diagnoses(self.folder, self.anatomy, self.kinds)
-        values = [diagnosis_to_dict(each) for each in (*earlier, diagnosis)]
+        earlier = _read_diagnoses(self.folder, self.space)
+        values = [each.to_dict() for each in (*earlier, diagnosis)]
         text = json.dumps(values, indent=1, allow_nan=False)
         replace_file(self.folder / DIAGNOSES, text.encode())
 
@@ -65,18 +58,18 @@ class FolderJournal:
         Raises:
             LogError: A file is damaged, or of another robot.
         """
-        return read_database(self.folder, self.anatomy, self.kinds)
+        return _read_database(self.folder, self.space)
 
 
 def create_journal(
-    folder: Path, anatomy: Anatomy, kinds: Sequence[FaultKind] = EVERY_KIND
+    folder: Path, anatomy: Anatomy, kinds: Sequence[FaultKind] = ()
 ) -> FolderJournal:
     """Makes the folder of a new run.
 
     Args:
         folder: New or empty folder.
         anatomy: Parts of the robot.
-        kinds: Fault kinds that the diagnoses may name.
+        kinds: Third-party kinds that the diagnoses may name, beside the built-in kinds.
 
     Raises:
         InputError: The folder is not empty, or cannot be made.
@@ -96,12 +89,10 @@ def create_journal(
         raise InputError(
             f"{folder} cannot be made: {error.strerror}; choose another folder"
         ) from error
-    return FolderJournal(folder, anatomy, tuple(kinds))
+    return FolderJournal(folder, HypothesisSpace(anatomy, tuple(kinds)))
 
 
-def read_database(
-    folder: Path, anatomy: Anatomy, kinds: Sequence[FaultKind] = EVERY_KIND
-) -> Database:
+def read_database(folder: Path, anatomy: Anatomy, kinds: Sequence[FaultKind] = ()) -> Database:
     """Returns the finished trials and the diagnoses of a run, read and verified.
 
     A ``.part`` file, the log of an interrupted trial, is ignored.
@@ -109,24 +100,28 @@ def read_database(
     Args:
         folder: Folder of the run; see ``FolderJournal``.
         anatomy: Parts of the robot, to read the hypotheses.
-        kinds: Fault kinds that the diagnoses may name.
+        kinds: Third-party kinds that the diagnoses may name, beside the built-in kinds.
 
     Raises:
         InputError: The folder is not the folder of a run.
         LogError: A file is damaged, or of another robot.
     """
+    return _read_database(folder, HypothesisSpace(anatomy, tuple(kinds)))
+
+
+def _read_database(folder: Path, space: HypothesisSpace) -> Database:
     if not (folder / TRIALS).is_dir():
         raise InputError(f"{folder}: expected the folder of a run, with a folder {TRIALS} in it")
     paths = sorted((folder / TRIALS).glob("*.mcap"), key=_trial_order)
     trials = tuple(read_log(path).trial for path in paths)
     for trial in trials:
-        if trial.behaviour.names != anatomy.names:
+        if trial.behaviour.names != space.anatomy.names:
             raise SchemaMismatchError(
                 trial.path,
                 f"it is of the robot {trial.robot!r}, with other sensors, motors or hinges",
                 advice="give the folder of a run of one robot",
             )
-    return Database(trials, _read_diagnoses(folder, anatomy, kinds))
+    return Database(trials, _read_diagnoses(folder, space))
 
 
 def _trial_order(path: Path) -> tuple[int, str]:
@@ -135,14 +130,11 @@ def _trial_order(path: Path) -> tuple[int, str]:
     return (int(digits) if digits.isdecimal() else 0, path.name)
 
 
-def _read_diagnoses(
-    folder: Path, anatomy: Anatomy, kinds: Sequence[FaultKind]
-) -> tuple[Diagnosis, ...]:
+def _read_diagnoses(folder: Path, space: HypothesisSpace) -> tuple[Diagnosis, ...]:
     path = folder / DIAGNOSES
-    parse_hypothesis = partial(parse, anatomy=anatomy, kinds=kinds)
     try:
         items: Any = json.loads(path.read_bytes())
-        return tuple(diagnosis_from_dict(item, parse_hypothesis) for item in items)
+        return tuple(diagnosis_from_dict(item, space.parse) for item in items)
     except FileNotFoundError:
         return ()
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:

@@ -6,11 +6,11 @@ from pathlib import Path
 
 from mcap.writer import CompressionType, Writer
 
-import selfmodel
 from selfmodel.logs.atomic import partial_path, sync
 from selfmodel.logs.files import as_write_error, create_partial, publish
 from selfmodel.logs.records import MEDIA_TYPES, with_digest
 from selfmodel.logs.schemas import schema_text
+from selfmodel.version import __version__
 
 CHUNK = 256 * 2**10
 """Size of a chunk before compression, bytes: with the library's 1 MiB, a kill would lose a whole
@@ -40,7 +40,7 @@ class LogFile:
             enable_data_crcs=True,
         )
         with as_write_error(partial_path(path)):
-            self._mcap.start(profile="ros2", library=f"selfmodel/{selfmodel.__version__}")
+            self._mcap.start(profile="ros2", library=f"selfmodel/{__version__}")
 
     def metadata(self, name: str, texts: Mapping[str, str]) -> None:
         """Writes a metadata record, with its digest."""

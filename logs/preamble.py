@@ -6,7 +6,6 @@ import mcap
 import mujoco
 import numpy as np
 
-import selfmodel
 from selfmodel.controllers.playback import Playback
 from selfmodel.logs.controllers import controller_bytes
 from selfmodel.logs.logfile import LogFile
@@ -32,6 +31,7 @@ from selfmodel.logs.topics import DESCRIPTION, DESCRIPTION_TYPE, description
 from selfmodel.logs.urdf import urdf
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.trial import TrialPlan
+from selfmodel.version import __version__
 
 
 def write_preamble(log: LogFile, robot: Robot, plan: TrialPlan, header: TrialHeader) -> None:
@@ -80,7 +80,7 @@ def write_preamble(log: LogFile, robot: Robot, plan: TrialPlan, header: TrialHea
 
 def _software() -> dict[str, str]:
     return {
-        "selfmodel": selfmodel.__version__,
+        "selfmodel": __version__,
         "mujoco": mujoco.__version__,
         "numpy": np.__version__,
         "python": platform.python_version(),

@@ -171,8 +171,9 @@ def read_gap(path: str | Path) -> dict[str, Any] | None:
     For scoring only: no code of a diagnosis may call this function.
 
     Returns:
-        Numbers of a ``selfmodel.physical.reality_gap.Gap``, and under ``structure`` those of a
-        ``selfmodel.physical.structural_mismatch.Structure`` or None; None without a gap.
+        Attributes of a ``selfmodel.physical.reality_gap.RealityGap``, and under ``structure`` those
+        of a ``selfmodel.physical.structural_mismatch.StructuralMismatch`` or None; None without a
+        gap.
 
     Raises:
         LogError: The file is damaged, or its gap is invalid.

@@ -17,7 +17,7 @@ from selfmodel.logs.files import as_write_error
 from selfmodel.logs.logfile import LogFile
 from selfmodel.logs.preamble import write_preamble
 from selfmodel.logs.records import FINISHED, RESULT, STOPPED, Result, TrialHeader, checked_name
-from selfmodel.physical.cleanup import Ending
+from selfmodel.physical.cleanup import Cleanup
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Names, Sample
 from selfmodel.trials.trial import TrialPlan
@@ -56,7 +56,7 @@ def write_trial(
     # The robot is stopped in any case.
     with (
         TrialWriter(path, robot, plan, header) as writer,
-        Ending(getattr(samples, "close", lambda: None)),
+        Cleanup(getattr(samples, "close", lambda: None)),
     ):
         for sample in itertools.islice(samples, plan.steps):
             writer.add(sample)

@@ -1,4 +1,4 @@
-"""``python -m selfmodel``: the command line."""
+"""``python -m selfmodel``: the same command line as ``selfmodel``."""
 
 from selfmodel.cli import main
 

@@ -21,7 +21,7 @@ from selfmodel.robot.mjcf.mujoco_errors import told_by_mujoco
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
 from selfmodel.robot.state_access import present, signal_fields, writer
-from selfmodel.simulation.activations import activations_of
+from selfmodel.simulation.activations import activations_since_rest
 from selfmodel.trials.behaviour import SIGNALS, Behaviour, Sample, Signal
 
 STATE: tuple[Signal, ...] = (
@@ -148,7 +148,7 @@ def _sum(robot: Robot, physics: Any, task: Any, behaviour: Behaviour, run: int) 
     fields = {"qpos": np.zeros((len(commands), model.nq))}
     fields["qvel"] = np.zeros((len(commands), model.nv))
     writer(robot, fields.__getitem__)({signal: behaviour[signal][run] for signal in STATE})
-    activations = activations_of(robot, commands)
+    activations = activations_since_rest(robot, commands)
     total = 0.0
     for k in range(1, len(commands)):
         data.qpos[:], data.qvel[:] = fields["qpos"][k], fields["qvel"][k]

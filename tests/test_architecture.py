@@ -3,6 +3,7 @@
 import ast
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,7 @@ FOLDERS |= {name: f"selfmodel.{name}" for name in ("comparators", "logs")}
 ADDED = ("selfmodel.tasks", "selfmodel.comparators", "selfmodel.logs")
 
 
+@cache
 def modules() -> dict[str, Path]:
     """Every module of the package and its file."""
     found = {}
@@ -25,6 +27,7 @@ def modules() -> dict[str, Path]:
     return found
 
 
+@cache
 def imports(path: Path) -> set[str]:
     """The names that a file imports, at its top or anywhere inside."""
     names = set()
@@ -54,7 +57,7 @@ ROOMS = (
 )
 """The rooms, in the order in which data flows: each may import itself and the rooms before it."""
 
-VOCABULARY = ("arrays", "errors", "files", "settings", "evolution")
+VOCABULARY = ("arrays", "errors", "files", "settings", "evolution", "version")
 """The files beside the rooms, which every room may import."""
 
 
@@ -64,6 +67,7 @@ def room(module: str) -> str | None:
     return name if name in ROOMS else None
 
 
+@cache
 def imported_modules(module: str) -> set[str]:
     """The modules of the package that a module imports, those under TYPE_CHECKING too."""
     known = modules()
@@ -159,3 +163,46 @@ def test_no_file_is_longer_than_four_hundred_lines():
     }
 
     assert not {path: length for path, length in lengths.items() if length > 400}
+
+
+BY_THEME = {
+    "cli/rendering/test_render": "the command of cli/render with all that it draws",
+    "cli/test_controllers": "one option of many commands",
+    "cli/test_kinds": "one option of many commands",
+    "diagnosis/test_verdict": "a verdict is of the search and of the significance together",
+    "faults/test_graded": "all kinds with a severity, each a file of its own",
+    "faults/test_kinds": "the contract of every kind, each a file of its own",
+    "logs/rosbag/test_bags": "a reader of recordings that are made here",
+    "logs/rosbag/test_import": "an import from beginning to end",
+    "logs/rosbag/test_roundtrip": "an import from beginning to end",
+    "logs/test_conformance": "the format, in the cases of others",
+    "logs/test_damage": "the format: no damage is silent",
+    "logs/test_fuzz": "the format: no damage is silent",
+    "logs/test_hostile_logs": "every reader, given hostile files",
+    "logs/test_hostile_models": "every reader, given hostile files",
+    "logs/test_interruption": "the writer and the rescue together",
+    "logs/test_messages": "the message of every topic",
+    "logs/test_roundtrip": "the writer and the reader together",
+    "logs/test_without_mujoco": "the room as a whole",
+    "robot/mjcf/test_commands": "the commands that take a file of the user",
+}
+"""Test files that are named by a theme of several modules, and the theme."""
+
+
+def test_every_test_file_names_its_module():
+    mirrored = {name.removeprefix("selfmodel.").replace(".", "/") for name in modules()}
+    homeless = set()
+    for path in (ROOT / "tests").rglob("test_*.py"):
+        name = path.relative_to(ROOT / "tests").with_suffix("").as_posix()
+        folder, _, file = name.rpartition("/")
+        if folder in ("", "end_to_end", "docs"):  # the repository, journeys through it, its pages
+            continue
+        words = file.removeprefix("test_").split("_")
+        begins = ["_".join(words[:count]) for count in range(1, len(words) + 1)]
+        own = {f"{folder}/{begin}" for begin in begins}
+        package = folder if folder.rpartition("/")[2] in begins else ""
+        if not (own | {package}) & mirrored:
+            homeless.add(name)
+
+    assert homeless - set(BY_THEME) == set()
+    assert set(BY_THEME) - homeless == set(), "these have a module's name, or are gone"

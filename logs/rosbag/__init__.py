@@ -1,1 +1,1 @@
-"""Recordings of real robots: rosbag2 bags in any form, read without ROS, as trial logs."""
+"""Import of rosbag2 recordings as trial logs, without ROS."""

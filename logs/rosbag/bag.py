@@ -1,4 +1,4 @@
-"""A bag in any of its forms: a folder, one file, split files, packed or not."""
+"""Reader of rosbag2 bags: a folder, one file or split files, compressed or not."""
 
 import hashlib
 import re
@@ -29,13 +29,13 @@ AGAIN = "record it again, or unpack it by its own tool to see what is whole"
 
 @dataclass(frozen=True)
 class Topic:
-    """A topic of a bag.
+    """Topic of a bag.
 
     Attributes:
-        name: Such as ``/joint_states``.
-        type: Such as ``sensor_msgs/msg/JointState``; "" if the bag does not say.
-        encoding: ``cdr``, or what cannot be read.
-        count: How many messages it has.
+        name: Name, such as ``/joint_states``.
+        type: Message type, such as ``sensor_msgs/msg/JointState``; "" if unknown.
+        encoding: Encoding of the messages; only ``cdr`` is supported.
+        count: Number of messages.
     """
 
     name: str
@@ -46,11 +46,11 @@ class Topic:
 
 @dataclass(frozen=True)
 class Source:
-    """A file of a bag, as it was found.
+    """File of a bag.
 
     Attributes:
-        name: Its name within the bag.
-        sha256: Of its bytes, in hexadecimal: recorders write no checksums of their own.
+        name: Name within the bag.
+        sha256: SHA-256 of the file, in hexadecimal: recorders write no checksums.
     """
 
     name: str
@@ -59,13 +59,13 @@ class Source:
 
 @dataclass(frozen=True)
 class Bag:
-    """A recording whose files have all been read once, and are whole.
+    """Recording whose files have been read and checked once.
 
     Attributes:
-        path: As the user gave it.
-        topics: By name.
-        sources: Its files, in order.
-        files: Where they can be read: unpacked, where they were packed.
+        path: Path from the user.
+        topics: Topics by name.
+        sources: Files of the bag, in order.
+        files: Readable file, decompressed if necessary, and original name of each source.
     """
 
     path: Path
@@ -76,10 +76,10 @@ class Bag:
     def messages(self, wanted: Collection[str]) -> Iterator[tuple[str, int, bytes]]:
         """Yields topic, log time in ns and bytes of each message on some topics, file by file.
 
-        Nothing is decoded, so topics that nobody asks for may hold anything.
+        Messages are not decoded.
 
         Raises:
-            LogError: A file has been damaged meanwhile, or a message cannot be unpacked.
+            LogError: A file was damaged meanwhile, or a message cannot be decompressed.
         """
         for file, name in self.files:
             for item in _read(file, name):
@@ -89,14 +89,14 @@ class Bag:
 
 @contextmanager
 def open_bag(path: Path) -> Iterator[Bag]:
-    """Gives a bag; what had to be unpacked is removed at the end.
+    """Context manager that yields a bag, and removes decompressed files at the end.
 
     Args:
-        path: The folder of a bag, with its ``metadata.yaml`` or without, or one of its files.
+        path: Folder of a bag, with or without ``metadata.yaml``, or one of its files.
 
     Raises:
-        LogError: A file is damaged, missing, or no recording.
-        InputError: There is no such bag, or it cannot be read.
+        LogError: A file is damaged, missing, or not a recording.
+        InputError: The bag does not exist, or cannot be read.
     """
     with TemporaryDirectory(prefix="selfmodel-") as folder, _explained(path):
         names = _files(path)
@@ -130,7 +130,7 @@ def _within(filename: object, path: Path) -> bool:
 
 
 def _files(path: Path) -> list[Path]:
-    """The storage files of a bag, in order."""
+    """Storage files of a bag, in order."""
     if not path.is_dir():
         check_regular(path, "a bag")
         return [path]
@@ -151,14 +151,14 @@ _STORAGE = re.compile(r"\.(mcap|db3)(\.zstd)?$")
 
 
 def _natural(path: Path) -> list[tuple[int, str]]:
-    """Sorts ``bag_2`` before ``bag_10``."""
+    """Sort key that orders ``bag_2`` before ``bag_10``."""
     return [(int(part) if part.isdecimal() else 0, part) for part in re.split(r"(\d+)", path.name)]
 
 
 def _listed(path: Path) -> list[str]:
-    """The files that ``metadata.yaml`` lists; of older versions, with the folder before them."""
+    """Files in ``metadata.yaml``, without the folder that older versions prepend."""
     try:
-        # The base loader makes everything a text, so no value can fail to be what it claims.
+        # The base loader returns every value as text.
         data: Any = YAML(typ="base", pure=True).load(read_file(path, METADATA, 2**20))
         listed = data["rosbag2_bagfile_information"]["relative_file_paths"]
     except (YAMLError, ValueError, KeyError, TypeError, RecursionError) as failure:
@@ -172,7 +172,7 @@ def _listed(path: Path) -> list[str]:
 
 
 def _ready(name: Path, place: Path) -> Path:
-    """Returns a file that can be read: itself, or what it holds, unpacked to ``place``."""
+    """Returns a readable file: the file itself, or its content decompressed to ``place``."""
     if not _begins(name, ZSTD_MAGIC):
         return name
     try:
@@ -207,7 +207,7 @@ def _topics(files: list[tuple[Path, Path]]) -> dict[str, Topic]:
     return {
         topic: Topic(
             topic,
-            # A topic of two types fits no role, and says why.
+            # A topic of two types fits no role; the error names both types.
             " and ".join(dict.fromkeys(kind for kind, _ in found)),
             " and ".join(dict.fromkeys(encoding for _, encoding in found)),
             counts.get(topic, 0),
@@ -217,7 +217,7 @@ def _topics(files: list[tuple[Path, Path]]) -> dict[str, Topic]:
 
 
 def _full(kind: str) -> str:
-    """Old recordings leave out the middle of ``sensor_msgs/msg/JointState``."""
+    """Full name of a message type; old recordings omit its ``msg``."""
     package, slash, name = kind.partition("/")
     return f"{package}/msg/{name}" if slash and "/" not in name else kind
 

@@ -1,4 +1,4 @@
-"""A mapping held against robot and bag: complaints name its line, and what there is instead."""
+"""Checks of a mapping against robot and bag; an error names the line and the alternatives."""
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
@@ -26,22 +26,22 @@ TYPES: Mapping[RoleKind, tuple[str, ...]] = MappingProxyType(
         "touch": (WRENCH, *NUMBERS, ARRAY),
     }
 )
-"""The types of message that can play each role."""
+"""Message types that can play each role."""
 
 
 def check_names(
     mapping: BagMapping, hinges: Sequence[str], motors: Sequence[str], touches: Sequence[str]
 ) -> None:
-    """Checks that a mapping names the parts of the robot, and none else.
+    """Checks that a mapping names the parts of the robot and no others.
 
     Args:
-        mapping: What to check.
-        hinges: The robot's hinges: each must be mapped.
-        motors: Its motors: each must be mapped.
-        touches: Its touch sensors: each may be.
+        mapping: The mapping.
+        hinges: Hinges of the robot; all must be mapped.
+        motors: Motors of the robot; all must be mapped.
+        touches: Touch sensors of the robot; some may be mapped.
 
     Raises:
-        InputError: It names a part that there is not, or leaves out one.
+        InputError: The mapping names an unknown part, or omits a required part.
     """
     document = mapping.document
     for angles, what, known in (
@@ -69,10 +69,10 @@ def fitting(bag: Bag, kind: RoleKind) -> list[str]:
 
 
 def check_topics(mapping: BagMapping, bag: Bag) -> None:
-    """Checks that each topic of a mapping is there, of a type that fits, and has messages.
+    """Checks that each topic of a mapping exists, has a suitable type, and has messages.
 
     Raises:
-        InputError: It does not hold.
+        InputError: A check failed.
     """
     for role in mapping.roles:
         path, known = (*role.path, "topic"), fitting(bag, role.kind)
@@ -96,7 +96,7 @@ def check_topics(mapping: BagMapping, bag: Bag) -> None:
 
 
 def _check_columns_are_named(mapping: BagMapping, role: Role, kind: str) -> None:
-    """A Float64MultiArray has numbers without names; other types have no use for an order."""
+    """Checks that the columns of a Float64MultiArray, and of no other type, have names."""
     if role.kind == "commands":
         key, given = "order", bool(mapping.commands.order)
     elif role.kind == "touch":
@@ -106,8 +106,8 @@ def _check_columns_are_named(mapping: BagMapping, role: Role, kind: str) -> None
     if kind == ARRAY and not given:
         raise mapping.document.error(
             role.path,
-            f"{role.topic} has numbers without names ({ARRAY}): add {key} to [{role.name}], to "
-            f"say which is which",
+            f"{role.topic} has numbers without names ({ARRAY}): add {key} to "
+            f"[{role.name}], which names them",
         )
     if kind != ARRAY and given:
         raise mapping.document.error(
@@ -117,10 +117,10 @@ def _check_columns_are_named(mapping: BagMapping, role: Role, kind: str) -> None
 
 
 def check_columns(mapping: BagMapping, series: Mapping[str, Series]) -> None:
-    """Checks that each name of a mapping is told of on its topic.
+    """Checks that each name of a mapping occurs on its topic.
 
     Raises:
-        InputError: It is not.
+        InputError: A name does not.
     """
     order = mapping.commands.order
     width = len(series[mapping.commands.topic].columns)

@@ -1,4 +1,4 @@
-"""When each message was measured: by its own stamp, or else by when it was received."""
+"""Measurement time of each message: its time stamp, or else its log time."""
 
 from dataclasses import dataclass
 
@@ -8,21 +8,21 @@ from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.logs.rosbag.series import Column, IntArray, Series
 
 APART = 60.0
-"""Seconds: stamps further than that from the log times are of another clock."""
+"""Maximum median difference of stamps and log times of one clock, s."""
 
 BEYOND = 1e12
-"""No measurement of a robot is larger than this, in any unit; and its square is still finite."""
+"""Magnitude above which a value is no measurement, in any unit; its square is finite."""
 
 
 @dataclass(frozen=True, eq=False)
 class Clocked:
-    """The times of a topic's messages.
+    """Times of a topic's messages.
 
     Attributes:
-        times: ``(n,)`` ns.
-        usable: ``(n,)``: False for a single stamp that is far from all others.
-        fallbacks: For how many messages the log time stands in for a stamp.
-        latency: ``(k,)`` s, from stamp to log, of the messages that have a usable stamp.
+        times: Times, ``(n,)`` ns.
+        usable: Flags, ``(n,)``; False for a stamp far from all other stamps.
+        fallbacks: Number of messages without a stamp, which have their log time.
+        latency: Delay from stamp to log time, ``(k,)`` s, of the messages with a usable stamp.
     """
 
     times: IntArray
@@ -37,11 +37,11 @@ class ClocksApartError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """What is known of one thing over time.
+    """Time series of one quantity.
 
     Attributes:
-        times: ``(m,)`` ns, strictly increasing.
-        values: ``(m, width)``, finite.
+        times: Times, ``(m,)`` ns, strictly increasing.
+        values: Values, ``(m, width)``, finite.
     """
 
     times: IntArray
@@ -52,8 +52,9 @@ def clocked(series: Series, clock: str) -> Clocked:
     """Returns the times of a topic's messages.
 
     Args:
-        series: The messages.
-        clock: ``header``: by stamps, where there are any; ``log``: by log times alone.
+        series: Messages of the topic.
+        clock: ``header`` for stamps, with log times for messages without a stamp; ``log`` for log
+            times.
 
     Raises:
         ClocksApartError: Stamps and log times differ by more than ``APART``.
@@ -63,8 +64,8 @@ def clocked(series: Series, clock: str) -> Clocked:
     everything = np.ones(len(stamped), dtype=bool)
     apart = float(np.median(latency)) if len(latency) else 0.0
     if clock == "log":
-        told = latency if abs(apart) <= APART else latency[:0]
-        return Clocked(series.logged, everything, 0, told)
+        usable_latency = latency if abs(apart) <= APART else latency[:0]
+        return Clocked(series.logged, everything, 0, usable_latency)
     if abs(apart) > APART:
         raise ClocksApartError(
             f"the stamps on {series.topic.name} and the times at which it was recorded are "
@@ -81,14 +82,14 @@ def clocked(series: Series, clock: str) -> Clocked:
 
 
 def track(clock: Clocked, column: Column, wanted: slice) -> Track:
-    """Returns some of a column's numbers over time: sorted, each time once, all of them known.
+    """Returns the time series of some of a column's numbers, sorted, with distinct times.
 
-    What is NaN, infinite or ``BEYOND`` is not known.
+    Rows with a value that is NaN, infinite or above ``BEYOND`` are left out.
 
     Args:
-        clock: The times of the topic.
-        column: What the topic says.
-        wanted: Which of the numbers.
+        clock: Times of the topic.
+        column: Column of the topic.
+        wanted: Slice of the numbers.
     """
     times, values = clock.times[column.index], column.values[:, wanted]
     known = clock.usable[column.index] & (np.abs(values) <= BEYOND).all(axis=1)

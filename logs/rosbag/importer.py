@@ -1,4 +1,4 @@
-"""The import of a recording: a bag, a mapping and a robot make a behaviour, and its quality."""
+"""Import of a recording: behaviour and quality from a bag, a mapping and a robot."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -33,20 +33,20 @@ from selfmodel.trials.behaviour import SIGNALS, Behaviour, Sample, Signal
 from selfmodel.trials.trial import TrialPlan
 
 LONGEST = 1_000_000
-"""Control steps that an import may have: one wrong stamp must not fill the memory."""
+"""Maximum control steps of an import: a wrong stamp must not fill the memory."""
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """What a bag says of one trial.
+    """Trial in a bag, resampled at the control steps.
 
     Attributes:
-        behaviour: At the control steps; NaN is what was not observed.
-        qualities: By topic.
-        sources: The files it is from.
-        clock: What the times go by.
-        origin: When the trial starts, ns since 1970.
-        notes: What a user should know, a sentence each.
+        behaviour: Behaviour at the control steps; NaN where not observed.
+        qualities: Recording quality by topic.
+        sources: Files of the bag.
+        clock: Clock of the times: ``header`` or ``log``.
+        origin: Start of the trial, ns since 1970.
+        notes: Warnings for the user, one sentence each.
     """
 
     behaviour: Behaviour
@@ -58,14 +58,14 @@ class Recording:
 
     @property
     def valid(self) -> dict[str, float]:
-        """The share of each signal that was observed."""
+        """Fraction of observed values by signal."""
         return {
             signal: float(np.mean(np.isfinite(values)))
             for signal, values in self.behaviour.signals.items()
         }
 
     def facts(self) -> dict[str, str]:
-        """Returns what the log says of its origin; lists and records are JSON."""
+        """Returns the origin of the trial as texts for its log; lists and records are JSON."""
         topics = {topic: found.facts() for topic, found in self.qualities.items()}
         sources = {source.name: source.sha256 for source in self.sources}
         return {
@@ -79,16 +79,16 @@ class Recording:
 
 
 def import_bag(path: Path, mapping: BagMapping, robot: Robot) -> Recording:
-    """Returns what a bag says of one trial of a robot.
+    """Returns the trial in a bag.
 
     Args:
-        path: The bag: a folder or a file.
-        mapping: Which topic plays which role.
-        robot: The one that the mapping names.
+        path: Folder or file of the bag.
+        mapping: Mapping from topics to roles.
+        robot: Robot that the mapping names.
 
     Raises:
         LogError: The bag is damaged.
-        InputError: The bag cannot be read, or the mapping fits it or the robot not.
+        InputError: The bag cannot be read, or the mapping does not fit the bag or the robot.
     """
     anatomy = robot.anatomy
     touches = [sensor.name for sensor in anatomy.sensors if sensor.kind == "touch"]
@@ -119,14 +119,14 @@ def write_recording(
     mapping: BagMapping,
     controller: Controller | None,
 ) -> Path:
-    """Writes a recording as a trial's log.
+    """Writes a recording as the log of a trial.
 
     Args:
-        path: The log's name; it must not exist.
-        robot: The robot as its model describes it.
-        recording: What the bag says.
-        mapping: How it was read; the log keeps its text.
-        controller: What drove the robot; without it, the recorded commands are what drives.
+        path: Name of the log; it must not exist.
+        robot: Robot as its model describes it.
+        recording: Trial in the bag.
+        mapping: Mapping of the import; the log contains its text.
+        controller: Controller of the robot; if not given, a playback of the recorded commands.
 
     Raises:
         InputError: The file exists, or the controller does not fit the robot.
@@ -150,22 +150,22 @@ def _clocks(mapping: BagMapping, series: Mapping[str, Series]) -> dict[str, Cloc
             found[role.topic] = clocked(series[role.topic], mapping.clock)
         except ClocksApartError as error:
             raise mapping.document.error(
-                (*role.path, "topic"), f'{error}: set clock = "log" to go by the log times alone'
+                (*role.path, "topic"), f'{error}: set clock = "log" to use the log times'
             ) from error
     return found
 
 
 def _steps(mapping: BagMapping, tracks: Tracks, timestep: float) -> Steps:
-    """The control steps at which every role has data."""
+    """Control steps at which every role has data."""
     needed = required(mapping, tracks)
     for role, part, track in needed:
         if not len(track.times):
             raise mapping.document.error(
                 (*role.path, "topic"),
-                f"{role.topic} says nothing that is a number about {part}: name another topic",
+                f"{role.topic} has no number for {part}: name another topic",
             )
     first = max(int(track.times[0]) for _, _, track in needed)
-    # The last command stands, so commands end no trial.
+    # The last command is held, so the end of the commands does not end the trial.
     last = min(int(track.times[-1]) for role, _, track in needed if role.kind != "commands")
     origin = first + round(mapping.start * 1e9)
     period = timestep * 1e9

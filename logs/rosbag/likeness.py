@@ -1,4 +1,4 @@
-"""Which joint of a bag is meant by which of the model, when two people have named them."""
+"""Matching of a bag's joint names to those of the model, by similarity."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -7,13 +7,13 @@ from difflib import SequenceMatcher
 from types import MappingProxyType
 
 SURE = 0.75
-"""Names that are so alike, of at most 1, mean the same, if no other comes near."""
+"""Minimum similarity of a certain match, of at most 1, if no other name is ``NEAR``."""
 
 ALIKE = 0.3
-"""Names less alike than this are not even a guess."""
+"""Minimum similarity of a match."""
 
 NEAR = 0.1
-"""A second name that is less than this behind the best makes it a guess."""
+"""Minimum lead over the second most similar name of a certain match."""
 
 _WORDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
@@ -32,23 +32,23 @@ _WORDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         **dict.fromkeys(("kfe", "calf", "shank", "tibia", "lower"), ("knee",)),
         "haa": ("hip",),
         **dict.fromkeys(("foot", "ft", "contact", "force", "wrench", "sole"), ("touch",)),
-        # What says nothing about which joint it is.
+        # Words that do not identify a joint.
         **dict.fromkeys(("joint", "motor", "servo", "actuator", "link", "position"), ()),
     }
 )
 
 
 _SIDES = (frozenset({"front", "middle", "back"}), frozenset({"left", "right"}))
-"""Two of one of these are never the same, however alike the rest is."""
+"""Sets of exclusive words: names with two words of one set never match."""
 
 
 @dataclass(frozen=True)
 class Guess:
-    """A name of the bag for one of the model.
+    """Name in the bag that matches a name of the model.
 
     Attributes:
-        name: Which.
-        sure: Whether it is more than a guess.
+        name: Name in the bag.
+        sure: Whether the match is certain.
     """
 
     name: str
@@ -56,17 +56,17 @@ class Guess:
 
 
 def matched(wanted: Sequence[str], offered: Sequence[str]) -> dict[str, Guess]:
-    """Returns for each wanted name the offered one that is most like it, each used once.
+    """Returns the most similar offered name for each wanted name, each used once.
 
-    Order, case and the usual abbreviations do not matter: ``FL_calf_joint`` is much like
+    Order, case and the usual abbreviations do not matter: ``FL_calf_joint`` is similar to
     ``front_left_knee``.
 
     Args:
-        wanted: The model's names.
-        offered: The bag's names.
+        wanted: Names of the model.
+        offered: Names in the bag.
 
     Returns:
-        By the wanted name; names that nothing is like are left out.
+        Matches by wanted name; names without a match are left out.
     """
     scores = {(ours, theirs): likeness(ours, theirs) for ours in wanted for theirs in offered}
     found: dict[str, Guess] = {}
@@ -83,7 +83,7 @@ def matched(wanted: Sequence[str], offered: Sequence[str]) -> dict[str, Guess]:
 
 
 def likeness(ours: str, theirs: str) -> float:
-    """Returns how alike two names are: 0, nothing in common, to 1, the same words or initials."""
+    """Returns the similarity of two names, 0 to 1, which is 1 for the same words or initials."""
     if "".join(word[0] for word in _parts(ours)) == theirs.lower():
         return 1.0
     first, second = _words(ours), _words(theirs)
@@ -100,5 +100,5 @@ def _words(name: str) -> frozenset[str]:
 
 
 def _parts(name: str) -> list[str]:
-    """``FLKnee_2`` is ``fl``, ``knee`` and ``2``."""
+    """Words of a name: ``FLKnee_2`` has ``fl``, ``knee`` and ``2``."""
     return [part.lower() for part in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", name)]

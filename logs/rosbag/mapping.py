@@ -1,4 +1,4 @@
-"""The mapping: which topic of a bag plays which role for which part of a robot."""
+"""Mapping from the topics of a bag to roles and parts of a robot."""
 
 import math
 from collections.abc import Mapping
@@ -12,10 +12,10 @@ from selfmodel.trials.trial import Stage
 ANGLES: Mapping[str, float] = MappingProxyType({"rad": 1.0, "deg": math.pi / 180})
 LENGTHS: Mapping[str, float] = MappingProxyType({"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0})
 FORCES = ("N", "kN", "raw")
-"""A touch sensor's threshold has the unit of its topic, so none of these needs converting."""
+"""Units of touch sensors; the threshold has the unit of the topic, so none is converted."""
 
 UNKNOWN = "?"
-"""What a suggested mapping has in the place of a name that is still to be filled in."""
+"""Placeholder of a suggested mapping for a name that the user must fill in."""
 
 RoleKind = Literal["joints", "commands", "base", "imu", "touch"]
 
@@ -25,12 +25,12 @@ FRAMES = ("start", "recorded")
 
 @dataclass(frozen=True)
 class Link:
-    """How a part of the model is told of in the bag: its angle = sign x recorded + offset.
+    """Conversion of a recorded angle: angle = sign x recorded + offset.
 
     Attributes:
-        name: What the bag calls it.
-        sign: 1 or -1.
-        offset: Radians.
+        name: Name in the bag.
+        sign: Sign, 1 or -1.
+        offset: Offset, rad.
     """
 
     name: str
@@ -40,13 +40,13 @@ class Link:
 
 @dataclass(frozen=True)
 class Angles:
-    """A topic that tells angles: of the joints, or those that are commanded.
+    """Topic of joint angles or of commanded angles.
 
     Attributes:
         role: ``joints`` or ``commands``.
-        topic: Which.
-        scale: Radians in its unit.
-        links: By the model's hinge or motor.
+        topic: Name of the topic.
+        scale: Recorded unit, rad.
+        links: Conversions by the model's hinge or motor.
         order: Names of the columns of a Float64MultiArray; empty for other types.
     """
 
@@ -59,12 +59,12 @@ class Angles:
 
 @dataclass(frozen=True)
 class Base:
-    """The topic that tells where the root body is.
+    """Topic of the pose of the root body.
 
     Attributes:
-        topic: Which.
-        frame: ``start``: the trial begins at x = y = 0 heading along +x; or ``recorded``.
-        scale: Metres in its unit.
+        topic: Name of the topic.
+        frame: ``start``, in which the trial begins at x = y = 0 heading along +x; or ``recorded``.
+        scale: Recorded unit, m.
     """
 
     topic: str
@@ -74,12 +74,12 @@ class Base:
 
 @dataclass(frozen=True)
 class Touch:
-    """A topic that tells of one touch sensor.
+    """Topic of one touch sensor.
 
     Attributes:
-        topic: Which.
-        column: Which number of a Float64MultiArray; "" for other types.
-        threshold: The sensor reads 1 above this.
+        topic: Name of the topic.
+        column: Column of a Float64MultiArray; "" for other types.
+        threshold: Value above which the sensor reads 1, in the unit of the topic.
     """
 
     topic: str
@@ -89,12 +89,12 @@ class Touch:
 
 @dataclass(frozen=True)
 class Role:
-    """A role that a topic plays.
+    """Role of a topic.
 
     Attributes:
-        kind: Which.
-        path: Its table in the mapping.
-        topic: Who plays it.
+        kind: Kind of the role.
+        path: Table of the role in the mapping.
+        topic: Name of the topic.
     """
 
     kind: RoleKind
@@ -103,28 +103,28 @@ class Role:
 
     @property
     def name(self) -> str:
-        """What reports call it, such as ``touch.front_left_touch``."""
+        """Name for reports, such as ``touch.front_left_touch``."""
         return ".".join(self.path)
 
 
 @dataclass(frozen=True)
 class BagMapping:
-    """A mapping as it was written, checked against itself.
+    """Mapping of a file, checked for internal consistency.
 
     Attributes:
-        document: Its text; complaints name its lines.
-        robot: A robot's name, or an MJCF file.
-        control_timestep: Seconds; given with an MJCF file only.
-        controller: What drove the robot: a file.
-        stage: Where in a story the trial stands: ``before`` where nothing was wrong.
-        clock: ``header`` or ``log``.
-        start: Seconds after the first moment at which every role has data.
-        duration: Seconds; None for as long as every role has data.
-        joints: The hinges.
-        commands: The motors.
-        base: The root body's motion.
-        imu: The topic of an Imu.
-        touch: By the robot's touch sensor.
+        document: Text of the mapping; errors name its lines.
+        robot: Name of a robot, or an MJCF file.
+        control_timestep: Control time step, s; with an MJCF file only.
+        controller: File of the controller.
+        stage: Stage of the trial: ``before`` for a healthy robot.
+        clock: Clock of the times: ``header`` or ``log``.
+        start: Start of the trial after the first time at which every role has data, s.
+        duration: Duration, s; None for as long as every role has data.
+        joints: Topic of the hinges.
+        commands: Topic of the motors.
+        base: Topic of the root body.
+        imu: Name of the topic of an Imu.
+        touch: Topics by touch sensor.
     """
 
     document: Document
@@ -143,7 +143,7 @@ class BagMapping:
 
     @property
     def roles(self) -> tuple[Role, ...]:
-        """Every role that a topic plays."""
+        """Roles of all mapped topics."""
         found = [
             Role("joints", ("joints",), self.joints.topic),
             Role("commands", ("commands",), self.commands.topic),

@@ -1,4 +1,4 @@
-"""The file of a mapping: read strictly, so that no entry is without effect."""
+"""Strict reader of mapping files: an entry without effect is an error."""
 
 from pathlib import Path
 from typing import Literal
@@ -22,14 +22,14 @@ from selfmodel.logs.rosbag.tables import Table, parse_document
 from selfmodel.trials.trial import STAGES
 
 LARGEST = 2**20
-"""Bytes that a mapping may have."""
+"""Maximum size of a mapping, bytes."""
 
 
 def read_mapping(path: Path) -> BagMapping:
     """Returns the mapping in a file.
 
     Raises:
-        InputError: It cannot be read, or is wrong; the sentence names the line.
+        InputError: The file cannot be read, or is invalid; the message names the line.
     """
     try:
         text = read_file(path, "a mapping", LARGEST).decode()
@@ -39,11 +39,11 @@ def read_mapping(path: Path) -> BagMapping:
 
 
 def parse_mapping(text: str, name: str) -> BagMapping:
-    """Returns the mapping that a text says; see ``read_mapping``.
+    """Returns the mapping in a text; see ``read_mapping``.
 
     Args:
-        text: TOML.
-        name: What errors call it.
+        text: Text, as TOML.
+        name: Name of the text in errors.
     """
     document, tables = parse_document(text, name)
     top = Table(document, (), tables)
@@ -93,19 +93,19 @@ def _angles(table: Table, role: Literal["joints", "commands"]) -> Angles:
         order = table.texts("order")
     names = table.table("names")
     links = {name: _link(names, name, scale) for name in names.keys}
-    told: dict[str, str] = {}
+    parts: dict[str, str] = {}
     for name, link in links.items():
         if link.name == UNKNOWN:
             raise table.document.error(
                 (*names.path, name), f"{name} is still {UNKNOWN!r}: fill in its name in the bag"
             )
-        if link.name in told:
+        if link.name in parts:
             raise table.document.error(
                 (*names.path, name),
-                f"{link.name} is listed twice, for {told[link.name]} and for {name}: expected "
+                f"{link.name} is listed twice, for {parts[link.name]} and for {name}: expected "
                 f"each joint of the bag once",
             )
-        told[link.name] = name
+        parts[link.name] = name
         if order and link.name not in order:
             raise table.document.unknown((*names.path, name), "name in order", link.name, order)
     table.done()
@@ -122,12 +122,12 @@ def _link(names: Table, name: str, scale: float) -> Link:
             path, f'{name} must be "a name in the bag" or {{ name = ... }}, got {value!r}'
         )
     table = Table(names.document, path, value)
-    told, sign = table.text("name"), table.number("sign", 1.0)
+    recorded, sign = table.text("name"), table.number("sign", 1.0)
     offset = table.number("offset", 0.0) * scale
     table.done()
     if sign not in (1, -1):
         raise names.document.error((*path, "sign"), f"sign must be 1 or -1, got {sign:g}")
-    return Link(told, sign, offset)
+    return Link(recorded, sign, offset)
 
 
 def _base(table: Table) -> Base:

@@ -1,4 +1,4 @@
-"""The messages that can play a role, each read into names and rows of numbers."""
+"""Decoders of the supported message types, into names and rows of numbers."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -25,16 +25,16 @@ WRENCH = "geometry_msgs/msg/WrenchStamped"
 NUMBERS = ("std_msgs/msg/Float64", "std_msgs/msg/Float32", "std_msgs/msg/Bool")
 
 Rows = tuple[tuple[str, ...], FloatArray]
-"""The names that a message tells of, and a row of numbers for each, ``(names, width)``."""
+"""Names in a message, and a row of numbers for each, ``(names, width)``."""
 
 
 @dataclass(frozen=True)
 class FaultKind:
-    """A type of message that can be read.
+    """Supported message type.
 
     Attributes:
-        stamped: Whether it has a header, and so says when it was measured.
-        rows: Reads a decoded one.
+        stamped: Whether the message has a header with a time stamp.
+        rows: Returns the rows of a decoded message.
     """
 
     stamped: bool
@@ -42,23 +42,23 @@ class FaultKind:
 
 
 class RefusedError(ValueError):
-    """A message contradicts itself; it is counted and left out, and the rest is good."""
+    """A message contradicts itself; it is counted and left out."""
 
 
 class UndecodableError(ValueError):
-    """The bytes of a message are not what its type says."""
+    """The bytes of a message do not fit its type."""
 
 
 def read_message(payload: bytes, kind: str) -> tuple[int, Rows]:
     """Returns the time stamp of a message, ns (0 if it has none), and its rows.
 
     Args:
-        payload: CDR.
-        kind: Its type, one of ``KINDS``.
+        payload: Message, as CDR.
+        kind: Message type, one of ``KINDS``.
 
     Raises:
-        RefusedError: It contradicts itself.
-        UndecodableError: It is damaged.
+        RefusedError: The message contradicts itself.
+        UndecodableError: The message is damaged.
     """
     from rosbags.serde import SerdeError  # noqa: PLC0415 - takes a while
 
@@ -76,7 +76,7 @@ def read_message(payload: bytes, kind: str) -> tuple[int, Rows]:
 
 @cache
 def _types() -> "Typestore":
-    """The standard types. Those in KINDS are alike in every ROS 2, so the bag's are not needed."""
+    """Standard message types. Those in KINDS are the same in every ROS 2 distribution."""
     from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415 - takes a while
 
     return get_typestore(Stores.ROS2_HUMBLE)
@@ -131,7 +131,7 @@ def _pose_stamped(message: "ros.geometry_msgs__msg__PoseStamped") -> Rows:
 
 
 def _imu(message: "ros.sensor_msgs__msg__Imu") -> Rows:
-    # REP 145: a first covariance of -1 says that there is no such measurement.
+    # REP 145: a first covariance of -1 means no measurement.
     known = message.orientation_covariance[0] != -1
     turning = message.angular_velocity_covariance[0] != -1
     row = [
@@ -165,10 +165,10 @@ KINDS: Mapping[str, FaultKind] = MappingProxyType(
         **dict.fromkeys(NUMBERS, FaultKind(stamped=False, rows=_number)),
     }
 )
-"""Every type that can be read.
+"""Supported message types by name.
 
 Widths: JointState 3 (position, velocity, effort), those of commands 1, Odometry and PoseStamped 13
 (position, orientation w x y z, linear and angular velocity in the child's frame), Imu 7
-(orientation w x y z, angular velocity), touch 1. What a message does not tell is NaN. The columns
-of a Float64MultiArray are called by their numbers.
+(orientation w x y z, angular velocity), touch 1. Missing numbers are NaN. The columns of a
+Float64MultiArray are named by their index.
 """

@@ -1,4 +1,4 @@
-"""What a user should know of an import before trusting a diagnosis made from it."""
+"""Warnings about an imported recording."""
 
 from collections.abc import Iterator, Mapping
 
@@ -10,16 +10,16 @@ from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Behaviour
 
 APART = 0.1
-"""A joint that starts further than this from the model's start pose is told of, rad."""
+"""Difference from the model's initial pose above which a joint is listed, rad."""
 
 LISTED = 5
-"""So many gaps of a topic are told of one by one."""
+"""Maximum listed gaps of a topic."""
 
 
 def notes(
     mapping: BagMapping, behaviour: Behaviour, qualities: Mapping[str, Quality], robot: Robot
 ) -> tuple[str, ...]:
-    """Returns the sentences, the weightiest first."""
+    """Returns the warnings, one sentence each, most important first."""
     return (
         *_pose(behaviour, robot),
         *_travel(behaviour),
@@ -72,16 +72,16 @@ def _gaps(behaviour: Behaviour, qualities: Mapping[str, Quality]) -> Iterator[st
     end = float(behaviour.time[-1])
     for topic, found in qualities.items():
         within = [gap for gap in found.gaps if gap.start < end and gap.start + gap.length > 0]
-        if not within or found.roles == ("commands",):  # a command stands until the next
+        if not within or found.roles == ("commands",):  # a command is held until the next
             continue
-        told = [f"{gap.length * 1e3:.0f} ms at {gap.start:.3f} s" for gap in within[:LISTED]]
+        listed = [f"{gap.length * 1e3:.0f} ms at {gap.start:.3f} s" for gap in within[:LISTED]]
         if len(within) > LISTED:
-            told.append(f"{len(within) - LISTED} more")
+            listed.append(f"{len(within) - LISTED} more")
         rows = sum(
             int(np.sum((behaviour.time > gap.start) & (behaviour.time < gap.start + gap.length)))
             for gap in within
         )
-        yield f"{topic}: silent for {', '.join(told)}; rows marked as not observed: {rows}"
+        yield f"{topic}: silent for {', '.join(listed)}; rows marked as not observed: {rows}"
 
 
 def _left_out(qualities: Mapping[str, Quality]) -> Iterator[str]:

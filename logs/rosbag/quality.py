@@ -1,4 +1,4 @@
-"""How well a topic was recorded: rate, jitter, gaps, latency, and what was left out."""
+"""Recording quality of a topic: rate, jitter, gaps, latency, and omitted messages."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -11,16 +11,16 @@ from selfmodel.logs.rosbag.resample import REACH
 from selfmodel.logs.rosbag.series import Series
 
 LISTED = 100
-"""So many gaps of a topic are recorded one by one."""
+"""Maximum listed gaps of a topic."""
 
 
 @dataclass(frozen=True)
 class Gap:
-    """A time in which a topic was silent for more than ``REACH`` of its usual periods.
+    """Interval between two messages longer than ``REACH`` usual periods.
 
     Attributes:
-        start: Seconds from the start of the trial to the last message before; may be negative.
-        length: Seconds until the next message.
+        start: Time of the message before the gap, from the start of the trial, s; may be negative.
+        length: Duration, s.
     """
 
     start: float
@@ -29,23 +29,23 @@ class Gap:
 
 @dataclass(frozen=True)
 class Quality:
-    """What is to be known of a topic's recording.
+    """Recording quality of a topic.
 
     Attributes:
-        roles: Which roles it plays.
-        type: The type of its messages.
-        messages: How many it has.
-        rate: Messages a second, from the usual (median) period; None for fewer than two.
-        jitter: Standard deviation of the period without the gaps, s; None for fewer than two.
-        longest: The longest period, s; None for fewer than two.
-        gaps: In order.
-        latency: Median of log time minus stamp, s; None where there are no stamps.
-        latency_max: The largest, s.
-        fallbacks: Messages that go by log time because they have no stamp.
-        strays: Messages left out because their stamp is far from all others.
-        repeated: Messages left out because another has the same stamp.
-        reordered: Messages that came after one with a later stamp; they are put in their place.
-        refused: Messages left out because they contradict themselves, by the reason.
+        roles: Roles of the topic.
+        type: Message type.
+        messages: Number of messages.
+        rate: Message rate from the median period, 1/s; None for fewer than two messages.
+        jitter: Standard deviation of the period without gaps, s; None for fewer than two messages.
+        longest: Longest period, s; None for fewer than two messages.
+        gaps: Gaps, in order.
+        latency: Median of log time minus stamp, s; None without stamps.
+        latency_max: Maximum of log time minus stamp, s; None without stamps.
+        fallbacks: Number of messages without a stamp, which have their log time.
+        strays: Number of messages left out because their stamp is far from all others.
+        repeated: Number of messages left out because of a repeated stamp.
+        reordered: Number of messages recorded after a later stamp, and sorted.
+        refused: Numbers of messages left out because they contradict themselves, by reason.
     """
 
     roles: tuple[str, ...]
@@ -64,7 +64,7 @@ class Quality:
     refused: Mapping[str, int]
 
     def facts(self) -> dict[str, Any]:
-        """Returns all that as plain values, with the first ``LISTED`` gaps."""
+        """Returns the quality as JSON values, with the first ``LISTED`` gaps."""
         longest = max((gap.length for gap in self.gaps), default=0.0)
         where = [[gap.start, gap.length] for gap in self.gaps[:LISTED]]
         gaps = {"count": len(self.gaps), "longest": longest, "where": where}
@@ -75,13 +75,13 @@ def quality(series: Series, clock: Clocked, origin: int, roles: tuple[str, ...])
     """Returns the quality of a topic.
 
     Args:
-        series: Its messages.
-        clock: Their times.
-        origin: When the trial starts, ns.
-        roles: Which roles it plays.
+        series: Messages of the topic.
+        clock: Times of the messages.
+        origin: Start of the trial, ns.
+        roles: Roles of the topic.
     """
-    told = clock.times[clock.usable]
-    times = np.unique(told)
+    usable = clock.times[clock.usable]
+    times = np.unique(usable)
     periods = np.diff(times) / 1e9
     usual = float(np.median(periods)) if len(periods) else None
     silent = periods > REACH * usual if usual is not None else np.zeros(0, dtype=bool)
@@ -99,7 +99,7 @@ def quality(series: Series, clock: Clocked, origin: int, roles: tuple[str, ...])
         latency_max=float(clock.latency.max()) if len(clock.latency) else None,
         fallbacks=clock.fallbacks,
         strays=int(np.sum(~clock.usable)),
-        repeated=len(told) - len(times),
-        reordered=int(np.sum(told < np.maximum.accumulate(told))) if len(told) else 0,
+        repeated=len(usable) - len(times),
+        reordered=int(np.sum(usable < np.maximum.accumulate(usable))) if len(usable) else 0,
         refused=dict(series.refused),
     )

@@ -1,6 +1,6 @@
-"""From irregular samples to the control steps, without inventing any.
+"""Resampling of irregular samples at the control steps, with NaN in gaps.
 
-Times are in one unit, whichever. A result is NaN wherever the samples do not bear it out.
+All times of a call are in the same unit.
 """
 
 import numpy as np
@@ -8,29 +8,29 @@ import numpy as np
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 
 REACH = 1.5
-"""Samples further apart than so many usual periods have a gap between them."""
+"""Minimum gap between two samples, in usual (median) periods."""
 
 
 def reach(times: FloatArray) -> float:
-    """Returns how far apart two samples of a series may be, and still bear out what is between.
+    """Returns the maximum distance of two samples between which a series is interpolated.
 
     Args:
-        times: ``(m,)``, increasing.
+        times: Times of the samples, ``(m,)``, increasing.
     """
     return REACH * float(np.median(np.diff(times))) if len(times) > 1 else 0.0
 
 
 def linear(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -> FloatArray:
-    """Returns values interpolated between the samples before and after.
+    """Returns linearly interpolated values.
 
     Args:
-        times: ``(m,)``, strictly increasing.
-        values: ``(m, width)``.
-        at: ``(steps,)``.
+        times: Times of the samples, ``(m,)``, strictly increasing.
+        values: Samples, ``(m, width)``.
+        at: Times of the steps, ``(steps,)``.
         limit: See ``reach``.
 
     Returns:
-        ``(steps, width)``; a sample's own value at its own time.
+        Values, ``(steps, width)``; exactly the sample at the time of a sample.
     """
     before, after, share, valid = _bracket(times, at, limit)
     result = np.full((len(at), values.shape[1]), np.nan)
@@ -40,12 +40,12 @@ def linear(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) 
 
 
 def angles(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -> FloatArray:
-    """Returns angles interpolated the short way round; see ``linear``.
+    """Returns angles interpolated along the shorter arc; see ``linear``.
 
     Args:
-        times: ``(m,)``, strictly increasing.
-        values: ``(m, width)`` rad, of which a jump by more than pi is a turn counted anew.
-        at: ``(steps,)``.
+        times: Times of the samples, ``(m,)``, strictly increasing.
+        values: Angles, ``(m, width)`` rad; a jump by more than pi is a wrap-around.
+        at: Times of the steps, ``(steps,)``.
         limit: See ``reach``.
     """
     return linear(times, np.unwrap(values, axis=0), at, limit)
@@ -55,13 +55,13 @@ def slerp(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -
     """Returns orientations interpolated along the shortest arc.
 
     Args:
-        times: ``(m,)``, strictly increasing.
-        values: ``(m, 4)`` unit quaternions, of which each means the same as its negative.
-        at: ``(steps,)``.
+        times: Times of the samples, ``(m,)``, strictly increasing.
+        values: Unit quaternions of either sign, ``(m, 4)``.
+        at: Times of the steps, ``(steps,)``.
         limit: See ``reach``.
 
     Returns:
-        ``(steps, 4)`` unit quaternions.
+        Unit quaternions, ``(steps, 4)``.
     """
     before, after, share, valid = _bracket(times, at, limit)
     result = np.full((len(at), 4), np.nan)
@@ -87,16 +87,16 @@ def slerp(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -
 def hold(
     times: FloatArray, values: FloatArray, at: FloatArray, limit: float = np.inf
 ) -> FloatArray:
-    """Returns the last value that was given.
+    """Returns the last sample before each step (zero-order hold).
 
     Args:
-        times: ``(m,)``, strictly increasing.
-        values: ``(m, width)``.
-        at: ``(steps,)``.
-        limit: How old it may be; a command stands until the next one, a measurement does not.
+        times: Times of the samples, ``(m,)``, strictly increasing.
+        values: Samples, ``(m, width)``.
+        at: Times of the steps, ``(steps,)``.
+        limit: Maximum age of a sample; infinite for commands.
 
     Returns:
-        ``(steps, width)``.
+        Values, ``(steps, width)``.
     """
     before = np.searchsorted(times, at, side="right") - 1
     result = np.full((len(at), values.shape[1]), np.nan)
@@ -109,7 +109,7 @@ def hold(
 def _bracket(
     times: FloatArray, at: FloatArray, limit: float
 ) -> tuple[IndexArray, IndexArray, FloatArray, BoolArray]:
-    """The samples before and after each time, how far it is between them, and if that is valid."""
+    """Samples before and after each time, the fraction between them, and its validity."""
     if not len(times):
         nowhere = np.zeros(len(at), dtype=np.intp)
         return nowhere, nowhere, np.zeros(len(at)), np.zeros(len(at), dtype=bool)

@@ -1,4 +1,4 @@
-"""The messages of topics, gathered into columns of numbers by name."""
+"""Messages of topics as columns of numbers by name."""
 
 from collections import Counter
 from collections.abc import Collection, Mapping
@@ -17,11 +17,11 @@ IntArray = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """What a topic says of one name.
+    """Numbers of one name on a topic.
 
     Attributes:
-        index: ``(m,)``: which messages speak of it.
-        values: ``(m, width)``: what they say; see ``KINDS``.
+        index: Indices of the messages with that name, ``(m,)``.
+        values: Numbers, ``(m, width)``; see ``KINDS``.
     """
 
     index: IndexArray
@@ -30,14 +30,14 @@ class Column:
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """What was said on a topic.
+    """Messages of a topic.
 
     Attributes:
-        topic: Which.
-        stamps: ``(n,)`` ns, when each message says it was measured; 0 where it does not say.
-        logged: ``(n,)`` ns, when it was received.
-        columns: By the names in the messages, of which each message may have others.
-        refused: How many messages were left out, by the reason.
+        topic: The topic.
+        stamps: Time stamps, ``(n,)`` ns; 0 without a stamp.
+        logged: Log times, ``(n,)`` ns.
+        columns: Columns by name; each message may have other names.
+        refused: Numbers of messages left out, by reason.
     """
 
     topic: Topic
@@ -48,14 +48,14 @@ class Series:
 
 
 def read_series(bag: Bag, wanted: Collection[str]) -> dict[str, Series]:
-    """Returns what was said on some topics of a bag, reading it once.
+    """Returns the messages of some topics of a bag, in one pass.
 
     Args:
-        bag: The recording.
-        wanted: Names of topics it has, of types in ``KINDS``.
+        bag: The bag.
+        wanted: Names of topics of the bag, of types in ``KINDS``.
 
     Raises:
-        LogError: A message is damaged, or encoded in an unknown way.
+        LogError: A message is damaged, or has an unknown encoding.
     """
     for name in wanted:
         if bag.topics[name].encoding != "cdr":
@@ -83,7 +83,7 @@ def read_series(bag: Bag, wanted: Collection[str]) -> dict[str, Series]:
 class _Gathered:
     stamps: list[int] = field(default_factory=list)
     logged: list[int] = field(default_factory=list)
-    # By the names in a message: nearly always those of the one before.
+    # By the names in a message, nearly always the names of the message before.
     layouts: dict[tuple[str, ...], tuple[list[int], list[FloatArray]]] = field(default_factory=dict)
     refused: Counter[str] = field(default_factory=Counter)
 

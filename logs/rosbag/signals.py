@@ -1,4 +1,4 @@
-"""From tracks to the signals of a behaviour at the control steps."""
+"""Signals of a behaviour at the control steps, from tracks."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -20,11 +20,11 @@ Interpolation = Callable[[FloatArray, FloatArray, FloatArray, float], FloatArray
 
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """The control steps of a trial.
+    """Control steps of a trial.
 
     Attributes:
-        origin: When the first one is, ns.
-        at: ``(steps,)`` ns after that.
+        origin: Time of the first step, ns.
+        at: Times after the first step, ``(steps,)`` ns.
     """
 
     origin: int
@@ -32,9 +32,9 @@ class Steps:
 
 
 def joint_signals(tracks: Tracks, robot: Robot, steps: Steps) -> dict[Signal, FloatArray]:
-    """Returns what is known of the hinges.
+    """Returns positions, velocities and efforts of the hinges.
 
-    Only one without limits can go round: what jumps elsewhere did not turn a whole turn.
+    Only the angle of a hinge without limits can wrap around.
     """
     anatomy, model = robot.anatomy, robot.model
     positions = [
@@ -49,20 +49,20 @@ def joint_signals(tracks: Tracks, robot: Robot, steps: Steps) -> dict[Signal, Fl
 
 
 def command_signals(tracks: Tracks, anatomy: Anatomy, steps: Steps) -> dict[Signal, FloatArray]:
-    """Returns the commands: one stands until the next, however long that takes."""
+    """Returns the commands; each is held until the next."""
     return {"commands": _columns(tracks.commands, anatomy.motors, steps, _standing)}
 
 
 def sensor_signals(
     tracks: Tracks, anatomy: Anatomy, steps: Steps, joint_positions: FloatArray
 ) -> dict[Signal, FloatArray]:
-    """Returns what the robot's sensors would have read.
+    """Returns the readings of the robot's sensors.
 
     Args:
-        tracks: Those of touch are read.
-        anatomy: The robot's sensors.
-        steps: The control steps.
-        joint_positions: ``(steps, hinges)`` rad: what the angle sensors measure.
+        tracks: Tracks, of which those of touch sensors are read.
+        anatomy: Parts of the robot.
+        steps: Control steps.
+        joint_positions: Joint angles, the readings of angle sensors, ``(steps, hinges)`` rad.
     """
     readings = np.full((len(steps.at), len(anatomy.sensors)), np.nan)
     for column, sensor in enumerate(anatomy.sensors):
@@ -75,22 +75,22 @@ def sensor_signals(
 
 
 def base_signals(tracks: Tracks, steps: Steps, *, from_start: bool) -> dict[Signal, FloatArray]:
-    """Returns what is known of the root body.
+    """Returns the pose and velocities of the root body.
 
     Args:
-        tracks: Those of the base are read.
-        steps: The control steps.
-        from_start: Whether the trial begins at x = y = 0 heading along +x.
+        tracks: Tracks, of which those of the base are read.
+        steps: Control steps.
+        from_start: Whether to transform the trial to begin at x = y = 0 heading along +x.
 
     Raises:
-        ValueError: It should, but where it begins or heads is not known.
+        ValueError: The initial pose, which the transform needs, is unknown.
     """
     position = _wide(_at(tracks.base_position, steps, linear), 3)
     orientation = _wide(_at(tracks.base_orientation, steps, slerp), 4)
     velocity = _wide(_at(tracks.base_linear_velocity, steps, linear), 3)
     if from_start:
-        told = [(tracks.base_position, position), (tracks.base_orientation, orientation)]
-        if any(len(track.times) and np.isnan(rows[0]).any() for track, rows in told):
+        required = [(tracks.base_position, position), (tracks.base_orientation, orientation)]
+        if any(len(track.times) and np.isnan(rows[0]).any() for track, rows in required):
             raise ValueError("where the base is at the start of the trial is not known")
         if len(tracks.base_orientation.times):
             by = unyaw(orientation[0])
@@ -113,7 +113,7 @@ def _columns(
 
 
 def _at(track: Track, steps: Steps, method: Interpolation) -> FloatArray:
-    # Nanoseconds since the start are whole numbers to float64 too, for a hundred days.
+    # float64 represents nanoseconds exactly for a hundred days.
     times = (track.times - steps.origin).astype(np.float64)
     at = steps.at.astype(np.float64)
     if not len(times):
@@ -127,5 +127,5 @@ def _standing(times: FloatArray, values: FloatArray, at: FloatArray, limit: floa
 
 
 def _wide(values: FloatArray, width: int) -> FloatArray:
-    """A track without samples has one column, whatever it would have told."""
+    """Values with ``width`` columns; a track without samples has one column."""
     return values if values.shape[1] == width else np.full((len(values), width), np.nan)

@@ -1,19 +1,19 @@
-"""What a bag's file holds, whatever its form: topics that are announced, messages as bytes."""
+"""Records of a bag's file in any format: announced topics, and messages as bytes."""
 
 from dataclasses import dataclass
 
 LATEST = 2**62
-"""Log times that a bag may have end here, ns: the year 2116, and sums still fit 64 bits."""
+"""Maximum log time of a bag, ns: the year 2116; sums still fit 64 bits."""
 
 
 @dataclass(frozen=True)
 class Announced:
-    """A topic that a file says it has.
+    """Announcement of a topic in a file.
 
     Attributes:
-        topic: Its name, as it stands in the file.
-        type: The type of its messages, as it stands in the file.
-        encoding: How they are encoded: ``cdr`` is the one that can be read.
+        topic: Name in the file.
+        type: Message type in the file.
+        encoding: Encoding of the messages; only ``cdr`` is supported.
     """
 
     topic: str
@@ -23,12 +23,12 @@ class Announced:
 
 @dataclass(frozen=True)
 class Stored:
-    """A message as it stands in a file.
+    """Message in a file.
 
     Attributes:
-        topic: Where it was published.
-        time: When it was received, ns.
-        payload: Its bytes, possibly packed with zstd.
+        topic: Name of the topic.
+        time: Log time, ns.
+        payload: Bytes of the message, possibly compressed with zstd.
     """
 
     topic: str
@@ -37,14 +37,14 @@ class Stored:
 
 
 class DamageError(ValueError):
-    """What stands in a file cannot be."""
+    """The content of a file is impossible."""
 
 
 def checked_time(time: object) -> int:
-    """Returns a log time that can be reckoned with, ns.
+    """Returns a valid log time, ns.
 
     Raises:
-        DamageError: It is not one.
+        DamageError: The time is invalid.
     """
     if not isinstance(time, int) or not 0 <= time < LATEST:
         raise DamageError(f"a message has the log time {time!r} ns")

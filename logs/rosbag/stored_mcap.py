@@ -1,8 +1,8 @@
-"""The MCAP file of a bag, read in one pass from its start.
+"""Reader of the MCAP file of a bag, in one pass.
 
-Recorders write neither checksums nor, with some presets, an index, and the file may be one of a
-split recording. So nothing is required that a log of ours must have; what checks there are, are
-made: the checksums that are not 0, and the count of messages.
+Recorders write no checksums and, with some presets, no index, and the file may be part of a split
+recording. Unlike in a trial log, none of these is required; checksums other than 0 and the count
+of messages are verified.
 """
 
 import struct
@@ -24,28 +24,28 @@ ADVICE = "record it again, or recover what is whole with `mcap recover`"
 
 _FAILURES = (
     McapError,
-    ValueError,  # checksums, texts that are none, and what is found out here
+    ValueError,  # checksums, invalid text, and DamageError
     RuntimeError,  # lz4
     struct.error,
     zstandard.ZstdError,
     MemoryError,
     OverflowError,
 )
-"""Everything that the library and its decompressors raise over damaged bytes."""
+"""Exceptions that the mcap library and its decompressors raise for damaged bytes."""
 
 
 def read_mcap(path: Path, name: Path) -> Iterator[Announced | Stored]:
-    """Yields what a file holds, in its order.
+    """Yields the records of a file, in order.
 
-    A caller knows that the file is whole when the iteration ends without an exception.
+    The file is undamaged if the iteration ends without an exception.
 
     Args:
         path: The file.
-        name: What errors call it: its name before it was unpacked.
+        name: Name of the file in errors: the name before decompression.
 
     Raises:
         LogError: The file is damaged or ends too early.
-        OSError: It cannot be read.
+        OSError: The file cannot be read.
     """
     count = 0
     try:
@@ -71,13 +71,13 @@ def _items(file: IO[bytes]) -> Iterator[Announced | Stored]:
         elif isinstance(record, Schema):
             schemas[record.id] = record.name
         elif isinstance(record, Channel):
-            kind = schemas.get(record.schema_id, "")  # 0: it has none
+            kind = schemas.get(record.schema_id, "")  # 0: no schema
             topics[record.id] = record.topic
             yield Announced(record.topic, kind, record.message_encoding)
         elif isinstance(record, Statistics):
             claimed = record.message_count
     if claimed is not None and claimed != count:
-        raise DamageError(f"its statistics say {claimed} messages, it holds {count}")
+        raise DamageError(f"its statistics have {claimed} messages, its records {count}")
     if file.read(1):
         raise DamageError("something follows its end")
 

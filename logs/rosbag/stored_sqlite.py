@@ -1,4 +1,4 @@
-"""The SQLite file of a bag (``.db3``), as ROS 2 wrote them by default up to Humble."""
+"""Reader of the SQLite file of a bag (``.db3``), the default of ROS 2 up to Humble."""
 
 import shlex
 import sqlite3
@@ -14,14 +14,14 @@ SQLITE_MAGIC = b"SQLite format 3\x00"
 
 
 def read_sqlite(path: Path, name: Path) -> Iterator[Announced | Stored]:
-    """Yields what a file holds: the topics, then the messages in the order of their recording.
+    """Yields the records of a file: topics, then messages in the order of their recording.
 
     Args:
-        path: The file; it is not written to.
-        name: What errors call it: its name before it was unpacked.
+        path: The file; it is only read.
+        name: Name of the file in errors: the name before decompression.
 
     Raises:
-        CorruptError: The file is damaged, or no rosbag2 recording.
+        CorruptError: The file is damaged, or not a rosbag2 recording.
     """
     _refuse_unfinished(path, name)
     count = 0
@@ -40,18 +40,18 @@ def read_sqlite(path: Path, name: Path) -> Iterator[Announced | Stored]:
 
 _FAILURES = (
     sqlite3.Error,
-    ValueError,  # texts that are none, and what is found out here
+    ValueError,  # invalid text, and DamageError
     OverflowError,
     MemoryError,
 )
-"""Everything that comes of damaged bytes."""
+"""Exceptions of a damaged file."""
 
 
 def _refuse_unfinished(path: Path, name: Path) -> None:
-    """Refuses a file beside which lies what SQLite has not written into it yet.
+    """Checks that no write-ahead log or rollback journal is beside the file.
 
     Raises:
-        IncompleteError: There is such a file.
+        IncompleteError: Such a file exists.
     """
     for suffix in ("-wal", "-journal"):
         beside = path.with_name(path.name + suffix)
@@ -65,7 +65,7 @@ def _refuse_unfinished(path: Path, name: Path) -> None:
 
 
 def _items(path: Path) -> Iterator[Announced | Stored]:
-    # Immutable: a bag on a read-only disk has no place for SQLite's lock files.
+    # Immutable: SQLite cannot create its lock files on a read-only disk.
     address = f"{path.resolve().as_uri()}?mode=ro&immutable=1"
     with closing(sqlite3.connect(address, uri=True)) as database:
         database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST)
@@ -88,7 +88,7 @@ def _items(path: Path) -> Iterator[Announced | Stored]:
 
 
 def _check(database: sqlite3.Connection) -> None:
-    """Refuses what is no recording; a view under a table's name could compute for ever."""
+    """Checks the tables of a recording; a view in place of a table might never end."""
     tables = {
         name
         for name, sql in database.execute("SELECT name, sql FROM sqlite_master WHERE type='table'")

@@ -1,6 +1,6 @@
-"""A mapping to start from, drawn from a bag and a robot.
+"""Suggestion of a mapping from a bag and a robot.
 
-What is uncertain is marked: ``CHECK`` is a guess that may be right, ``CHANGE`` must be filled in.
+Comments mark uncertain entries: ``CHECK`` marks a guess, ``CHANGE`` an entry to fill in.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,13 +17,13 @@ _COMMANDED = ("command", "cmd", "target", "desired", "setpoint", "goal", "refere
 
 
 def suggest(bag: Bag, robot: Robot, name: str, *, with_timestep: bool) -> str:
-    """Returns a mapping as TOML.
+    """Returns the suggestion of a mapping, as TOML.
 
     Args:
-        bag: The recording.
-        robot: Whose trial it is.
-        name: What the mapping is to call the robot: its name, or its MJCF file.
-        with_timestep: Whether the mapping must say the control time step.
+        bag: The bag.
+        robot: Robot of the recording.
+        name: Name of the robot in the mapping, or its MJCF file.
+        with_timestep: Whether the mapping must contain the control time step.
 
     Raises:
         LogError: A message of the bag is damaged.
@@ -45,9 +45,9 @@ def suggest(bag: Bag, robot: Robot, name: str, *, with_timestep: bool) -> str:
             f"# s; CHECK: how often the robot is commanded"
         )
     lines += [
-        '# controller = "gait.npz"  # what drove the robot, if it is known',
-        '# stage = "before"  # recorded while nothing was wrong with the robot',
-        'clock = "header"  # or "log", where the time stamps are of another clock',
+        '# controller = "gait.npz"  # controller of the robot, if known',
+        '# stage = "before"  # of the healthy robot',
+        'clock = "header"  # or "log", if the time stamps are of another clock',
         "# start = 0.0      # s after the first moment at which every role has data",
         "# duration = 10.0  # s",
         "",
@@ -63,7 +63,7 @@ def suggest(bag: Bag, robot: Robot, name: str, *, with_timestep: bool) -> str:
 
 
 def _able(bag: Bag, kind: RoleKind) -> list[Topic]:
-    """The topics that can play a role, those of its first type first."""
+    """Topics that can play a role, in the order of the role's types."""
     able = [
         topic
         for topic in bag.topics.values()
@@ -77,7 +77,7 @@ def _is_command(topic: Topic) -> bool:
 
 
 def _fit(series: Series, parts: Sequence[str]) -> int:
-    """How many parts of the robot a topic seems to tell of."""
+    """Number of parts of the robot with a matching name on a topic."""
     if series.topic.type == ARRAY:
         return len(parts) if len(series.columns) == len(parts) else 0
     return len(matched(parts, list(series.columns)))
@@ -94,14 +94,14 @@ def _angles(
     parts: Sequence[str],
     order: tuple[str, ...],
 ) -> Iterator[str]:
-    """The table of the joints or of the commands.
+    """Table of the joints or of the commands.
 
     Args:
-        table: Its name.
-        topics: Those that can play the role, the likeliest first.
-        series: What they say.
-        parts: The hinges or motors of the robot.
-        order: What the columns of a Float64MultiArray may be, in order.
+        table: Name of the table.
+        topics: Topics that can play the role, most likely first.
+        series: Messages by topic.
+        parts: Hinges or motors of the robot.
+        order: Likely names of the columns of a Float64MultiArray, in order.
     """
     yield f"[{table}]"
     yield _topic(topics)
@@ -111,7 +111,7 @@ def _angles(
         offered = _names(series, topics[:1])
         if topics[0].type == ARRAY:
             offered = _order(len(offered), order)
-            yield f"order = [{', '.join(map(_quoted, offered))}]  # CHECK: the bag does not say it"
+            yield f"order = [{', '.join(map(_quoted, offered))}]  # CHECK: the bag has no names"
     yield f"[{table}.names]  # each may also be {{ name = ..., sign = -1, offset = 0.1 }}"
     found = matched(parts, offered)
     for part in parts:
@@ -139,7 +139,7 @@ def _topic(topics: Sequence[Topic]) -> str:
 def _base(bag: Bag) -> Iterator[str]:
     topics = _able(bag, "base")
     if not topics:
-        yield "# No topic tells where the robot is: no displacement can be known."
+        yield "# No topic has the position of the base: the trial has no displacement."
         yield ""
         return
     yield "[base]"
@@ -147,7 +147,7 @@ def _base(bag: Bag) -> Iterator[str]:
     yield 'frame = "start"'
     yield 'unit = "m"'
     if topics[0].type != ODOMETRY:
-        yield "# It tells no velocities, and none are derived."
+        yield "# It has no velocities, and none are derived."
     yield ""
 
 
@@ -165,7 +165,7 @@ def _touches(bag: Bag, sensors: Sequence[str]) -> Iterator[str]:
     found = matched(sensors, list(topics))
     for sensor in sensors:
         if sensor not in found:
-            yield f"# No topic is like {sensor}: it counts as not observed."
+            yield f"# No topic is similar to {sensor}: it is not observed."
             continue
         topic = topics[found[sensor].name]
         unsure = "" if found[sensor].sure else "  # CHECK: not sure"
@@ -177,7 +177,7 @@ def _touches(bag: Bag, sensors: Sequence[str]) -> Iterator[str]:
 
 
 def _quoted(text: str) -> str:
-    """A text as TOML has it: names in a bag may hold anything."""
+    """TOML string of a text; names in a bag may contain any character."""
     return f'"{"".join(map(_escaped, text))}"'
 
 

@@ -1,4 +1,4 @@
-"""TOML read strictly, where every complaint names the line that it is about."""
+"""Strict TOML reader; each error names its line."""
 
 import re
 import tomllib
@@ -11,7 +11,7 @@ from selfmodel.errors import InputError, unknown_name
 Name = TypeVar("Name", bound=str)
 
 Keys = tuple[str, ...]
-"""The names of the tables, and of the key, that lead to an entry."""
+"""Path of an entry: names of its tables, then its key."""
 
 _KEY = r"""(?:[A-Za-z0-9_-]+|"(?:[^"\\]|\\.)*"|'[^']*')"""
 _KEYS = rf"{_KEY}(?:\s*\.\s*{_KEY})*"
@@ -21,12 +21,12 @@ _ENTRY = re.compile(rf"\s*({_KEYS})\s*=")
 
 @dataclass(frozen=True)
 class Document:
-    """A TOML text, and where in it things stand.
+    """TOML text with the lines of its entries.
 
     Attributes:
-        name: What errors call it.
-        text: All of it.
-        lines: The line of each key and table, from 1; keys of inline tables are left out.
+        name: Name of the text in errors.
+        text: The text.
+        lines: Line of each key and table, from 1; keys of inline tables are left out.
     """
 
     name: str
@@ -34,13 +34,12 @@ class Document:
     lines: Mapping[Keys, int]
 
     def error(self, path: Keys, sentence: str, item: str = "") -> InputError:
-        """Returns an error that names the line of what it is about.
+        """Returns an error that names the line of an entry.
 
         Args:
-            path: The table's and the key's names; of one that has no line of its own, the line
-                of what contains it is named.
-            sentence: What was expected, what came, and how to mend it.
-            item: A text in a list under that key, which may stand some lines below.
+            path: Path of the entry; for an entry without its own line, the line of its table.
+            sentence: Expected value, given value, and remedy.
+            item: Text in a list under that key, which may be some lines below.
         """
         known = next((path[:n] for n in range(len(path), 0, -1) if path[:n] in self.lines), ())
         line = self.lines.get(known, 1)
@@ -52,15 +51,15 @@ class Document:
     def unknown(
         self, path: Keys, what: str, name: str, known: Iterable[str], item: str = ""
     ) -> InputError:
-        """Returns the error for a name that is none of ``known``; see ``error``."""
+        """Returns the error for a name that is not in ``known``; see ``error``."""
         return self.error(path, str(unknown_name(what, name, known)), item)
 
 
 def parse_document(text: str, name: str) -> tuple[Document, dict[str, Any]]:
-    """Returns a TOML text as a document and as its tables.
+    """Returns the document and the tables of a TOML text.
 
     Raises:
-        InputError: It is no TOML, or says something twice.
+        InputError: The text is not TOML, or has a duplicate entry.
     """
     document = Document(name, text, _lines(text))
     try:
@@ -74,7 +73,7 @@ def parse_document(text: str, name: str) -> tuple[Document, dict[str, Any]]:
 
 
 def _explained(reason: str, text: str, line: int) -> str:
-    entry = _ENTRY.match(text.split("\n")[line - 1])  # not splitlines: TOML knows this end only
+    entry = _ENTRY.match(text.split("\n")[line - 1])  # not splitlines: TOML has no other line end
     if reason == "Cannot overwrite a value" and entry:
         return f"{entry[1]} is listed twice: expected each name once, remove one of the two"
     if reason.startswith(("Cannot declare", "Cannot mutate")):
@@ -101,12 +100,12 @@ def _names(keys: str) -> Keys:
 
 
 class Table:
-    """A table whose entries are taken one by one; what nobody takes is an error.
+    """Table whose entries are taken one by one; an entry that is not taken is an error.
 
     Args:
-        document: Where it stands.
-        path: Its name there.
-        entries: What it holds.
+        document: Document of the table.
+        path: Path of the table.
+        entries: Entries of the table.
     """
 
     def __init__(self, document: Document, path: Keys, entries: Mapping[str, Any]) -> None:
@@ -119,7 +118,7 @@ class Table:
         """Takes a text.
 
         Raises:
-            InputError: This, and the other methods: it is missing, or no text.
+            InputError: The entry is missing or not a text; likewise in the other methods.
         """
         value = self._take(key, default)
         if not isinstance(value, str):
@@ -143,7 +142,7 @@ class Table:
         return float(value)
 
     def texts(self, key: str) -> tuple[str, ...]:
-        """Takes a list of texts, of which none comes twice."""
+        """Takes a list of distinct texts."""
         value = self._take(key, None)
         if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
             raise self._wrong(key, "a list of texts", value)
@@ -161,25 +160,25 @@ class Table:
         return Table(self.document, (*self.path, key), value)
 
     def value(self, key: str) -> object:
-        """Takes whatever it is."""
+        """Takes an entry of any type."""
         return self._take(key, None)
 
     def has(self, key: str) -> bool:
-        """Says whether there is an entry that has not been taken."""
+        """Returns whether there is an entry that has not been taken."""
         if key not in self._known:
             self._known.append(key)
         return key in self._entries
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """The names of the entries that have not been taken."""
+        """Keys of the entries that have not been taken."""
         return tuple(self._entries)
 
     def done(self) -> None:
-        """Ends the taking.
+        """Checks that all entries have been taken.
 
         Raises:
-            InputError: There is an entry that nobody took.
+            InputError: An entry has not been taken.
         """
         for key in self._entries:
             where = f"[{'.'.join(self.path)}]" if self.path else "the mapping"

@@ -1,4 +1,4 @@
-"""What the bag tells of each part of the robot, in the model's units and signs."""
+"""Time series of each part of the robot, in the model's units and signs."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,18 +19,18 @@ _NOTHING = Track(np.zeros(0, dtype=np.int64), np.zeros((0, 1)))
 
 @dataclass(frozen=True, eq=False)
 class Tracks:
-    """Every track of a recording; what is not told is a track without samples.
+    """Tracks of a recording; a missing quantity is a track without samples.
 
     Attributes:
-        positions: By hinge, rad.
-        velocities: By hinge, rad/s.
-        efforts: By hinge, N m.
-        commands: By motor, rad.
-        touch: By touch sensor, 0 or 1.
-        base_position: m, in the recorded frame.
+        positions: Joint angles by hinge, rad.
+        velocities: Joint velocities by hinge, rad/s.
+        efforts: Joint torques by hinge, N m.
+        commands: Commanded angles by motor, rad.
+        touch: Readings by touch sensor, 0 or 1.
+        base_position: Position in the recorded frame, m.
         base_orientation: Unit quaternions, w x y z, in the recorded frame.
-        base_linear_velocity: m/s, in the base's own frame.
-        base_angular_velocity: rad/s, in the base's own frame.
+        base_linear_velocity: Linear velocity in the frame of the base, m/s.
+        base_angular_velocity: Angular velocity in the frame of the base, rad/s.
     """
 
     positions: Mapping[str, Track]
@@ -50,9 +50,9 @@ def read_tracks(
     """Returns the tracks of a recording.
 
     Args:
-        mapping: Which topic tells of what; it fits the series.
-        series: By topic.
-        clocks: By topic.
+        mapping: Mapping, checked against the series.
+        series: Messages by topic.
+        clocks: Times by topic.
     """
 
     def of(topic: str, name: str, wanted: slice) -> Track:
@@ -85,7 +85,7 @@ def read_tracks(
     if mapping.imu is not None:
         if mapping.base is None:
             orientation = _unit(of(mapping.imu, "", slice(0, 4)))
-        # A gyroscope measures what odometry at best derives.
+        # A gyroscope measures the angular velocity; odometry derives it.
         measured = of(mapping.imu, "", slice(4, 7))
         angular = measured if len(measured.times) else angular
     return Tracks(
@@ -94,7 +94,7 @@ def read_tracks(
 
 
 def required(mapping: BagMapping, tracks: Tracks) -> list[tuple[Role, str, Track]]:
-    """Returns the tracks without which there is no trial, with the role and the part of each."""
+    """Returns the tracks that a trial requires, each with its role and part."""
     roles = {role.path: role for role in mapping.roles}
     found = [(roles["joints",], hinge, track) for hinge, track in tracks.positions.items()]
     found += [(roles["commands",], motor, track) for motor, track in tracks.commands.items()]
@@ -112,7 +112,7 @@ def _scaled(track: Track, scale: float, offset: float = 0.0) -> Track:
 
 
 def _unit(track: Track) -> Track:
-    """Quaternions brought to length 1; those that were never filled in are left out."""
+    """Normalised quaternions; unset ones, of length 0, are left out."""
     lengths: FloatArray = np.linalg.norm(track.values, axis=1)
     known = np.abs(lengths - 1) < 0.1
     return Track(track.times[known], track.values[known] / lengths[known, np.newaxis])

@@ -1,4 +1,4 @@
-"""Turning vectors and orientations, and the frame in which a trial begins."""
+"""Rotation of vectors and orientations, and the initial frame of a trial."""
 
 import numpy as np
 
@@ -6,11 +6,11 @@ from selfmodel.arrays import FloatArray
 
 
 def rotated(vectors: FloatArray, quaternions: FloatArray) -> FloatArray:
-    """Returns vectors, as seen from outside, that were told in a turned frame.
+    """Returns vectors of a rotated frame in the parent frame.
 
     Args:
-        vectors: ``(steps, 3)``.
-        quaternions: ``(steps, 4)`` or ``(1, 4)``, unit, w x y z: how the frame is turned.
+        vectors: Vectors, ``(steps, 3)``.
+        quaternions: Unit quaternions of the frame, ``(steps, 4)`` or ``(1, 4)``, w x y z.
     """
     scalar, axis = quaternions[:, :1], quaternions[:, 1:]
     twice = 2 * np.cross(axis, vectors)
@@ -19,11 +19,11 @@ def rotated(vectors: FloatArray, quaternions: FloatArray) -> FloatArray:
 
 
 def turned(quaternions: FloatArray, by: FloatArray) -> FloatArray:
-    """Returns orientations after the world was turned.
+    """Returns orientations after a rotation of the world.
 
     Args:
-        quaternions: ``(steps, 4)``, w x y z.
-        by: ``(4,)``, w x y z.
+        quaternions: Orientations, ``(steps, 4)``, w x y z.
+        by: Rotation, ``(4,)``, w x y z.
     """
     w, x, y, z = by
     matrix = np.array([[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]])
@@ -32,13 +32,13 @@ def turned(quaternions: FloatArray, by: FloatArray) -> FloatArray:
 
 
 def unyaw(quaternion: FloatArray) -> FloatArray:
-    """Returns the turn about the vertical that makes an orientation head along +x.
+    """Returns the rotation about the vertical that turns a heading to +x.
 
     Args:
-        quaternion: ``(4,)``, w x y z.
+        quaternion: Orientation, ``(4,)``, w x y z.
 
     Returns:
-        ``(4,)``, w x y z.
+        Rotation, ``(4,)``, w x y z.
     """
     w, x, y, z = quaternion
     half = -np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)) / 2

@@ -1,49 +1,68 @@
-"""The command line: one file a command."""
+"""The command line: one file a command, imported when the command runs."""
 
 import sys
+from importlib.metadata import version
+from typing import Annotated
 
 import typer
 
-from selfmodel.cli import logs, suite
-from selfmodel.cli.ablate import ablate
-from selfmodel.cli.calibrate import calibrate
-from selfmodel.cli.diagnose import diagnose
+from selfmodel.cli.lazy import group
 from selfmodel.cli.output.plain import plain
-from selfmodel.cli.recover import recover
-from selfmodel.cli.render import render
-from selfmodel.cli.replay import replay
-from selfmodel.cli.robots import robots
-from selfmodel.cli.trial import trial
 from selfmodel.errors import InputError, WorkError, describe
 
-app = typer.Typer(
-    name="selfmodel",
-    help="Find out what changed in a legged robot from a few logged trials, and get it walking.",
-    no_args_is_help=True,
-    add_completion=False,
-    # An error that nobody foresaw shows its plain traceback: it is a bug report.
-    pretty_exceptions_enable=False,
+COMMANDS = {
+    "robots": ("selfmodel.cli.robots:robots", "List the robots, or the parts of one."),
+    "recover": ("selfmodel.cli.recover:recover", "Diagnose a failure and evolve a new gait."),
+    "trial": ("selfmodel.cli.trial:trial", "Run and log one trial of the simulated robot."),
+    "calibrate": ("selfmodel.cli.calibrate:calibrate", "Fit the self-model to logged trials."),
+    "diagnose": ("selfmodel.cli.diagnose:diagnose", "Rank the hypotheses that explain logs."),
+    "replay": ("selfmodel.cli.replay:replay", "Simulate a logged trial again, and compare."),
+    "render": ("selfmodel.cli.render:render", "Draw a logged trial beside its simulation."),
+    "ablate": ("selfmodel.cli.ablate:ablate", "Compare comparators on the same trials."),
+    "suite": ("selfmodel.cli.suite:app", "Recover the bodies of dm_control's suite."),
+    "logs": ("selfmodel.cli.logs:app", "Inspect, verify, salvage and import trial logs."),
+}
+"""``module:function`` and one-line help per command."""
+
+app = group(
+    "selfmodel",
+    "Find out what changed in a legged robot from a few logged trials, and get it walking.",
+    COMMANDS,
+    completion=True,
 )
-app.command()(robots)
-app.command()(recover)
-app.command()(trial)
-app.command()(calibrate)
-app.command()(diagnose)
-app.command()(replay)
-app.command()(render)
-app.command()(ablate)
-app.add_typer(suite.app)
-app.add_typer(logs.app)
+
+
+def _print_version(wanted: bool) -> None:  # noqa: FBT001  # typer passes the value by position
+    if wanted:
+        typer.echo(f"selfmodel {version('selfmodel')}")
+        raise typer.Exit
+
+
+@app.callback()
+def selfmodel(
+    *,
+    _version: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_print_version, is_eager=True, help="Print the version and exit."
+        ),
+    ] = False,
+) -> None:
+    """Parses the options that come before the command."""
 
 
 def main() -> None:
-    """Runs the command line; exits with 0 done, 1 the work failed, 2 wrong usage or bad input."""
+    """Runs the command line.
+
+    Exit status: 0 done; 1 the work failed; 2 wrong usage or bad input; 130 interrupted.
+    """
     try:
-        app()
+        # The same usage line for `python -m selfmodel` as for the installed command.
+        app(prog_name="selfmodel")
     except InputError as error:
         _fail(describe(error), 2)
     except (OSError, WorkError) as error:
-        # A disk that is full, a folder that may not be written: the file's name is in it.
+        # A full disk, a folder without write permission: the message contains the file's name.
         _fail(describe(error), 1)
     except MemoryError as error:
         _fail(f"there is not enough memory ({error or 'for this'}): ask for less at once", 1)

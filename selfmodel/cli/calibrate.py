@@ -1,17 +1,23 @@
-"""``selfmodel calibrate``: a self-model fitted to logs of the intact robot."""
+"""``selfmodel calibrate``: the self-model fitted to logs of the healthy robot."""
 
 import json
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
-from selfmodel.cli.options import Json, LogFiles, RobotOrModel, Threads
+from selfmodel.cli.inputs import check_folder
+from selfmodel.cli.options import Json, LogFiles, SelfModel, Threads
+from selfmodel.cli.output.plain import counted, plain
+from selfmodel.cli.output.tables import show
 from selfmodel.errors import InputError
-
-if TYPE_CHECKING:
-    from selfmodel.robot.robot import Robot
+from selfmodel.experiments import trial_logs
+from selfmodel.logs.files import as_write_error, create_partial, publish, refuse_existing
+from selfmodel.robot.parameters import factor_names
+from selfmodel.robot.robot import Robot
+from selfmodel.simulation.calibration import calibrate as fit_to
+from selfmodel.simulation.threads import thread_count
 
 
 def calibrate(
@@ -20,28 +26,22 @@ def calibrate(
     out: Annotated[
         Path,
         typer.Option(
-            "--out", "-o", metavar="MODEL.xml", help="The MJCF to write; it must not exist."
+            *("--out", "-o"), metavar="MODEL.xml", help="MJCF file to write; it must not exist."
         ),
     ],
-    robot: RobotOrModel = None,
+    robot: SelfModel = None,
     threads: Threads = 0,
     as_json: Json = False,
 ) -> None:
     """Fit masses, friction, damping, motors and delay of the self-model to logged trials.
 
-    Give trials of the robot with nothing wrong: what is wrong in them would become part of the
-    model. What is written is a model for --robot of diagnose and replay.
+    Give trials of the healthy robot: a fault in them would become part of the model. Commands
+    that read logs take the new model as --robot MODEL.xml.
     """
-    # Whatever brings MuJoCo waits until the command runs.
-    from selfmodel.experiments import trial_logs  # noqa: PLC0415
-    from selfmodel.logs.files import as_write_error, create_partial, publish, refuse_existing  # noqa: PLC0415
-    from selfmodel.robot.parameters import factor_names  # noqa: PLC0415
-    from selfmodel.simulation.calibrate import calibrate as fit_to  # noqa: PLC0415
-    from selfmodel.simulation.threads import thread_count  # noqa: PLC0415
-
     start = perf_counter()
     if out.suffix.lower() != ".xml":
         raise InputError(f"--out needs a name that ends in .xml, got {str(out)!r}")
+    check_folder(out)
     refuse_existing(out)
     logs = trial_logs.logs(files)
     before = trial_logs.robot_of_logs(logs, robot)
@@ -73,19 +73,16 @@ def calibrate(
         _print(result)
 
 
-def _refuse_assets(robot: "Robot", where: str) -> None:
+def _refuse_assets(robot: Robot, where: str) -> None:
     if robot.assets:
         raise InputError(
-            f"{where}: its model names other files ({', '.join(sorted(robot.assets))}), and what "
-            f"calibrate writes is one MJCF that stands alone: give --robot a model without them, "
-            f"or let diagnose calibrate for itself by giving it these logs too"
+            f"{where}: its model names other files ({', '.join(sorted(robot.assets))}), and "
+            f"calibrate writes a single MJCF file: give --robot a model without them, or give "
+            f"these logs to diagnose, which calibrates by itself"
         )
 
 
 def _print(result: dict[str, Any]) -> None:
-    from selfmodel.cli.output.plain import plain  # noqa: PLC0415  # only where it is printed
-    from selfmodel.cli.output.tables import show  # noqa: PLC0415  # the same
-
     rows = [
         (plain(one["name"]), "1", f"{one['factor']:.3f}", f"± {100 * one['deviation']:.1f} %")
         for one in result["parameters"]
@@ -94,14 +91,13 @@ def _print(result: dict[str, Any]) -> None:
     typer.echo(f"delay, control steps: {result['delay']} ({result['delay_before']} before)")
     typer.echo(
         f"error of predicted motion: {result['error']:.3f} ({result['error_before']:.3f} before), "
-        f"the root mean square over 10 steps, in the units of docs/calibration.md"
+        f"the root mean square over predictions of 10 steps, each signal in its own scale"
     )
     if result["as_it_was"]:
-        typer.echo("The model predicts the logs exactly already: it is left as it was.")
-    count = len(result["logs"])
+        typer.echo("The model already predicts the logs exactly: it is written unchanged.")
     typer.echo(
         plain(
             f"{result['model']}: {result['robot']} as fitted to "
-            f"{count} {'log' if count == 1 else 'logs'} in {result['seconds']:.1f} s"
+            f"{counted(len(result['logs']), 'log')} in {result['seconds']:.1f} s"
         )
     )

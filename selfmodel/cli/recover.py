@@ -1,13 +1,16 @@
-"""``selfmodel recover``: a robot walks, fails, and is brought back."""
+"""``selfmodel recover``: the paper's loop, from a healthy gait to one for the damaged robot."""
 
+from datetime import datetime
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from selfmodel.cli import inputs
 from selfmodel.cli.options import (
     DEFAULT_KINDS,
     Calibrated,
+    Case,
     ComparatorName,
     ControllerKind,
     Damage,
@@ -21,18 +24,28 @@ from selfmodel.cli.options import (
     Population,
     RobotName,
     Seed,
+    Steps,
     Structural,
     Threads,
+    Trials,
 )
+from selfmodel.cli.output.display import display
+from selfmodel.cli.output.report import as_object, print_report
 from selfmodel.comparators import DEFAULT
+from selfmodel.controllers.controller import check_silent_neurons
+from selfmodel.experiments import plugins, robots
+from selfmodel.experiments.experiment import Experiment, run
+from selfmodel.faults.hypothesis_space import HypothesisSpace
+from selfmodel.faults.neuron import silent_neurons
+from selfmodel.logs.files import replace_file
+from selfmodel.settings import Settings
+from selfmodel.simulation.threads import thread_count
 
 
 def recover(
     robot: RobotName,
     *,
-    case: Annotated[
-        int | None, typer.Option(metavar="N", help="A failure of the paper's Table I, 1 to 10.")
-    ] = None,
+    case: Case = None,
     damage: Damage = None,
     model_settings: ModelSettings = None,
     comparator: ComparatorName = DEFAULT.name,
@@ -44,37 +57,30 @@ def recover(
     controller: ControllerKind = "network",
     neurons: Neurons = None,
     seed: Seed = 0,
-    trials: Annotated[
-        int, typer.Option(min=1, max=99, help="Physical trials after the failing one.")
-    ] = 3,
+    steps: Steps = 1000,
+    trials: Trials = 3,
     population: Population = 100,
     generations: Generations = 30,
     out: Annotated[
         Path | None,
         typer.Option(
-            metavar="DIR", help="Folder of the run, new or empty.", show_default="a new one in runs"
+            *("--out", "-o"),
+            metavar="DIR",
+            help="Folder of the run, new or empty.",
+            show_default="a new one in runs",
         ),
     ] = None,
     threads: Threads = 0,
     as_json: Json = False,
 ) -> None:
-    """Recover a robot from a failure: diagnose it from logged trials, evolve a controller."""
-    # Whatever brings MuJoCo waits until the command runs.
-    from selfmodel.cli import inputs  # noqa: PLC0415
-    from selfmodel.cli.output.display import display  # noqa: PLC0415
-    from selfmodel.cli.output.report import as_object, print_report  # noqa: PLC0415
-    from selfmodel.controllers.controller import check_silent_neurons  # noqa: PLC0415
-    from selfmodel.experiments import plugins, robots  # noqa: PLC0415
-    from selfmodel.experiments.experiment import Experiment, run  # noqa: PLC0415
-    from selfmodel.faults.hypothesis_space import HypothesisSpace  # noqa: PLC0415
-    from selfmodel.faults.neuron import silent_neurons  # noqa: PLC0415
-    from selfmodel.logs.files import replace_file  # noqa: PLC0415
-    from selfmodel.settings import Settings  # noqa: PLC0415
-    from selfmodel.simulation.threads import thread_count  # noqa: PLC0415
+    """Recover a robot from a failure: diagnose it from logged trials, evolve a controller.
 
+    The physical robot is a simulated one with the failure of --case or --damage, which the
+    algorithm does not read. Every physical trial becomes a log in the folder of the run.
+    """
     entry = robots.robot_entry(robot, model_settings or ())
     considered = plugins.kinds(kinds)
-    damaged = inputs.case_notation(entry, case, damage)
+    damaged = inputs.case_notation(entry.cases, case, damage)
     made = entry.robot()
     design = plugins.design(controller, made, neurons)
     truth = HypothesisSpace(made.anatomy, considered).parse(damaged)
@@ -86,7 +92,7 @@ def recover(
         comparator=plugins.comparator(comparator),
         kinds=considered,
         calibrated=calibrate,
-        settings=Settings(trials=trials, generations=generations).scaled(population),
+        settings=Settings(steps=steps, trials=trials, generations=generations).scaled(population),
         seed=seed,
         threads=thread_count(threads),
         folder=out or _new_folder(made.name),
@@ -105,7 +111,7 @@ def recover(
     result = as_object(experiment, outcome)
     try:
         replace_file(experiment.folder / "result.json", f"{result}\n".encode())
-    finally:  # what was found is said even where the disk is full
+    finally:  # the result is printed even if the disk is full
         if as_json:
             typer.echo(result)
         else:
@@ -113,7 +119,5 @@ def recover(
 
 
 def _new_folder(robot: str) -> Path:
-    """A folder in ``runs/`` that no run has used, whose name tells nothing of what is hidden."""
-    from datetime import datetime  # noqa: PLC0415  # with the other work of the command
-
+    """Returns an unused folder in ``runs/``; its name does not contain the hidden failure."""
     return Path("runs") / f"{robot}-{datetime.now().astimezone():%Y%m%d-%H%M%S-%f}"

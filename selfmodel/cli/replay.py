@@ -1,27 +1,33 @@
-"""``selfmodel replay``: a log simulated again, and compared."""
+"""``selfmodel replay``: a logged trial simulated again, and compared with its log."""
 
 import json
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
+import mujoco
 import typer
 
-from selfmodel.cli.options import Json, NamedKinds, RobotOrModel, Threads
-
-if TYPE_CHECKING:
-    from selfmodel.logs import TrialLog
-    from selfmodel.simulation.replay import Replay
-    from selfmodel.trials.behaviour import Signal
+from selfmodel.cli.options import HypothesisText, Json, LogFile, NamedKinds, SelfModel, Threads
+from selfmodel.cli.output.plain import counted, plain
+from selfmodel.cli.output.replay_figure import check_figure, draw
+from selfmodel.cli.output.tables import show
+from selfmodel.experiments import plugins, trial_logs
+from selfmodel.faults.hypothesis_space import HypothesisSpace
+from selfmodel.logs import TrialLog
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.simulation.threads import thread_count
+from selfmodel.simulation.trial_replay import Replay, replay as simulate
+from selfmodel.trials.behaviour import SIGNALS, Signal
 
 TOLERANCE = 1e-6
-"""By how much numbers may differ and count as the same between versions of MuJoCo, or after
-an import, in their SI unit: some thousand roundings, before contact makes more of them."""
+"""Largest difference that counts as equal between versions of MuJoCo or after an import, SI
+units: some thousand roundings, before contacts amplify them."""
 
 WINDOWS = 10
 """Rows of the table of errors over time."""
 
-COLUMNS: "tuple[tuple[Signal, str], ...]" = (
+COLUMNS: tuple[tuple[Signal, str], ...] = (
     ("base_position", "base, m"),
     ("joint_positions", "joints, rad"),
     ("joint_velocities", "joints, rad/s"),
@@ -31,35 +37,21 @@ COLUMNS: "tuple[tuple[Signal, str], ...]" = (
 
 
 def replay(
-    file: Annotated[Path, typer.Argument(metavar="LOG", help="A trial log, NAME.mcap.")],
+    file: LogFile,
     *,
-    hypothesis: Annotated[
-        str,
-        typer.Option(
-            metavar="NOTATION", help="What is taken to be wrong, such as break:front_left_knee."
-        ),
-    ] = "intact",
+    hypothesis: HypothesisText = "intact",
     kinds: NamedKinds = "all",
-    model: RobotOrModel = None,
+    model: SelfModel = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", metavar="FIGURE.png|svg|pdf", help="Draw the error over time."),
+        typer.Option(
+            *("--out", "-o"), metavar="FIGURE.png", help="Figure of the error: .png, .svg or .pdf."
+        ),
     ] = None,
     threads: Threads = 0,
     as_json: Json = False,
 ) -> None:
-    """Simulate a logged trial again, from its log alone, and compare what it does to the bit."""
-    # Whatever brings MuJoCo waits until the command runs.
-    import mujoco  # noqa: PLC0415
-
-    from selfmodel.cli.replay_figure import check_figure, draw  # noqa: PLC0415
-    from selfmodel.experiments import plugins, trial_logs  # noqa: PLC0415
-    from selfmodel.faults.hypothesis_space import HypothesisSpace  # noqa: PLC0415
-    from selfmodel.simulation.replay import replay as simulate  # noqa: PLC0415
-    from selfmodel.simulation.simulator import Simulator  # noqa: PLC0415
-    from selfmodel.simulation.threads import thread_count  # noqa: PLC0415
-    from selfmodel.trials.behaviour import SIGNALS  # noqa: PLC0415
-
+    """Simulate a logged trial again from its log, and compare the two bit by bit."""
     if out is not None:
         check_figure(out)
     (log,) = trial_logs.logs([file])
@@ -80,7 +72,7 @@ def replay(
         "first_divergence_step": found.first_divergence_step,
         "rms": {signal: _finite(found.rms(signal)) for signal in SIGNALS},
         "tolerance": tolerance,
-        "diverged": found.broke_down,
+        "diverged": found.diverged,
         "mujoco": {"logged": logged, "running": mujoco.__version__},
     }
     if out is not None:
@@ -96,41 +88,38 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _print(result: dict[str, Any], log: "TrialLog", found: "Replay") -> None:
-    from selfmodel.cli.output.plain import plain  # noqa: PLC0415  # only where it is printed
-    from selfmodel.cli.output.tables import show  # noqa: PLC0415  # the same
-
+def _print(result: dict[str, Any], log: TrialLog, found: Replay) -> None:
     typer.echo(
-        plain(f"{result['log']}: {result['steps']} steps of {result['robot']}, replayed as ")
+        plain(f"{result['log']}: {counted(result['steps'], 'step')} of {result['robot']}")
+        + ", replayed as "
         + result["hypothesis"]
     )
     versions = result["mujoco"]
     if versions["logged"] != versions["running"]:
         typer.echo(
             f"The log was made with MuJoCo {plain(versions['logged'])}, this is "
-            f"{versions['running']}: what differs by less than {TOLERANCE:g} counts as the same."
+            f"{versions['running']}: differences below {TOLERANCE:g} count as equal."
         )
     if log.imported:
         typer.echo(
-            f"The log was imported, and resampled: what differs by less than {TOLERANCE:g} counts "
-            f"as the same."
+            f"The log was imported, and resampled: differences below {TOLERANCE:g} count as equal."
         )
-    if found.broke_down:
-        typer.echo("The simulation broke down: with this hypothesis the model is unstable.")
+    if found.diverged:
+        typer.echo("The simulation diverged: with this hypothesis the model is unstable.")
     if found.identical:
-        typer.echo("identical: every number that was observed is the simulated one, to the bit.")
+        typer.echo("identical: every observed number equals the simulated one, to the bit.")
         return
     step = found.first_divergence_step
     if step is None:
-        typer.echo(f"the same all the way, but for what is within {result['tolerance']:g}.")
+        typer.echo(f"equal at every step, within {result['tolerance']:g}.")
     else:
         time = step * log.control_timestep
-        typer.echo(f"They part at step {step} ({time:g} s). Root mean square of the difference:")
+        typer.echo(f"They differ from step {step} ({time:g} s). Root mean square difference:")
     show(("time, s", *(title for _, title in COLUMNS)), _rows(log, found), texts=0)
 
 
-def _rows(log: "TrialLog", found: "Replay") -> list[tuple[str, ...]]:
-    """The error of each signal in each part of the trial."""
+def _rows(log: TrialLog, found: Replay) -> list[tuple[str, ...]]:
+    """Returns the error of each signal in each window of the trial."""
     steps = log.trial.behaviour.steps
     windows = min(WINDOWS, steps)
     rows = []
@@ -138,6 +127,6 @@ def _rows(log: "TrialLog", found: "Replay") -> list[tuple[str, ...]]:
         first, last = steps * k // windows, steps * (k + 1) // windows
         errors = [found.rms(signal, slice(first, last)) for signal, _ in COLUMNS]
         start, end = first * log.control_timestep, (last - 1) * log.control_timestep
-        told = ("-" if math.isnan(error) else f"{error:.3g}" for error in errors)
-        rows.append((f"{start:.2f}-{end:.2f}", *told))
+        texts = ("-" if math.isnan(error) else f"{error:.3g}" for error in errors)
+        rows.append((f"{start:.2f}-{end:.2f}", *texts))
     return rows

@@ -1,34 +1,32 @@
-"""``selfmodel robots``: the robots that come with it, and the parts of one or of your own."""
+"""``selfmodel robots``: the robots of selfmodel, and the parts of a robot or an MJCF file."""
 
 import json
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
+from rich.console import Console
 
 from selfmodel.cli.options import Json, ModelSettings
 from selfmodel.cli.output.plain import plain
-
-if TYPE_CHECKING:
-    from selfmodel.tasks import Entry
+from selfmodel.cli.output.robot_parts import parts, print_parts
+from selfmodel.cli.output.tables import folding
+from selfmodel.experiments.robots import is_model, notes_on, robot_entry
+from selfmodel.robot.designs import network_for
+from selfmodel.tasks import ROBOTS, Entry
 
 
 def robots(
     robot: Annotated[
         str | None,
         typer.Argument(
-            metavar="[ROBOT|ROBOT.xml]", help="Show the parts of this one, or of an MJCF of yours."
+            metavar="[ROBOT]", help="Name of a robot, or path of an MJCF file, ROBOT.xml."
         ),
     ] = None,
     *,
     model_settings: ModelSettings = None,
     as_json: Json = False,
 ) -> None:
-    """List the robots, or the parts and failure cases of one."""
-    # The robots bring MuJoCo, which takes longer to import than the help takes to print.
-    from selfmodel.cli.output.robot_parts import parts, print_parts  # noqa: PLC0415
-    from selfmodel.experiments.robots import is_model, notes_on, robot_entry  # noqa: PLC0415
-    from selfmodel.tasks import ROBOTS  # noqa: PLC0415
-
+    """List the robots; with ROBOT, its joints, sensors, motors, faults and cases of Table I."""
     if robot is None:
         every = [_facts(robot_entry(name)) for name in ROBOTS]
         if as_json:
@@ -43,14 +41,11 @@ def robots(
         typer.echo(json.dumps(facts, indent=2, allow_nan=False))
         return
     print_parts(facts)
-    _print_cases(facts)
     for note in notes:
         typer.echo(plain(f"note: {note}"))
 
 
-def _facts(entry: "Entry") -> dict[str, Any]:
-    from selfmodel.robot.designs import network_for  # noqa: PLC0415  # imports MuJoCo
-
+def _facts(entry: Entry) -> dict[str, Any]:
     made = entry.robot()
     network = network_for(made)
     return {
@@ -68,30 +63,19 @@ def _facts(entry: "Entry") -> dict[str, Any]:
 
 
 def _print_all(facts: list[dict[str, Any]]) -> None:
-    from rich.console import Console  # noqa: PLC0415  # only where a table is drawn
-    from rich.table import Table  # noqa: PLC0415
-
-    table = Table("robot", "joints", "hinges", "sensors", "weights", "tasks", "cases")
-    for one in facts:
-        counts = (len(one["joints"]), len(one["hinges"]), len(one["sensors"]), one["weights"])
-        table.add_row(
-            one["robot"], *map(str, counts), ", ".join(one["tasks"]), f"1 to {len(one['cases'])}"
+    rows = [
+        (
+            one["robot"],
+            *(str(len(one[parts])) for parts in ("joints", "hinges", "sensors")),
+            str(one["weights"]),
+            ", ".join(one["tasks"]),
+            f"1 to {len(one['cases'])}",
         )
-    Console().print(table)
+        for one in facts
+    ]
+    columns = ("robot", "joints", "hinges", "sensors", "weights", "tasks", "cases")
+    Console(markup=False).print(folding(columns, rows))
     typer.echo(
         "`selfmodel robots ROBOT` lists its parts and cases; `selfmodel suite list` the bodies of "
         "dm_control's suite."
     )
-
-
-def _print_cases(facts: dict[str, Any]) -> None:
-    from rich.console import Console  # noqa: PLC0415  # only where a table is drawn
-    from rich.table import Table  # noqa: PLC0415
-
-    if not facts["cases"]:
-        return
-    cases = Table("case", "damage", title="failures of Table I")
-    cases.columns[1].overflow = "fold"
-    for number, notation in facts["cases"].items():
-        cases.add_row(number, notation)
-    Console().print(cases)

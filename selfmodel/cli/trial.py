@@ -1,76 +1,59 @@
-"""``selfmodel trial``: runs and logs one physical trial."""
+"""``selfmodel trial``: one logged trial of the simulated physical robot."""
 
 import json
 from pathlib import Path
-from typing import Annotated
 
+import numpy as np
 import typer
 
+from selfmodel.cli import inputs
 from selfmodel.cli.options import (
+    ControllerSource,
     Damage,
     GapLevel,
     Json,
     ModelSettings,
     NamedKinds,
     Neurons,
+    NewLog,
     RobotName,
     Seed,
     StageName,
+    Steps,
     Structural,
-    check_log_name,
 )
+from selfmodel.controllers.controller import Controller, check_silent_neurons, draw_genomes
+from selfmodel.experiments import plugins, robots, trial_logs
+from selfmodel.experiments.reality import draw_reality
+from selfmodel.faults.hypothesis_space import HypothesisSpace
+from selfmodel.faults.neuron import silent_neurons
+from selfmodel.logs.physical_trial import run_trial
+from selfmodel.logs.records import TrialHeader
+from selfmodel.robot.designs import DESIGNS
+from selfmodel.settings import Settings
+from selfmodel.trials.trial import TrialPlan
 
 
 def trial(
     robot: RobotName,
     *,
-    out: Annotated[
-        Path,
-        typer.Option(
-            "--out", "-o", metavar="FILE.mcap", help="The log to write; it must not exist."
-        ),
-    ],
+    out: NewLog,
     damage: Damage = None,
     kinds: NamedKinds = "all",
     model_settings: ModelSettings = None,
-    controller: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.npz|LOG.mcap|network|cpg",
-            help="Whose controller drives the robot, or the kind of a random one from the seed.",
-            show_default="network",
-        ),
-    ] = None,
+    controller: ControllerSource = None,
     neurons: Neurons = None,
     gap: GapLevel = 0.0,
     structure: Structural = False,
+    steps: Steps = 1000,
     stage: StageName = "single",
     seed: Seed = 0,
     as_json: Json = False,
 ) -> None:
     """Run one trial of the simulated physical robot and write its log."""
-    # Whatever brings MuJoCo waits until the command runs.
-    import numpy as np  # noqa: PLC0415
-
-    from selfmodel.cli import inputs  # noqa: PLC0415
-    from selfmodel.controllers.controller import (  # noqa: PLC0415
-        Controller,
-        check_silent_neurons,
-        draw_genomes,
-    )
-    from selfmodel.experiments import plugins, robots, trial_logs  # noqa: PLC0415
-    from selfmodel.experiments.reality import draw_reality  # noqa: PLC0415
-    from selfmodel.faults.hypothesis_space import HypothesisSpace  # noqa: PLC0415
-    from selfmodel.faults.neuron import silent_neurons  # noqa: PLC0415
-    from selfmodel.logs.physical_trial import run_trial  # noqa: PLC0415
-    from selfmodel.logs.records import TrialHeader  # noqa: PLC0415
-    from selfmodel.robot.designs import DESIGNS  # noqa: PLC0415
-    from selfmodel.settings import Settings  # noqa: PLC0415
-    from selfmodel.trials.trial import TrialPlan  # noqa: PLC0415
-
     kind = "network" if controller is None else str(controller)
     made = robots.robot_entry(robot, model_settings or ()).robot()
-    check_log_name(out)
+    inputs.check_log_name(out)
     hidden = HypothesisSpace(made.anatomy, plugins.kinds(kinds)).parse(
         "intact" if damage is None else damage
     )
@@ -81,7 +64,7 @@ def trial(
     else:
         driver = trial_logs.controller(Path(kind), made, neurons)
     check_silent_neurons(driver.design, silent_neurons(hidden))
-    settings = Settings()
+    settings = Settings(steps=steps)
     plan = TrialPlan("trial", inputs.stage(stage), driver, settings.steps, seed)
     header = TrialHeader(settings, hidden=str(hidden), gap=reality.text)
     try:

@@ -1,8 +1,7 @@
 """Command source of a trial: a controller, or the playback of recorded commands."""
 
 from collections import Counter
-from collections.abc import Sequence
-from collections.abc import Set as AbstractSet
+from collections.abc import Sequence, Set as AbstractSet
 
 import numpy as np
 

@@ -1,7 +1,6 @@
 """Controllers: a design, such as a network or a CPG, with the genome that sets its weights."""
 
-from collections.abc import Sequence
-from collections.abc import Set as AbstractSet
+from collections.abc import Sequence, Set as AbstractSet
 from dataclasses import dataclass
 from typing import Protocol
 

@@ -10,8 +10,7 @@ locomotion* (ICRA 2008).
 """
 
 import math
-from collections.abc import Sequence
-from collections.abc import Set as AbstractSet
+from collections.abc import Sequence, Set as AbstractSet
 from dataclasses import dataclass
 from typing import ClassVar
 

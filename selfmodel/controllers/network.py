@@ -1,7 +1,6 @@
 """Recurrent network: the paper's controller design."""
 
-from collections.abc import Sequence
-from collections.abc import Set as AbstractSet
+from collections.abc import Sequence, Set as AbstractSet
 from dataclasses import dataclass
 from typing import ClassVar
 

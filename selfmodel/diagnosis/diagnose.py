@@ -85,27 +85,27 @@ class DiagnosticSearch:
         surrogate = surrogate_of(self.evidence, self._own_surrogate, trials)
         is_piecewise = self.evidence.is_piecewise(trials)
         found = self._evolved(surrogate, seeds, rng, on_generation)
-        best, looks = found[0], self._loss_functions(trials, surrogate)
+        best, losses = found[0], self._loss_functions(trials, surrogate)
         # Ranked: hypotheses that were proposed and compared with the whole trials. Hypotheses that
         # only the tests below compare with the trials are never ranked.
         ranked: set[Hypothesis] = set() if is_piecewise else set(found)
         if is_piecewise:
-            best = self._refined(found[:REFINEMENT_STARTS], looks, ranked)
+            best = self._refined(found[:REFINEMENT_STARTS], losses, ranked)
         ranked |= {best, INTACT}
         self._proposed |= ranked
         judged = list(ranked)
         totals = dict(zip(judged, map(float, self.evidence.distances(judged, trials)), strict=True))
         others = [one for one in _ranked(totals) if one != best]
-        indistinguishable = self._indistinguishable(best, others, looks, is_piecewise=is_piecewise)
-        unsearched = best_unsearched_fault(best, self._space, looks)
-        undetectable = undetectable_faults(best, self._space, looks) if is_piecewise else []
+        indistinguishable = self._indistinguishable(best, others, losses, is_piecewise=is_piecewise)
+        unsearched = best_unsearched_fault(best, self._space, losses)
+        undetectable = undetectable_faults(best, self._space, losses) if is_piecewise else []
         kept = self._settings.kept
         return Diagnosis(
             ranked=tuple(Candidate(one, totals[one]) for one in [best, *others][:kept]),
             trials=len(trials),
             intact_distance=totals[INTACT],
             indistinguishable=indistinguishable[:kept],
-            verdict=self._verdict(best, indistinguishable, unsearched, looks),
+            verdict=self._verdict(best, indistinguishable, unsearched, losses),
             test=TEST if is_piecewise else EQUAL_DISTANCES,
             unsearched=unsearched,
             undetectable=tuple(undetectable[:kept]),
@@ -172,13 +172,13 @@ class DiagnosticSearch:
         )
 
     def _refined(
-        self, known: Sequence[Hypothesis], looks: LossFunctions, compared: set[Hypothesis]
+        self, known: Sequence[Hypothesis], losses: LossFunctions, compared: set[Hypothesis]
     ) -> Hypothesis:
         """Returns the best hypothesis around the known ones.
 
         Args:
             known: Hypotheses to start from.
-            looks: Losses on the trials.
+            losses: Losses on the trials.
             compared: Every hypothesis that is compared with the whole trials is added.
         """
         return refined(
@@ -186,9 +186,9 @@ class DiagnosticSearch:
             self._space,
             self._settings.genes,
             LossFunctions(
-                damaged=_recorded(looks.damaged, compared),
-                surrogate=_recorded(looks.surrogate, self._proposed),
-                healthy=looks.healthy,
+                damaged=_recorded(losses.damaged, compared),
+                surrogate=_recorded(losses.surrogate, self._proposed),
+                healthy=losses.healthy,
             ),
         )
 
@@ -196,21 +196,21 @@ class DiagnosticSearch:
         self,
         best: Hypothesis,
         others: Sequence[Hypothesis],
-        looks: LossFunctions,
+        losses: LossFunctions,
         *,
         is_piecewise: bool,
     ) -> tuple[Hypothesis, ...]:
         """Hypotheses not significantly worse than the best, without supersets of its faults."""
         parts = _without_severities(best)
         candidates = [other for other in others if not parts <= _without_severities(other)]
-        best_losses, *rows = looks.damaged([best, *candidates])
+        best_losses, *rows = losses.damaged([best, *candidates])
         if is_piecewise:
             distinct = [is_better(best_losses, row) for row in rows]
         else:
             distinct = [bool(row.sum() != best_losses.sum()) for row in rows]
         indistinct = [one for one, apart in zip(candidates, distinct, strict=True) if not apart]
         return tuple(
-            one for one in indistinct if not any_fault_is_model_error(one, looks, self._space)
+            one for one in indistinct if not any_fault_is_model_error(one, losses, self._space)
         )
 
     def _verdict(
@@ -218,13 +218,13 @@ class DiagnosticSearch:
         best: Hypothesis,
         indistinguishable: Sequence[Hypothesis],
         unsearched: UnsearchedFault | None,
-        looks: LossFunctions,
+        losses: LossFunctions,
     ) -> Verdict:
         if unsearched is not None:
             return "unexplained"
         if self._intact:
             healthy = self.evidence.losses([INTACT], self._intact)[0]
-            if exceeds_healthy_loss(looks.damaged([best])[0], healthy):
+            if exceeds_healthy_loss(losses.damaged([best])[0], healthy):
                 return "unexplained"
         return "ambiguous" if indistinguishable else "explained"
 

@@ -1,9 +1,11 @@
 """A diagnosis: hypotheses ranked by distance to all trials, and a verdict on the best."""
 
+import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.trials.data_frame import data_frame
 
 Verdict = Literal["explained", "ambiguous", "unexplained"]
 """``explained``: the best hypothesis predicts the trials about as well as the self-model predicts
@@ -25,6 +27,10 @@ class Candidate:
     hypothesis: Hypothesis
     distance: float
 
+    def to_dict(self) -> dict[str, Any]:
+        """Returns the JSON values; the distance is None where a simulation diverged."""
+        return {"hypothesis": str(self.hypothesis), "distance": _finite(self.distance)}
+
 
 @dataclass(frozen=True)
 class UnsearchedFault:
@@ -38,8 +44,8 @@ class UnsearchedFault:
     hypothesis: Hypothesis
     kind: str
 
-    def as_object(self) -> dict[str, str]:
-        """Returns the JSON object."""
+    def to_dict(self) -> dict[str, Any]:
+        """Returns the JSON values."""
         return {"hypothesis": str(self.hypothesis), "kind": self.kind}
 
 
@@ -78,3 +84,44 @@ class Diagnosis:
     def best(self) -> Hypothesis:
         """The best hypothesis."""
         return self.ranked[0].hypothesis
+
+    def __repr__(self) -> str:
+        count = f"{self.trials} {'trial' if self.trials == 1 else 'trials'}"
+        lines = [f"<Diagnosis of {count}: {self.best}, {self.verdict}"]
+        lines += [f"  {one.distance:10.4f}  {one.hypothesis}" for one in self.ranked]
+        for name in ("indistinguishable", "undetectable"):
+            others = ", ".join(map(str, getattr(self, name)))
+            lines += [f"  {name}: {others}"] if others else []
+        if self.unsearched is not None:
+            lines.append(f"  unsearched: {self.unsearched.hypothesis} ({self.unsearched.kind})")
+        return "\n".join(lines) + ">"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns the JSON values of a run's ``diagnoses.json``.
+
+        The keys ``rivals``, ``unseen`` and ``outside`` are those of a published format; they hold
+        the attributes ``indistinguishable``, ``undetectable`` and ``unsearched``.
+        """
+        return {
+            "trials": self.trials,
+            "intact_distance": _finite(self.intact_distance),
+            "rivals": [str(hypothesis) for hypothesis in self.indistinguishable],
+            "unseen": [str(hypothesis) for hypothesis in self.undetectable],
+            "verdict": self.verdict,
+            "test": self.test,
+            "outside": self.unsearched.to_dict() if self.unsearched else None,
+            "ranked": [candidate.to_dict() for candidate in self.ranked],
+        }
+
+    def to_pandas(self) -> Any:  # noqa: ANN401  # pandas is optional
+        """Returns the ranking as a ``pandas.DataFrame``: hypothesis and distance, best first.
+
+        Raises:
+            InputError: pandas is not installed.
+        """
+        return data_frame([candidate.to_dict() for candidate in self.ranked])
+
+
+def _finite(distance: float) -> float | None:
+    """JSON has no infinity, which is the distance of a simulation that diverged."""
+    return distance if math.isfinite(distance) else None

@@ -19,7 +19,7 @@ STEPS = 20
 """Control steps of the check that robots with the fault share a batch with others."""
 
 
-def check_kind(kind: FaultKind, robot: Robot) -> None:
+def check_fault_kind(kind: FaultKind, robot: Robot) -> None:
     """Checks that a kind fulfils the contract of ``FaultKind``.
 
     Args:

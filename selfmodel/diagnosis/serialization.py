@@ -13,43 +13,21 @@ from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, UnsearchedFault,
 from selfmodel.faults.hypothesis import Hypothesis
 
 
-def diagnosis_to_dict(diagnosis: Diagnosis) -> dict[str, Any]:
-    """Returns a diagnosis as JSON values, as in ``diagnoses.json``."""
-    confidence = confidence_to_dict(diagnosis)
-    return {
-        "trials": diagnosis.trials,
-        "intact_distance": confidence["intact_distance"],
-        "rivals": confidence["rivals"],
-        "unseen": [str(hypothesis) for hypothesis in diagnosis.undetectable],
-        "verdict": confidence["verdict"],
-        "test": confidence["test"],
-        "outside": confidence["outside"],
-        "ranked": ranking_to_list(diagnosis.ranked),
-    }
-
-
 def confidence_to_dict(diagnosis: Diagnosis) -> dict[str, Any]:
     """Returns the verdict and the alternatives to the best hypothesis, as in ``--json`` output."""
-    return {
-        "verdict": diagnosis.verdict,
-        "rivals": [str(hypothesis) for hypothesis in diagnosis.indistinguishable],
-        "unseen": [_extra(hypothesis, diagnosis.best) for hypothesis in diagnosis.undetectable],
-        "test": diagnosis.test,
-        "outside": diagnosis.unsearched.as_object() if diagnosis.unsearched else None,
-        "intact_distance": _to_json(diagnosis.intact_distance),
-    }
+    values = diagnosis.to_dict()
+    extra = [_extra(hypothesis, diagnosis.best) for hypothesis in diagnosis.undetectable]
+    keys = ("verdict", "rivals", "unseen", "test", "outside", "intact_distance")
+    return {key: extra if key == "unseen" else values[key] for key in keys}
 
 
 def ranking_to_list(ranked: Sequence[Candidate]) -> list[dict[str, Any]]:
-    """Returns hypotheses with their distances as JSON values; null where a simulation diverged."""
-    return [
-        {"hypothesis": str(candidate.hypothesis), "distance": _to_json(candidate.distance)}
-        for candidate in ranked
-    ]
+    """Returns hypotheses with their distances as JSON values; None where a simulation diverged."""
+    return [candidate.to_dict() for candidate in ranked]
 
 
 def diagnosis_from_dict(values: Mapping[str, Any], parse: Callable[[str], Hypothesis]) -> Diagnosis:
-    """Returns the diagnosis that ``diagnosis_to_dict`` wrote.
+    """Returns the diagnosis of the values that ``Diagnosis.to_dict`` returned.
 
     Args:
         values: JSON values. ``outside`` and ``unseen`` are optional: earlier files lack them.
@@ -82,11 +60,6 @@ def diagnosis_from_dict(values: Mapping[str, Any], parse: Callable[[str], Hypoth
 def _extra(hypothesis: Hypothesis, best: Hypothesis) -> str:
     """The faults of a hypothesis that the best one lacks, in notation."""
     return str(Hypothesis(tuple(fault for fault in hypothesis.faults if fault not in best.faults)))
-
-
-def _to_json(distance: float) -> float | None:
-    """JSON has no infinity, which is the distance of a simulation that diverged."""
-    return distance if math.isfinite(distance) else None
 
 
 def _from_json(distance: float | None) -> float:

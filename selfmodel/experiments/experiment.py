@@ -14,7 +14,7 @@ from selfmodel.experiments.reality import draw_reality
 from selfmodel.experiments.scoring import is_correct
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import FaultKind
-from selfmodel.faults.registry import PAPER_KINDS, notation_kinds
+from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.logs.journal import create_journal
 from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.physical.interface import PhysicalRobot
@@ -98,7 +98,7 @@ def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
         healthy, damaged = (experiment.physical(robot, hidden) for hidden in (INTACT, truth))
     else:
         healthy, damaged = reality.robot(robot), reality.robot(robot, truth, stream=1)
-    journal = create_journal(experiment.folder, robot.anatomy, notation_kinds(experiment.kinds))
+    journal = create_journal(experiment.folder, robot.anatomy, experiment.kinds)
     recovery = recover(
         healthy=healthy,
         damaged=damaged,

@@ -6,7 +6,7 @@ from typing import Any
 
 from selfmodel.errors import InputError
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.calibrate import Calibration, calibrate
+from selfmodel.simulation.calibration import Calibration, calibrate
 from selfmodel.trials.trial import Trial
 
 

@@ -12,7 +12,7 @@ from selfmodel.experiments.fitting import fitted
 from selfmodel.faults.kind import FaultKind
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.calibrate import Calibration
+from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.threads import thread_count
 from selfmodel.trials.trial import Trial
@@ -86,9 +86,7 @@ def set_up_diagnosis(
     nominal = trial_logs.robot_of_logs(list(read.values()), None) if robot is None else robot
     to_explain, reference = found[: len(trials)], found[len(trials) :]
     if not reference:
-        later = [trial for trial in to_explain if trial.plan.stage != "before"] or to_explain
-        reference = [trial for trial in to_explain if trial not in later]
-        to_explain = later
+        to_explain, reference = by_stage(to_explain)
     first = to_explain[0]
     if settings is None:
         settings = read[first.path].settings if first.path in read else Settings()
@@ -103,6 +101,15 @@ def set_up_diagnosis(
         search=DiagnosticSearch(simulator, comparator, settings, kinds, intact=reference),
         seed=first.plan.seed if seed is None else seed,
     )
+
+
+def by_stage(trials: Sequence[Trial]) -> tuple[list[Trial], list[Trial]]:
+    """Returns the trials to explain and the trials of the healthy robot, by their stages.
+
+    Trials of the stage ``before`` are healthy, unless there are no others.
+    """
+    failed = [trial for trial in trials if trial.plan.stage != "before"] or list(trials)
+    return failed, [trial for trial in trials if trial not in failed]
 
 
 def _paths(sources: Sequence[TrialSource]) -> list[Path]:

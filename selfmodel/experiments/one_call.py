@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from selfmodel.comparators import SEGMENT_PREDICTION
+from selfmodel.comparators import DEFAULT
 from selfmodel.controllers.command_source import CommandSource
 from selfmodel.controllers.controller import Controller, Design
 from selfmodel.diagnosis.comparator import Comparator
@@ -17,7 +17,6 @@ from selfmodel.experiments.robots import is_model, robot_entry
 from selfmodel.faults import KINDS, PAPER_KINDS, FaultKind
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
-from selfmodel.faults.registry import notation_kinds
 from selfmodel.logs import physical_trial
 from selfmodel.logs.journal import create_journal
 from selfmodel.logs.records import TrialHeader
@@ -33,13 +32,16 @@ from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation import calibrate as calibration
-from selfmodel.simulation import replay as replays
-from selfmodel.simulation.calibrate import Calibration
-from selfmodel.simulation.replay import Replay
+from selfmodel.simulation import calibration, trial_replay
+from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.threads import thread_count
+from selfmodel.simulation.trial_replay import Replay
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
+
+
+def _kinds(kinds: str | Sequence[FaultKind]) -> Sequence[FaultKind]:
+    return plugins.kinds(kinds) if isinstance(kinds, str) else kinds
 
 
 def _ignore(_event: object) -> None:
@@ -193,7 +195,9 @@ def replay(
         tolerance: Largest difference of two numbers that count as equal, in their unit.
         threads: Threads of the physics; 0 for all processors.
     """
-    return replays.replay(trial, hypothesis, Simulator(robot, thread_count(threads)), tolerance)
+    return trial_replay.replay(
+        trial, hypothesis, Simulator(robot, thread_count(threads)), tolerance
+    )
 
 
 def diagnose(
@@ -201,8 +205,8 @@ def diagnose(
     *,
     healthy: Sequence[TrialSource] = (),
     robot: Robot | None = None,
-    comparator: str | Comparator = SEGMENT_PREDICTION,
-    kinds: Sequence[FaultKind] = PAPER_KINDS,
+    comparator: str | Comparator = DEFAULT,
+    kinds: str | Sequence[FaultKind] = PAPER_KINDS,
     settings: Settings | None = None,
     calibrate: bool = True,
     seed: int | None = None,
@@ -219,7 +223,7 @@ def diagnose(
             them, and the verdict compares with them.
         robot: The nominal robot; None for the model in the logs.
         comparator: A comparator, its name, or ``package.module:object``.
-        kinds: Fault kinds to search.
+        kinds: Fault kinds to search, or their names separated by commas.
         settings: Parameters of the search; None for those in the first log.
         calibrate: Whether the self-model is fitted to the healthy trials.
         seed: Seed of all random numbers; None for that of the first trial.
@@ -236,7 +240,7 @@ def diagnose(
         healthy,
         robot=robot,
         comparator=judge,
-        kinds=kinds,
+        kinds=_kinds(kinds),
         settings=settings,
         seed=seed,
         calibrate=calibrate,
@@ -253,8 +257,8 @@ def recover(
     robot: Robot,
     folder: str | Path,
     *,
-    comparator: str | Comparator = SEGMENT_PREDICTION,
-    kinds: Sequence[FaultKind] = PAPER_KINDS,
+    comparator: str | Comparator = DEFAULT,
+    kinds: str | Sequence[FaultKind] = PAPER_KINDS,
     settings: Settings | None = None,
     design: str | Design = "network",
     calibrate: bool = True,
@@ -273,7 +277,7 @@ def recover(
         robot: The nominal robot, from which the self-model is made.
         folder: Folder of the run, new or empty: every trial's log and every diagnosis.
         comparator: A comparator, its name, or ``package.module:object``.
-        kinds: Fault kinds to search.
+        kinds: Fault kinds to search, or their names separated by commas.
         settings: Parameters of the recovery; the paper's by default.
         design: Name of a controller design, such as ``network`` or ``cpg``, or a design.
         calibrate: Whether the self-model is fitted to the trial before the failure.
@@ -287,8 +291,8 @@ def recover(
         TrialError: A physical robot could not finish a trial.
     """
     count = thread_count(threads)
-    chosen = settings or Settings()
-    journal = create_journal(Path(folder), robot.anatomy, notation_kinds(kinds))
+    chosen, searched = settings or Settings(), _kinds(kinds)
+    journal = create_journal(Path(folder), robot.anatomy, searched)
     return loop.recover(
         healthy=healthy,
         damaged=damaged,
@@ -300,7 +304,7 @@ def recover(
         seed=seed,
         on_event=on_event,
         design=plugins.design(design, robot) if isinstance(design, str) else design,
-        kinds=kinds,
+        kinds=searched,
         calibrate=partial(fitted, robot, threads=count) if calibrate else None,
         next_trial=next_trial,
     )

@@ -4,9 +4,9 @@ import json
 from dataclasses import dataclass
 
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
-from selfmodel.physical.reality_gap import Gap, draw_gap
+from selfmodel.physical.reality_gap import RealityGap, draw_gap
 from selfmodel.physical.simulated_robot import SimulatedRobot
-from selfmodel.physical.structural_mismatch import Structure, draw_structure
+from selfmodel.physical.structural_mismatch import StructuralMismatch, draw_structural_mismatch
 from selfmodel.recovery.random_streams import gap_stream, structure_stream
 from selfmodel.robot.robot import Robot
 
@@ -20,16 +20,16 @@ class Reality:
         structure: Structural mismatches; None without any.
     """
 
-    gap: Gap
-    structure: Structure | None
+    gap: RealityGap
+    structure: StructuralMismatch | None
 
     @property
     def text(self) -> str | None:
         """Hidden record of a trial log, as JSON; None if the robot equals its model."""
         if self.gap.level == 0 and self.structure is None:
             return None
-        structure = None if self.structure is None else self.structure.as_values()
-        return json.dumps({**self.gap.as_values(), "structure": structure}, allow_nan=False)
+        structure = None if self.structure is None else self.structure.as_dict()
+        return json.dumps({**self.gap.as_dict(), "structure": structure}, allow_nan=False)
 
     def robot(self, robot: Robot, hidden: Hypothesis = INTACT, stream: int = 0) -> SimulatedRobot:
         """Returns the physical robot with hidden faults; see ``SimulatedRobot``."""
@@ -53,8 +53,7 @@ def simulated_robot(
         >>> import selfmodel
         >>> robot = selfmodel.load_robot("quadruped")
         >>> damaged = selfmodel.parse_hypothesis("break:front_left_knee", robot)
-        >>> selfmodel.simulated_robot(robot, damaged, gap=0.05)
-        <SimulatedRobot quadruped: break:front_left_knee, gap 0.05>
+        >>> physical = selfmodel.simulated_robot(robot, damaged, gap=0.05)
 
     Args:
         robot: The nominal robot.
@@ -84,5 +83,5 @@ def draw_reality(robot: Robot, seed: int, level: float, *, structure: bool) -> R
     """
     return Reality(
         gap=draw_gap(robot, level, gap_stream(seed)),
-        structure=draw_structure(robot, structure_stream(seed)) if structure else None,
+        structure=draw_structural_mismatch(robot, structure_stream(seed)) if structure else None,
     )

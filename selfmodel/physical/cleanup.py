@@ -1,4 +1,4 @@
-"""What is done at the end of a block, whatever ends it."""
+"""Cleanup action of a ``with`` block, run after success and after every exception."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,20 +8,22 @@ from selfmodel.errors import WorkError, describe
 
 
 @dataclass(frozen=True)
-class Ending:
-    """A context manager that does something at its end; what ended the block comes first.
+class Cleanup:
+    """Context manager that runs an action at the end of its block.
 
-    An exception, Ctrl-C too, that ended the block goes on. Where the end itself fails then, that is
-    a note to it. Where nothing went wrong, or a generator was closed, it is the error.
+    An exception of the block, such as Ctrl-C, is raised in any case: a failure of the action is
+    added to it as a note. After a block without an exception, or in a closed generator, a failure
+    of the action is raised itself. ``contextlib.ExitStack`` would replace the exception of the
+    block by the failure of the action.
 
     Attributes:
-        end: What is done; it may raise ``OSError`` or ``WorkError``.
+        action: The action; it may raise ``OSError`` or ``WorkError``.
     """
 
-    end: Callable[[], object]
+    action: Callable[[], object]
 
     def __enter__(self) -> None:
-        """Does nothing yet."""
+        """Enters the block; there is nothing to acquire."""
 
     def __exit__(
         self,
@@ -29,9 +31,9 @@ class Ending:
         reason: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        """Does what is to be done at the end."""
+        """Runs the action."""
         try:
-            self.end()
+            self.action()
         except (OSError, WorkError) as failure:
             if reason is None or isinstance(reason, GeneratorExit):
                 raise

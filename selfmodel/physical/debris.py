@@ -1,19 +1,19 @@
-"""A limb that fell off: it lies on the ground of the physical robot, where it is in the way."""
+"""Debris of a physical robot: free bodies in the places of its detached limbs."""
 
 import mujoco
 import numpy as np
 
 from selfmodel.faults.broken import BROKEN
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.physical.reality_gap import DEBRIS
+from selfmodel.physical.reality_gap import DEBRIS_PREFIX
 from selfmodel.robot.robot import Robot
 
-MEMORY = 4 * 2**20
-"""Bytes for the contacts of a robot among its debris."""
+CONTACT_MEMORY = 4 * 2**20
+"""Size of MuJoCo's arena for the contacts of a robot with its debris, bytes."""
 
 
-def lost_limbs(robot: Robot, hidden: Hypothesis) -> tuple[str, ...]:
-    """Returns the first body of each limb that falls off, in the hypothesis's order."""
+def detached_limbs(robot: Robot, hidden: Hypothesis) -> tuple[str, ...]:
+    """Returns the root body of each limb that a hypothesis detaches, in its order of faults."""
     limbs = []
     for fault in hidden.faults:
         if fault.kind is BROKEN:
@@ -23,84 +23,84 @@ def lost_limbs(robot: Robot, hidden: Hypothesis) -> tuple[str, ...]:
 
 
 def add_debris(spec: mujoco.MjSpec, limbs: tuple[str, ...]) -> None:
-    """Adds a free copy of each limb to the physical robot's model, behind everything else.
+    """Adds a free copy of each limb to a physical robot's model, after all other bodies.
 
-    The robot's own limb stays where it is: as a ghost it keeps the layout of what is logged. The
-    copy has no motors, tendons and sensors, its joints hang loose, and it collides with the ground,
-    the robot and other debris; but not with a part that it overlaps when it falls off, which would
-    throw it away.
+    The robot's own limb remains as a detached body, so that the layout of the logged signals is
+    unchanged. The copy has no motors, tendons and sensors, and its joints are free. It collides
+    with the ground, the robot and other debris, but not with a body that it overlaps when it is
+    detached: the contact force would throw it away.
 
     Args:
-        spec: The model, changed.
-        limbs: The first body of each.
+        spec: The model; it is changed.
+        limbs: Root body of each limb.
     """
     bare = spec.copy()
     for parts in (bare.actuators, bare.sensors, bare.equalities, bare.tendons):
         for part in list(parts):
             bare.delete(part)
-    # What is excluded from collisions as it overlaps is found out anew.
+    # _overlapping_pairs computes the excluded pairs anew.
     for parts in (bare.excludes, bare.pairs):
         for part in list(parts):
             bare.delete(part)
     for k, limb in enumerate(limbs):
         _add_limb(spec, bare, limb, k)
-    spec.memory = max(spec.memory, MEMORY)
-    for one, other in _overlapping(spec, limbs):
+    spec.memory = max(spec.memory, CONTACT_MEMORY)
+    for one, other in _overlapping_pairs(spec, limbs):
         spec.add_exclude(bodyname1=one, bodyname2=other)
 
 
 def _add_limb(spec: mujoco.MjSpec, bare: mujoco.MjSpec, limb: str, number: int) -> None:
-    """Adds a free copy of one limb of a robot without motors and sensors."""
-    # Every attachment brings materials and meshes of its own, under names of its own.
-    prefix = f"{DEBRIS}{number}_"
+    """Adds a free copy of a limb, taken from a robot without motors and sensors."""
+    # Every attachment has copies of its materials and meshes: a prefix per limb keeps them apart.
+    prefix = f"{DEBRIS_PREFIX}{number}_"
     spec.worldbody.add_frame().attach_body(bare.copy().body(limb), prefix, "")
-    piece = spec.body(prefix + limb)
-    for part in (piece, *(p for kind in _NAMED for p in piece.find_all(kind))):
-        part.name = part.name.replace(prefix, DEBRIS, 1)
-    for joint in list(piece.joints):
+    root = spec.body(prefix + limb)
+    for part in (root, *(p for kind in _RENAMED_ELEMENTS for p in root.find_all(kind))):
+        part.name = part.name.replace(prefix, DEBRIS_PREFIX, 1)
+    for joint in list(root.joints):
         spec.delete(joint)
-    piece.add_freejoint(name=DEBRIS + limb)
-    felt = 0
+    root.add_freejoint(name=DEBRIS_PREFIX + limb)
+    affinities = 0
     for geom in bare.geoms:
-        felt |= int(geom.conaffinity)
-    for geom in piece.find_all("geom"):
+        affinities |= int(geom.conaffinity)
+    for geom in root.find_all("geom"):
         if geom.contype or geom.conaffinity:
-            geom.contype |= felt
-            geom.conaffinity |= felt
+            geom.contype |= affinities
+            geom.conaffinity |= affinities
 
 
-_NAMED = ("body", "joint", "geom")
+_RENAMED_ELEMENTS = ("body", "joint", "geom")
 
 
-def _overlapping(spec: mujoco.MjSpec, limbs: tuple[str, ...]) -> list[tuple[str, str]]:
-    """The pairs of bodies, debris and other, that overlap when the limbs fall off."""
+def _overlapping_pairs(spec: mujoco.MjSpec, limbs: tuple[str, ...]) -> list[tuple[str, str]]:
+    """Returns the pairs of a body and a debris body that overlap when the limbs are detached."""
     model = spec.compile()
     data = mujoco.MjData(model)
-    drop_debris(model, data, limbs)
+    place_debris(model, data, limbs)
     mujoco.mj_forward(model, data)
     geoms = data.contact.geom[data.contact.dist < 0]
     pairs = np.unique(np.sort(model.geom_bodyid[geoms], axis=1), axis=0)
-    # Debris stands last in the model, and what stands first is the world.
+    # Debris has the highest body numbers, so the second of a pair; the world is body 0.
     return [
         (model.body(one).name, model.body(other).name)
         for one, other in pairs
-        if one != 0 and model.body(other).name.startswith(DEBRIS)
+        if one != 0 and model.body(other).name.startswith(DEBRIS_PREFIX)
     ]
 
 
-def drop_debris(model: mujoco.MjModel, data: mujoco.MjData, limbs: tuple[str, ...]) -> None:
-    """Puts each piece of debris where the limb is that it is a copy of.
+def place_debris(model: mujoco.MjModel, data: mujoco.MjData, limbs: tuple[str, ...]) -> None:
+    """Sets the pose of each debris body to the pose of the limb that it is a copy of.
 
     Args:
-        model: A physical robot's, with debris.
-        data: Its state, of which the debris's positions are written.
-        limbs: The first body of each.
+        model: Model of a physical robot with debris.
+        data: State of the model; the positions of the debris are written.
+        limbs: Root body of each limb.
     """
     mujoco.mj_kinematics(model, data)
     for limb in limbs:
         body = data.body(limb)
-        data.joint(DEBRIS + limb).qpos[:] = np.concatenate([body.xpos, body.xquat])
+        data.joint(DEBRIS_PREFIX + limb).qpos[:] = np.concatenate([body.xpos, body.xquat])
     for j in range(model.njnt):
         name = model.joint(j).name
-        if name.startswith(DEBRIS) and model.jnt_type[j] != mujoco.mjtJoint.mjJNT_FREE:
-            data.joint(j).qpos[:] = data.joint(name.removeprefix(DEBRIS)).qpos
+        if name.startswith(DEBRIS_PREFIX) and model.jnt_type[j] != mujoco.mjtJoint.mjJNT_FREE:
+            data.joint(j).qpos[:] = data.joint(name.removeprefix(DEBRIS_PREFIX)).qpos

@@ -1,4 +1,4 @@
-"""A physical robot behind any ``dm_env.Environment``: how real hardware is driven."""
+"""Physical robot behind a ``dm_env.Environment``, such as real hardware."""
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -13,76 +13,76 @@ from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.controllers.command_source import CommandSource, make_batch
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError, TrialError
-from selfmodel.physical.cleanup import Ending
+from selfmodel.physical.cleanup import Cleanup
 from selfmodel.physical.safety_limits import Limit
-from selfmodel.physical.step_timing import TIME, Stopwatch
+from selfmodel.physical.step_timing import TIMESTAMP, StepTimer
 from selfmodel.robot.actuator_ranges import command_ranges
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import SIGNALS, Names, Sample, Signal
 
 Observe = Callable[[Any], Mapping[str, Any] | None]
-"""Turns an observation into our signals, each ``(width,)``, and perhaps ``time``; what it leaves
-out, and what is NaN, was not observed. None: nothing was."""
+"""Function from an observation of the environment to signals by name, each ``(width,)``, with an
+optional ``time``. Absent signals and NaN were not observed; None if nothing was observed."""
 
 
-def by_name(observation: Any) -> Mapping[str, Any] | None:  # noqa: ANN401  # dm_env's is anything
-    """Takes what an observation has under the names of our signals, and leaves the rest.
+def signals_by_name(
+    observation: Any,  # noqa: ANN401  # dm_env leaves the type of observations open
+) -> Mapping[str, Any] | None:
+    """Returns the items of an observation that have the name of a signal.
 
     Raises:
-        InputError: It has no names, or none of ours.
+        InputError: The observation is not a mapping, or has no signal.
     """
     if observation is None:
         return None
     if not isinstance(observation, Mapping):
         raise InputError(
             f"expected an observation that is a mapping by name, got a "
-            f"{type(observation).__name__}: give observe=, which makes one of it"
+            f"{type(observation).__name__}: give observe=, a function to such a mapping"
         )
-    ours = {name: observation[name] for name in (*SIGNALS, TIME) if name in observation}
-    if not ours:
+    signals = {name: observation[name] for name in (*SIGNALS, TIMESTAMP) if name in observation}
+    if not signals:
         raise InputError(
             f"expected an observation with some of {', '.join(SIGNALS)}, got one of "
-            f"{', '.join(map(str, observation)) or 'nothing'}: give observe=, which renames them"
+            f"{', '.join(map(str, observation)) or 'nothing'}: give observe=, a function that "
+            f"renames them"
         )
-    return ours
+    return signals
 
 
 class EnvironmentRobot:
-    """A physical robot that is stepped through an environment; see ``PhysicalRobot``.
+    """Physical robot that is stepped through an environment; see ``PhysicalRobot``.
 
-    ``reset`` is to bring the robot to its start pose, at rest; ``step`` is to give the motors their
-    targets at once, to return when a control time step has passed, and to bring what was observed
-    then. What paces it is the environment's affair; what is measured here is what came of it.
+    ``reset`` must move the robot to its initial pose, at rest. ``step`` must send the targets to
+    the motors at once, return after one control time step, and return the observation of that time.
+    The environment sets the pace; ``EnvironmentRobot`` measures it.
 
-    A ``step`` that observes nothing in time gives None as its observation, and may raise
-    ``TimeoutError`` for it. The controller then goes on with the readings that it had.
+    If nothing is observed in time, ``step`` returns the observation None or raises
+    ``TimeoutError``. The controller then runs on its previous readings.
 
-    The safe command is sent before ``reset``, at the end, and before anything else when the trial
-    ends early, whatever the reason: an exception in the environment, a limit, silence, Ctrl-C, or a
-    caller that stops iterating.
+    The safe command is sent before ``reset`` and at the end. It is the first action after an early
+    end of a trial: an exception in the environment, an exceeded limit, missing observations,
+    Ctrl-C, or a caller that stops iterating.
 
     Args:
-        env: What the robot is stepped through. Its actions are the motor targets, in the order of
-            the model's motors.
+        env: The environment. Its actions are the motor targets, in the order of the model's motors.
         robot: The robot as its model describes it.
-        observe: Turns an observation into our signals.
-        stop: Brings the robot to rest, safely, at any time, and again if it is at rest. Without it,
-            ``env.step(safe)`` does; before ``reset`` and after the last step of an episode, that
-            is ``reset`` without targets, as ``dm_env`` has it, so the robot moves to its start.
-        safe: The motor targets that are safe, ``(motors,)``; if not given, 0 or what is nearest to
-            it that a motor can be commanded.
-        limits: What the robot is stopped for; ``physical.safety_limits`` has some.
-            The signals that they need are readings too.
-        critical: Signals of which no number may be NaN in an observation that came.
-        patience: Steps in a row for which a reading may be missing.
-        tolerance: By how much of a control time step a step may be late.
+        observe: Converts an observation to signals.
+        stop: Stops the robot safely, at any time and repeatedly. The default is ``env.step(safe)``.
+            Before ``reset`` and after the last step of an episode, a ``dm_env`` environment ignores
+            the targets and resets, so the robot then moves to its initial pose.
+        safe: Safe motor targets, ``(motors,)``; by default 0, clipped to the range of each motor.
+        limits: Safety limits, such as those of ``physical.safety_limits``. Their signals are
+            required, as the controller's readings are.
+        critical: Signals that must not be NaN in an observation that arrived.
+        patience: Consecutive steps for which a required signal may be missing.
+        tolerance: Largest deviation of a punctual step, as a fraction of the control time step.
         silent_neurons: Indices of the silent hidden neurons of the controller.
-        clock: Tells the time, s; it never goes back. The environment's observations may tell it
-            better, as ``time``.
+        clock: Monotonic clock, s. Timestamps of observations, as ``time``, take precedence.
 
     Raises:
-        InputError: The environment's actions are not the robot's motors, or neither are the safe
-            targets.
+        InputError: The number of actions of the environment, or of safe targets, is not the number
+            of motors.
     """
 
     def __init__(
@@ -90,7 +90,7 @@ class EnvironmentRobot:
         env: dm_env.Environment,
         robot: Robot,
         *,
-        observe: Observe = by_name,
+        observe: Observe = signals_by_name,
         stop: Callable[[], object] | None = None,
         safe: FloatArray | None = None,
         limits: Sequence[Limit] = (),
@@ -108,7 +108,7 @@ class EnvironmentRobot:
         ):
             if shape != motors:
                 raise InputError(
-                    f"{what} must be the targets of the {motors[0]} motors of {robot.name} "
+                    f"{what} must be targets of the {motors[0]} motors of {robot.name} "
                     f"({', '.join(robot.anatomy.motors)}), got the shape {shape}"
                 )
         self._env, self._robot, self._observe = env, robot, observe
@@ -121,14 +121,16 @@ class EnvironmentRobot:
     def run(self, controller: CommandSource, steps: int) -> Iterator[Sample]:
         """Runs a controller; see ``PhysicalRobot``.
 
-        Close what this returns when done, as ``write_trial`` does: that stops the robot.
+        The caller must close the returned iterator, as ``write_trial`` does: closing it stops the
+        robot.
 
         Raises:
-            TrialError: The environment failed, ended its episode or was silent, or a limit was
-                exceeded; the robot was stopped, or the error's note says that it was not.
-            InputError: The observations are not of this robot.
+            TrialError: The environment failed, ended its episode or returned no observations, or a
+                limit was exceeded. The robot was stopped, unless a note of the error reports a
+                failed stop.
+            InputError: The observations do not have the shapes of the robot's signals.
         """
-        with Ending(self._make_safe):  # after Ctrl-C and bugs too: no robot goes on by itself
+        with Cleanup(self._make_safe):  # after Ctrl-C and programming errors too
             self._make_safe()
             yield from self._steps(controller, steps)
 
@@ -136,30 +138,32 @@ class EnvironmentRobot:
         try:
             self._send_safe()
         except KeyboardInterrupt:
-            # A second Ctrl-C must not keep the first one's from the robot.
-            with Ending(self._send_safe):
+            # A second Ctrl-C must not prevent the safe command of the first.
+            with Cleanup(self._send_safe):
                 raise
 
     def _send_safe(self) -> None:
         try:
             self._halt()
-        except Exception as error:  # a driver is somebody else's, and may raise anything
-            raise TrialError(f"the safe command could not be sent: {_told(error)}") from error
+        except Exception as error:  # the caller's driver may raise any exception
+            raise TrialError(
+                f"the safe command could not be sent: {_type_and_message(error)}"
+            ) from error
 
     def _steps(self, controller: CommandSource, steps: int) -> Iterator[Sample]:
         robot = self._robot
         names, timestep = robot.anatomy.names, robot.control_timestep
-        brain = make_batch([controller], [self._silent_neurons], len(names.sensors))
+        controllers = make_batch([controller], [self._silent_neurons], len(names.sensors))
         commands = np.zeros((1, len(names.motors)))
         needed = {signal for limit in self._limits for signal in limit.signals}
         if not isinstance(controller, Playback):
             needed.add("sensors")
-        silent: dict[Signal, IndexArray] = {
+        missing_steps: dict[Signal, IndexArray] = {
             signal: np.zeros(names.width(signal), dtype=np.intp)
             for signal in SIGNALS
             if signal in needed or signal == "sensors"
         }
-        on_event = Stopwatch(timestep, self._tolerance)
+        timer = StepTimer(timestep, self._tolerance)
         ended = False
         for k in range(steps):
             if ended:
@@ -167,52 +171,59 @@ class EnvironmentRobot:
                     f"the environment ended its episode after {k} of {steps} steps: give it a "
                     f"longer time limit, or the trial fewer steps"
                 )
-            seen = self._act(commands[0] if k else None)
-            ended = seen is not None and seen.last()
-            told = self._observe(seen.observation) if seen is not None else None
-            moment = on_event.look(self.clock(), told)
-            values = _rows(names, {} if moment.missing or told is None else told)
-            for signal, counts in silent.items():
-                unread = np.isnan(values[signal]) & (signal in needed or moment.missing)
-                silent[signal] = np.where(unread, counts + 1, 0)
-            self._check(k, values, silent, missing=moment.missing)
+            result = self._step_environment(commands[0] if k else None)
+            ended = result is not None and result.last()
+            observation = self._observe(result.observation) if result is not None else None
+            timing = timer.update(self.clock(), observation)
+            values = _rows(names, {} if timing.missing or observation is None else observation)
+            for signal, counts in missing_steps.items():
+                missing = np.isnan(values[signal]) & (signal in needed or timing.missing)
+                missing_steps[signal] = np.where(missing, counts + 1, 0)
+            self._check(k, values, missing_steps, missing=timing.missing)
             readings = values["sensors"]
-            np.copyto(brain.readings[0], readings, where=~np.isnan(readings))
-            brain.step(commands)
+            np.copyto(controllers.readings[0], readings, where=~np.isnan(readings))
+            controllers.step(commands)
             values["commands"] = commands[0].copy()
-            yield Sample(k * timestep, values, moment)
+            yield Sample(k * timestep, values, timing)
 
-    def _act(self, targets: FloatArray | None) -> dm_env.TimeStep | None:
-        """Gives the motors their targets, or begins where there are none yet; None for silence."""
+    def _step_environment(self, targets: FloatArray | None) -> dm_env.TimeStep | None:
+        """Steps the environment, or resets it if there are no targets; None after a timeout."""
         try:
             return self._env.reset() if targets is None else self._env.step(targets.copy())
         except TimeoutError:
             return None
-        except Exception as error:  # an environment is somebody else's, and may raise anything
-            raise TrialError(f"the environment failed: {_told(error)}") from error
+        except Exception as error:  # the caller's environment may raise any exception
+            raise TrialError(f"the environment failed: {_type_and_message(error)}") from error
 
     def _check(
         self,
         k: int,
         values: Mapping[Signal, FloatArray],
-        silent: Mapping[Signal, IndexArray],
+        missing_steps: Mapping[Signal, IndexArray],
         *,
         missing: bool,
     ) -> None:
-        """Sees whether the robot can go on.
+        """Checks the observation of a step.
+
+        Args:
+            k: The step.
+            values: Row of each signal, ``(width,)``, NaN where not observed.
+            missing_steps: Consecutive steps without a value, ``(width,)``, of each required signal.
+            missing: Whether nothing was observed at this step.
 
         Raises:
-            TrialError: It cannot.
+            TrialError: A required signal is missing for too long, a number is invalid, or a limit
+                is exceeded.
         """
-        patience = self._patience if k else 0  # at first there is nothing to go on with
-        for signal, counts in silent.items():
+        patience = self._patience if k else 0  # at step 0 there are no previous readings
+        for signal, counts in missing_steps.items():
             columns = self._robot.anatomy.names.columns(signal)
             pairs = zip(columns, counts > patience, strict=True)
-            if lacking := ", ".join(name for name, is_silent in pairs if is_silent):
+            if lacking := ", ".join(name for name, is_missing in pairs if is_missing):
                 if signal != "sensors":
-                    lacking = f"{signal} ({lacking}), which a limit needs,"
+                    lacking = f"{signal} ({lacking}), which a limit requires,"
                 raise TrialError(
-                    f"nothing was read of {lacking} for more than {patience} steps, at step {k}"
+                    f"no reading of {lacking} for more than {patience} steps, at step {k}"
                 )
         for signal, row in values.items():
             if np.any(np.isinf(row)):
@@ -225,7 +236,7 @@ class EnvironmentRobot:
 
 
 def _step_to(env: dm_env.Environment, targets: FloatArray) -> None:
-    with suppress(TimeoutError):  # they were sent, and nobody asks what is observed
+    with suppress(TimeoutError):  # the targets were sent; the observation is not used
         env.step(targets.copy())
 
 
@@ -234,27 +245,27 @@ def _nearest_to_zero(robot: Robot) -> FloatArray:
     return np.asarray(np.clip(0.0, centre - half, centre + half))
 
 
-def _rows(names: Names, told: Mapping[str, Any]) -> dict[Signal, FloatArray]:
-    """Every signal of an observation but the commands, NaN where it was not observed.
+def _rows(names: Names, observation: Mapping[str, Any]) -> dict[Signal, FloatArray]:
+    """Returns the row of every signal but the commands, NaN where not observed.
 
     Raises:
-        InputError: A signal has another shape.
+        InputError: The shape of a signal is not ``(width,)``.
     """
     rows: dict[Signal, FloatArray] = {}
     for signal in SIGNALS:
         if signal == "commands":
             continue
         width = names.width(signal)
-        given = told.get(signal)
+        given = observation.get(signal)
         row = np.full(width, np.nan) if given is None else np.array(given, dtype=np.float64)
         if row.shape != (width,):
             raise InputError(
-                f"expected {signal} of shape ({width},) in an observation, that is "
+                f"expected {signal} of shape ({width},) in an observation, its columns being "
                 f"{', '.join(names.columns(signal))}, got the shape {row.shape}"
             )
         rows[signal] = row
     return rows
 
 
-def _told(error: Exception) -> str:
+def _type_and_message(error: Exception) -> str:
     return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__

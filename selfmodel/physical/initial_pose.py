@@ -1,57 +1,61 @@
-"""How a physical robot stands when a trial starts: never quite as its model does."""
+"""Random initial pose of a physical robot, near the reference pose of its model."""
 
 import mujoco
 import numpy as np
 
-from selfmodel.physical.measurement_noise import turned
+from selfmodel.physical.measurement_noise import rotated_by_vector
 from selfmodel.robot.embodiment import WELD_ARMATURE
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state_access import fields_of, present, signal_fields, writer
 
-ANGLES = 0.2
-"""Standard deviation of the joint angles at the start, rad, at a level of 1."""
+ANGLE_DEVIATION = 0.2
+"""Standard deviation of the initial joint angles, rad, at a gap level of 1."""
 
-TILT = 0.1
-"""That of the base's roll and of its pitch."""
+TILT_DEVIATION = 0.1
+"""Standard deviation of the initial roll and pitch of the base, rad, at a gap level of 1."""
 
 
 def randomize_initial_pose(
     robot: Robot, model: mujoco.MjModel, data: mujoco.MjData, level: float, rng: np.random.Generator
 ) -> None:
-    """Moves a robot from its reference pose to one nearby, and lifts it out of the ground.
+    """Moves a robot from its reference pose to a random pose nearby, above the ground.
 
-    Joint angles stay within their limits, held joints and the heading as they are. A root that
-    cannot tilt or rise does not.
+    Joint angles stay within their limits. Welded joints and the heading are unchanged, and so are
+    degrees of freedom that the base does not have, such as the tilt of a planar base.
 
     Args:
-        robot: The robot, whose parts are moved.
-        model: What it is like.
-        data: Its state, in the reference pose; written.
-        level: The gap's.
-        rng: Where the pose is drawn from.
+        robot: The robot as its model describes it.
+        model: Compiled model of the physical robot.
+        data: State of the model in the reference pose; it is changed.
+        level: Level of the reality gap.
+        rng: Random numbers of the pose.
     """
-    where, write = signal_fields(robot, model), writer(robot, fields_of(data), model)
-    deepest = _depth(robot, model, data)
-    angles = level * ANGLES * rng.standard_normal(len(robot.anatomy.hinges))
+    fields, write = signal_fields(robot, model), writer(robot, fields_of(data), model)
+    reference_depth = _penetration_depth(robot, model, data)
+    angles = level * ANGLE_DEVIATION * rng.standard_normal(len(robot.anatomy.hinges))
     for name, angle in zip(robot.anatomy.hinges, angles, strict=True):
         hinge = model.joint(name)
         if model.dof_armature[hinge.dofadr[0]] == WELD_ARMATURE:
             continue
         moved = data.qpos[hinge.qposadr[0]] + angle
         data.qpos[hinge.qposadr[0]] = np.clip(moved, *hinge.range) if hinge.limited[0] else moved
-    tilt = np.append(level * TILT * rng.standard_normal(2), 0.0)
-    base = turned(present(where["base_orientation"], data), tilt)
+    tilt = np.append(level * TILT_DEVIATION * rng.standard_normal(2), 0.0)
+    base = rotated_by_vector(present(fields["base_orientation"], data), tilt)
     write({"base_orientation": base[np.newaxis]})
-    # Contact forces start within the skin: no deeper than in the reference pose, nothing kicks.
-    lift = [0.0, 0.0, max(0.0, _depth(robot, model, data) - deepest)]
-    write({"base_position": (present(where["base_position"], data) + lift)[np.newaxis]})
+    # Penetration no deeper than in the reference pose: deeper contacts would throw the robot up.
+    depth = _penetration_depth(robot, model, data)
+    lift = [0.0, 0.0, max(0.0, depth - reference_depth)]
+    write({"base_position": (present(fields["base_position"], data) + lift)[np.newaxis]})
 
 
-def _depth(robot: Robot, model: mujoco.MjModel, data: mujoco.MjData) -> float:
-    """How deep the robot is in the ground, m; negative within a contact's margin."""
+def _penetration_depth(robot: Robot, model: mujoco.MjModel, data: mujoco.MjData) -> float:
+    """Returns the depth of the robot's deepest contact with the world, m.
+
+    The depth is negative for a contact within its margin, and 0 without a contact.
+    """
     mujoco.mj_fwdPosition(model, data)
     root = model.body(robot.root).id
     roots = model.body_rootid[model.geom_bodyid[data.contact.geom]]
-    # A contact of the world with the robot, in either order.
+    # The world and the robot, in either order.
     depths = -data.contact.dist[(roots == root).any(axis=1) & (roots == 0).any(axis=1)]
     return float(depths.max(initial=-np.inf)) if len(depths) else 0.0

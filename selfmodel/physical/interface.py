@@ -8,34 +8,37 @@ from selfmodel.trials.behaviour import Sample
 
 
 class PhysicalRobot(Protocol):
-    """The only way in which the algorithm reaches a robot: it runs a controller and looks on."""
+    """Physical robot: runs a controller and yields samples.
+
+    Diagnosis and recovery have access to a physical robot through this method only.
+    """
 
     def run(self, controller: CommandSource, steps: int) -> Iterator[Sample]:
-        """Runs a controller from the start position, one sample a control step as it happens.
+        """Runs a controller from the initial pose and yields each sample during its control step.
 
-        A caller that stops iterating stops the robot.
+        The robot stops when the caller stops iterating.
 
         Args:
-            controller: What drives the robot.
+            controller: Source of the commands.
             steps: Control steps to run.
 
         Yields:
-            The state, the readings and the commands of each step, ``steps`` of them. Times are
-            those that the control loop aims at, multiples of the control time step to the bit;
-            when a step really was is its ``moment``, on a robot that is ``TimedRobot``.
+            State, readings and commands of each control step, ``steps`` samples. Sample times are
+            nominal, exact multiples of the control time step; the measured time of a step of a
+            ``TimedRobot`` is in the sample's ``moment``.
         """
         ...
 
 
 @runtime_checkable
 class TimedRobot(PhysicalRobot, Protocol):
-    """A physical robot with a clock of its own: each of its samples has a ``moment``.
+    """Physical robot with a clock of its own: each of its samples has a ``moment``.
 
-    No trial of it can be made again as it was. So one that is stopped before its end is kept as a
-    finished log that says so, where that of a simulated robot is an unfinished file.
+    Its trials are not reproducible. So the log of a trial that was stopped early is finished and
+    marked as stopped; the log of a simulated robot remains an unfinished file.
     """
 
     @property
     def clock(self) -> Callable[[], float]:
-        """Tells the time, s, from any beginning; it never goes back."""
+        """Monotonic clock: returns the time, s, from any origin."""
         ...

@@ -1,4 +1,4 @@
-"""The instruments of a physical robot: what they make of its state on the way to who reads it."""
+"""Measurement noise of a physical robot: on the controller's readings and on logged signals."""
 
 from typing import Protocol
 
@@ -13,40 +13,40 @@ from selfmodel.trials.signal_scales import MEASUREMENT_FULL_SCALES
 
 
 class Measurement(Protocol):
-    """Turns what is into what is received and logged."""
+    """Measurement model: from true values to received readings and logged signals."""
 
     def corrupt_readings(self, readings: FloatArray) -> None:
-        """Turns the readings, ``(sensors,)``, into those that the controller gets, in place."""
+        """Replaces true readings, ``(sensors,)``, by the readings that the controller receives."""
         ...
 
     def measure(self, signal: Signal, values: FloatArray) -> FloatArray:
-        """Returns what is logged of a row of a signal, ``(width,)``; it may be the row itself."""
+        """Returns the logged row of a signal, ``(width,)``; it may be ``values`` itself."""
         ...
 
 
 class ExactMeasurement:
-    """Instruments that tell what is."""
+    """Noise-free measurements."""
 
     def corrupt_readings(self, readings: FloatArray) -> None:
-        """Leaves the readings."""
+        """Leaves the readings unchanged."""
 
     def measure(self, _signal: Signal, values: FloatArray) -> FloatArray:
-        """Returns the values."""
+        """Returns the values unchanged."""
         return values
 
 
 class NoisyMeasurement:
-    """Instruments with white noise, of a part of their full scale.
+    """Measurements with white noise in proportion to the full scale of each signal.
 
-    An angle reading gets normal noise of ``level`` (half its range reads as 1). A touch reading is
-    wrong with a probability of ``level / 2``. A sensor that is dead reads exactly 0. What is
-    logged of a joint comes from an instrument of its own, with noise of its own.
+    An angle reading has normal noise with a standard deviation of ``level`` (half of the range is a
+    reading of 1). A touch reading is flipped with a probability of ``level / 2``. A dead sensor
+    reads exactly 0. Logged joint positions have noise independent of the readings.
 
     Args:
-        level: Standard deviation of the noise, as a part of the full scale.
-        anatomy: The robot's parts.
-        embodiment: The robot with what is wrong with it.
-        rng: Where the noise is drawn from.
+        level: Standard deviation of the noise, as a fraction of the full scale.
+        anatomy: Parts of the robot.
+        embodiment: Model of the robot with its faults.
+        rng: Random numbers of the noise.
     """
 
     def __init__(
@@ -56,12 +56,12 @@ class NoisyMeasurement:
         self._dead = dead_sensors(anatomy, embodiment)
         self._touch = np.array([sensor.kind == "touch" for sensor in anatomy.sensors])
         ranges = [embodiment.model.joint(hinge).range for hinge in anatomy.hinges]
-        # A hinge without limits turns half way round to either side.
+        # The range of a hinge without limits is pi to either side.
         self._half_ranges = np.array([(high - low) / 2 or np.pi for low, high in ranges])
 
     def corrupt_readings(self, readings: FloatArray) -> None:
         """Adds noise to the readings."""
-        # The same numbers are drawn whatever is dead, so that a fault moves no other noise.
+        # The draws do not depend on the dead sensors: a fault leaves all other noise unchanged.
         wrong = self._rng.random(readings.shape) < self._level / 2
         noise = self._level * self._rng.standard_normal(readings.shape)
         flipped = np.where(wrong, 1 - readings, readings)
@@ -74,31 +74,31 @@ class NoisyMeasurement:
             return values
         if signal == "base_orientation":
             turn = self._level * MEASUREMENT_FULL_SCALES[signal] * self._rng.standard_normal(3)
-            return turned(values, turn)
+            return rotated_by_vector(values, turn)
         joints = signal == "joint_positions"
         scale = self._half_ranges if joints else MEASUREMENT_FULL_SCALES[signal]
         return np.asarray(values + self._level * scale * self._rng.standard_normal(values.shape))
 
 
 def dead_sensors(anatomy: Anatomy, embodiment: Embodiment) -> BoolArray:
-    """Returns which sensors give no signal at all, ``(sensors,)``.
+    """Returns a mask of the sensors without any signal, ``(sensors,)``.
 
-    The sensor of a joint that is held at 0 reads 0 too, but it works.
+    The sensor of a joint that is welded at 0 reads 0 too, but is not dead.
     """
     model = embodiment.model
-    held = [
+    welded = [
         bool(sensor.hinge)
         and bool(model.dof_armature[model.joint(sensor.hinge).dofadr[0]] == WELD_ARMATURE)
         for sensor in anatomy.sensors
     ]
     silent = (embodiment.gain == 0) & (embodiment.offset == 0)
-    return np.asarray(silent & ~np.array(held, dtype=bool))
+    return np.asarray(silent & ~np.array(welded, dtype=bool))
 
 
-def turned(orientation: FloatArray, turn: FloatArray) -> FloatArray:
-    """Returns an orientation (w x y z) turned by a rotation vector in its own frame, rad."""
-    by, result = np.array([1.0, 0, 0, 0]), np.empty(4)
-    mujoco.mju_quatIntegrate(by, turn, 1.0)
-    mujoco.mju_mulQuat(result, orientation, by)
+def rotated_by_vector(orientation: FloatArray, vector: FloatArray) -> FloatArray:
+    """Returns an orientation (w x y z) rotated by a rotation vector in the body frame, rad."""
+    rotation, result = np.array([1.0, 0, 0, 0]), np.empty(4)
+    mujoco.mju_quatIntegrate(rotation, vector, 1.0)
+    mujoco.mju_mulQuat(result, orientation, rotation)
     mujoco.mju_normalize4(result)
     return result

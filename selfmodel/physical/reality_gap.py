@@ -1,4 +1,4 @@
-"""The reality gap: how a physical robot differs from its model where no hypothesis names it."""
+"""Reality gap: random differences between a physical robot and its model that are not faults."""
 
 import copy
 import dataclasses
@@ -16,32 +16,32 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.scaling import scale_model
 
-WIDEST = 0.5
-"""The largest level: beyond it, a third of the factors would be at their floor or unbelievable."""
+MAX_GAP_LEVEL = 0.5
+"""Largest level: above it, a third of the factors would be at their minimum or implausible."""
 
-FLOOR = 0.2
-"""No factor is below this: a body keeps a mass, a motor a force, a foot a grip."""
+MIN_FACTOR = 0.2
+"""Smallest factor: masses, motor forces and friction remain positive."""
 
-LONGEST_DELAY = 2
-"""Control steps that a command can take to reach the motors."""
+MAX_EXTRA_DELAY = 2
+"""Largest control delay in addition to the model's, control steps."""
 
-DEBRIS = "debris_"
-"""What the names in a physical model begin with that belong to a limb that fell off."""
+DEBRIS_PREFIX = "debris_"
+"""Prefix of the names of debris bodies, joints and geoms in a physical robot's model."""
 
 
 @dataclass(frozen=True)
-class Gap:
-    """One drawing of the reality gap: one physical robot, with the noise of its instruments.
+class RealityGap:
+    """One draw of the reality gap, for one physical robot.
 
     Attributes:
-        level: The relative standard deviation that everything is drawn by; 0 is no gap.
-        mass: Multiplies each body's mass, by the body's name.
-        inertia: Multiplies each body's principal moments of inertia, likewise.
-        friction: Multiplies the sliding friction of every geom and contact pair.
-        damping: Multiplies the damping of every joint.
-        motors: Multiplies each motor's torque before its limits, by the motor's name.
-        delay: Control steps that a command takes to reach the motors.
-        seed: From which the noise and the start of every trial are drawn.
+        level: Relative standard deviation of every factor; 0 is no gap.
+        mass: Factor of each body's mass, by body name.
+        inertia: Factor of each body's principal moments of inertia, by body name.
+        friction: Factor of the sliding friction of every geom and contact pair.
+        damping: Factor of the damping of every joint.
+        motors: Factor of each motor's torque before its limits, by motor name.
+        delay: Control delay in addition to the model's, control steps.
+        seed: Seed of the measurement noise and of the initial pose of every trial.
     """
 
     level: float
@@ -53,33 +53,34 @@ class Gap:
     delay: int
     seed: int
 
-    def as_values(self) -> dict[str, Any]:
-        """Returns its numbers as plain values, for a log."""
+    def as_dict(self) -> dict[str, Any]:
+        """Returns the attributes as plain values, for a log."""
         return dataclasses.asdict(self)
 
 
-def draw_gap(robot: Robot, level: float, rng: np.random.Generator) -> Gap:
-    """Returns a reality gap drawn for a robot.
+def draw_gap(robot: Robot, level: float, rng: np.random.Generator) -> RealityGap:
+    """Returns a random reality gap for a robot.
 
-    Masses, moments of inertia and motors get a factor of 1 + level N each; friction and damping,
-    which are known less well, one factor of 1 + 2 level N each for the whole robot; the delay is
-    uniform. The same numbers are drawn at every level, so a robot at a wider gap is the same one,
-    further from its model.
+    Every mass, moment of inertia and motor has a factor of 1 + level N. Friction and damping are
+    known less precisely: each has one factor of 1 + 2 level N for the whole robot. The delay is
+    uniform. The draws do not depend on the level, so two levels with the same random numbers
+    describe the same robot at different distances from its model.
 
-    Source of the idea, that what a simulation gets wrong be drawn: Jakobi, Husbands and Harvey,
-    "Noise and the reality gap" (ECAL 1995).
+    Source of the idea of randomising simulation errors: Jakobi, Husbands and Harvey, "Noise and
+    the reality gap" (ECAL 1995).
 
     Args:
         robot: The robot as its model describes it.
-        level: 0 to ``WIDEST``; at 0 every factor is 1.
-        rng: Where everything is drawn from.
+        level: 0 to ``MAX_GAP_LEVEL``; at 0 every factor is 1.
+        rng: Random numbers of the gap.
 
     Raises:
         InputError: The level is out of range.
     """
-    if not 0 <= level <= WIDEST:
+    if not 0 <= level <= MAX_GAP_LEVEL:
         raise InputError(
-            f"a reality gap has a level from 0 (none) to {WIDEST}, such as 0.05, got {level}"
+            f"expected a reality gap with a level from 0 (none) to {MAX_GAP_LEVEL}, such as 0.05, "
+            f"got {level}"
         )
     model = robot.model
 
@@ -91,8 +92,8 @@ def draw_gap(robot: Robot, level: float, rng: np.random.Generator) -> Gap:
     mass, inertia = factors(bodies), factors(bodies)
     friction, damping = _factor(2 * level, rng.standard_normal(2)).tolist()
     motors = factors(list(robot.anatomy.motors))
-    delay = int(rng.integers(LONGEST_DELAY + 1))
-    return Gap(
+    delay = int(rng.integers(MAX_EXTRA_DELAY + 1))
+    return RealityGap(
         level=level,
         mass=mass,
         inertia=inertia,
@@ -104,53 +105,53 @@ def draw_gap(robot: Robot, level: float, rng: np.random.Generator) -> Gap:
     )
 
 
-def perturbed(model: mujoco.MjModel, gap: Gap) -> mujoco.MjModel:
-    """Returns a copy of a robot's model, as heavy, slippery, damped and strong as the gap says.
+def perturbed_model(model: mujoco.MjModel, gap: RealityGap) -> mujoco.MjModel:
+    """Returns a copy of a robot's model with the masses, friction, damping and motors of a gap.
 
-    Its layout is the same, so a hypothesis can be worked into it with ``embody``, and such copies
-    share a batch. A body or motor that the gap does not name keeps what it has. What is not part
-    of a model, the delay and the noise, is not in it.
+    The layout of the copy is the model's: ``apply_faults`` applies a hypothesis to it, and such
+    copies share a batch. A body or motor without a factor in the gap is unchanged. The delay and
+    the measurement noise are not part of a model.
 
     Args:
-        model: The robot with nothing wrong; it is not changed.
-        gap: What is different.
+        model: Model of the healthy robot; it is not changed.
+        gap: The reality gap.
     """
     if gap.level == 0:
         return copy.copy(model)
-    names = [model.body(b).name.removeprefix(DEBRIS) for b in range(model.nbody)]
+    names = [model.body(b).name.removeprefix(DEBRIS_PREFIX) for b in range(model.nbody)]
     motors = [model.actuator(k).name for k in range(model.nu)]
     return scale_model(
         model,
-        mass=_by_name(gap.mass, names),
-        inertia=_by_name(gap.inertia, names),
+        mass=_factors_of(gap.mass, names),
+        inertia=_factors_of(gap.inertia, names),
         friction=gap.friction,
         damping=gap.damping,
-        motor_gains=_by_name(gap.motors, motors),
+        motor_gains=_factors_of(gap.motors, motors),
     )
 
 
 def perturbed_models(
-    robot: Robot, shape: Hypothesis, members: int, level: float
+    robot: Robot, spec_part: Hypothesis, members: int, level: float
 ) -> tuple[mujoco.MjModel, ...]:
-    """Returns models of one robot, each perturbed by a gap of its own.
+    """Returns models of one robot, each perturbed by a different reality gap.
 
-    The gaps are the same whatever the shape, so that what is compared on the models is compared on
-    the same draws.
+    The gaps do not depend on the hypothesis, so hypotheses are compared on common random numbers.
 
     Args:
         robot: The robot as its model describes it.
-        shape: What reshapes the model; the rest of a hypothesis is for ``embody``.
-        members: How many.
-        level: Of the gaps.
+        spec_part: The faults that edit the model's specification; ``apply_faults`` applies the
+            other faults of a hypothesis.
+        members: Number of models.
+        level: Level of the gaps.
     """
-    rng, model = np.random.default_rng(members), compile_model(robot, shape)
-    return tuple(perturbed(model, draw_gap(robot, level, rng)) for _ in range(members))
+    rng, model = np.random.default_rng(members), compile_model(robot, spec_part)
+    return tuple(perturbed_model(model, draw_gap(robot, level, rng)) for _ in range(members))
 
 
 def _factor(spread: float, normal: FloatArray) -> FloatArray:
-    return np.maximum(FLOOR, 1 + spread * normal)
+    return np.maximum(MIN_FACTOR, 1 + spread * normal)
 
 
-def _by_name(factors: Mapping[str, float], names: list[str]) -> FloatArray:
-    """The factor of each name, ``(names,)``; 1 for a name without a factor."""
+def _factors_of(factors: Mapping[str, float], names: list[str]) -> FloatArray:
+    """Returns the factor of each name, ``(names,)``; 1 for a name without a factor."""
     return np.array([factors.get(name, 1.0) for name in names])

@@ -1,4 +1,4 @@
-"""What a robot is stopped for: limits that are looked at in every observation."""
+"""Safety limits: conditions on an observation under which a robot is stopped."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -10,18 +10,17 @@ from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Signal
 
 NORM_TOLERANCE = 0.01
-"""By how much the length of a measured quaternion may differ from 1."""
+"""Largest deviation of a measured quaternion's norm from 1."""
 
 
 @dataclass(frozen=True)
 class Limit:
-    """What a robot is stopped for.
+    """Safety limit: a condition under which a robot is stopped.
 
     Attributes:
-        signals: Those without which it says nothing; a robot that does not observe them is stopped
-            too.
-        reason: Looks at what was observed, ``(width,)`` each with NaN for what was not; returns why
-            the robot must be stopped, or "" if it need not be.
+        signals: Required signals; a robot that does not observe them is stopped too.
+        reason: Returns why the robot must be stopped, or "" if no limit is exceeded. Its argument
+            is the row of each signal, ``(width,)``, NaN where not observed.
     """
 
     signals: tuple[Signal, ...]
@@ -29,11 +28,11 @@ class Limit:
 
 
 def joint_limits(robot: Robot, margin: float) -> Limit:
-    """Stops a robot whose hinge is beyond the range that its model gives it.
+    """Returns a limit on the joint positions: the ranges of the robot's model plus a margin.
 
     Args:
-        robot: Whose hinges; those without a range have no limit.
-        margin: By how much a hinge may be beyond, rad; m where it slides.
+        robot: The robot; a hinge without a range has no limit.
+        margin: Allowed distance beyond the range, rad; m for a slide joint.
     """
     names = robot.anatomy.hinges
     hinges = [robot.model.joint(name) for name in names]
@@ -56,19 +55,21 @@ def joint_limits(robot: Robot, margin: float) -> Limit:
     return Limit(("joint_positions",), reason)
 
 
-def tilt_limit(most: float) -> Limit:
-    """Stops a robot whose root body leans too far.
+def tilt_limit(max_tilt: float) -> Limit:
+    """Returns a limit on the tilt of the base.
 
     Args:
-        most: The angle that its z axis may have with the world's, rad.
+        max_tilt: Largest angle between the z axes of the base and the world, rad.
     """
 
     def reason(observed: Mapping[Signal, FloatArray]) -> str:
         _, x, y, _ = orientation = observed["base_orientation"]
         norm = float(np.linalg.norm(orientation))
         if abs(norm - 1) > NORM_TOLERANCE:
-            return f"base_orientation is no rotation: a quaternion of length {norm:.2f}, not 1"
+            return f"base_orientation must be a unit quaternion, got the norm {norm:.2f}"
         tilt = float(np.arccos(np.clip(1 - 2 * (x * x + y * y), -1, 1)))
-        return f"it leans by {tilt:.2f} rad, more than {most:g} rad" if tilt > most else ""
+        if tilt > max_tilt:  # False for NaN: the orientation was not observed
+            return f"the base is tilted by {tilt:.2f} rad, more than {max_tilt:g} rad"
+        return ""
 
     return Limit(("base_orientation",), reason)

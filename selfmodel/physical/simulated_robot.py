@@ -1,4 +1,4 @@
-"""Physical robots: what the algorithm may ask of one, and a simulated one that hides its fault."""
+"""Simulated physical robot: a hidden fault, a reality gap and structural mismatches."""
 
 import dataclasses
 from collections import deque
@@ -12,11 +12,11 @@ from selfmodel.controllers.command_source import CommandSource, make_batch
 from selfmodel.errors import TrialError
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
-from selfmodel.physical.debris import add_debris, drop_debris, lost_limbs
+from selfmodel.physical.debris import add_debris, detached_limbs, place_debris
 from selfmodel.physical.initial_pose import randomize_initial_pose
 from selfmodel.physical.measurement_noise import ExactMeasurement, Measurement, NoisyMeasurement
-from selfmodel.physical.reality_gap import Gap, perturbed
-from selfmodel.physical.structural_mismatch import Structure, add_structure
+from selfmodel.physical.reality_gap import RealityGap, perturbed_model
+from selfmodel.physical.structural_mismatch import StructuralMismatch, add_structural_mismatch
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
@@ -24,35 +24,38 @@ from selfmodel.robot.state_access import fields_of, signal_fields
 from selfmodel.trials.behaviour import SIGNALS, Sample
 
 OWN_SEED = 1
-"""The seed of what is random in a physical robot without a gap, such as its terrain: another than
-the self-model's, which is 0."""
+"""Seed of the randomness of a fault, such as terrain, in a physical robot without a gap; the
+self-model's seed is 0."""
 
 
 class SimulatedRobot:
-    """A physical robot in simulation, with something wrong with it that it tells nobody.
+    """Simulated physical robot with a hidden fault.
 
     Args:
         robot: The robot as its model describes it.
-        hidden: What is wrong with it.
-        gap: How else it differs from its model; None, or a level of 0: not at all.
-        structure: How it is built differently from its model; None: not at all.
-        stream: Which of the gap's streams of noise is this robot's own: robots that share a gap,
-            such as one before and after its failure, have different ones.
+        hidden: Hypothesis that is true of the physical robot.
+        gap: Reality gap; None or a level of 0 for no gap.
+        structure: Structural mismatch; None for the structure of the model.
+        stream: Number of the robot's random number stream among those of the gap's seed. Robots
+            that share a gap, such as one robot before and after its failure, have different
+            streams.
     """
 
     def __init__(
         self,
         robot: Robot,
         hidden: Hypothesis = INTACT,
-        gap: Gap | None = None,
-        structure: Structure | None = None,
+        gap: RealityGap | None = None,
+        structure: StructuralMismatch | None = None,
         stream: int = 0,
     ) -> None:
         self._robot = robot
         self._gap = gap if gap is not None and gap.level > 0 else None
-        self._limbs = lost_limbs(robot, hidden) if self._gap is not None else ()
+        self._limbs = detached_limbs(robot, hidden) if self._gap is not None else ()
         seed = gap.seed if gap else OWN_SEED
-        edits = [partial(add_structure, structure=structure)] if structure is not None else []
+        edits = (
+            [partial(add_structural_mismatch, structure=structure)] if structure is not None else []
+        )
         if self._limbs:
             edits.append(partial(add_debris, limbs=self._limbs))
         self._embodiment = build(
@@ -60,17 +63,17 @@ class SimulatedRobot:
             hidden,
             seed,
             edits=edits,
-            perturb=None if self._gap is None else partial(perturbed, gap=self._gap),
+            perturb=None if self._gap is None else partial(perturbed_model, gap=self._gap),
         )
         self._noise = np.random.SeedSequence(seed, spawn_key=(stream,))
 
     def run(self, controller: CommandSource, steps: int) -> Iterator[Sample]:
         """Runs a controller; see ``PhysicalRobot``.
 
-        Without a gap, the same bits as the ``Simulator``'s, unless something about the fault is
-        random, such as the bumps of a terrain: those are this robot's own. With one, each run takes
-        the next stream of noise: two runs differ, and the n-th of the same seed is the same to the
-        bit.
+        Without a gap, the samples are bit-identical to the ``Simulator``'s, unless the fault is
+        random, such as terrain, which differs from the self-model's. With a gap, each run has the
+        next random number stream: two runs differ, and the n-th runs of two robots with the same
+        seed are bit-identical.
 
         Raises:
             TrialError: The simulation diverged.
@@ -100,22 +103,24 @@ class SimulatedRobot:
             measurement = NoisyMeasurement(self._gap.level, robot.anatomy, embodiment, rng)
             delay += self._gap.delay
             randomize_initial_pose(robot, model, data, self._gap.level, rng)
-            drop_debris(model, data, self._limbs)
+            place_debris(model, data, self._limbs)
         mujoco.mj_forward(model, data)
-        senses = SensorReader(model, robot.anatomy, [embodiment])
-        brain = make_batch([controller], [embodiment.silent_neurons], len(robot.anatomy.sensors))
+        reader = SensorReader(model, robot.anatomy, [embodiment])
+        controllers = make_batch(
+            [controller], [embodiment.silent_neurons], len(robot.anatomy.sensors)
+        )
         commands = np.zeros((1, model.nu))
-        underway = deque(np.zeros((delay, model.nu)))
-        # What is logged as commanded is what the controller said, not what the motors have got.
-        where = signal_fields(robot, model)
-        live = {signal: place.reader(fields_of(data)) for signal, place in where.items()}
-        live |= {"sensors": lambda: brain.readings, "commands": lambda: commands}
+        delay_line = deque(np.zeros((delay, model.nu)))
+        # Logged commands are the controller's outputs, before the control delay.
+        state_fields = signal_fields(robot, model)
+        live = {signal: field.reader(fields_of(data)) for signal, field in state_fields.items()}
+        live |= {"sensors": lambda: controllers.readings, "commands": lambda: commands}
         for k in range(steps):
-            senses.read(data.sensordata[np.newaxis], data.qpos[np.newaxis], brain.readings)
-            measurement.corrupt_readings(brain.readings[0])
-            brain.step(commands)
-            underway.append(commands[0].copy())
-            data.ctrl[:] = underway.popleft()
+            reader.read(data.sensordata[np.newaxis], data.qpos[np.newaxis], controllers.readings)
+            measurement.corrupt_readings(controllers.readings[0])
+            controllers.step(commands)
+            delay_line.append(commands[0].copy())
+            data.ctrl[:] = delay_line.popleft()
             yield Sample(
                 time=k * robot.control_timestep,
                 values={
@@ -127,6 +132,6 @@ class SimulatedRobot:
                 mujoco.mj_step(model, data, substeps)
                 if data.warning.number.any():
                     raise TrialError(
-                        f"the simulation of the physical robot broke down after step {k}: its "
-                        f"model is unstable under this controller; try a smaller physics time step"
+                        f"the simulation of the physical robot diverged after step {k}: its model "
+                        f"is unstable under this controller; try a smaller physics time step"
                     )

@@ -1,4 +1,4 @@
-"""Whether the steps of a robot with a clock of its own come in time."""
+"""Step timing of a robot with its own clock: measured times, late steps and missing steps."""
 
 import math
 from collections.abc import Mapping
@@ -6,51 +6,54 @@ from typing import Any
 
 from selfmodel.trials.behaviour import StepTiming
 
-TIME = "time"
-"""What an observation may tell beside our signals: when it was made, s, by the robot's clock."""
+TIMESTAMP = "time"
+"""Optional key of an observation, beside the signals: its time by the robot's clock, s."""
 
 
-class Stopwatch:
-    """Tells each step's moment.
+class StepTimer:
+    """Computes the timing of each control step.
 
-    Where the first observation says when it was made, only what observations say counts; otherwise
-    only the clock does.
+    If the first observation has a timestamp, all times are timestamps of observations; otherwise
+    all times are readings of the clock.
 
     Args:
-        timestep: What is to lie between two steps, s.
-        tolerance: By how much of that a step may be off.
+        timestep: Control time step, s.
+        tolerance: Largest deviation of a punctual step, as a fraction of the control time step.
     """
 
     def __init__(self, timestep: float, tolerance: float) -> None:
         self._timestep, self._tolerance = timestep, tolerance
-        self._zero = self._last = math.nan
-        self._since = 0
-        self._stamped = False
+        self._origin = self._last_elapsed = math.nan
+        self._steps_since_last = 0
+        self._has_timestamps = False
 
-    def look(self, now: float, told: Mapping[str, Any] | None) -> StepTiming:
-        """Returns the moment of the next step.
+    def update(self, now: float, observation: Mapping[str, Any] | None) -> StepTiming:
+        """Returns the timing of the next step.
 
-        An observation that is not newer than the one before is that one again: it is missing.
+        An observation that is not newer than the previous observation is a repetition, and counts
+        as missing.
 
         Args:
-            now: What the clock says, s.
-            told: What was observed; None if nothing was.
+            now: Reading of the clock, s.
+            observation: The observation; None if nothing was observed.
         """
-        stamp = float("nan" if told is None else told.get(TIME, "nan"))
-        if math.isinf(stamp):  # no time: a log could not hold it
-            stamp = math.nan
-        if math.isnan(self._zero):
-            self._stamped = not math.isnan(stamp)
-            self._zero = stamp if self._stamped else now
-        elapsed = (stamp if self._stamped else now) - self._zero
-        self._since += 1
-        if math.isnan(elapsed) or (self._stamped and elapsed <= self._last):
-            # Without a time an observation may be of any moment.
-            unknown = math.isnan(elapsed) and told is not None
+        timestamp = float("nan" if observation is None else observation.get(TIMESTAMP, "nan"))
+        if math.isinf(timestamp):  # a log cannot contain an infinite time
+            timestamp = math.nan
+        if math.isnan(self._origin):
+            self._has_timestamps = not math.isnan(timestamp)
+            self._origin = timestamp if self._has_timestamps else now
+        elapsed = (timestamp if self._has_timestamps else now) - self._origin
+        self._steps_since_last += 1
+        if math.isnan(elapsed) or (self._has_timestamps and elapsed <= self._last_elapsed):
+            # The time of an observation without a timestamp is unknown.
+            unknown = math.isnan(elapsed) and observation is not None
             return StepTiming(math.nan, late=unknown, missing=not unknown)
-        off = abs(elapsed - self._last - self._since * self._timestep)
-        self._last, self._since = elapsed, 0
-        # Nothing is before the first: its NaN is never late.
+        deviation = abs(elapsed - self._last_elapsed - self._steps_since_last * self._timestep)
+        self._last_elapsed, self._steps_since_last = elapsed, 0
+        # The deviation of the first step is NaN, which is never late.
         return StepTiming(
-            elapsed, late=off > self._tolerance * self._timestep, missing=told is None
+            elapsed,
+            late=deviation > self._tolerance * self._timestep,
+            missing=observation is None,
         )

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.evolution import Generation
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.simulation.calibrate import Calibration
+from selfmodel.simulation.calibration import Calibration
 from selfmodel.trials.trial import Trial
 
 

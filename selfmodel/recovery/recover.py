@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 from selfmodel.controllers.controller import Controller, Design
 from selfmodel.diagnosis.comparator import Comparator
@@ -22,8 +23,9 @@ from selfmodel.recovery.random_streams import choice_stream, diagnosis_stream, r
 from selfmodel.recovery.repair import RepairSearch
 from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
-from selfmodel.simulation.calibrate import Calibration
+from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.data_frame import data_frame
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
 
 
@@ -64,6 +66,51 @@ class Recovery:
         """Largest forward displacement of the recovery trials, m; NaN if unobserved in all."""
         displacements = [trial.displacement for trial in self.trials[2:]]
         return max((value for value in displacements if not math.isnan(value)), default=math.nan)
+
+    def __repr__(self) -> str:
+        lines = [f"<Recovery: {self.diagnosis.best}, {self.diagnosis.verdict}"]
+        lines += [
+            f"  {row['trial']:14} {row['displacement']:8.3f} m  {row['hypothesis']}"
+            for row in self._rows()
+        ]
+        return "\n".join(lines) + ">"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns the result as JSON values: trials, displacements in m, diagnosis, evaluations."""
+        return {
+            "trials": self._rows(),
+            "displacement": {
+                "before": self.before,
+                "after": self.after,
+                "recovered": None if math.isnan(self.recovered) else self.recovered,
+            },
+            "diagnosis": self.diagnosis.to_dict(),
+            "evaluations": {
+                "repair": self.repair_evaluations,
+                "diagnostic": self.diagnostic_evaluations,
+                "distinct_hypotheses": self.distinct_hypotheses,
+            },
+        }
+
+    def to_pandas(self) -> Any:  # noqa: ANN401  # pandas is optional
+        """Returns the physical trials as a ``pandas.DataFrame``, one row per trial.
+
+        Raises:
+            InputError: pandas is not installed.
+        """
+        return data_frame(self._rows())
+
+    def _rows(self) -> list[dict[str, Any]]:
+        return [
+            {
+                "trial": trial.plan.name,
+                "stage": trial.plan.stage,
+                "hypothesis": str(tried),
+                "displacement": trial.displacement,
+                "log": trial.path,
+            }
+            for trial, tried in zip(self.trials, self.tried, strict=True)
+        ]
 
 
 def recover(

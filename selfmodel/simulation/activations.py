@@ -1,7 +1,8 @@
-"""The state of motors that remember their commands, computed from the commands.
+"""Actuator activations (MuJoCo's ``act``), computed from the commands.
 
-No log holds it: a motor with ``dyntype`` filter follows its command with a time constant, one with
-integrator adds its commands up. From rest on, their state follows from what they were commanded.
+Activations are not logged. The activation of a motor with the ``dyntype`` filter follows its
+command with a time constant, and the activation of an integrator is the sum of its commands. Both
+are zero at the start of a trial, so they follow from the commands since.
 """
 
 import mujoco
@@ -17,109 +18,122 @@ _RUNGE_KUTTA = int(mujoco.mjtIntegrator.mjINT_RK4)
 _UNCLAMPED = int(mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL)
 
 
-def starting_activations(robot: Robot, segments: Segments, delay: int) -> FloatArray:
-    """Returns the activations with which segments of a trial begin.
+def initial_activations(robot: Robot, segments: Segments, delay: int) -> FloatArray:
+    """Returns the activations at the beginning of segments of a trial.
 
-    The motors are at rest when a trial begins. Where the segments do not say what was commanded
-    since, they are taken to have followed the first of the commands that are known for long.
+    Activations are zero when a trial begins. If the commands since then are not part of the
+    segments, activations are assumed to be settled at the first known command.
 
     Args:
-        robot: The robot with nothing wrong: no fault changes how an activation follows a command.
-        segments: Where to begin, and what was commanded.
-        delay: Control steps from a command to its effect.
+        robot: The healthy robot: no fault changes the activation dynamics.
+        segments: Initial states and commands.
+        delay: Control delay, control steps.
 
     Returns:
-        ``(segments, na)``; of a robot whose motors remember nothing, ``(segments, 0)``.
+        ``(segments, na)``; ``(segments, 0)`` for a robot without activations.
     """
     model = robot.model
     motors: IndexArray = np.flatnonzero(model.actuator_dyntype != mujoco.mjtDyn.mjDYN_NONE)
     found = np.zeros((len(segments.commands), model.na))
     if not len(motors):
         return found
-    follow = _Follower(robot, motors)
+    dynamics = _ActivationDynamics(robot, motors)
     if segments.past is None:
         effective = segments.commands[:, : max(segments.lead - delay, 0), motors]
-        state = follow.settled(segments.commands[:, 0, motors])
+        state = dynamics.settled(segments.commands[:, 0, motors])
         for k in range(effective.shape[1]):
-            state = follow.after(state, effective[:, k])
+            state = dynamics.next(state, effective[:, k])
         found[:, model.actuator_actadr[motors]] = state
         return found
     commands, starts = segments.past.commands[:, motors], segments.past.starts
-    # What is not known is taken to have stood since the last command that is.
-    known = np.maximum.accumulate(
+    # An unknown command is assumed to be the last known command before it; 0 at first.
+    last_known = np.maximum.accumulate(
         np.where(np.isfinite(commands), np.arange(len(commands))[:, np.newaxis] + 1, 0)
     )
-    rested = np.concatenate([np.zeros((1, len(motors))), commands])
-    held = np.take_along_axis(rested, known, axis=0)
+    from_rest = np.concatenate([np.zeros((1, len(motors))), commands])
+    filled = np.take_along_axis(from_rest, last_known, axis=0)
     states = np.zeros((int(starts.max(initial=0)) + 1, len(motors)))
     for k in range(len(states) - 1):
-        command = held[k - delay] if k >= delay else np.zeros(len(motors))
-        states[k + 1] = follow.after(states[k], command)
+        command = filled[k - delay] if k >= delay else np.zeros(len(motors))
+        states[k + 1] = dynamics.next(states[k], command)
     found[:, model.actuator_actadr[motors]] = states[starts]
     return found
 
 
-def activations_of(robot: Robot, commands: FloatArray) -> FloatArray:
-    """Returns the activations in a run that shows all commands since rest.
+def activations_since_rest(robot: Robot, commands: FloatArray) -> FloatArray:
+    """Returns the activations of a run with known commands since its start.
 
     Args:
-        robot: The robot with nothing wrong.
-        commands: As the motors got them, ``(steps, motors)``.
+        robot: The healthy robot.
+        commands: Commands at the motors, after the control delay, ``(steps, motors)``.
 
     Returns:
-        ``(steps, na)``, in each row those with which its command was given.
+        Activations before the command of each row, ``(steps, na)``.
     """
     model = robot.model
     motors: IndexArray = np.flatnonzero(model.actuator_dyntype != mujoco.mjtDyn.mjDYN_NONE)
     found = np.zeros((len(commands), model.na))
     if not len(motors):
         return found
-    follow, state = _Follower(robot, motors), np.zeros(len(motors))
-    for row, command in zip(found[1:], commands[:, motors], strict=False):  # the last has no row
-        state = follow.after(state, command)
+    dynamics, state = _ActivationDynamics(robot, motors), np.zeros(len(motors))
+    # The last command has no row after it.
+    for row, command in zip(found[1:], commands[:, motors], strict=False):
+        state = dynamics.next(state, command)
         row[model.actuator_actadr[motors]] = state
     return found
 
 
-class _Follower:
-    """How the activations of some motors change over a control step.
+class _ActivationDynamics:
+    """Activation dynamics over one control step.
 
-    A command stands for all of it, so the change is linear, and what an activation is clamped to
-    at the end it would be clamped to on the way: it moves to one side only.
+    A command is constant during a control step, so the update is linear and each activation changes
+    monotonically: clamping at the end of the step equals clamping at each physics step.
 
     Source: MuJoCo's documentation, "Activation dynamics"; ``mj_nextActivation``.
+
+    Args:
+        robot: The healthy robot.
+        motors: Indices of the motors with activations, ``(motors,)``.
     """
 
     def __init__(self, robot: Robot, motors: IndexArray) -> None:
         model = robot.model
         timestep, kind = float(model.opt.timestep), model.actuator_dyntype[motors]
-        part = timestep / np.maximum(model.actuator_dynprm[motors, 0], mujoco.mjMINVAL)
+        ratio = timestep / np.maximum(model.actuator_dynprm[motors, 0], mujoco.mjMINVAL)
         runge_kutta = model.opt.integrator == _RUNGE_KUTTA
-        slope = 1 - part / 2 + part**2 / 6 - part**3 / 24 if runge_kutta else 1.0
-        followed = np.where(kind == _FILTER, part, -np.expm1(-part)) * slope
-        kept = (1 - followed) ** robot.substeps
-        adds = kind == _INTEGRATOR
-        self._adds = adds
-        self._kept = np.where(adds, 1.0, kept)
-        self._gain = np.where(adds, timestep * robot.substeps, 1 - kept)
+        correction = 1 - ratio / 2 + ratio**2 / 6 - ratio**3 / 24 if runge_kutta else 1.0
+        substep_gain = np.where(kind == _FILTER, ratio, -np.expm1(-ratio)) * correction
+        decay = (1 - substep_gain) ** robot.substeps
+        integrates = kind == _INTEGRATOR
+        self._integrates = integrates
+        self._decay = np.where(integrates, 1.0, decay)
+        self._gain = np.where(integrates, timestep * robot.substeps, 1 - decay)
         limited = model.actuator_ctrllimited[motors].astype(bool)
         clamps = limited & (not model.opt.disableflags & _UNCLAMPED)
-        self._commands = _bounds(clamps, model.actuator_ctrlrange[motors])
+        self._command_bounds = _bounds(clamps, model.actuator_ctrlrange[motors])
         limited = model.actuator_actlimited[motors].astype(bool)
-        self._states = _bounds(limited, model.actuator_actrange[motors])
+        self._activation_bounds = _bounds(limited, model.actuator_actrange[motors])
 
-    def after(self, state: FloatArray, command: FloatArray) -> FloatArray:
-        """The activations after a control step, ``(..., motors)`` like state and command."""
-        clamped = np.clip(command, *self._commands)
-        return np.asarray(np.clip(self._kept * state + self._gain * clamped, *self._states))
+    def next(self, state: FloatArray, command: FloatArray) -> FloatArray:
+        """Returns the activations after a control step, ``(..., motors)``.
+
+        Args:
+            state: Activations before the step, ``(..., motors)``.
+            command: Commands of the step, ``(..., motors)``.
+        """
+        clamped = np.clip(command, *self._command_bounds)
+        after = self._decay * state + self._gain * clamped
+        return np.asarray(np.clip(after, *self._activation_bounds))
 
     def settled(self, command: FloatArray) -> FloatArray:
-        """The activations once a command has stood for long; 0 where it would add up for ever."""
-        clamped = np.clip(command, *self._commands)
-        return np.asarray(np.clip(np.where(self._adds, 0.0, clamped), *self._states))
+        """Returns the steady state under a constant command; 0 for an integrator."""
+        clamped = np.clip(command, *self._command_bounds)
+        steady = np.where(self._integrates, 0.0, clamped)
+        return np.asarray(np.clip(steady, *self._activation_bounds))
 
 
 def _bounds(limited: BoolArray, ranges: FloatArray) -> tuple[FloatArray, FloatArray]:
-    none = np.array([[-np.inf, np.inf]])
-    low, high = np.where(limited[:, np.newaxis], ranges, none).T
+    """Returns the lower and the upper bound of each motor, infinite if not limited."""
+    unbounded = np.array([[-np.inf, np.inf]])
+    low, high = np.where(limited[:, np.newaxis], ranges, unbounded).T
     return low, high

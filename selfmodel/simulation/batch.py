@@ -1,4 +1,4 @@
-"""Batches of MuJoCo simulations: made, stepped, and known for which of them broke down."""
+"""Batches of MuJoCo simulations that continue when some of them diverge."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -16,7 +16,7 @@ from selfmodel.trials.behaviour import Signal
 
 
 def new_batch(model: mujoco.MjModel, embodiments: Sequence[Embodiment], threads: int) -> Batch:
-    """A batch with each simulation on its embodiment's model."""
+    """Returns a batch with one simulation per embodiment."""
     batch = Batch(model, len(embodiments), nthread=threads)
     batch.set_models([embodiment.model for embodiment in embodiments])
     return batch
@@ -25,9 +25,10 @@ def new_batch(model: mujoco.MjModel, embodiments: Sequence[Embodiment], threads:
 def live_signals(
     robot: Robot, batch: Batch, embodiments: Sequence[Embodiment], record: Sequence[Signal]
 ) -> dict[Signal, Reader]:
-    """Returns for each signal of the state what reads its present value.
+    """Returns functions that read the current values of recorded signals from a batch.
 
-    What the controllers receive and give is not part of MuJoCo's state, and is left out.
+    The readings and the commands of the controllers are not part of MuJoCo's state, and are
+    omitted.
     """
     state = signal_fields(robot, *(embodiment.model for embodiment in embodiments))
     return {
@@ -38,10 +39,10 @@ def live_signals(
 
 
 class LiveBatch:
-    """Steps the simulations of a batch that MuJoCo has not raised in, and knows which broke down.
+    """Batch that steps only the simulations without a MuJoCo error, and records divergence.
 
-    One that MuJoCo warns about is reset by it and goes on, worthless but harmless: rows of a batch
-    do not touch each other.
+    MuJoCo resets a simulation with a warning, which continues to be stepped: its values are
+    invalid, but the simulations of a batch are independent.
     """
 
     def __init__(self, batch: Batch) -> None:
@@ -50,12 +51,12 @@ class LiveBatch:
         self._failed = np.zeros(batch.nsim, dtype=bool)
 
     def forward(self) -> None:
-        """Computes what follows from the present state."""
+        """Computes all quantities that depend on the state (``mj_forward``)."""
         with self._failures():
             self._batch.forward(self._ids)
 
     def step(self, substeps: int) -> None:
-        """Makes that many physics steps."""
+        """Advances by a number of physics steps."""
         with self._failures():
             self._batch.step(self._ids, nstep=substeps)
 
@@ -68,14 +69,14 @@ class LiveBatch:
             self._ids = np.flatnonzero(~self._failed)
 
     def diverged(self) -> BoolArray:
-        """Returns which simulations mean nothing, ``(n,)``."""
+        """Returns a mask of the simulations that diverged or had a warning, ``(n,)``."""
         warned: BoolArray = self._batch.warning[:, :, 1].any(axis=1)
         return np.asarray(self._failed | warned)
 
 
 @contextmanager
 def silence_mujoco_warnings() -> Iterator[None]:
-    """Keeps MuJoCo's warnings off the terminal and out of a file: each is counted by its run."""
+    """Suppresses MuJoCo's warnings on the terminal and in its log file; each run counts its own."""
     before, quiet = mujoco.MjLogConfig.get(), mujoco.MjLogConfig.get()
     quiet.logto_console = quiet.logto_file = False
     mujoco.MjLogConfig.set(quiet)

@@ -1,4 +1,4 @@
-"""Where feet met the ground: felt by touch, and known by the joints and the base above it."""
+"""Ground contact points, reconstructed from touch sensors and forward kinematics."""
 
 import mujoco
 import numpy as np
@@ -10,22 +10,22 @@ from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.rotation import directions
 from selfmodel.trials.state_estimation import STATE, estimated_states
 
-FAR = 10.0
-"""How far a foot may be from where the model has its level ground, m."""
+MAX_GROUND_DISTANCE = 10.0
+"""Largest distance between a foot and the model's level ground, m."""
 
 
-def felt_points(robot: Robot, behaviour: Behaviour) -> FloatArray:
-    """Returns where something with a touch sensor met the ground.
+def ground_contact_points(robot: Robot, behaviour: Behaviour) -> FloatArray:
+    """Returns the ground contact points of the bodies with touch sensors in a trial.
 
-    It is the place of a body that is lowest, at each step at which the sensor of that body said
-    that it touches. A sensor that errs gives points in the air.
+    A contact point is the lowest point of a body, at each step with a touch reading of 1. Wrong
+    touch readings result in points in the air.
 
     Args:
-        robot: The robot with nothing wrong.
-        behaviour: What was observed in a trial.
+        robot: The healthy robot.
+        behaviour: The logged behaviour of the trial.
 
     Returns:
-        ``(n, 3)`` in the world's frame, m, read only; none where the model has no level ground.
+        ``(n, 3)``, world frame, m, read-only; ``(0, 3)`` for a model without level ground.
     """
     model = robot.model
     ground, feet = _level_ground(model), _feet(robot)
@@ -41,14 +41,14 @@ def felt_points(robot: Robot, behaviour: Behaviour) -> FloatArray:
         mujoco.mj_kinematics(model, data)
         for column, geoms in feet.items():
             if behaviour["sensors"][step, column] == 1:
-                points += _lowest(model, data, ground, geoms)
-    felt = np.array(points).reshape(-1, 3)
-    felt.flags.writeable = False  # it is remembered
-    return felt
+                points += _lowest_point(model, data, ground, geoms)
+    contacts = np.array(points).reshape(-1, 3)
+    contacts.flags.writeable = False  # the simulator caches the array
+    return contacts
 
 
 def _level_ground(model: mujoco.MjModel) -> int | None:
-    """The plane of the world that lies most level, if there is one."""
+    """Returns the most level plane of the world, or None without a plane."""
     planes = (model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE) & (model.geom_bodyid == 0)
     numbers = np.flatnonzero(planes)
     if not len(numbers):
@@ -58,7 +58,7 @@ def _level_ground(model: mujoco.MjModel) -> int | None:
 
 
 def _feet(robot: Robot) -> dict[int, list[int]]:
-    """For the column of each touch sensor the geoms of its body that can touch something."""
+    """Returns the colliding geoms of each touch sensor's body, by the column of the sensor."""
     model = robot.model
     solid = (model.geom_contype | model.geom_conaffinity) != 0
     feet = {}
@@ -70,14 +70,14 @@ def _feet(robot: Robot) -> dict[int, list[int]]:
     return {column: geoms for column, geoms in feet.items() if geoms}
 
 
-def _lowest(
+def _lowest_point(
     model: mujoco.MjModel, data: mujoco.MjData, ground: int, geoms: list[int]
 ) -> list[FloatArray]:
-    """The point of some geoms that is nearest to the level ground; none where all are far."""
-    nearest, between = FAR, np.empty(6)
+    """Returns the point of some geoms nearest to the level ground; empty if all are too far."""
+    nearest, segment = MAX_GROUND_DISTANCE, np.empty(6)
     lowest: list[FloatArray] = []
     for geom in geoms:
-        distance = mujoco.mj_geomDistance(model, data, ground, geom, FAR, between)
+        distance = mujoco.mj_geomDistance(model, data, ground, geom, MAX_GROUND_DISTANCE, segment)
         if distance < nearest:
-            nearest, lowest = distance, [between[3:].copy()]
+            nearest, lowest = distance, [segment[3:].copy()]
     return lowest

@@ -1,4 +1,4 @@
-"""What comes out of a batch of simulations, and what they cost."""
+"""Results and statistics of simulation batches."""
 
 from dataclasses import dataclass
 
@@ -10,13 +10,13 @@ from selfmodel.trials.behaviour import Behaviour
 
 @dataclass
 class SimulationStats:
-    """What a simulator has done so far.
+    """Cumulative statistics of a simulator.
 
     Attributes:
-        runs: Simulations.
-        steps: Control steps, over all simulations.
-        diverged: Simulations that diverged, or in which MuJoCo warned.
-        physics_seconds: Wall time spent inside MuJoCo's steps.
+        runs: Number of simulations.
+        steps: Number of control steps, over all simulations.
+        diverged: Number of simulations that diverged or had a MuJoCo warning.
+        physics_seconds: Wall time of MuJoCo's steps, s.
     """
 
     runs: int = 0
@@ -27,18 +27,18 @@ class SimulationStats:
 
 @dataclass(frozen=True, eq=False)
 class SimulationResult:
-    """The outcome of a batch of runs.
+    """Result of a batch of runs.
 
     Attributes:
-        behaviour: The signals that were asked for, with a leading axis of ``n``.
-        diverged: ``(n,)``: which runs mean nothing, because the simulation broke down.
+        behaviour: The recorded signals, with a leading axis of ``n``.
+        diverged: Mask of the runs that diverged, ``(n,)``; their signals are invalid.
     """
 
     behaviour: Behaviour
     diverged: BoolArray
 
     def grouped(self, *shape: int) -> "SimulationResult":
-        """Returns the same with the runs ``(n,)`` as an array of that shape, row by row."""
+        """Returns the result with its axis of runs, ``(n,)``, reshaped in row-major order."""
         flat = self.behaviour
         signals = {
             signal: values.reshape(*shape, *values.shape[1:])

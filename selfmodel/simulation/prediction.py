@@ -1,4 +1,4 @@
-"""Short predictions from logged states, under the commands that were logged."""
+"""Short predictions from logged states under logged commands."""
 
 from collections.abc import Sequence
 from time import perf_counter
@@ -13,7 +13,7 @@ from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
 from selfmodel.robot.state_access import writer
-from selfmodel.simulation.activations import starting_activations
+from selfmodel.simulation.activations import initial_activations
 from selfmodel.simulation.batch import LiveBatch, live_signals, new_batch, silence_mujoco_warnings
 from selfmodel.simulation.outcome import SimulationResult, SimulationStats
 from selfmodel.simulation.requests import Segments
@@ -25,49 +25,48 @@ def predict(
     embodiments: Sequence[Embodiment],
     segments: Segments,
     *,
-    moves_as: Sequence[int] | None = None,
+    same_dynamics_as: Sequence[int] | None = None,
     threads: int,
     stats: SimulationStats,
     delay: int | None = None,
 ) -> SimulationResult:
-    """Predicts segments of a trial with each of some models of a robot.
+    """Predicts segments of a trial with several models of a robot.
 
-    Where the segments say the whole state, all of them are simulated side by side. Where they do
-    not say where the base is and how fast, each begins there where the one before it ended: what
-    was logged is put into one long simulation again and again.
+    Segments with the whole state are simulated in parallel. Segments without the position and the
+    linear velocity of the base are simulated in sequence: each begins with the base in the
+    predicted state at the end of the segment before.
 
-    What an embodiment holds still, such as a jammed joint, begins where it is held. Nothing moves
-    the hinges of a lost limb: where the segments say angles, they begin at rest, at their median
-    angle over all segments.
+    Welded joints begin at their welded angle. The hinges of a detached limb have no logged motion:
+    if the segments include joint positions, these hinges begin at rest, at their median angle over
+    all segments.
 
     Args:
-        robot: The robot with nothing wrong.
-        embodiments: At least one, of the robot's layout.
-        segments: Where to begin and what was commanded.
-        moves_as: For each embodiment the number of the first one that moves as it does under the
-            same commands, though its sensors may tell another story: only that one is simulated.
-            Without it, all are.
-        threads: Threads that MuJoCo steps on, the caller's included.
-        stats: Is told what was simulated.
-        delay: Control steps from a command to its effect; that of the robot if none is given.
+        robot: The healthy robot.
+        embodiments: At least one model, with the layout of the robot.
+        segments: Initial states and commands.
+        same_dynamics_as: For each embodiment the index of the first embodiment with the same
+            dynamics, whatever its sensors: only that embodiment is simulated. By default all are.
+        threads: Threads of MuJoCo's steps, including the caller's.
+        stats: Statistics that are updated.
+        delay: Control delay, control steps; the robot's by default.
 
     Returns:
         Signals of ``(n, segments, horizon + 1, width)``; a run has diverged if any of its segments
         has.
 
     Raises:
-        InputError: The segments do not say the commands that are still on their way.
+        InputError: The segments do not include all commands that are in the delay line.
     """
     late = robot.control_delay if delay is None else delay
     if segments.lead < late:
         raise InputError(
-            f"the robot's commands take effect {late} steps late, and segments have "
-            f"{segments.lead} from before they begin: a comparator needs a lead of "
-            f"{MAX_CONTROL_DELAY}"
+            f"the robot's commands take effect {late} steps late, and segments have a lead of "
+            f"{segments.lead}: a comparator needs a lead of {MAX_CONTROL_DELAY}"
         )
     n, count, horizon = len(embodiments), len(segments.commands), segments.horizon
     simulated, source_of = np.unique(
-        np.arange(n) if moves_as is None else np.asarray(moves_as), return_inverse=True
+        np.arange(n) if same_dynamics_as is None else np.asarray(same_dynamics_as),
+        return_inverse=True,
     )
     moving = [embodiments[i] for i in simulated]
     whole = "base_position" in segments.states
@@ -76,11 +75,11 @@ def predict(
     bodies = _repeated(moving, together)
     batch = new_batch(robot.model, bodies, threads)
     qpos, sensordata = batch.bind("qpos"), batch.bind("sensordata")
-    # Noise of its own for each segment: of a few numbers nobody sees how much there is.
-    senses = SensorReader(robot.model, robot.anatomy, embodiments, together)
+    # Independent noise per segment: a segment alone is too short to estimate a noise level.
+    reader = SensorReader(robot.model, robot.anatomy, embodiments, together)
     readings = np.empty((n * together, len(robot.anatomy.sensors)))
-    # Where in the batch each row of the result is found.
-    place = (source_of[:, np.newaxis] * together + np.arange(together)).ravel()
+    # Row of the batch for each row of the result.
+    batch_rows = (source_of[:, np.newaxis] * together + np.arange(together)).ravel()
     live = live_signals(robot, batch, bodies, segments.record)
     kept = {
         signal: np.empty(
@@ -88,29 +87,29 @@ def predict(
         )
         for signal in segments.record
     }
-    start = _Start(robot, batch, moving, segments)
-    activations = starting_activations(robot, segments, late)
+    inputs = _BatchInputs(robot, batch, moving, segments)
+    activations = initial_activations(robot, segments, late)
     batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE)
     alive = LiveBatch(batch)
     first = segments.lead - late
     with silence_mujoco_warnings():
         for stage in stages:
-            start.write(activations, stage)
+            inputs.write_states(activations, stage)
             clock = perf_counter()
             alive.forward()
             stats.physics_seconds += perf_counter() - clock
             for k in range(horizon + 1):
                 if "sensors" in kept:
-                    senses.read(sensordata[place], qpos[place], readings)
+                    reader.read(sensordata[batch_rows], qpos[batch_rows], readings)
                     kept["sensors"][:, stage, k] = readings.reshape(n, together, -1)
                 for signal, read in live.items():
-                    kept[signal][:, stage, k] = read()[place].reshape(n, together, -1)
+                    kept[signal][:, stage, k] = read()[batch_rows].reshape(n, together, -1)
                 if k < horizon:
-                    start.command(segments.commands[stage, first + k])
+                    inputs.write_commands(segments.commands[stage, first + k])
                     clock = perf_counter()
                     alive.step(robot.substeps)
                     stats.physics_seconds += perf_counter() - clock
-    diverged: BoolArray = np.any(alive.diverged()[place].reshape(n, together), axis=1)
+    diverged: BoolArray = np.any(alive.diverged()[batch_rows].reshape(n, together), axis=1)
     stats.runs += n
     stats.steps += len(moving) * count * horizon
     stats.diverged += int(diverged.sum())
@@ -122,8 +121,8 @@ def _repeated(embodiments: Sequence[Embodiment], times: int) -> list[Embodiment]
     return [embodiment for embodiment in embodiments for _ in range(times)]
 
 
-class _Start:
-    """Writes logged states and commands into a batch, the same for each of the embodiments."""
+class _BatchInputs:
+    """Writes logged states and commands into a batch, the same for every embodiment."""
 
     def __init__(
         self,
@@ -134,38 +133,46 @@ class _Start:
     ) -> None:
         self._segments = segments
         self._n = len(embodiments)
-        models = [one.model for one in embodiments for _ in range(batch.nsim // len(embodiments))]
+        models = [own.model for own in embodiments for _ in range(batch.nsim // len(embodiments))]
         self._write = writer(robot, batch.bind, *models)
         self._ctrl = batch.bind("ctrl")
         self._act = batch.bind("act")
         self._qpos, self._qvel = batch.bind("qpos"), batch.bind("qvel")
-        resting = _resting(robot, segments)
-        self._still = [
-            (number, *still)
-            for number, one in enumerate(embodiments)
-            for still in (*one.welded, *(resting[name] for name in one.detached & resting.keys()))
+        median = _median_angles(robot, segments)
+        self._constant_angles = [
+            (number, *constant)
+            for number, own in enumerate(embodiments)
+            for constant in (*own.welded, *(median[name] for name in own.detached & median.keys()))
         ]
 
-    def write(self, activations: FloatArray, stage: IndexArray) -> None:
-        """Begins the segments of these numbers."""
+    def write_states(self, activations: FloatArray, stage: IndexArray) -> None:
+        """Writes the initial states of some segments.
+
+        Args:
+            activations: Initial activations of all segments, ``(segments, na)``.
+            stage: Indices of the segments to begin.
+        """
         states = self._segments.states
         self._write({signal: self._for_all(values[stage]) for signal, values in states.items()})
         self._act[:] = self._for_all(activations[stage])
-        for number, position, velocity, angle in self._still:
-            mine = slice(number * len(stage), (number + 1) * len(stage))
-            self._qpos[mine, position] = angle
-            self._qvel[mine, velocity] = 0.0
+        for number, position, velocity, angle in self._constant_angles:
+            rows = slice(number * len(stage), (number + 1) * len(stage))
+            self._qpos[rows, position] = angle
+            self._qvel[rows, velocity] = 0.0
 
-    def command(self, commands: FloatArray) -> None:
-        """Gives the commands of one step, ``(segments, motors)``."""
+    def write_commands(self, commands: FloatArray) -> None:
+        """Writes the commands of one step, ``(segments, motors)``."""
         self._ctrl[:] = self._for_all(commands)
 
     def _for_all(self, values: FloatArray) -> FloatArray:
         return np.tile(values, (self._n, 1))
 
 
-def _resting(robot: Robot, segments: Segments) -> dict[str, tuple[int, int, float]]:
-    """Of each hinge whose angle is known its places in the state and its median angle."""
+def _median_angles(robot: Robot, segments: Segments) -> dict[str, tuple[int, int, float]]:
+    """Returns the ``qpos`` and ``qvel`` index and the median angle of each hinge, by name.
+
+    The result is empty for segments without joint positions.
+    """
     angles = segments.states.get("joint_positions")
     if angles is None:
         return {}

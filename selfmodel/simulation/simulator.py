@@ -1,4 +1,4 @@
-"""The self-model in motion: many robots, each with its hypothesis and driver, in one batch."""
+"""Simulator: batches of closed-loop rollouts, short predictions and ensembles of the self-model."""
 
 import copy
 from collections.abc import Sequence
@@ -16,55 +16,55 @@ from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
 from selfmodel.simulation.batch import LiveBatch, live_signals, new_batch, silence_mujoco_warnings
-from selfmodel.simulation.ground_contacts import felt_points
+from selfmodel.simulation.ground_contacts import ground_contact_points
 from selfmodel.simulation.outcome import SimulationResult, SimulationStats
 from selfmodel.simulation.prediction import predict
 from selfmodel.simulation.requests import Ensemble, Segments
 from selfmodel.trials.behaviour import Behaviour, Signal
 
 Run = tuple[Hypothesis, CommandSource]
-"""What one simulation runs: a robot with what the hypothesis says wrong, and what drives it."""
+"""A simulation: faults of the robot, and the source of its commands."""
 
-REMEMBERED_EMBODIMENTS = 1024
-"""Built models that are kept, where they are small."""
+MAX_CACHED_EMBODIMENTS = 1024
+"""Largest number of cached models, if ``MAX_CACHED_BYTES`` does not limit it."""
 
-REMEMBERED_TRIALS = 16
-"""Trials whose felt ground is kept."""
+MAX_CACHED_TRIALS = 16
+"""Trials with cached ground contact points."""
 
-REMEMBERED_SHAPES = 16
-"""Shapes of the robot and its world of which the members of an ensemble are kept."""
+MAX_CACHED_ENSEMBLES = 16
+"""Cached ensembles, one per edit of the model's specification."""
 
-REMEMBERED_BYTES = 2**29
-"""What they may take: one of our robots' takes 0.3 MB, a dog's with its meshes 5 MB."""
+MAX_CACHED_BYTES = 2**29
+"""Size of the cached models: a quadruped or hexapod has 0.3 MB, a dog with its meshes 5 MB."""
 
 
 class Simulator:
-    """Steps batches of one robot closed loop; a run's bits do not depend on its batch or threads.
+    """Batch simulator of one robot; a run is bit-identical in every batch and thread count.
 
     Args:
-        robot: The robot with nothing wrong.
-        threads: Threads that MuJoCo steps on, the caller's included.
-        stats: Is told what was simulated; a new one if none is given.
+        robot: The healthy robot.
+        threads: Threads of MuJoCo's steps, including the caller's.
+        stats: Statistics that are updated; new ones by default.
     """
 
     def __init__(self, robot: Robot, threads: int, stats: SimulationStats | None = None) -> None:
         self.robot = robot
         self.threads = threads
         self.stats = SimulationStats() if stats is None else stats
-        room = REMEMBERED_BYTES // int(robot.model.nbuffer)
-        self._embodiment = lru_cache(max(1, min(REMEMBERED_EMBODIMENTS, room)))(
+        affordable = MAX_CACHED_BYTES // int(robot.model.nbuffer)
+        self._embodiment = lru_cache(max(1, min(MAX_CACHED_EMBODIMENTS, affordable)))(
             partial(build, robot)
         )
-        self._felt = lru_cache(REMEMBERED_TRIALS)(partial(felt_points, robot))
-        self._members = lru_cache(REMEMBERED_SHAPES)(partial(perturbed_models, robot))
+        self._contact_points = lru_cache(MAX_CACHED_TRIALS)(partial(ground_contact_points, robot))
+        self._members = lru_cache(MAX_CACHED_ENSEMBLES)(partial(perturbed_models, robot))
 
     def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> SimulationResult:
-        """Simulates each run for ``steps`` control steps from its start.
+        """Simulates each run for ``steps`` control steps from the initial pose.
 
         Args:
-            runs: At least one.
+            runs: At least one run.
             steps: Control steps, and rows of every signal.
-            record: The signals to keep; what is not kept costs nothing.
+            record: Signals to record; other signals are not computed.
         """
         embodiments = [self._embodiment(hypothesis) for hypothesis, _ in runs]
         return self._run(embodiments, [driver for _, driver in runs], steps, record)
@@ -78,44 +78,45 @@ class Simulator:
         """Predicts segments of a trial under each hypothesis; see ``prediction.predict``.
 
         Args:
-            hypotheses: At least one.
-            segments: Where to begin and what was commanded.
-            observed: The trial, from which the ground is felt where a hypothesis says that it is
-                not known; without it, or where the base's place is not part of the segments'
-                state, the self-model's own is taken.
+            hypotheses: At least one hypothesis.
+            segments: Initial states and commands.
+            observed: Behaviour of the trial, for fault kinds whose model adapts to its ground
+                contacts. If None, or without the base's position in the segments, such a fault
+                has the self-model's own ground.
         """
         embodiments = [self._embodiment(hypothesis) for hypothesis in hypotheses]
         if observed is not None and "base_position" in segments.states:
             embodiments = [
-                self._on_felt_ground(embodiment, hypothesis, observed)
+                self._adapted_to_contacts(embodiment, hypothesis, observed)
                 for embodiment, hypothesis in zip(embodiments, hypotheses, strict=True)
             ]
         first: dict[Hypothesis, int] = {}
-        moves_as = [
+        same_dynamics_as = [
             first.setdefault(hypothesis.dynamics_part, i) for i, hypothesis in enumerate(hypotheses)
         ]
         return predict(
             self.robot,
             embodiments,
             segments,
-            moves_as=moves_as,
+            same_dynamics_as=same_dynamics_as,
             threads=self.threads,
             stats=self.stats,
         )
 
-    def _on_felt_ground(
+    def _adapted_to_contacts(
         self, embodiment: Embodiment, hypothesis: Hypothesis, observed: Behaviour
     ) -> Embodiment:
-        ways = [
+        """Returns an embodiment adapted to the ground contacts of a trial."""
+        hooks = [
             (fault.kind.adapt_to_contacts, fault)
             for fault in hypothesis.faults
             if fault.kind.adapt_to_contacts
         ]
-        if not ways:
+        if not hooks:
             return embodiment
-        own = copy.deepcopy(embodiment)  # the other is remembered
-        for feel, fault in ways:
-            feel(own, fault, self._felt(observed))
+        own = copy.deepcopy(embodiment)  # the argument is in the cache
+        for adapt_to_contacts, fault in hooks:
+            adapt_to_contacts(own, fault, self._contact_points(observed))
         return own
 
     def run_ensemble(
@@ -125,13 +126,13 @@ class Simulator:
         steps: int,
         ensemble: Ensemble,
     ) -> SimulationResult:
-        """Simulates each hypothesis with each of some self-models that differ a little.
+        """Simulates each hypothesis with each member of an ensemble of perturbed self-models.
 
         Args:
-            hypotheses: At least one.
-            driver: What drives the robot.
+            hypotheses: At least one hypothesis.
+            driver: Source of the commands.
             steps: Control steps, and rows of every signal.
-            ensemble: How many self-models, and how different.
+            ensemble: Number of members, gap level and recorded signals.
 
         Returns:
             Signals of ``(n, members, steps, width)``; a hypothesis has diverged if any member has.
@@ -142,8 +143,8 @@ class Simulator:
             for model in self._members(hypothesis.spec_part, ensemble.members, ensemble.level)
         ]
         flat = self._run(embodiments, [driver] * len(embodiments), steps, ensemble.record)
-        outcome = flat.grouped(len(hypotheses), ensemble.members)
-        return SimulationResult(outcome.behaviour, np.asarray(outcome.diverged.any(axis=1)))
+        grouped = flat.grouped(len(hypotheses), ensemble.members)
+        return SimulationResult(grouped.behaviour, np.asarray(grouped.diverged.any(axis=1)))
 
     def _run(
         self,
@@ -154,8 +155,8 @@ class Simulator:
     ) -> SimulationResult:
         robot, n = self.robot, len(embodiments)
         batch = new_batch(robot.model, embodiments, self.threads)
-        senses = SensorReader(robot.model, robot.anatomy, embodiments)
-        brains = make_batch(
+        reader = SensorReader(robot.model, robot.anatomy, embodiments)
+        controllers = make_batch(
             drivers,
             [embodiment.silent_neurons for embodiment in embodiments],
             len(robot.anatomy.sensors),
@@ -163,18 +164,18 @@ class Simulator:
         sensordata, qpos, ctrl = (batch.bind(field) for field in ("sensordata", "qpos", "ctrl"))
         motors = _DelayLine(ctrl, robot.control_delay)
         live = live_signals(robot, batch, embodiments, record)
-        live |= {"sensors": lambda: brains.readings, "commands": lambda: motors.inlet}
-        # By step while it runs, so that a step is written in one piece.
+        live |= {"sensors": lambda: controllers.readings, "commands": lambda: motors.inlet}
+        # Steps first during the run, so that each step is written to contiguous memory.
         kept = {
             signal: np.empty((steps, n, robot.anatomy.names.width(signal))) for signal in record
         }
-        # After every field is bound: one that is bound later stays zero until the next step.
+        # After all bindings: a field that is bound later remains zero until the next step.
         batch.reset()
         alive = LiveBatch(batch)
         with silence_mujoco_warnings():
             for k in range(steps):
-                senses.read(sensordata, qpos, brains.readings)
-                brains.step(motors.inlet)
+                reader.read(sensordata, qpos, controllers.readings)
+                controllers.step(motors.inlet)
                 motors.advance()
                 for signal, rows in kept.items():
                     rows[k] = live[signal]()
@@ -194,11 +195,11 @@ class Simulator:
 
 
 class _DelayLine:
-    """Commands on their way to the motors; before the first arrives, the motors hold 0.
+    """Delay line of the commands; the motors' commands are 0 until the first arrives.
 
     Args:
-        outlet: What the motors obey, ``(n, motors)``, written.
-        delay: Control steps from a command to its effect.
+        outlet: Commands at the motors, ``(n, motors)``; written.
+        delay: Control delay, control steps.
     """
 
     def __init__(self, outlet: FloatArray, delay: int) -> None:
@@ -206,12 +207,12 @@ class _DelayLine:
         self._line = np.zeros((delay, *outlet.shape))
         self._step = 0
         self.inlet = np.zeros(outlet.shape) if delay else outlet
-        """Where the next command is written: where nothing is delayed, the outlet itself."""
+        """Next commands, ``(n, motors)``; the outlet itself without a delay."""
 
     def advance(self) -> None:
-        """Takes what stands in the inlet, and hands on what is due."""
+        """Moves the commands of the inlet into the line, and the delayed ones to the outlet."""
         if len(self._line):
-            place = self._step % len(self._line)
-            self._outlet[:] = self._line[place]
-            self._line[place] = self.inlet
+            slot = self._step % len(self._line)
+            self._outlet[:] = self._line[slot]
+            self._line[slot] = self.inlet
             self._step += 1

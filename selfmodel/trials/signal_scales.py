@@ -100,7 +100,7 @@ MEASUREMENT_FULL_SCALES: Mapping[Signal, float] = MappingProxyType(
         "base_angular_velocity": 0.5,
     }
 )
-"""Full scale of each simulated instrument; measurement noise is a fraction of the full scale.
+"""Full scale of each logged signal; the level of measurement noise is a fraction of it.
 
 The full scale of a joint position is half the range of its hinge. Commands have no noise: they are
 known."""

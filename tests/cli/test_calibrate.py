@@ -1,4 +1,4 @@
-"""Promises of `selfmodel calibrate`: a model that other commands take, or a sentence that helps."""
+"""``selfmodel calibrate``: the model that it writes, and the inputs that it refuses."""
 
 import json
 from pathlib import Path
@@ -17,8 +17,8 @@ from selfmodel.settings import Settings
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import Sample, Signal
 from selfmodel.trials.trial import Stage, TrialPlan
-from tests.conftest import random_motion
 from tests.helpers.command import selfmodel
+from tests.helpers.drivers import random_motion
 
 STEPS = 150
 SETTINGS = Settings(generations=2).scaled(8)
@@ -67,6 +67,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made
 
 
+@pytest.mark.search
 def test_a_calibrated_model_is_one_for_replay_and_diagnose(folder: Path):
     done = selfmodel("calibrate", "intact.mcap", "-o", "fit.xml", "--json", cwd=folder)
     assert done.returncode == 0, done.stderr
@@ -89,6 +90,7 @@ def test_a_calibrated_model_is_one_for_replay_and_diagnose(folder: Path):
     assert again.returncode == 0, again.stderr
 
 
+@pytest.mark.search
 def test_a_trial_from_before_the_failure_is_fitted_to_and_not_explained(tmp_path: Path):
     healthy = selfmodel(
         *("trial", "quadruped", "--stage", "before", "--out", "healthy.mcap"), cwd=tmp_path
@@ -117,7 +119,7 @@ def test_a_table_says_each_factor_and_how_sure_it_is(folder: Path):
     assert "motor front_left_shoulder" in done.stdout
     assert "± 15.0 %" in done.stdout
     assert "delay, control steps: 0 (0 before)" in done.stdout
-    assert "it is left as it was" in done.stdout
+    assert "it is written unchanged" in done.stdout
 
 
 @pytest.mark.parametrize(
@@ -148,6 +150,7 @@ def test_what_cannot_be_used_is_said_in_one_sentence(
     assert (folder / "taken.xml").read_text(encoding="utf-8") == "mine"
 
 
+@pytest.mark.search
 def test_a_robot_that_nobody_sees_is_calibrated_and_diagnosed(folder: Path):
     fit = selfmodel("calibrate", "unseen.mcap", "-o", "unseen.xml", "--json", cwd=folder)
     done = selfmodel(

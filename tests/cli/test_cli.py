@@ -1,10 +1,11 @@
-"""Promises of the command line, kept by running it as its users do."""
+"""The command line: its outputs, exit statuses and error messages."""
 
 import json
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -15,14 +16,34 @@ from selfmodel.errors import TrialError
 from selfmodel.logs import read_log, save_controller
 from selfmodel.logs.journal import read_database
 from selfmodel.robot.robot import Robot
-from tests.conftest import random_controllers
-from tests.helpers.command import DIAGNOSIS, SMALL, selfmodel
+from tests.helpers.command import DIAGNOSIS, SMALL, Done, selfmodel, selfmodel_process
+from tests.helpers.drivers import random_controllers
 
 ROOT = Path(__file__).parents[2]
 
 
-def test_recover_prints_one_json_object_with_everything_promised(recovered: tuple[Path, dict]):
-    _, told = recovered
+STEPS, TRIALS = {"short": 60, "recovered": 1000}, {"short": 1, "recovered": 3}
+
+RUNS = pytest.mark.parametrize(
+    "run", ["short", pytest.param("recovered", marks=pytest.mark.search)]
+)
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
+    """A folder in which a recovery with short trials ran, and the JSON that it printed."""
+    folder = tmp_path_factory.mktemp("short")
+    few = ("--steps", "60", "--trials", "1")
+    done = selfmodel(
+        "recover", "quadruped", "--case", "4", *SMALL, *few, "--out", "run", "--json", cwd=folder
+    )
+    assert done.returncode == 0, done.stderr
+    return folder, json.loads(done.stdout)
+
+
+@RUNS
+def test_recover_prints_one_json_object_with_every_key(run: str, request: pytest.FixtureRequest):
+    _, told = request.getfixturevalue(run)
 
     assert set(told) == {
         *("robot", "case", "truth", "comparator", "kinds", "gap", "structure", "seed", "trials"),
@@ -35,13 +56,15 @@ def test_recover_prints_one_json_object_with_everything_promised(recovered: tupl
     assert told["comparator"] == "segment-prediction"
     assert (told["controller"], told["neurons"]) == ("network", 3)
     assert told["verdict"] in {"explained", "ambiguous", "unexplained"}
-    assert told["outside"] is None, "without a gap, a fault that is considered explains all"
+    if run == "recovered":
+        assert told["outside"] is None, "without a gap, a fault that is searched explains all"
     assert set(told["calibration"]) >= {"deviations", "error_before", "error"}
     assert told["intact_distance"] >= told["diagnosis"][0]["distance"] >= 0
     stages = [trial["stage"] for trial in told["trials"]]
-    assert stages == ["before", "after", "recovery", "recovery", "recovery"]
-    assert told["physical_trials"] == 3
-    assert told["evaluations"]["repair"] == told["evaluations"]["diagnostic"] == 4 * (8 + 4)
+    assert stages == ["before", "after", *["recovery"] * TRIALS[run]]
+    assert told["physical_trials"] == TRIALS[run]
+    evaluations = (TRIALS[run] + 1) * (8 + 4)
+    assert told["evaluations"]["repair"] == told["evaluations"]["diagnostic"] == evaluations
     assert set(told["evaluations"]) == {
         *("repair", "diagnostic", "distinct_hypotheses", "simulated_steps", "diverged"),
     }
@@ -56,30 +79,38 @@ def test_recover_prints_one_json_object_with_everything_promised(recovered: tupl
     assert isinstance(told["correct"], bool)
 
 
-def test_every_trial_of_a_recovery_is_a_log_that_says_the_same(recovered: tuple[Path, dict]):
-    folder, told = recovered
+@RUNS
+def test_every_trial_of_a_recovery_is_a_log_with_the_same_values(
+    run: str, request: pytest.FixtureRequest
+):
+    folder, told = request.getfixturevalue(run)
     for trial in told["trials"]:
         log = read_log(folder / trial["log"])
 
         assert log.trial.displacement == trial["displacement"]
         assert log.trial.plan.stage == trial["stage"]
-        assert log.trial.behaviour.steps == 1000
+        assert log.trial.behaviour.steps == STEPS[run]
     assert not list(folder.rglob("*.part"))
 
 
-def test_the_database_is_read_back_from_the_folder(recovered: tuple[Path, dict], quadruped: Robot):
-    folder, told = recovered
+@RUNS
+def test_the_database_is_read_back_from_the_folder(
+    run: str, request: pytest.FixtureRequest, quadruped: Robot
+):
+    folder, told = request.getfixturevalue(run)
     database = read_database(folder / "run", quadruped.anatomy)
 
     assert [t.displacement for t in database.trials] == [t["displacement"] for t in told["trials"]]
-    assert [t.plan.stage for t in database.evidence] == ["after", *["recovery"] * 3]
+    assert [t.plan.stage for t in database.evidence] == ["after", *["recovery"] * TRIALS[run]]
     assert [str(h) for h in database.hypotheses] == [d["hypothesis"] for d in told["diagnosis"]]
     assert json.loads((folder / "run" / "result.json").read_text(encoding="utf-8")) == told
 
 
-def test_the_same_seed_tells_the_same(recovered: tuple[Path, dict]):
+@pytest.mark.process
+@pytest.mark.search
+def test_the_same_seed_gives_the_same_in_another_process(recovered: tuple[Path, dict]):
     folder, told = recovered
-    again = selfmodel(
+    again = selfmodel_process(
         *("recover", "quadruped", "--case", "4", *SMALL, "--out", "again", "--json"),
         *("--threads", "1"),
         cwd=folder,
@@ -91,8 +122,8 @@ def test_the_same_seed_tells_the_same(recovered: tuple[Path, dict]):
     assert timeless(json.loads(again.stdout)) == timeless(told)
 
 
-def test_a_folder_that_holds_another_run_is_refused_and_left_alone(recovered: tuple[Path, dict]):
-    folder, _ = recovered
+def test_a_folder_that_holds_another_run_is_refused_and_left_alone(short: tuple[Path, dict]):
+    folder, _ = short
     before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
     refused = selfmodel("recover", "hexapod", "--case", "1", "--out", "run", cwd=folder)
 
@@ -140,8 +171,18 @@ def test_bad_input_is_one_sentence_and_status_2(tmp_path: Path, arguments: list[
     assert [path.name for path in tmp_path.iterdir()] == ["bad.mcap"]
 
 
-def test_progress_goes_to_standard_error_in_plain_lines_when_piped(tmp_path: Path):
-    done = selfmodel("recover", "quadruped", "--case", "9", *SMALL, "--trials", "1", cwd=tmp_path)
+@pytest.mark.parametrize(
+    ("run", "steps"),
+    [
+        (selfmodel, 60),
+        pytest.param(selfmodel_process, 1000, marks=[pytest.mark.process, pytest.mark.search]),
+    ],
+)
+def test_progress_goes_to_standard_error_in_plain_lines_when_piped(
+    run: Callable[..., Done], steps: int, tmp_path: Path
+):
+    few = (*SMALL, "--trials", "1", "--steps", str(steps))
+    done = run("recover", "quadruped", "--case", "9", *few, cwd=tmp_path)
 
     assert done.returncode == 0
     assert "\x1b" not in done.stderr + done.stdout
@@ -213,6 +254,8 @@ def test_a_trial_without_a_controller_draws_one_from_its_seed(tmp_path: Path):
     assert told[0] == told[1] != told[2]
 
 
+@pytest.mark.process
+@pytest.mark.search
 def test_an_interrupted_recovery_keeps_its_finished_trials(tmp_path: Path):
     running = subprocess.Popen(
         [
@@ -237,22 +280,27 @@ def test_an_interrupted_recovery_keeps_its_finished_trials(tmp_path: Path):
         assert read_log(trials / f"{name}.mcap").trial.behaviour.steps == 1000
 
 
-def test_a_comparator_from_elsewhere_plugs_in(tmp_path: Path):
+@pytest.mark.parametrize("steps", ["100", pytest.param("1000", marks=pytest.mark.search)])
+def test_a_comparator_from_elsewhere_plugs_in(steps: str, tmp_path: Path):
     (tmp_path / "mine.py").write_text(
         "from selfmodel.trials.behaviour import forward_displacement\n"
         "from selfmodel.simulation.requests import ClosedLoop\n"
+        "class Prepared:\n"
+        "    request = ClosedLoop(record=('base_position',))\n"
+        "    def __init__(self, trial):\n"
+        "        self.displacement = trial.displacement\n"
+        "    def distances(self, simulated):\n"
+        "        return (forward_displacement(simulated) - self.displacement) ** 2\n"
         "class Squared:\n"
         "    name = 'squared'\n"
-        "    def request(self, trial):\n"
-        "        return ClosedLoop(record=('base_position',))\n"
-        "    def distances(self, simulated, trial):\n"
-        "        return (forward_displacement(simulated) - trial.displacement) ** 2\n"
+        "    def prepare(self, trial):\n"
+        "        return Prepared(trial)\n"
         "squared = Squared()\n",
         encoding="utf-8",
     )
     done = selfmodel(
         *("recover", "quadruped", "--case", "2", *SMALL, "--trials", "1", "--json"),
-        *("--comparator", "mine:squared", "--out", "run"),
+        *("--comparator", "mine:squared", "--steps", steps, "--out", "run"),
         cwd=tmp_path,
         PYTHONPATH=".",
     )
@@ -271,13 +319,7 @@ def test_robots_are_listed_with_their_parts_and_cases(tmp_path: Path):
     assert [len(one["cases"]) for one in told] == [10, 10]
 
 
-def test_help_names_every_command(tmp_path: Path):
-    done = selfmodel("--help", cwd=tmp_path)
-
-    assert done.returncode == 0
-    assert all(command in done.stdout for command in ("robots", "recover", "trial"))
-
-
+@pytest.mark.process
 def test_the_installed_command_is_the_same_as_the_module():
     command = Path(sys.executable).with_name("selfmodel")
     done = subprocess.run([command, "robots"], capture_output=True, text=True, check=True, cwd=ROOT)
@@ -285,10 +327,39 @@ def test_the_installed_command_is_the_same_as_the_module():
     assert "quadruped" in done.stdout
 
 
-def test_what_an_error_s_notes_say_is_told_too(
+@pytest.mark.process
+def test_a_process_ends_with_the_status_and_writes_each_stream_apart(tmp_path: Path):
+    good = selfmodel_process("robots", "quadruped", "--json", cwd=tmp_path)
+    bad = selfmodel_process("robots", "octopod", cwd=tmp_path)
+    failed = selfmodel_process("logs", "verify", "no.mcap", cwd=tmp_path)
+
+    assert json.loads(good.stdout)["robot"] == "quadruped"
+    assert (good.returncode, good.stderr) == (0, "")
+    assert (bad.returncode, bad.stdout) == (2, "")
+    assert bad.stderr.startswith("error: unknown robot 'octopod'")
+    assert (failed.returncode, failed.stderr) == (1, "")
+
+
+@pytest.mark.process
+def test_a_reader_that_closes_the_pipe_ends_the_command_without_a_traceback(tmp_path: Path):
+    with subprocess.Popen(
+        [sys.executable, "-m", "selfmodel", "robots", "quadruped", "--json"],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as running:
+        running.stdout.close()
+        said = running.stderr.read()
+
+    assert running.returncode == 1
+    assert said == ""
+
+
+def test_the_notes_of_an_error_are_in_its_message(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
-    def fail() -> None:
+    def fail(**_: str) -> None:
         error = TrialError("the environment failed")
         error.add_note("the safe command could not be sent")
         raise error

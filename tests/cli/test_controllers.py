@@ -1,4 +1,4 @@
-"""Promises of ``--controller`` and ``--neurons``: what is evolved, and what the logs say of it."""
+"""``--controller`` and ``--neurons``: the design that is evolved, and its logs."""
 
 import json
 from pathlib import Path
@@ -20,6 +20,8 @@ def rhythmic(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
     return folder, json.loads(done.stdout)
 
 
+@pytest.mark.search
+@pytest.mark.search
 def test_a_recovery_evolves_oscillators_where_they_are_asked_for(rhythmic: tuple[Path, dict]):
     folder, told = rhythmic
     drivers = [read_log(folder / one["log"]).trial.plan.controller for one in told["trials"]]
@@ -30,6 +32,8 @@ def test_a_recovery_evolves_oscillators_where_they_are_asked_for(rhythmic: tuple
     assert drivers[0] == drivers[1] != drivers[2]
 
 
+@pytest.mark.search
+@pytest.mark.search
 def test_the_logs_of_oscillators_give_the_ranking_of_their_run(rhythmic: tuple[Path, dict]):
     folder, told = rhythmic
     logs = [one["log"] for one in told["trials"]]
@@ -38,6 +42,8 @@ def test_the_logs_of_oscillators_give_the_ranking_of_their_run(rhythmic: tuple[P
     assert json.loads(done.stdout)["diagnosis"] == told["diagnosis"]
 
 
+@pytest.mark.search
+@pytest.mark.search
 def test_oscillators_of_a_log_drive_another_trial_which_replays(rhythmic: tuple[Path, dict]):
     folder, told = rhythmic
     given = ("--controller", told["trials"][0]["log"], "--damage", "break:back_left_knee")
@@ -63,6 +69,8 @@ def test_a_trial_takes_random_cpgs_or_a_random_network_of_any_size(tmp_path: Pat
     assert large.design.hidden == 6
 
 
+@pytest.mark.search
+@pytest.mark.search
 def test_a_recovery_s_network_has_as_many_neurons_as_are_asked_for(tmp_path: Path):
     asked = ("--neurons", "5", "--damage", "neuron:4", "--no-calibrate")
     done = selfmodel("recover", "quadruped", *asked, *FEW, cwd=tmp_path)

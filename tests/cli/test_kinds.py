@@ -1,4 +1,4 @@
-"""Promises of ``--kinds``: a diagnosis proposes what is considered, and nothing else."""
+"""``--kinds``: a diagnosis searches the given fault kinds and no others."""
 
 import json
 import os
@@ -33,6 +33,7 @@ def words(diagnosis: list[dict]) -> set[str]:
     return {term.partition("=")[0].partition(":")[0] for term in terms}
 
 
+@pytest.mark.search
 def test_a_recovery_considers_the_kinds_that_are_chosen(heavy: tuple[Path, dict]):
     _, told = heavy
 
@@ -42,6 +43,7 @@ def test_a_recovery_considers_the_kinds_that_are_chosen(heavy: tuple[Path, dict]
     assert words(told["diagnosis"]) <= {*told["kinds"], "intact"}
 
 
+@pytest.mark.search
 def test_the_logs_and_the_kinds_of_a_run_give_its_ranking(heavy: tuple[Path, dict]):
     run, told = heavy
     logs = [trial["log"] for trial in told["trials"]]
@@ -81,6 +83,7 @@ def test_a_trial_and_its_replay_name_a_kind_of_ones_own(tmp_path: Path):
     assert "payload" in unknown.stderr
 
 
+@pytest.mark.search
 def test_the_paper_s_kinds_are_the_default(recovered: tuple[Path, dict]):
     _, told = recovered
 

@@ -1,4 +1,4 @@
-"""Promises of the commands that work on logs: logs, replay, diagnose."""
+"""The commands that work on logs: logs, replay, diagnose."""
 
 import json
 import os
@@ -150,7 +150,8 @@ def test_verify_says_ok_or_what_is_wrong_a_line_a_file(folder: Path):
     assert "no.mcap: expected a log file that can be read" in lines[2]
 
 
-def test_logs_are_looked_into_where_there_is_no_simulator(folder: Path, tmp_path: Path):
+@pytest.mark.process
+def test_logs_are_read_without_mujoco(folder: Path, tmp_path: Path):
     for arguments in (
         ("logs", "info", "a.mcap"),
         ("logs", "verify", "a.mcap"),
@@ -172,7 +173,7 @@ def test_replay_of_the_truth_is_identical_and_says_so(folder: Path):
     assert told["first_divergence_step"] is None
     assert set(told["rms"].values()) == {0}
     assert told["mujoco"] == {"logged": version, "running": version}
-    assert "identical: every number" in said
+    assert "identical: every observed number" in said
 
 
 def test_replay_of_another_hypothesis_shows_where_they_part(folder: Path, tmp_path: Path):
@@ -184,7 +185,7 @@ def test_replay_of_another_hypothesis_shows_where_they_part(folder: Path, tmp_pa
     assert told["identical"] is False
     assert 0 <= told["first_divergence_step"] < 100
     assert all(error > 0 for error in told["rms"].values())
-    assert f"They part at step {told['first_divergence_step']}" in drawn.stdout
+    assert f"They differ from step {told['first_divergence_step']}" in drawn.stdout
     assert max(map(len, drawn.stdout.splitlines())) <= 80
     assert figure.read_bytes().startswith(b"\x89PNG")
 
@@ -207,6 +208,18 @@ def test_replay_with_another_mujoco_compares_with_a_tolerance_and_says_so(
 
 
 @pytest.fixture(scope="module")
+def short(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
+    """A folder in which a recovery with short trials ran, and the JSON that it printed."""
+    folder = tmp_path_factory.mktemp("short")
+    few = (*SMALL, "--steps", "100", "--trials", "1")
+    done = selfmodel(
+        "recover", "quadruped", "--case", "1", *few, "--out", "run", "--json", cwd=folder
+    )
+    assert done.returncode == 0, done.stderr
+    return folder, json.loads(done.stdout)
+
+
+@pytest.fixture(scope="module")
 def recovered_as_the_paper_did(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
     """A folder in which a small recovery by displacement alone ran, and what it printed."""
     folder = tmp_path_factory.mktemp("paper")
@@ -220,8 +233,13 @@ def recovered_as_the_paper_did(tmp_path_factory: pytest.TempPathFactory) -> tupl
 
 @pytest.mark.parametrize(
     ("run", "options"),
-    [("recovered", ()), ("recovered_as_the_paper_did", PAPERS)],
-    ids=["default", "forward-displacement"],
+    [
+        pytest.param("short", (), id="short"),
+        pytest.param("recovered", (), marks=pytest.mark.search, id="default"),
+        pytest.param(
+            "recovered_as_the_paper_did", PAPERS, marks=pytest.mark.search, id="displacement"
+        ),
+    ],
 )
 def test_diagnosis_from_logs_alone_says_what_the_run_said_that_wrote_them(
     run: str, options: tuple[str, ...], request: pytest.FixtureRequest
@@ -241,6 +259,7 @@ def test_diagnosis_from_logs_alone_says_what_the_run_said_that_wrote_them(
     assert found["seconds"] > 0
 
 
+@pytest.mark.search
 def test_the_papers_way_is_the_ea_alone_ranked_by_distance_from_a_model_as_it_is(
     recovered_as_the_paper_did: tuple[Path, dict],
 ):
@@ -254,6 +273,7 @@ def test_the_papers_way_is_the_ea_alone_ranked_by_distance_from_a_model_as_it_is
     assert ranked == sorted(ranked)
 
 
+@pytest.mark.search
 def test_diagnosis_shows_its_ranking_and_takes_another_self_model(
     recovered: tuple[Path, dict], tmp_path: Path
 ):

@@ -1,7 +1,8 @@
-"""Promises of ``selfmodel suite``: what it lists, and runs that go on where they were stopped."""
+"""``selfmodel suite``: the list of bodies, and studies that continue where they stopped."""
 
 import csv
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,10 +10,10 @@ import pytest
 from typer.testing import CliRunner
 
 from selfmodel.cli import app
+from selfmodel.cli.suite import run
 from selfmodel.comparators import DEFAULT
 from selfmodel.errors import InputError
 from selfmodel.experiments.grid import Job, run_grid
-from selfmodel.experiments.suite import work
 from selfmodel.experiments.suite.bodies import DOMAINS, bodies
 from selfmodel.experiments.suite.plan import (
     Study,
@@ -24,11 +25,18 @@ from selfmodel.experiments.suite.plan import (
 )
 from selfmodel.experiments.suite.rows import SuiteRow, summarise
 from selfmodel.experiments.suite.work import run_study
+from selfmodel.logs import load_controller, read_gap
 from selfmodel.settings import Settings
 from tests.helpers.command import SMALL, selfmodel
 from tests.robot.mjcf.awkward import CUBE
 
 ROOT = Path(__file__).parents[2]
+
+
+def studies(test: Callable[..., None]) -> Callable[..., None]:
+    """Marks a test that runs a study, in worker processes."""
+    return pytest.mark.process(pytest.mark.search(pytest.mark.bodies(test)))
+
 
 TINY = (*SMALL, "--steps", "60", "--trials", "1", "--workers", "1")
 
@@ -79,6 +87,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict, list[st
     return folder, json.loads(done.stdout), arguments
 
 
+@pytest.mark.bodies
 def test_every_domain_is_listed_with_its_parts_and_cases(tmp_path: Path):
     done = selfmodel("suite", "list", "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
@@ -93,6 +102,7 @@ def test_every_domain_is_listed_with_its_parts_and_cases(tmp_path: Path):
     assert "8" not in walker["cases"]
 
 
+@studies
 def test_ours_and_the_suites_and_ones_own_fail_and_recover_side_by_side(
     study: tuple[Path, dict, list[str]],
 ):
@@ -115,6 +125,7 @@ def test_ours_and_the_suites_and_ones_own_fail_and_recover_side_by_side(
         assert [row["truth"] for row in csv.DictReader(file)] == [row["truth"] for row in rows]
 
 
+@studies
 def test_the_same_command_again_does_nothing_and_says_the_same(
     study: tuple[Path, dict, list[str]],
 ):
@@ -127,6 +138,7 @@ def test_the_same_command_again_does_nothing_and_says_the_same(
     assert {path: path.stat().st_mtime_ns for path in folder.rglob("*.mcap")} == logs
 
 
+@studies
 def test_one_more_seed_is_added_to_what_is_there(study: tuple[Path, dict, list[str]]):
     folder, told, arguments = study
     more = [*arguments, "--seeds", "2"]
@@ -140,6 +152,7 @@ def test_one_more_seed_is_added_to_what_is_there(study: tuple[Path, dict, list[s
     assert [row for row in rows if row["seed"] == 0] == told["rows"]
 
 
+@studies
 def test_a_study_that_was_made_otherwise_is_not_mixed_with_another(
     study: tuple[Path, dict, list[str]],
 ):
@@ -171,6 +184,7 @@ def test_a_body_that_is_another_by_now_is_not_run_into_its_study(
     assert after.parameters != before.parameters
 
 
+@studies
 def test_the_score_may_be_the_tasks_own_rewards(tmp_path: Path):
     arguments = ["suite", "run", "--domains", "suite-walker", "--tasks", "stand", "--cases", "3"]
     done = selfmodel(*arguments, *TINY, "--score", "return", "--out", "out", "--json", cwd=tmp_path)
@@ -191,6 +205,9 @@ REFUSED = [
     ({"score": "beauty"}, "unknown score 'beauty'"),
     ({"comparator": "no-such"}, "unknown comparator"),
     ({"controller": "brain"}, "unknown kind of controller"),
+    ({"kinds": "brek"}, "unknown kind 'brek'"),
+    ({"gap": 0.7}, "a gap is a number from 0 to 0.5"),
+    ({"controller": "cpg", "neurons": 4}, "--neurons 4 is of a network"),
     ({"bodies": ["biped.xml", "other/biped.xml"]}, "would have the same file names"),
 ]
 
@@ -213,7 +230,7 @@ def test_what_cannot_be_run_is_refused_before_anything_is(
 
 def test_all_cases_are_those_that_the_bodies_have(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     asked: list[Study] = []
-    monkeypatch.setattr(work, "run_study", lambda study, **_: asked.append(study) or ())
+    monkeypatch.setattr(run, "run_study", lambda study, **_: asked.append(study) or ())
     arguments = ["suite", "run", "--domains", "hopper,swimmer", "--out", str(tmp_path)]
     told = CliRunner().invoke(app, arguments)
 
@@ -233,14 +250,60 @@ def test_oscillators_have_no_neurons_that_could_be_silent(tmp_path: Path):
     assert [job.parameters["case"] for job in recovery_jobs(oscillating)] == [9]
 
 
+def test_a_share_has_every_nth_gait_and_its_recoveries(tmp_path: Path):
+    study = replace(STUDY, bodies=["quadruped"], cases=[9], seeds=range(3), folder=tmp_path)
+    put_gaits(study)
+
+    assert [job.seed for job in gait_jobs(study, (2, 2))] == [1]
+    assert [job.seed for job in recovery_jobs(study, (1, 2))] == [0, 2]
+
+
+def test_an_option_is_a_parameter_of_a_study_only_if_it_is_not_the_default(tmp_path: Path):
+    study = replace(STUDY, bodies=["quadruped"], cases=[9], folder=tmp_path)
+    put_gaits(study)
+    (plain,), (other,) = recovery_jobs(study), recovery_jobs(replace(study, gap=0.1, kinds="all"))
+    (gait,), (larger,) = gait_jobs(study), gait_jobs(replace(study, neurons=5))
+
+    shared = plain.parameters["shared"]
+    assert set(shared) == {"selfmodel", "settings", "score", "controller", "comparator"}
+    assert other.parameters["shared"] == {**shared, "gap": 0.1, "kinds": "all"}
+    assert larger.parameters == {**gait.parameters, "neurons": 5}
+
+
+@studies
+def test_a_study_has_a_gap_a_size_of_network_and_kinds_of_faults(tmp_path: Path):
+    arguments = ["suite", "run", "--domains", "quadruped", "--case", "2", *TINY, "--neurons", "5"]
+    arguments += [
+        "--gap",
+        "0.05",
+        "--structure",
+        "--kinds",
+        "break,jam",
+        "--only",
+        "1/1",
+        "--out",
+        "out",
+    ]
+    done = selfmodel(*arguments, "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+
+    assert told["failures"] == []
+    (gait,) = (tmp_path / "out" / "gaits").glob("*.npz")
+    assert load_controller(gait).design.hidden == 5
+    (log,) = (tmp_path / "out" / "runs").rglob("01-after.mcap")
+    assert read_gap(log)["structure"] is not None
+
+
 def put_gaits(study: Study) -> None:
     """Something in the place of each gait."""
     for job in gait_jobs(study):
         path = gait_path(study.folder, job.key)
-        path.parent.mkdir(parents=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(b"a gait")
 
 
+@pytest.mark.process
 def test_a_gait_that_was_lost_is_told_of_and_not_passed_over(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

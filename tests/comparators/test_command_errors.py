@@ -14,7 +14,7 @@ from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import SIGNALS, Behaviour
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.conftest import random_controllers, random_cpgs
+from tests.helpers.drivers import random_controllers, random_cpgs
 from tests.helpers.memory import in_memory
 
 STEPS = 60

@@ -19,8 +19,8 @@ from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segment
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import SIGNALS, Behaviour, Signal
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.conftest import random_controllers
 from tests.helpers.comparators import Prepared, PreparedPieces
+from tests.helpers.drivers import random_controllers
 
 Both = tuple[Trial, Behaviour]
 
@@ -34,7 +34,7 @@ def hypotheses_about(robot: Robot) -> list[str]:
 @pytest.fixture(scope="module")
 def logged_and_simulated(robot: Robot) -> Both:
     """A trial of a damaged robot, and runs of its controller: with the same damage, and others."""
-    # One that does not tremble: trembling joints are taken for noisy ones, and averaged.
+    # No joint oscillates at every step: such joints are taken for noisy, and averaged.
     controller = random_controllers(robot, 5)[4]
     runs = [(parse(text, robot.anatomy), controller) for text in hypotheses_about(robot)]
     simulated = Simulator(robot, 2).run(runs, 300, SIGNALS).behaviour
@@ -65,7 +65,7 @@ def test_a_comparator_keeps_its_contract(name: str, robot: Robot, logged_and_sim
 
     check_comparator(comparator, trial, with_the_perfect_one(outcome, shown(request, trial)))
     distances = prepared.distances(outcome)
-    assert np.all(distances[1:] > distances[0]), "it does not tell the truth from other damage"
+    assert np.all(distances[1:] > distances[0]), "other damage is as close as the truth"
     if isinstance(request, ClosedLoop):
         assert distances[0] == 0
     # No member of an ensemble is the robot, and a base that is carried on drifts.
@@ -127,7 +127,7 @@ class Broken:
 
 
 @pytest.mark.parametrize(
-    ("way", "said"),
+    ("way", "message"),
     [
         ("nothing", "prepare must return an object with request and distances, got None"),
         ("request", "a request of ClosedLoop must record some of"),
@@ -144,11 +144,11 @@ class Broken:
     ],
 )
 def test_the_contract_kit_sees_each_way_to_break_it(
-    way: str, said: str, logged_and_simulated: Both
+    way: str, message: str, logged_and_simulated: Both
 ):
     trial, simulated = logged_and_simulated
     own = replace(trial, behaviour=copied(trial.behaviour))
-    with pytest.raises(ValueError, match=said):
+    with pytest.raises(ValueError, match=message):
         check_comparator(Broken(way), own, copied(simulated))
 
 
@@ -250,13 +250,13 @@ def test_the_contract_kit_sees_a_request_that_cannot_be_met(logged_and_simulated
         (fewer, "the states of joint_positions must have shape"),
         (replace(segments(trial), record=("commands",)), "Segments must record some of"),
     ]
-    for asks, said in broken:
-        with pytest.raises(ValueError, match=said):
+    for asks, message in broken:
+        with pytest.raises(ValueError, match=message):
             check_comparator(Pieces(asks), trial, simulated)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
-    ("way", "said"),
+    ("way", "message"),
     [
         ("shape", "expected losses of shape"),
         ("none", "expected losses of shape"),
@@ -267,12 +267,12 @@ def test_the_contract_kit_sees_a_request_that_cannot_be_met(logged_and_simulated
     ],
 )
 def test_the_contract_kit_sees_each_way_to_break_it_in_pieces(
-    way: str, said: str, logged_and_simulated: Both
+    way: str, message: str, logged_and_simulated: Both
 ):
     trial, _ = logged_and_simulated
     comparator = Pieces(ClosedLoop(("joint_positions",)), way)
 
-    with pytest.raises(ValueError, match=said):
+    with pytest.raises(ValueError, match=message):
         check_comparator(comparator, trial, runs_of_shape(trial, 300))
 
 
@@ -305,7 +305,7 @@ def test_what_a_trial_shows_is_cut_where_its_segments_begin(logged_and_simulated
         )
 
 
-def test_what_no_trial_shows_is_said(logged_and_simulated: Both):
+def test_a_segment_that_no_trial_contains_is_named(logged_and_simulated: Both):
     trial, _ = logged_and_simulated
 
     with pytest.raises(ValueError, match="no step at which segment 0 could begin"):

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from selfmodel.comparators import GAIT_PATTERN
 from selfmodel.comparators.gait_features import LARGE_DIFFERENCES

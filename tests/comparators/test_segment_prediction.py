@@ -14,17 +14,17 @@ TOUCH = 0
 
 def losses(trial: Behaviour, readings: np.ndarray) -> np.ndarray:
     """The loss of each segment where only these readings, ``(segments, 13, 4)``, are predicted."""
-    told = logged(trial)
-    perfect = shown(SEGMENT_PREDICTION.prepare(told).request, told)
+    one = logged(trial)
+    perfect = shown(SEGMENT_PREDICTION.prepare(one).request, one)
     signals = {**perfect.signals, "sensors": readings[np.newaxis]}
     found = Behaviour(perfect.names, perfect.time, signals)
-    return SEGMENT_PREDICTION.prepare(told).losses(found)[0]
+    return SEGMENT_PREDICTION.prepare(one).losses(found)[0]
 
 
 def predicted(trial: Behaviour) -> np.ndarray:
     """The readings of a perfect prediction, ``(segments, 13, 4)``."""
-    told = logged(trial)
-    return shown(SEGMENT_PREDICTION.prepare(told).request, told)["sensors"][0].copy()
+    one = logged(trial)
+    return shown(SEGMENT_PREDICTION.prepare(one).request, one)["sensors"][0].copy()
 
 
 def test_a_touch_at_the_beginning_of_a_segment_is_judged_only_where_the_robot_stands():
@@ -52,7 +52,7 @@ def test_a_touch_that_is_never_predicted_counts_three_times_where_it_comes():
     walking = gait()
     silent, late = predicted(walking), predicted(walking)
     silent[..., TOUCH] = 0
-    # The same segments wrong in the same steps, but for one at another place that is felt.
+    # The same segments wrong in the same steps, but for one with a predicted touch.
     late[..., TOUCH] = 0
     far = int(np.flatnonzero(predicted(walking)[:, 1:, TOUCH].any(axis=1))[-1])
     late[far] = predicted(walking)[far]

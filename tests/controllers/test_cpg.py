@@ -5,8 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from selfmodel.controllers.command_range import TARGET_RANGE
 from selfmodel.controllers.command_source import make_batch
@@ -24,7 +23,7 @@ from selfmodel.robot.designs import cpg_for
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import SIGNALS
-from tests.conftest import random_controllers, random_cpgs
+from tests.helpers.drivers import random_controllers, random_cpgs
 
 RANGES = ((0.5, 0.25), (0.0, 1.0), (-2.0, 1.0))
 CPG = Cpg(("touch", "angle"), ("hip", "knee", "ankle"), 0.01, RANGES)

@@ -6,7 +6,7 @@ import pytest
 from selfmodel.controllers.command_source import make_batch
 from selfmodel.controllers.playback import Playback, played_back
 from selfmodel.robot.robot import Robot
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 
 COMMANDS = np.array([[0.1, 0.2], [0.3, 0.4], [0.5, 0.6]])
 

@@ -25,8 +25,9 @@ from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segment
 from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.trials.behaviour import Behaviour, Signal
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.conftest import exploding, random_controllers
 from tests.helpers.comparators import Prepared, PreparedPieces
+from tests.helpers.drivers import random_controllers
+from tests.helpers.hostile import exploding
 from tests.helpers.memory import in_memory
 
 STEPS = 60
@@ -197,6 +198,7 @@ def test_the_distance_is_the_sum_over_the_trials_of_the_mean_over_the_pieces(
     assert not np.array_equal(losses[0], losses[1]) or isinstance(comparator, Plain)
 
 
+@pytest.mark.search
 def test_a_diagnosis_simulates_nothing_twice_and_ranks_nothing_that_is_not_considered(
     quadruped: Robot,
 ):
@@ -298,7 +300,7 @@ def test_what_is_prepared_must_be_a_prepared_trial(quadruped: Robot, trials: lis
 
 
 @pytest.mark.parametrize(
-    ("comparator", "said"),
+    ("comparator", "message"),
     [
         (Plain(gives=lambda _: 1.0), r"gave \(\) distances for 2 simulations"),
         (Plain(gives=lambda n: np.ones((n, 1))), r"gave \(2, 1\) distances for 2"),
@@ -314,11 +316,11 @@ def test_what_is_prepared_must_be_a_prepared_trial(quadruped: Robot, trials: lis
     ],
 )
 def test_a_comparator_that_breaks_its_contract_is_named_with_what_it_did(
-    comparator: Plain, said: str, quadruped: Robot, trials: list[Trial], three: list[Hypothesis]
+    comparator: Plain, message: str, quadruped: Robot, trials: list[Trial], three: list[Hypothesis]
 ):
     evidence = Evidence(Simulator(quadruped, 1), comparator)
 
-    with pytest.raises(InputError, match=f"the comparator 'plain' .*{said}.*check_comparator"):
+    with pytest.raises(InputError, match=f"the comparator 'plain' .*{message}.*check_comparator"):
         evidence.distances(three[:2], trials)
 
 

@@ -1,4 +1,4 @@
-"""Promises about what only mends the self-model: it is no fault, and no rival lives by it."""
+"""Tests of model error: it is no fault, and no indistinguishable hypothesis depends on it."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -22,7 +22,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 from tests.helpers.memory import in_memory
 
 PIECES = 60
@@ -31,7 +31,7 @@ SLIPPERY, KNEE = "friction=0.2", "break:front_left_knee"
 
 
 def of(robot: Robot, means: Mapping[str, float]) -> Losses:
-    """Losses with some scatter: of most hypotheses a mean of 1, of those named another."""
+    """Losses with scatter: mean 1, but for the named hypotheses."""
     scatter = 0.01 * np.random.default_rng(0).normal(size=PIECES)
     known = {parse(text, robot.anatomy): mean for text, mean in means.items()}
     return lambda hypotheses: np.array([known.get(one, 1.0) * (1 + scatter) for one in hypotheses])
@@ -73,7 +73,7 @@ def test_of_what_would_have_done_harm_nothing_else_is_asked(quadruped: Robot):
 
 
 def trial(robot: Robot, truth: str, gait: Controller, stage: Stage, number: int) -> Trial:
-    """A trial across a small gap, on ground that is slippery before the failure and after."""
+    """A trial across a small reality gap, on slippery ground before and after the failure."""
     reality = draw_reality(robot, 3, 0.02, structure=False)
     hidden = parse("+".join({truth, SLIPPERY} - {"intact"}), robot.anatomy)
     plan = TrialPlan(f"{number:02d}-{stage}", stage, gait, SMALL.steps, 0)
@@ -93,6 +93,7 @@ def diagnosed(robot: Robot, truth: str, *, looks_back: bool) -> Diagnosis:
     return search(after, [], np.random.default_rng(0), lambda _: None)
 
 
+@pytest.mark.search
 @pytest.mark.parametrize("truth", ["intact", "jam:front_left_knee"])
 def test_ground_that_always_was_slippery_is_no_change_nor_part_of_a_rival(
     quadruped: Robot, truth: str

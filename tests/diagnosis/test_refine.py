@@ -1,8 +1,7 @@
-"""Promises of the search around a good hypothesis, on made-up losses: no physics, no EA.
+"""Tests of the refinement on synthetic losses, without physics and without the EA.
 
-Each fault has its own effect on every piece of the trials, and the effects of a hypothesis add up;
-what is left of the truth's effects, squared, is the loss. So the truth is at 0, and a fault that
-the truth has is worth as much as its effect is large.
+Each fault has an effect on every segment, and the effects of a hypothesis add up. The loss is the
+squared difference from the effects of the truth, so the truth has a loss of 0.
 """
 
 import itertools
@@ -11,8 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
 from selfmodel.diagnosis.refine import refined
@@ -36,13 +34,13 @@ def said(text: str) -> Hypothesis:
 
 
 def effects(seed: int = 0) -> Mapping[Fault, np.ndarray]:
-    """What each fault changes in every piece; no two do the same."""
+    """Independent effects of each fault, ``(segments,)``."""
     rng = np.random.default_rng(seed)
     return {fault: rng.normal(size=PIECES) for fault in FAULTS}
 
 
 def additive(truth: Hypothesis, floor: float = 0.01, seed: int = 0) -> Losses:
-    """Losses in a world where the effects of faults add up."""
+    """Losses of additive effects of faults."""
     effect = effects(seed)
 
     def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
@@ -58,7 +56,7 @@ def additive(truth: Hypothesis, floor: float = 0.01, seed: int = 0) -> Losses:
 
 
 def counted(table: Mapping[str, float], otherwise: float) -> Losses:
-    """Losses that are the same in every piece but for a ripple, from a table."""
+    """Losses from a table, equal in all segments but for a ripple."""
     known = {said(text): loss for text, loss in table.items()}
     ripple = np.linspace(-0.01, 0.01, PIECES)
 
@@ -69,14 +67,14 @@ def counted(table: Mapping[str, float], otherwise: float) -> Losses:
 
 
 def centred(rng: np.random.Generator) -> np.ndarray:
-    """Noise of exactly no mean."""
+    """Noise with a mean of exactly 0."""
     noise = rng.normal(size=PIECES)
     return noise - noise.mean()
 
 
 @dataclass(frozen=True)
 class Proposing(HypothesisSpace):
-    """A space with candidates of the test's own, in an order of its own."""
+    """A space with given candidates in a given order."""
 
     faults: tuple[Fault, ...] = ()
 
@@ -112,7 +110,7 @@ def test_a_compound_is_found_from_nothing_but_single_faults(text: str):
 
 
 def test_a_needle_is_found_where_only_one_of_its_faults_shows_by_itself():
-    # Alone, the sensor makes it worse, as every other fault does.
+    # Alone, the sensor fault increases the loss, as every other fault does.
     needle = "break:back_left_knee+sensor:front_left_angle"
     losses = counted({"intact": 1.0, "break:back_left_knee": 0.9, needle: 0.1}, otherwise=1.5)
 
@@ -137,7 +135,7 @@ def test_a_needle_that_nothing_leads_to_is_found_from_what_is_known_already():
 
 
 def helped(swing: float) -> Losses:
-    """A broken knee is the truth; a sensor that fails helps a little, and brings some chance."""
+    """Losses with a broken knee as the truth; a failed sensor lowers them by a noisy gain."""
     knee, helper = said("break:front_left_knee"), said("sensor:front_right_touch").faults[0]
     of = additive(knee, floor=1.0)
     help_ = np.resize([swing, -swing], PIECES) - 0.2
@@ -190,7 +188,7 @@ def test_once_a_fault_is_spared_another_may_be_the_better_one_beside_what_is_lef
         )
     )
     ripple = np.linspace(-0.01, 0.01, PIECES)
-    # Searches that begin from nothing end at one of these.
+    # Searches from the empty hypothesis end at one of these.
     dead_ends = [canonical([fault], ANATOMY) for fault in FAULTS[:3]]
     known = dict.fromkeys(dead_ends, 2.9 - ripple) | {
         three: 1.0 + ripple,
@@ -262,18 +260,18 @@ def test_of_two_that_predict_the_same_the_one_with_fewer_faults_is_chosen():
 
 
 SMALL_WORLD = FAULTS[::4]
-"""Faults for tests that search many times."""
+"""A subset of the faults for tests with many searches."""
 
 NOISY, CLEAR = st.floats(0.01, 2), st.just(1e-6)
 
 
 def worlds(spread: st.SearchStrategy[float]) -> st.SearchStrategy[Losses]:
-    """Worlds in which losses are drawn anew for each hypothesis, with noise from piece to piece."""
+    """Loss functions with random losses per hypothesis and noise per segment."""
     return st.builds(_random_world, st.integers(0, 2**32 - 1), spread, st.integers(5, 12))
 
 
 def _random_world(seed: int, spread: float, pieces: int) -> Losses:
-    """Losses drawn anew for each hypothesis, always the same for the same one."""
+    """Random losses, a function of the hypothesis."""
 
     def row(hypothesis: Hypothesis) -> np.ndarray:
         place = [FAULTS.index(fault) for fault in hypothesis.faults]

@@ -1,4 +1,4 @@
-"""Promises of the fit of degrees: found between the levels, never worse, nothing that is not."""
+"""Tests of fitted severities: between the levels, never worse, without nominal severities."""
 
 from collections.abc import Mapping, Sequence
 
@@ -20,11 +20,11 @@ WEAK_MOTOR = KINDS["motor"]
 
 
 def bowl(truth: Mapping[str, float], floor: float = 0.01) -> Losses:
-    """A world in which a motor and the ground have degrees; losses grow with the distance to them.
+    """Losses that grow with the distance to true severities of a motor and of the ground.
 
     Args:
-        truth: The degree of each term that the truth has.
-        floor: What is left at the truth.
+        truth: True severity by term.
+        floor: Loss at the truth.
     """
     ripple = np.linspace(0.9, 1.1, PIECES)
 
@@ -79,12 +79,12 @@ def test_a_fit_of_degrees_never_makes_it_worse_and_a_degree_that_is_nothing_goes
 
 
 def rugged(truth: float, noise: float, lucky: float) -> Losses:
-    """Losses of frictions: a bowl in noise of its own for every degree, and one that is lucky.
+    """Losses of frictions: a bowl with noise per severity, and one lucky severity.
 
     Args:
-        truth: Where the bowl is lowest.
-        noise: Standard deviation of what a piece differs by from one degree to another.
-        lucky: A degree that predicts a little better than the truth.
+        truth: Position of the minimum.
+        noise: Standard deviation of the noise per segment and severity.
+        lucky: A severity with a lower loss than the truth.
     """
 
     def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
@@ -129,7 +129,7 @@ def test_a_degree_that_is_told_from_its_neighbours_stays():
 
 
 def valleys(*bottoms: float, noise: float, pieces: int = PIECES) -> Losses:
-    """Losses of frictions that are lowest at several degrees, in noise of their own for each."""
+    """Losses of frictions with several minima and noise per severity."""
 
     def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
         rows = []
@@ -175,7 +175,7 @@ def test_classes_of_what_reshapes_the_model_have_no_mean():
 
 
 def test_a_degree_that_is_not_needed_becomes_the_fault_without_one():
-    """A sensor with a gain that is next to none has failed, as far as anybody can tell."""
+    """A gain close to 0 is indistinguishable from a failed sensor."""
     dead, faint = (parse(f"sensor:front_left_touch{of}", ANATOMY) for of in ("", "=gain0.1"))
     gains = space_of(KINDS["sensor-gain"])
     ripple = np.linspace(0.95, 1.05, PIECES)
@@ -188,7 +188,7 @@ def test_a_degree_that_is_not_needed_becomes_the_fault_without_one():
 
 
 def test_a_mean_that_no_longer_needs_the_fault_leaves_the_best_degree_as_it_is():
-    """All winds but one predict as well as none, and not significantly worse than that one."""
+    """One wind is better than none, and no other wind is significantly worse than that wind."""
     rng = np.random.default_rng(0)
     noise = rng.normal(size=PIECES)
     noise -= noise.mean()

@@ -1,9 +1,8 @@
-"""Promises of the tests between hypotheses: paired, above rounding, and at ease with infinity."""
+"""Tests of the significance tests: pairing, rounding errors, infinite losses."""
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy import stats
 
@@ -24,7 +23,7 @@ DIVERGED = np.full(5, np.inf)
 
 
 def of_mean_and_error(mean: float, error: float, pieces: int = 100) -> np.ndarray:
-    """Losses of exactly this mean and this standard error of the mean."""
+    """Losses with a given mean and standard error of the mean."""
     swing = np.tile([-1.0, 1.0], pieces // 2)
     return mean + swing / swing.std(ddof=1) * error * np.sqrt(pieces)
 
@@ -61,7 +60,7 @@ def test_a_difference_counts_from_three_standard_errors_on(errors: float, told: 
 
 @pytest.mark.parametrize(("times", "told"), [(LOSS_RATIO * 1.01, True), (LOSS_RATIO * 0.99, False)])
 def test_three_times_the_loss_counts_whatever_the_errors(times: float, told: bool):  # noqa: FBT001  # what is expected
-    # All of the difference is in one piece of a hundred: z is 1.
+    # The whole difference is in one segment of a hundred: z is 1.
     one = np.full(100, 0.01)
     other = one.copy()
     other[7] += (times - 1) * one.sum()
@@ -140,7 +139,7 @@ def test_of_two_at_most_one_is_better(pair: np.ndarray):
 def test_the_order_of_the_pieces_does_not_matter(pair: np.ndarray, order: list[int]):
     one, other = pair
     z = paired_z(other, one) if np.isfinite(pair).all() else 0.0
-    if abs(z - MIN_Z) > 1e-6:  # where rounding does not decide
+    if abs(z - MIN_Z) > 1e-6:  # where the result does not depend on rounding
         assert is_better(one[order], other[order]) == is_better(one, other)
 
 
@@ -156,7 +155,7 @@ def test_what_became_better_did_so_by_five_standard_errors(errors: float, told: 
 
 
 def at_the_edge(errors: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Losses, what was gained before, and what would have to be gained since for so many errors."""
+    """Losses, gains on healthy trials, and gains that exceed them by some standard errors."""
     rng = np.random.default_rng(2)
     one, gain, earlier = rng.normal(10, 1, 80), rng.normal(1, 0.3, 80), rng.normal(0.9, 0.3, 40)
     z = stats.ttest_ind(gain, earlier, equal_var=False).statistic
@@ -210,7 +209,7 @@ def test_what_did_not_help_before_does_not_mend_however_little_it_helps_since(ha
 
 @pytest.mark.parametrize(("error", "told"), [(0.19, True), (0.21, False)])
 def test_trials_that_would_not_have_shown_the_harm_say_nothing(error: float, told: bool):  # noqa: FBT001  # of a table
-    # As much harm as it helps would have been 0.6 below what it helps: MIN_Z errors of 0.2.
+    # A harm as large as the gain is 0.6 below the gain: MIN_Z standard errors of 0.2.
     one, before = np.full(100, 10.0), np.full(100, 10.0)
 
     assert (

@@ -14,8 +14,8 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour, collect
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.conftest import random_controllers
 from tests.helpers.comparators import PreparedPieces
+from tests.helpers.drivers import random_controllers
 from tests.helpers.gaits import changed
 
 SMALL = dataclasses.replace(Settings().scaled(4), generations=1)
@@ -29,7 +29,14 @@ def trial(quadruped: Robot) -> Trial:
     return Trial(plan, quadruped.name, run, "nowhere.mcap")
 
 
-@pytest.mark.parametrize("name", ["sensor-series", "gait-pattern", "noisy-transfer"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "gait-pattern",
+        pytest.param("sensor-series", marks=pytest.mark.search),
+        pytest.param("noisy-transfer", marks=pytest.mark.search),
+    ],
+)
 def test_a_comparator_of_whole_trials_has_their_openings_as_surrogate(
     name: str, quadruped: Robot, trial: Trial
 ):
@@ -57,6 +64,7 @@ def test_a_comparator_of_whole_trials_has_their_openings_as_surrogate(
     assert steps == {"evidence": {300}, "surrogate": {100}}
 
 
+@pytest.mark.search
 def test_where_the_opening_tells_nothing_the_whole_trial_is_the_surrogate(
     quadruped: Robot, trial: Trial
 ):

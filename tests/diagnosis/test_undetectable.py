@@ -1,4 +1,4 @@
-"""Promises about what may be wrong besides: neither shown by the trials nor ruled out."""
+"""Tests of undetectable faults: the trials neither require them nor rule them out."""
 
 from collections.abc import Mapping, Sequence
 
@@ -20,7 +20,7 @@ PIECES = 60
 
 
 def of(robot: Robot, means: Mapping[str, float], otherwise: float) -> Losses:
-    """Losses with some scatter: a mean for some hypotheses, another for the rest."""
+    """Losses with scatter: a mean per named hypothesis, another mean for the rest."""
     scatter = 0.01 * np.random.default_rng(0).normal(size=PIECES)
     known = {parse(text, robot.anatomy): mean for text, mean in means.items()}
 
@@ -71,7 +71,7 @@ def test_beside_what_diverges_nothing_is_unseen(quadruped: Robot):
 
 def test_the_closest_comes_first_and_each_says_one_fault_more(quadruped: Robot):
     best = parse(KNEE, quadruped.anatomy)
-    # The difference is below what counts as one.
+    # The difference is below NEGLIGIBLE_LOSS.
     means = {
         KNEE: 1.0,
         f"{KNEE}+sensor:back_left_touch": 1.0,

@@ -1,4 +1,4 @@
-"""Promises about kinds that were not considered: one that explains more is found, and named."""
+"""Tests of unsearched kinds: a significantly better fault is found and reported."""
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
@@ -25,7 +25,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 from tests.helpers.memory import in_memory
 
 PIECES = 60
@@ -33,7 +33,7 @@ SMALL = dataclasses.replace(Settings().scaled(12), generations=2)
 
 
 def of(robot: Robot, means: Mapping[str, float]) -> Callable[[Sequence[Hypothesis]], np.ndarray]:
-    """Losses with some scatter: of most hypotheses a mean of 1, of those named another."""
+    """Losses with scatter: mean 1, but for the named hypotheses."""
     scatter = 0.01 * np.random.default_rng(0).normal(size=PIECES)
     known = {parse(text, robot.anatomy): mean for text, mean in means.items()}
     return lambda hypotheses: np.array(
@@ -116,7 +116,7 @@ def test_only_what_was_not_considered_is_asked_about_and_nothing_that_reshapes(q
     assert found is None
     assert kinds >= set(ALL_KINDS) - set(PAPER_KINDS) - {ROUGHNESS}
     assert ROUGHNESS not in kinds
-    # In the place of a dead sensor, one that measures wrongly; beside it, all else.
+    # A sensor gain replaces the failed sensor; all other faults are added to it.
     assert parse("sensor:back_left_angle=gain0.5", quadruped.anatomy) in asked
     assert all(best.faults[0] in one.faults or len(one) == 1 for one in asked)
 
@@ -133,7 +133,7 @@ def test_with_all_kinds_considered_nothing_is_outside(quadruped: Robot):
 
 
 def trial(robot: Robot, truth: str, gait: Controller, stage: Stage, number: int) -> Trial:
-    """A trial across a small gap."""
+    """A trial across a small reality gap."""
     reality = draw_reality(robot, 3, 0.03, structure=False)
     physical = reality.robot(robot, parse(truth, robot.anatomy), stream=number)
     plan = TrialPlan(f"{number:02d}-{stage}", stage, gait, SMALL.steps, 0)
@@ -153,7 +153,11 @@ def diagnosed(robot: Robot, truth: str, gait: Controller) -> Diagnosis:
 
 @pytest.mark.parametrize(
     ("truth", "kind"),
-    [("wind=30", "wind"), ("sensor:back_left_angle=gain0.3", "sensor-gain"), ("intact", None)],
+    [
+        ("wind=30", "wind"),
+        pytest.param("sensor:back_left_angle=gain0.3", "sensor-gain", marks=pytest.mark.search),
+        pytest.param("intact", None, marks=pytest.mark.search),
+    ],
 )
 def test_a_weak_failure_of_another_kind_is_unexplained_and_named_across_a_gap(
     quadruped: Robot, truth: str, kind: str | None
@@ -170,6 +174,7 @@ def test_a_weak_failure_of_another_kind_is_unexplained_and_named_across_a_gap(
     assert all(fault.kind in PAPER_KINDS for one in found.ranked for fault in one.hypothesis.faults)
 
 
+@pytest.mark.search
 def test_comparators_of_whole_trials_ask_for_nothing_outside(quadruped: Robot):
     gait = random_controllers(quadruped, 5)[2]
     search = DiagnosticSearch(

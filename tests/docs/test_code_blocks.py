@@ -1,15 +1,14 @@
 """Code blocks of the documentation: each is run, or a comment before it gives the reason."""
 
 import re
-import shlex
 import shutil
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
 from selfmodel.cli import app
+from tests.helpers.code_blocks import blocks, commands
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted(ROOT.glob("docs/**/*.md"))
@@ -21,58 +20,6 @@ SEARCH = re.compile(
     r"|\b(recover|diagnose|evolve_controller)\("
 )
 """Commands and calls that run an evolutionary algorithm, a calibration or that draw for seconds."""
-
-
-@dataclass(frozen=True)
-class Block:
-    """A fenced block of a page.
-
-    Attributes:
-        line: Number of its first line.
-        language: The word after the fence, such as ``sh`` or ``{literalinclude}``.
-        argument: The rest of that line.
-        text: Its content.
-        comment: The HTML comment before it, such as ``not run: ...`` or ``file: NAME``.
-    """
-
-    line: int
-    language: str
-    argument: str
-    text: str
-    comment: str
-
-
-FENCE = re.compile(
-    r"(?:^<!-- (?P<comment>.*?) -->\n)?^```(?P<language>\S*) ?(?P<argument>.*)\n"
-    r"(?P<text>(?:.*\n)*?)^```$",
-    flags=re.MULTILINE,
-)
-
-
-def blocks(page: Path) -> list[Block]:
-    """The fenced blocks of a page, in order."""
-    text = page.read_text(encoding="utf-8")
-    return [
-        Block(
-            text.count("\n", 0, match.start("language")) + 1,
-            match["language"],
-            match["argument"],
-            match["text"],
-            match["comment"] or "",
-        )
-        for match in FENCE.finditer(text)
-    ]
-
-
-def is_run(block: Block) -> bool:
-    """Returns whether a block is Python or commands, and has no comment that it is not run."""
-    return block.language in ("sh", "python") and not block.comment.startswith("not run: ")
-
-
-def commands(block: Block) -> list[list[str]]:
-    """The commands of a block as arguments, without comments."""
-    lines = [shlex.split(line, comments=True) for line in block.text.splitlines()]
-    return [words for words in lines if words]
 
 
 def expanded(words: list[str]) -> list[str]:
@@ -90,7 +37,7 @@ def name_of(page: Path) -> str:
 def test_every_block_is_run_or_has_a_reason(page: Path):
     for block in blocks(page):
         place = f"{name_of(page)}:{block.line}"
-        if block.language == "sh" and is_run(block):
+        if block.language == "sh" and block.is_run:
             for words in commands(block):
                 assert words[0] == "selfmodel", f"{place}: {words[0]} cannot be run by this test"
         elif block.language not in ("sh", "python", *DATA):
@@ -106,9 +53,9 @@ def test_comments_belong_to_blocks():
 
 def runnable() -> list[object]:
     """The pages with code to run, those with a search marked."""
-    pages = [page for page in PAGES if any(map(is_run, blocks(page)))]
+    pages = [page for page in PAGES if any(block.is_run for block in blocks(page))]
     searches = {
-        page: SEARCH.search("".join(block.text for block in blocks(page) if is_run(block)))
+        page: SEARCH.search("".join(block.text for block in blocks(page) if block.is_run))
         for page in pages
     }
     marks = {page: [pytest.mark.search] if searches[page] else [] for page in pages}
@@ -126,9 +73,9 @@ def test_code_of_a_page_runs_in_order(page: Path, tmp_path: Path, monkeypatch: p
             (tmp_path / block.comment.removeprefix("file: ")).write_text(block.text)
         elif block.language == "{literalinclude}":
             shutil.copy(page.parent / block.argument, tmp_path)
-        elif is_run(block) and block.language == "python":
+        elif block.is_run and block.language == "python":
             exec(compile(block.text, place, "exec"), names)  # noqa: S102  # the page's own code
-        elif is_run(block):
+        elif block.is_run:
             for words in commands(block):
                 done = CliRunner().invoke(app, expanded(words[1:]))
                 assert done.exit_code == 0, f"{place}: {words}\n{done.output}\n{done.exception!r}"

@@ -27,7 +27,7 @@ from selfmodel.robot.anatomy import Joint
 from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.calibrate import prediction_error
+from selfmodel.simulation.calibration import prediction_error
 from selfmodel.simulation.requests import Past, Segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import suite_bodies, walking
@@ -35,8 +35,8 @@ from selfmodel.trials.behaviour import SIGNALS, Behaviour, collect
 from selfmodel.trials.rotation import rotation_between
 from selfmodel.trials.state_estimation import BASE, STATE
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.conftest import lacking
-from tests.helpers.bodies import BODIES, swinging, swung
+from tests.helpers.bodies import BODIES, EVERY_BODY, swinging, swung
+from tests.helpers.hostile import lacking
 from tests.logs.conftest import plan_of
 
 STEPS, HORIZON = 50, 10
@@ -47,7 +47,7 @@ solver stops at its tolerance with 79 degrees of freedom, and begins a segment w
 of the step before, the paths of light bones part a little."""
 
 
-@pytest.fixture(params=sorted(BODIES))
+@pytest.fixture(params=EVERY_BODY)
 def body(request: pytest.FixtureRequest) -> Robot:
     return BODIES[request.param]()
 

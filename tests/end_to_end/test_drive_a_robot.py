@@ -16,21 +16,31 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from selfmodel.logs.verify import verify
 from selfmodel.tasks.walking import environment, motion_capture
+from tests.helpers.code_blocks import blocks
 from tests.helpers.command import selfmodel
 from tests.helpers.socket_robot import OBSERVED, STOP, TIMESTEP, slow_quadruped
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "drive_a_robot.py"
+PAGE = ROOT / "docs" / "how-to" / "drive-a-robot.md"
+SERVER = (sys.executable, "-m", "tests.helpers.socket_robot")
 
 
 @contextmanager
 def robot(folder: Path, **failures: float | str) -> Iterator[str]:
     """A robot in another process; gives its port."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "tests.socket_robot", folder / "heard", json.dumps(failures)],
+        [
+            sys.executable,
+            "-m",
+            "tests.helpers.socket_robot",
+            folder / "heard",
+            json.dumps(failures),
+        ],
         cwd=ROOT,
         env={**os.environ, "MUJOCO_GL": "disable"},
         stdout=subprocess.PIPE,
@@ -97,6 +107,7 @@ def observed(commands: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
         yield observe(env.step(targets).observation)
 
 
+@pytest.mark.process
 def test_a_dropped_connection_stops_the_robot_and_leaves_a_whole_log(tmp_path: Path):
     with robot(tmp_path, **{"70": "hang up"}) as port:
         _, errors = (process := driver(tmp_path, port)).communicate(timeout=120)
@@ -115,6 +126,7 @@ def test_a_dropped_connection_stops_the_robot_and_leaves_a_whole_log(tmp_path: P
     assert told.stdout == f"ok: trial.mcap: 70 steps, stopped ({log.reason})\n"
 
 
+@pytest.mark.process
 def test_the_operator_is_told_that_the_robot_could_not_be_stopped(tmp_path: Path):
     with robot(tmp_path, **{"40": "die"}) as port:
         _, errors = (process := driver(tmp_path, port)).communicate(timeout=120)
@@ -128,6 +140,7 @@ def test_the_operator_is_told_that_the_robot_could_not_be_stopped(tmp_path: Path
     )
 
 
+@pytest.mark.process
 def test_a_robot_that_is_not_there_is_said_so_and_can_be_tried_again(tmp_path: Path):
     for _ in range(2):
         _, errors = (process := driver(tmp_path, "1")).communicate(timeout=120)  # nobody is there
@@ -159,21 +172,23 @@ def test_ctrl_c_stops_the_robot_and_leaves_a_whole_log(tmp_path: Path):
 
 
 def test_the_driver_that_the_docs_show_is_the_example_s_and_has_forty_lines():
+    begin, end = "# The driver begins here: the docs show it.", "# The driver ends here."
     text = EXAMPLE.read_text(encoding="utf-8")
-    shown = text.split("# The driver begins here: the docs show it.\n")[1]
-    shown = shown.split("\n\n# The driver ends here.\n")[0].strip()
+    shown = text.split(f"{begin}\n")[1].split(f"\n\n{end}\n")[0].strip()
     code = [line for line in shown.splitlines() if line.strip() and '"""' not in line]
 
     assert len(code) <= 40
-    docs = (ROOT / "docs" / "real-robots.md").read_text(encoding="utf-8")
-    assert f"```python\n{shown}\n```" in docs
+    (included,) = (b for b in blocks(PAGE) if b.language == "{literalinclude}")
+    assert (PAGE.parent / included.argument).resolve() == EXAMPLE
+    assert f':start-after: "{begin}"\n:end-before: "{end}"\n' in included.text
 
 
+@pytest.mark.process
+@pytest.mark.search
 def test_the_trial_of_the_docs_runs(tmp_path: Path):
-    docs = (ROOT / "docs" / "real-robots.md").read_text(encoding="utf-8")
-    (block,) = re.findall(r"```python\n(from pathlib.*?)```", docs, flags=re.DOTALL)
+    (block,) = (block for block in blocks(PAGE) if block.language == "python")
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "MUJOCO_GL": "disable"}
-    subprocess.run([sys.executable, "-c", block], cwd=tmp_path, env=environment, check=True)
+    subprocess.run([sys.executable, "-c", block.text], cwd=tmp_path, env=environment, check=True)
     log, _ = verify(tmp_path / "walk.mcap")
 
     assert (log.status, log.trial.behaviour.steps) == ("finished", 300)

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.comparator_contract import check_comparator
@@ -22,6 +23,7 @@ def run(name: str, *arguments: str, cwd: Path) -> str:
     return subprocess.run(command, cwd=cwd, check=True, capture_output=True, text=True).stdout
 
 
+@pytest.mark.process
 def test_a_recovery_in_python_is_drawn_from_its_logs(tmp_path: Path):
     told = run("recover_in_python.py", "run", cwd=tmp_path)
     run("plot_recovery.py", "run", "figure.png", cwd=tmp_path)
@@ -61,6 +63,7 @@ def test_a_comparator_of_ones_own_keeps_the_contract():
     )
 
 
+@pytest.mark.process
 def test_a_comparator_of_ones_own_plugs_in_from_the_folder_that_the_command_runs_in(tmp_path: Path):
     command = [
         *(Path(sys.executable).with_name("selfmodel"), "recover", "quadruped", "--case", "2"),
@@ -82,6 +85,7 @@ def test_plugins_of_ones_own_are_checked_in_python(tmp_path: Path):
     assert "payload: 12 faults that may be proposed" in told
 
 
+@pytest.mark.process
 def test_an_ablation_in_python_goes_on_where_it_was(tmp_path: Path):
     first = run("ablation.py", "folder", cwd=tmp_path)
     again = run("ablation.py", "folder", cwd=tmp_path)

@@ -1,4 +1,4 @@
-"""The README is true: its commands run, its Python runs, its links lead somewhere."""
+"""The README's commands, Python blocks and links work."""
 
 import re
 import shlex
@@ -8,47 +8,75 @@ from pathlib import Path
 
 import pytest
 
+from tests.helpers.code_blocks import Block, blocks, commands
+
 ROOT = Path(__file__).parents[2]
-README = (ROOT / "README.md").read_text(encoding="utf-8")
-PAPER_BUDGET = "selfmodel recover quadruped --case 1"
-"""What `make demo` runs; CI runs `make demo` itself."""
+README = ROOT / "README.md"
+PAGES = [README, *sorted(ROOT.glob("docs/**/*.md"))]
+DEMO = "selfmodel recover quadruped --case 1"
+"""The command of `make demo`; CI runs `make demo` itself."""
 
 
-def blocks(language: str) -> list[str]:
-    """The code blocks of one language."""
-    return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
+def steps() -> list[str | Block]:
+    """The README's commands and Python blocks, in the order in which a reader runs them."""
+    found: list[str | Block] = []
+    for block in blocks(README):
+        if block.is_run:
+            found += [block] if block.language == "python" else map(shlex.join, commands(block))
+    return found
 
 
-def commands() -> list[str]:
-    """The commands of the shell blocks, without their comments."""
-    lines = [line for block in blocks("sh") for line in block.splitlines()]
-    return [line.split("#")[0].strip() for line in lines if line.strip()]
+def is_in_ci(step: str | Block) -> bool:
+    """Returns whether CI runs a command by itself."""
+    return isinstance(step, str) and (step.startswith("make ") or step == DEMO)
 
 
-def test_every_command_is_run_here_or_by_ci(tmp_path: Path):
+def name_of(step: str | Block) -> str:
+    """The command, or the line of a Python block, as a test's name."""
+    return step if isinstance(step, str) else f"python, line {step.line}"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder in which all commands run: a command may read the files of earlier commands."""
+    return tmp_path_factory.mktemp("readme")
+
+
+@pytest.mark.process
+@pytest.mark.xdist_group("readme")
+@pytest.mark.parametrize("step", [one for one in steps() if not is_in_ci(one)], ids=name_of)
+def test_a_reader_can_run(step: str | Block, folder: Path):
+    arguments = ["-m", *shlex.split(step)] if isinstance(step, str) else ["-c", step.text]
+    done = subprocess.run(
+        [sys.executable, *arguments], cwd=folder, capture_output=True, text=True, check=False
+    )
+
+    assert done.returncode == 0, done.stderr
+
+
+def test_every_command_is_this_projects_and_what_make_runs_is_run_by_ci():
     ci = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
-    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    found = [step for step in steps() if isinstance(step, str)]
 
-    assert len(commands()) >= 8
-    for command in commands():
-        if command.startswith("make ") or command == PAPER_BUDGET:
-            continue
-        assert command.startswith("selfmodel "), command
-        arguments = [sys.executable, "-m", *shlex.split(command)]
-        done = subprocess.run(arguments, cwd=tmp_path, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, f"{command}\n{done.stderr}"
-    for command in (command for command in commands() if command.startswith("make ")):
-        assert re.search(rf"\b{command}\b", ci), command
-    assert f"$(BIN)/{PAPER_BUDGET}" in makefile
-    for block in blocks("python"):
-        subprocess.run([sys.executable, "-c", block], cwd=tmp_path, check=True, capture_output=True)
+    assert found
+    for command in found:
+        assert command.startswith(("selfmodel ", "make ")), command
+        if command.startswith("make "):
+            assert re.search(rf"\b{re.escape(command)}(?![\w-])", ci), command
+    assert f"$(BIN)/{DEMO}" in (ROOT / "Makefile").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("page", ["README.md", *(f"docs/{p.name}" for p in ROOT.glob("docs/*.md"))])
-def test_every_link_to_a_file_leads_somewhere(page: str):
-    text = (ROOT / page).read_text(encoding="utf-8")
+def test_a_block_of_the_readme_is_run_or_says_why_not():
+    known = ("sh", "python", "text")
+
+    assert [block.line for block in blocks(README) if block.language not in known] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_every_link_to_a_file_leads_somewhere(page: Path):
+    text = page.read_text(encoding="utf-8")
     targets = re.findall(r"\]\((?!https?:)([^)#]*)(?:#([^)]*))?\)", text)
-    files = [((ROOT / page).parent / target if target else ROOT / page) for target, _ in targets]
+    files = [(page.parent / target if target else page) for target, _ in targets]
 
     assert [file for file in files if not file.exists()] == []
     for file, (_, place) in zip(files, targets, strict=True):
@@ -56,6 +84,6 @@ def test_every_link_to_a_file_leads_somewhere(page: str):
 
 
 def headings(page: Path) -> set[str]:
-    """What links to the headings of a page are called."""
+    """The anchors of a page's headings."""
     found = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in found}

@@ -11,8 +11,7 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from selfmodel.errors import InputError
 from selfmodel.experiments.grid import GridBegins, Job, PartEnds, difference, finished, run_grid
@@ -106,6 +105,7 @@ def test_a_grid_does_every_part_once_and_not_again(tmp_path: Path):
     assert events[7:] == [GridBegins(total=6, finished=6)]
 
 
+@pytest.mark.process
 def test_the_results_do_not_depend_on_the_number_of_workers(tmp_path: Path):
     for workers in (1, 2):
         run_grid(
@@ -147,6 +147,7 @@ def test_a_failure_is_kept_and_stops_no_other(tmp_path: Path, fails: str, senten
     assert [each.key for each in finished(tmp_path)] == ["run-00", "run-01"]
 
 
+@pytest.mark.process
 def test_what_failed_is_tried_again(tmp_path: Path):
     assert run_grid(tmp_path, jobs(1, fails="foreseen"), work, workers=1, on_progress=silent)
     (tmp_path / "run-00" / "mended").touch()
@@ -154,6 +155,7 @@ def test_what_failed_is_tried_again(tmp_path: Path):
     assert run_grid(tmp_path, jobs(1, fails="foreseen"), work, workers=1, on_progress=silent) == ()
 
 
+@pytest.mark.process
 def test_a_run_whose_results_were_deleted_is_made_again(tmp_path: Path):
     run_grid(tmp_path, jobs(2), work, workers=1, on_progress=silent)
     shutil.rmtree(tmp_path / "run-01" / "parts")
@@ -173,6 +175,7 @@ def test_a_run_made_of_something_else_is_refused_before_anything_is_done(tmp_pat
     assert not (tmp_path / "new").exists()
 
 
+@pytest.mark.process
 def test_a_grid_that_was_killed_goes_on_where_it_was(tmp_path: Path):
     process = start(tmp_path)
     wait_for_a_result(tmp_path)
@@ -187,6 +190,7 @@ def test_a_grid_that_was_killed_goes_on_where_it_was(tmp_path: Path):
     assert all(calls(tmp_path / "runs")[key] == ["result"] for key in done)
 
 
+@pytest.mark.process
 def test_an_interrupt_ends_every_process_at_once_and_quietly(tmp_path: Path):
     process = start(tmp_path)
     wait_for_a_result(tmp_path)
@@ -206,6 +210,7 @@ def test_a_worker_never_sees_an_interrupt_not_even_while_it_starts(tmp_path: Pat
     assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
 
+@pytest.mark.process
 def test_a_second_process_at_one_grid_is_refused_and_nothing_is_done_twice(tmp_path: Path):
     process = start(tmp_path)
     wait_for_a_result(tmp_path)
@@ -218,6 +223,7 @@ def test_a_second_process_at_one_grid_is_refused_and_nothing_is_done_twice(tmp_p
     assert b"a plug-in may print" not in out
 
 
+@pytest.mark.process
 def test_a_worker_is_replaced_after_its_largest_number_of_tasks():
     chains = [[number] for number in range(MAX_TASKS_PER_WORKER + 1)]
     with closing(run_tasks(process_id, chains, 1)) as answers:

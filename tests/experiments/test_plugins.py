@@ -79,7 +79,7 @@ def test_a_comparator_that_cannot_be_used_is_refused(name: str, reason: str):
 
 
 def test_an_unknown_fault_kind_is_refused_with_the_installed_names():
-    with pytest.raises(InputError, match="unknown kind 'limb': did you mean .*limp"):
+    with pytest.raises(InputError, match=r"unknown kind 'limb': did you mean .*limp"):
         plugins.kinds("limb")
 
 

@@ -1,9 +1,9 @@
-"""Promises of the edits: a broken joint is a deleted limb, a jammed one a weld.
+"""Tests of model edits: a broken joint equals a deleted limb, a jammed joint equals a weld.
 
-The ground truth has another layout, so it can be compared for as long as contact has not blown
-up the last bits: over the first 100 control steps (1 s) of a motion that moves every joint, all
-joint angles and the root's pose agree within TOLERANCE. (Measured: below 1e-13 for broken joints,
-below 3e-9 for jammed ones.)
+The reference model has another layout, so rounding differs and contact amplifies the difference:
+the comparison covers the first 100 control steps (1 s) of a motion of every joint, over which all
+joint angles and the root body's pose agree within TOLERANCE. (Measured: below 1e-13 for broken
+joints, below 3e-9 for jammed ones.)
 """
 
 import mujoco
@@ -15,12 +15,12 @@ from selfmodel.faults.notation import parse
 from selfmodel.robot.anatomy import Joint
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import ROBOTS
-from tests.conftest import random_motion
+from tests.helpers.drivers import random_motion
 
 STEPS = 100
 TOLERANCE = 1e-7
 HELD = 1e-6
-"""How far a held joint may give way in 10 s, rad."""
+"""Maximum motion of a welded joint in 10 s, rad."""
 
 JOINTS = [
     (name, joint.name) for name, entry in ROBOTS.items() for joint in entry.robot().anatomy.joints
@@ -36,12 +36,12 @@ def without_limb(robot: Robot, joint: Joint) -> mujoco.MjModel:
 
 
 def with_weld(robot: Robot, joint: Joint, angle: float) -> mujoco.MjModel:
-    """The robot's model with a joint's bodies welded at an angle: there is no joint."""
+    """The robot's model with the bodies of a joint welded at an angle, without the joint."""
     spec = mujoco.MjSpec.from_string(robot.mjcf)
     for name in joint.hinges:
         hinge = spec.joint(name)
         body = hinge.parent
-        np.testing.assert_array_equal(hinge.pos, 0)  # else turning the body would move the pivot
+        np.testing.assert_array_equal(hinge.pos, 0)  # so rotating the body does not move the pivot
         turn, frame = np.empty(4), np.empty(4)
         mujoco.mju_axisAngle2Quat(turn, np.array(hinge.axis), angle)
         mujoco.mju_mulQuat(frame, np.array(body.quat), turn)
@@ -55,7 +55,7 @@ def with_weld(robot: Robot, joint: Joint, angle: float) -> mujoco.MjModel:
 
 
 def follow(robot: Robot, model: mujoco.MjModel, steps: int) -> dict[str, np.ndarray]:
-    """Runs motor targets on a model and returns the path of its root and of each of its hinges."""
+    """Returns the trajectories of the root body and of the hinges under given motor targets."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     hinges = {model.joint(j).name for j in range(model.njnt)} & set(robot.anatomy.hinges)

@@ -1,4 +1,4 @@
-"""Promises of graded faults and of environments: each is the model that one would write for it."""
+"""Tests of faults with severities and of environments against hand-written models."""
 
 import math
 from collections.abc import Iterator
@@ -21,8 +21,8 @@ from selfmodel.faults.terrain import (
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
 from selfmodel.simulation.simulator import Simulator
-from tests.conftest import random_controllers, random_motion
 from tests.faults.test_build import assert_same_paths, follow
+from tests.helpers.drivers import random_controllers, random_motion
 
 STEPS = 100
 
@@ -42,7 +42,7 @@ def assert_identical_paths(one: dict[str, np.ndarray], other: dict[str, np.ndarr
 
 
 def states(robot: Robot, count: int) -> Iterator[mujoco.MjData]:
-    """The robot in the middle of a motion, with targets far away."""
+    """The robot in the middle of a motion, with distant targets."""
     data = mujoco.MjData(robot.model)
     for targets in random_motion(robot, count):
         data.ctrl = targets * 1.5
@@ -86,7 +86,7 @@ def test_a_weak_motor_has_that_part_of_its_torque_at_any_load(robot: Robot, part
         limit = robot.model.actuator_forcerange[mine, 1]
         saturated |= bool(np.any(np.abs(data.actuator_force[mine]) == limit))
 
-    assert saturated  # else the torque limits were not tried
+    assert saturated  # so the torque limits are tested
 
 
 def test_a_motor_without_torque_moves_like_a_model_without_the_motor(robot: Robot):
@@ -105,7 +105,7 @@ def test_friction_is_the_model_with_that_friction(robot: Robot):
 
     assert_identical_paths(slippery, follow(robot, truth, STEPS))
     moved = slippery["torso"][-1] - follow(robot, robot.model, STEPS)["torso"][-1]
-    assert np.abs(moved).max() > 1e-3  # else friction would not matter
+    assert np.abs(moved).max() > 1e-3  # so friction has an effect
 
 
 def test_friction_leaves_what_cannot_touch_the_world_alone():
@@ -125,7 +125,7 @@ def test_friction_leaves_what_cannot_touch_the_world_alone():
 def test_a_slope_is_the_model_on_tilted_ground(robot: Robot, angle: float):
     spec = mujoco.MjSpec.from_string(robot.mjcf)
     tilt, turned = np.empty(4), np.empty(3)
-    # Uphill along x: the x axis of the ground points up, by a negative turn about y.
+    # Uphill along x: the x axis of the ground points up, by a negative rotation about y.
     mujoco.mju_axisAngle2Quat(tilt, np.array([0.0, 1.0, 0.0]), -angle)
     torso = spec.body("torso")
     mujoco.mju_rotVecQuat(turned, torso.pos, tilt)
@@ -139,10 +139,10 @@ def test_a_slope_is_the_model_on_tilted_ground(robot: Robot, angle: float):
 
 @pytest.mark.parametrize("angle", [0.17, -0.3])
 def test_a_slope_pulls_like_gravity_that_leans(robot: Robot, angle: float):
-    # A pyramid of friction has edges, which lie differently on tilted ground; a cone has none.
+    # A friction pyramid depends on the rotation of the ground; a cone does not.
     mjcf = robot.mjcf.replace('cone="pyramidal"', 'cone="elliptic"')
-    # MuJoCo's frame of a contact is not square where a leg stands upright on tilted ground, so
-    # both fall a little first, while their legs move.
+    # MuJoCo's contact frame is not orthogonal for an upright leg on tilted ground, so both robots
+    # fall a little first, while their legs move.
     height = robot.standing_height
     assert f'name="torso" pos="0 0 {height}"' in mjcf
     mjcf = mjcf.replace(f'pos="0 0 {height}"', f'pos="0 0 {height + 0.1}"')
@@ -221,7 +221,7 @@ def test_rough_terrain_rises_and_falls_as_far_as_it_says(robot: Robot):
     for (column, row), found in seen.items():
         if (
             math.hypot(column * CELL_SIZE, row * CELL_SIZE) > 1.5
-        ):  # above the robot the ray meets it
+        ):  # above the robot, the ray hits the robot
             assert found == pytest.approx(told[middle[1] + row, middle[0] + column], abs=1e-5)
     assert 0.03 < max(seen.values()) <= 0.04
     assert -0.04 <= min(seen.values()) < -0.03

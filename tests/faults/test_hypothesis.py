@@ -1,8 +1,7 @@
-"""Promises of canonical form: equal hypotheses are equal robots, in the fewest words."""
+"""Tests of the canonical form: equal hypotheses have equal effects, with the fewest faults."""
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from selfmodel.faults.hypothesis import INTACT, canonical
 from selfmodel.faults.kind import Fault

@@ -1,9 +1,8 @@
-"""Promises of the diagnostic genome: every genome is a hypothesis, and back again."""
+"""Tests of the hypothesis space: genomes, neighbours, severities."""
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from hypothesis.extra.numpy import arrays
 
 from selfmodel.errors import InputError
@@ -107,12 +106,14 @@ def test_more_faults_than_genes_are_refused():
 
 
 @pytest.mark.parametrize("kinds", [PAPER_KINDS, ALL_KINDS], ids=["paper", "all"])
+@settings(max_examples=15)
 @given(data=st.data())
 def test_neighbours_are_canonical_and_differ_from_the_hypothesis_by_one_fault(
     kinds: tuple[FaultKind, ...], data: st.DataObject
 ):
     space = HypothesisSpace(ANATOMIES["quadruped"], kinds)
-    hypothesis = space.canonical(data.draw(st.lists(st.sampled_from(space.coarse_candidates))))
+    candidates = st.sampled_from(space.coarse_candidates)
+    hypothesis = space.canonical(data.draw(st.lists(candidates, max_size=3)))
     own = set(hypothesis.faults)
 
     for one in space.neighbours(hypothesis):
@@ -122,8 +123,9 @@ def test_neighbours_are_canonical_and_differ_from_the_hypothesis_by_one_fault(
     less = space.with_one_less(hypothesis)
     assert all(len(one) <= len(hypothesis) for one in less)
     assert {space.canonical(own - {fault}) for fault in own} <= set(less)
-    more = space.with_one_more(hypothesis)
-    assert all(set(one.faults) - own for one in more)
+    # A failed sensor absorbs its noise, and is absorbed by a jammed joint: one fault less is left.
+    for one in space.with_one_more(hypothesis):
+        assert len(set(one.faults) - own) == 1 or set(one.faults) < own
 
 
 def test_a_severity_that_means_another_kind_or_nothing_changes_the_fault():

@@ -1,4 +1,4 @@
-"""The contract of every kind of fault and of environment: add one, and it is tested."""
+"""Contract tests of every kind of fault and of environment, parametrised over the registry."""
 
 import dataclasses
 import importlib.util
@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from selfmodel.controllers.playback import Playback
-from selfmodel.diagnosis.kind_contract import check_kind
+from selfmodel.diagnosis.kind_contract import check_fault_kind
 from selfmodel.errors import InputError
 from selfmodel.experiments import plugins, robots
 from selfmodel.faults.build import build
@@ -22,11 +22,11 @@ from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
-from tests.conftest import random_motion
+from tests.helpers.drivers import random_motion
 
 
 def example(name: str) -> ModuleType:
-    """An example, imported as its user would import it."""
+    """A module of examples/, imported by path."""
     path = Path(__file__).parents[2] / "examples" / f"{name}.py"
     spec = importlib.util.spec_from_file_location(name, path)
     module = importlib.util.module_from_spec(spec)
@@ -39,7 +39,7 @@ PAYLOAD = example("payload").PAYLOAD
 
 @pytest.mark.parametrize("kind", [*KINDS.values(), PAYLOAD], ids=lambda kind: kind.name)
 def test_a_kind_keeps_its_contract(kind: FaultKind, robot: Robot):
-    check_kind(kind, robot)
+    check_fault_kind(kind, robot)
 
 
 def test_the_registry_knows_each_kind_by_its_name():
@@ -59,7 +59,7 @@ def test_a_kind_of_degree_proposes_a_few_levels(name: str, robot: Robot):
 
 
 def test_what_a_joint_absorbs_would_not_move_the_robot(robot: Robot):
-    """The pair, built as it is said, moves like the canonical form."""
+    """Checks that the pair of faults moves like its canonical form."""
     anatomy = robot.anatomy
     driver = Playback(anatomy.motors, random_motion(robot, 60))
     first = anatomy.joints[0]
@@ -73,7 +73,7 @@ def test_what_a_joint_absorbs_would_not_move_the_robot(robot: Robot):
         (one, other)
         for one, other in permutations(faults, 2)
         if one.kind.absorbs(one, other, anatomy)
-        # These contradict each other: the canonical form decides which is meant.
+        # The two faults contradict each other, and the canonical form keeps one.
         and (one.kind.name, other.kind.name) != ("jam", "jam-angle")
     ]
     assert {one.kind.name for one, _ in absorbed} == {"break", "jam", "jam-angle", "sensor"}
@@ -87,11 +87,11 @@ def test_what_a_joint_absorbs_would_not_move_the_robot(robot: Robot):
 
 
 def nothing(_embodiment: Embodiment, _anatomy: Anatomy, _fault: Fault) -> None:
-    """Strikes nothing."""
+    """Edits nothing."""
 
 
 def heavier_each_time(_embodiment: Embodiment, _anatomy: Anatomy, _fault: Fault) -> None:
-    """Is another fault each time."""
+    """Edits the model differently at each call."""
     heavier_each_time.times += 1
     _embodiment.model.body_mass[1] += heavier_each_time.times
 
@@ -128,10 +128,10 @@ GRADED = FaultKind(
     ],
 )
 def test_the_contract_kit_sees_each_way_to_break_it(change: dict, said: str, quadruped: Robot):
-    check_kind(GRADED, quadruped)
+    check_fault_kind(GRADED, quadruped)
 
     with pytest.raises((ValueError, InputError), match=said):
-        check_kind(dataclasses.replace(GRADED, **change), quadruped)
+        check_fault_kind(dataclasses.replace(GRADED, **change), quadruped)
 
 
 def test_the_contract_kit_sees_a_kind_that_edits_the_robot_itself():
@@ -141,7 +141,7 @@ def test_the_contract_kit_sees_a_kind_that_edits_the_robot_itself():
         robot.model.body_mass[1] = 5.0
 
     with pytest.raises(ValueError, match=r"does not make the same robot|changes the robot itself"):
-        check_kind(dataclasses.replace(GRADED, apply=wrong), robot)
+        check_fault_kind(dataclasses.replace(GRADED, apply=wrong), robot)
 
 
 def test_kinds_are_chosen_by_name(monkeypatch: pytest.MonkeyPatch):

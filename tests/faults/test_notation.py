@@ -1,8 +1,7 @@
-"""Promises of the notation: it reads back what it writes, and says which term is wrong."""
+"""Tests of the notation: round trips, and messages that contain the malformed term."""
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from selfmodel.errors import InputError
 from selfmodel.faults.notation import parse

@@ -1,4 +1,4 @@
-"""Promises of what a diagnosis considers: what can strike the robot, under whatever name."""
+"""Tests of the kinds of a search: those that apply to the robot, and those they degenerate to."""
 
 import dataclasses
 from pathlib import Path
@@ -7,7 +7,7 @@ import pytest
 
 from selfmodel.comparators import SEGMENT_PREDICTION
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
-from selfmodel.diagnosis.kind_contract import check_kind
+from selfmodel.diagnosis.kind_contract import check_fault_kind
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
@@ -25,8 +25,8 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import TrialPlan
-from tests.conftest import random_controllers
 from tests.helpers.command import selfmodel
+from tests.helpers.drivers import random_controllers
 from tests.helpers.memory import in_memory
 
 SMALL = dataclasses.replace(Settings().scaled(12), generations=2, steps=300)
@@ -41,7 +41,7 @@ BARE = """\
 </worldbody>
 <actuator><position name="hip" joint="hip" kp="50" ctrlrange="-1 1"/></actuator></mujoco>
 """
-"""A robot without a sensor."""
+"""A robot without sensors."""
 
 
 def test_what_strikes_a_robot_stays_in_its_order_and_brings_its_other_names(robot: Robot):
@@ -66,7 +66,7 @@ def test_a_kind_that_no_diagnosis_may_propose_is_refused(robot: Robot):
 
 
 def test_kinds_that_a_fault_is_of_at_some_degree_can_be_named(quadruped: Robot):
-    """What a diagnosis says is read back from its log."""
+    """Diagnoses in a journal are parsed with these kinds."""
     sticky = FaultKind(name="sticky", keyword="sticky", apply=apply)
     stick = FaultKind(
         name="stick",
@@ -77,16 +77,16 @@ def test_kinds_that_a_fault_is_of_at_some_degree_can_be_named(quadruped: Robot):
         degenerates_to={0.0: sticky, 0.5: None},
     )
 
-    check_kind(stick, quadruped)
+    check_fault_kind(stick, quadruped)
     assert HypothesisSpace.of((stick,), quadruped.anatomy).kinds == (stick, sticky)
     assert str(HypothesisSpace(quadruped.anatomy, (stick,)).parse("stick=0")) == "sticky"
     for wrong in (KINDS["neuron"], KINDS["slope"]):
         with pytest.raises(ValueError, match=f"stick degenerates to {wrong.name}"):
-            check_kind(dataclasses.replace(stick, degenerates_to={0.0: wrong}), quadruped)
+            check_fault_kind(dataclasses.replace(stick, degenerates_to={0.0: wrong}), quadruped)
 
 
 def apply(embodiment: Embodiment, _anatomy: Anatomy, fault: Fault) -> None:
-    """More friction in every joint."""
+    """Adds friction to every joint."""
     embodiment.model.dof_frictionloss[6:] += 0.1 + fault.severity
 
 
@@ -104,6 +104,7 @@ def test_a_recovery_of_a_robot_with_nothing_to_strike_is_refused_before_any_tria
     assert list(tmp_path.rglob("*.mcap*")) == []
 
 
+@pytest.mark.search
 def test_a_joint_that_turns_out_to_be_jammed_at_0_is_found_among_angles_trial_after_trial(
     quadruped: Robot,
 ):

@@ -1,4 +1,4 @@
-"""Promises of the failures that are made for any body: Table I's for the paper's two robots."""
+"""Tests of the derived failures: Table I for the paper's robots, and its rules for any robot."""
 
 import re
 
@@ -15,7 +15,7 @@ SUITE = [suite_bodies.name(domain, tasks[0]) for domain, tasks in suite_bodies.D
 
 @pytest.fixture(scope="module", params=[*ROBOTS, *SUITE, "ant"])
 def body(request: pytest.FixtureRequest) -> Robot:
-    """Ours, the suite's, and an ant."""
+    """The built-in robots, bodies of the suite, and an ant."""
     return BODIES["ant"]() if request.param == "ant" else entry(request.param).robot()
 
 
@@ -52,7 +52,7 @@ def test_each_has_as_many_faults_as_it_says_and_no_two_are_alike(body: Robot):
     assert list(cases) == sorted(cases)
     assert len(set(meant.values())) == len(cases)
     for number, hypothesis in meant.items():
-        # What hangs on a lost limb cannot fail beside it: nothing is absorbed.
+        # No fault is at a part of the lost limb, so none is absorbed.
         assert len(hypothesis.faults) == {9: 0, 4: 2, 7: 2, 8: 3}.get(number, 1)
 
 
@@ -71,7 +71,9 @@ def test_a_limb_is_lost_whole_and_leaves_the_others(body: Robot):
 def test_what_a_body_cannot_have_is_left_out():
     assert 4 not in cases_of(entry("suite-hopper-hop").robot().anatomy)  # one limb
     assert 8 not in cases_of(entry("suite-walker-walk").robot().anatomy)  # two limbs
-    swimmer = cases_of(entry("suite-swimmer-swimmer6").robot().anatomy)  # one, and no touch
+    swimmer = cases_of(
+        entry("suite-swimmer-swimmer6").robot().anatomy
+    )  # one limb, without touch sensors
     assert list(swimmer) == [1, 2, 5, 6, 9, 10]
 
 

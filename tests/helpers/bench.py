@@ -12,7 +12,7 @@ from selfmodel.settings import Settings
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import SIGNALS, Behaviour, collect
 from selfmodel.trials.trial import TrialPlan
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 
 STEPS = 30
 QUADRUPED = ROBOTS["quadruped"].robot()

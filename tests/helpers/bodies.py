@@ -7,6 +7,7 @@ from functools import lru_cache, partial
 
 import mujoco
 import numpy as np
+import pytest
 
 from selfmodel.controllers.command_source import CommandSource
 from selfmodel.controllers.playback import played_back
@@ -118,6 +119,12 @@ BODIES: Mapping[str, Callable[[], Robot]] = {
     "ant": lru_cache(partial(sensed, "ant", ant(), 0.05)),
 }
 """Each body by its name; built once."""
+
+EVERY_BODY = [
+    name if name in ("walker", "hopper", "ant") else pytest.param(name, marks=pytest.mark.bodies)
+    for name in sorted(BODIES)
+]
+"""The names, for a test of every body: the fast tests keep three small ones."""
 
 
 def swinging(robot: Robot, steps: int) -> np.ndarray:

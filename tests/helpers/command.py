@@ -1,9 +1,15 @@
-"""The command line as its users run it."""
+"""The command line as its users run it, in this process or in one of its own."""
 
+import io
+import multiprocessing.process
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
+
+from selfmodel.cli import main
 
 SMALL = ("--population", "8", "--generations", "2")
 
@@ -11,11 +17,32 @@ DIAGNOSIS = (
     *("diagnosis", "verdict", "rivals", "unseen", "test", "intact_distance"),
     *("outside", "calibration"),
 )
-"""What JSON says of a diagnosis, be it of a recovery's or of logs."""
+"""JSON keys of a diagnosis, in the output of a recovery and of `selfmodel diagnose`."""
+
+Done = subprocess.CompletedProcess[str]
 
 
-def selfmodel(*arguments: str, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:
-    """Runs the command in a folder, with its output piped."""
+def selfmodel(*arguments: str, cwd: Path, **environment: str) -> Done:
+    """Runs the command in this process, as if started in that folder with piped output.
+
+    Signals, OpenGL and a command's imports need a process of its own: see ``selfmodel_process``.
+    """
+    stdout, stderr = io.StringIO(), io.StringIO()
+    with (
+        _as_started_in(cwd, ["selfmodel", *map(str, arguments)], environment),
+        redirect_stdout(stdout),
+        redirect_stderr(stderr),
+    ):
+        try:
+            main()
+            status = 0
+        except SystemExit as end:
+            status = end.code if isinstance(end.code, int) else int(end.code is not None)
+    return Done(arguments, status, stdout.getvalue(), stderr.getvalue())
+
+
+def selfmodel_process(*arguments: str, cwd: Path, **environment: str) -> Done:
+    """Runs the command in a process of its own, in a folder, with its output piped."""
     return subprocess.run(
         [sys.executable, "-m", "selfmodel", *arguments],
         cwd=cwd,
@@ -25,3 +52,29 @@ def selfmodel(*arguments: str, cwd: Path, **environment: str) -> subprocess.Comp
         check=False,
         timeout=300,
     )
+
+
+@contextmanager
+def _as_started_in(folder: Path, argv: list[str], environment: dict[str, str]) -> Iterator[None]:
+    """Sets what a new process would have, and restores it; modules in the folder are forgotten."""
+    before = Path.cwd(), sys.argv, list(sys.path), dict(os.environ), set(sys.modules)
+    spawned_in = multiprocessing.process.ORIGINAL_DIR
+    os.chdir(folder)
+    os.environ.update(environment)
+    places = [folder, *map(Path, filter(None, environment.get("PYTHONPATH", "").split(os.pathsep)))]
+    places = [place.resolve() for place in places]
+    sys.argv, sys.path[:0] = argv, map(str, places)
+    # Worker processes start in the folder in which their parent started.
+    multiprocessing.process.ORIGINAL_DIR = str(folder)
+    try:
+        yield
+    finally:
+        os.chdir(before[0])
+        sys.argv, sys.path[:] = before[1], before[2]
+        os.environ.clear()
+        os.environ.update(before[3])
+        multiprocessing.process.ORIGINAL_DIR = spawned_in
+        for name in set(sys.modules) - before[4]:
+            file = getattr(sys.modules[name], "__file__", None)
+            if file is not None and Path(file).parent in places:
+                del sys.modules[name]

@@ -1,8 +1,9 @@
 """A simulated robot in a process of its own, behind a TCP socket: what a driver is tested with.
 
 It moves in real time, one control time step a message, and answers each with what it observes then.
-Started as ``python -m tests.socket_robot HEARD [FAILURES]``: it prints its port, and writes the
-number of each message that it hears into a file, one a line, before it does anything else.
+Usage: ``python -m tests.helpers.socket_robot HEARD [FAILURES]``. The process prints its port, and
+writes the number of each message that it receives into a file, one a line, before it does anything
+else.
 """
 
 import dataclasses

@@ -17,8 +17,8 @@ from selfmodel.logs import (
     TruncatedError,
     UnsupportedError,
     read_log,
+    reader as reader_module,
 )
-from selfmodel.logs import reader as reader_module
 from selfmodel.logs.checksums import verified_records
 from selfmodel.logs.contents import Contents, read_contents
 from selfmodel.logs.records import HIDDEN, RESULT, TRIAL, with_digest, without_digest
@@ -241,11 +241,11 @@ def test_a_file_without_checksums_is_refused(log: Path):
 @pytest.mark.parametrize(
     ("count", "match"),
     [
-        ("message_count", "624 messages, it holds 625"),
-        ("attachment_count", "2 attachments, it holds 3"),
-        ("metadata_count", "3 metadata records, it holds 4"),
-        ("schema_count", "5 schemas, it holds 6"),
-        ("channel_count", "6 channels, it holds 7"),
+        ("message_count", "624 messages, its records 625"),
+        ("attachment_count", "2 attachments, its records 3"),
+        ("metadata_count", "3 metadata records, its records 4"),
+        ("schema_count", "5 schemas, its records 6"),
+        ("channel_count", "6 channels, its records 7"),
     ],
 )
 def test_counts_that_do_not_agree_are_refused(
@@ -259,7 +259,7 @@ def test_counts_that_do_not_agree_are_refused(
 
     monkeypatch.setattr(Statistics, "write", wrong)
     rewritten(log, lambda record: record)
-    with pytest.raises(CorruptError, match=f"its statistics say {match}"):
+    with pytest.raises(CorruptError, match=f"its statistics have {match}"):
         read_log(log)
 
 

@@ -228,11 +228,19 @@ UNSIZED = zstandard.ZstdCompressor(write_content_size=False)
 @pytest.mark.parametrize(
     ("more", "match"),
     [
-        ([chunk(message() * 500_000)] * 3, "more than a log may: 1000000 messages"),
+        pytest.param(
+            [chunk(message() * 500_000)] * 3,
+            "more than a log may: 1000000 messages",
+            marks=pytest.mark.fuzz,
+        ),
         ([chunk(record(0x80, b"") * 10**6)] * 9, "more than a log may: "),
         ([chunk(channel(1, "/odom") * 250_000)], "200000 records and chunks"),
         ([chunk(message(bytes(2**24 - 99)))] * 30, "bytes, unpacked"),
-        ([note(f"n{k}") for k in range(210_000)], "200000 records and chunks"),
+        pytest.param(
+            [note(f"n{k}") for k in range(210_000)],
+            "200000 records and chunks",
+            marks=pytest.mark.fuzz,
+        ),
         ([note("n", bytes(33 * 2**20))], "33554432 bytes beside its messages"),
         ([attachment("a", bytes(33 * 2**20))], "33554432 bytes attached"),
         ([attachment("a", b"x"), attachment("a", b"y")], "it has 'a' twice"),

@@ -244,11 +244,15 @@ def test_a_file_counts_as_often_as_it_is_named(trial: TrialLog):
 @pytest.mark.parametrize(
     ("mjcf", "files"),
     [
-        (mesh("m.stl"), {"m.stl": stl(40_000)}),
+        pytest.param(mesh("m.stl"), {"m.stl": stl(40_000)}, marks=pytest.mark.fuzz),
         (asset('<texture builtin="flat" width="1180" height="7080"/>'), {}),
         (asset('<hfield name="h" nrow="2896" ncol="2896" size="1 1 1 1"/>'), {}),
         (within("</sensor>", '<user dim="10000"/>' * 838), {}),
-        (within("</worldbody>", '<body><geom size="1"/></body>' * 9000), {}),
+        pytest.param(
+            within("</worldbody>", '<body><geom size="1"/></body>' * 9000),
+            {},
+            marks=pytest.mark.fuzz,
+        ),
         (within("</worldbody>", "<body><freejoint/><geom size='1'/></body>" * 990), {}),
     ],
 )

@@ -12,7 +12,6 @@ from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, canonical
 from selfmodel.faults.kind import ENVIRONMENT, Fault, FaultKind
 from selfmodel.faults.notation import parse
-from selfmodel.faults.registry import notation_kinds
 from selfmodel.logs import CorruptError, LogError, SchemaMismatchError, read_truth
 from selfmodel.logs.journal import FolderJournal, create_journal, read_database
 from selfmodel.logs.physical_trial import TrialRunner
@@ -209,7 +208,7 @@ def test_diagnoses_are_json_without_surprises(journal: FolderJournal, biped: Rob
 def test_rivals_of_a_third_party_s_kind_are_read_back(biped: Robot, tmp_path: Path):
     load = FaultKind(name="load", keyword="load", apply=lambda *_: None)
     loaded = canonical([Fault(load, ENVIRONMENT)], biped.anatomy)
-    journal = create_journal(tmp_path / "run", biped.anatomy, notation_kinds([load]))
+    journal = create_journal(tmp_path / "run", biped.anatomy, [load])
     told = dataclasses.replace(diagnosis(biped), indistinguishable=(loaded,))
     journal.add(told)
 

@@ -2,18 +2,18 @@
 
 import pytest
 
-from selfmodel.errors import WorkError, in_words
-from selfmodel.physical.cleanup import Ending
+from selfmodel.errors import WorkError, describe
+from selfmodel.physical.cleanup import Cleanup
 
 FAILURES = (OSError("the port is gone"), WorkError("the robot does not answer"))
 REASONS = (KeyboardInterrupt("Ctrl-C"), ZeroDivisionError("a bug"))
 
 
-def failing(failure: Exception) -> Ending:
+def failing(failure: Exception) -> Cleanup:
     def end() -> None:
         raise failure
 
-    return Ending(end)
+    return Cleanup(end)
 
 
 @pytest.mark.parametrize("failure", FAILURES, ids=repr)
@@ -23,7 +23,7 @@ def test_what_ended_a_block_goes_on_and_a_failing_end_is_a_note_to_it(
 ):
     with pytest.raises(type(reason)) as raised, failing(failure):
         raise type(reason)(*reason.args)
-    assert in_words(raised.value) == f"{reason}; {failure}"
+    assert describe(raised.value) == f"{reason}; {failure}"
 
 
 @pytest.mark.parametrize("failure", FAILURES, ids=repr)
@@ -41,6 +41,6 @@ def test_a_bug_at_the_end_is_not_hidden_in_a_note():
 
 def test_the_end_comes_once_and_after_the_block():
     done: list[str] = []
-    with Ending(lambda: done.append("end")):
+    with Cleanup(lambda: done.append("end")):
         done.append("block")
     assert done == ["block", "end"]

@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 
 from selfmodel.faults.notation import parse
-from selfmodel.physical.debris import drop_debris
-from selfmodel.physical.reality_gap import DEBRIS, draw_gap
+from selfmodel.physical.debris import place_debris
+from selfmodel.physical.reality_gap import DEBRIS_PREFIX, draw_gap
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state_access import signal_fields
 from selfmodel.tasks import ROBOTS
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 
 JOINTS = [
     (name, joint.name)
@@ -34,8 +34,8 @@ def left_alone(
     model = physical._embodiment.model
     data = mujoco.MjData(model)
     seen: list[np.ndarray] = []
-    pieces = [b for b in range(model.nbody) if model.body(b).name.startswith(DEBRIS)]
-    drop_debris(model, data, physical._limbs)
+    pieces = [b for b in range(model.nbody) if model.body(b).name.startswith(DEBRIS_PREFIX)]
+    place_debris(model, data, physical._limbs)
     for _ in range(round(seconds / model.opt.timestep)):
         mujoco.mj_step(model, data)
         seen.append(data.xipos[pieces].copy())
@@ -50,9 +50,9 @@ def test_a_lost_limb_falls_where_it_was_and_comes_to_rest_on_the_ground(name: st
     nominal = mujoco.MjData(robot.model)
     mujoco.mj_forward(robot.model, nominal)
     order = [
-        model.body(b).name.removeprefix(DEBRIS)
+        model.body(b).name.removeprefix(DEBRIS_PREFIX)
         for b in range(model.nbody)
-        if model.body(b).name.startswith(DEBRIS)
+        if model.body(b).name.startswith(DEBRIS_PREFIX)
     ]
 
     assert set(order) == lost
@@ -67,7 +67,7 @@ def test_a_lost_limb_falls_where_it_was_and_comes_to_rest_on_the_ground(name: st
     touching = {
         frozenset(model.body(model.geom_bodyid[g]).name for g in pair) for pair in data.contact.geom
     }
-    assert any("world" in pair and (pair & {DEBRIS + b for b in lost}) for pair in touching)
+    assert any("world" in pair and (pair & {DEBRIS_PREFIX + b for b in lost}) for pair in touching)
 
 
 @pytest.mark.parametrize(("name", "joint"), JOINTS)
@@ -94,7 +94,7 @@ def test_debris_stands_behind_all_that_is_the_robots(name: str):
         assert model.body(b).name == robot.model.body(b).name
     added = [model.body(b).name for b in range(robot.model.nbody, model.nbody)]
     assert len(added) == 4
-    assert all(body.startswith(DEBRIS) for body in added)
+    assert all(body.startswith(DEBRIS_PREFIX) for body in added)
 
 
 def test_debris_is_as_heavy_as_the_limb_was_and_collides_with_the_ground_and_the_robot(
@@ -104,10 +104,10 @@ def test_debris_is_as_heavy_as_the_limb_was_and_collides_with_the_ground_and_the
     model = broken(quadruped, "break:front_left_shoulder")._embodiment.model
     for body in ("front_left_upper", "front_left_lower"):
         np.testing.assert_allclose(
-            model.body(DEBRIS + body).mass, quadruped.model.body(body).mass * gap.mass[body]
+            model.body(DEBRIS_PREFIX + body).mass, quadruped.model.body(body).mass * gap.mass[body]
         )
         assert model.body(body).mass == 0
-    debris = model.geom(DEBRIS + "front_left_lower")
+    debris = model.geom(DEBRIS_PREFIX + "front_left_lower")
     for other in ("ground", "torso", "back_left_lower"):
         geom = model.geom(other)
         assert debris.contype & geom.conaffinity or geom.contype & debris.conaffinity
@@ -130,11 +130,11 @@ def test_there_is_debris_only_where_a_limb_fell_off_across_a_gap(quadruped: Robo
 def test_debris_does_not_pass_through_the_robot(quadruped: Robot):
     model = broken(quadruped, "break:front_left_knee")._embodiment.model
     data = mujoco.MjData(model)
-    data.joint(DEBRIS + "front_left_lower").qpos[:3] = [0, 0, 0.5]
+    data.joint(DEBRIS_PREFIX + "front_left_lower").qpos[:3] = [0, 0, 0.5]
     mujoco.mj_step(model, data, 80)
 
     # By then it would have fallen 0.78 m.
-    assert data.body(DEBRIS + "front_left_lower").xpos[2] > data.body("torso").xpos[2]
+    assert data.body(DEBRIS_PREFIX + "front_left_lower").xpos[2] > data.body("torso").xpos[2]
 
 
 def test_in_a_trial_debris_starts_where_the_limb_is_however_the_robot_stands(
@@ -143,15 +143,15 @@ def test_in_a_trial_debris_starts_where_the_limb_is_however_the_robot_stands(
     starts = []
 
     def watched(model: mujoco.MjModel, data: mujoco.MjData, limbs: tuple[str, ...]) -> None:
-        drop_debris(model, data, limbs)
+        place_debris(model, data, limbs)
         starts.append(data)
 
-    monkeypatch.setattr("selfmodel.physical.simulated_robot.drop_debris", watched)
+    monkeypatch.setattr("selfmodel.physical.simulated_robot.place_debris", watched)
     physical = broken(quadruped, "break:front_left_shoulder", 0.3)
     (controller,) = random_controllers(quadruped, 1)
     next(iter(physical.run(controller, 3)))
     for body in ("front_left_upper", "front_left_lower"):
-        lost, left = starts[0].body(DEBRIS + body), starts[0].body(body)
+        lost, left = starts[0].body(DEBRIS_PREFIX + body), starts[0].body(body)
         np.testing.assert_allclose(lost.xpos, left.xpos, atol=1e-9)
         np.testing.assert_allclose(lost.xmat, left.xmat, atol=1e-9)
     assert starts[0].joint("front_left_knee").qpos[0] != 0

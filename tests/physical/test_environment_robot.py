@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.comparators.command_errors import command_errors
@@ -22,7 +21,7 @@ from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.physical.environment_robot import EnvironmentRobot
 from selfmodel.physical.interface import PhysicalRobot, TimedRobot
 from selfmodel.physical.simulated_robot import SimulatedRobot
-from selfmodel.physical.step_timing import Stopwatch
+from selfmodel.physical.step_timing import StepTimer
 from selfmodel.recovery.recover import Recovery, recover
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
@@ -31,7 +30,6 @@ from selfmodel.tasks import load
 from selfmodel.tasks.walking import motion_capture
 from selfmodel.trials.behaviour import SIGNALS, collect
 from selfmodel.trials.trial import TrialPlan
-from tests.conftest import random_controllers
 from tests.helpers.bench import (
     CONTROLLER,
     NAMES,
@@ -44,6 +42,7 @@ from tests.helpers.bench import (
     logged,
     observation,
 )
+from tests.helpers.drivers import random_controllers
 
 
 @pytest.mark.parametrize("text", ["intact", "break:{0}", "sensor:{1}+friction=0.5"])
@@ -138,7 +137,7 @@ def test_a_caller_that_stops_iterating_stops_the_robot():
 
 def test_a_robot_that_cannot_be_read_at_the_start_is_not_driven():
     bench = Bench({0: None})
-    with pytest.raises(TrialError, match=r"nothing was read of front_left_touch, .* at step 0"):
+    with pytest.raises(TrialError, match=r"no reading of front_left_touch, .* at step 0"):
         driven(bench)
     assert bench.done == ["stop", "reset", "stop"]
 
@@ -225,11 +224,11 @@ def test_an_infinite_time_is_none_and_leaves_a_log_that_can_be_read(tmp_path: Pa
 def test_a_step_is_late_exactly_where_its_time_is_off_by_more_than_the_tolerance(
     took: list[float],
 ):
-    on_event, now = Stopwatch(1.0, 0.25), 7.0
-    assert not on_event.look(now, {}).late
+    timer, now = StepTimer(1.0, 0.25), 7.0
+    assert not timer.update(now, {}).late
     for each in took:
         before, now = now, now + each
-        moment = on_event.look(now, {})
+        moment = timer.update(now, {})
         if abs(abs(now - before - 1) - 0.25) > 1e-9:
             assert moment.late == (abs(now - before - 1) > 0.25)
         assert moment.elapsed == now - 7.0

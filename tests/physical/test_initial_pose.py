@@ -3,13 +3,12 @@
 import mujoco
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.spatial.transform import Rotation
 
 from selfmodel.faults.build import build
 from selfmodel.faults.notation import parse
-from selfmodel.physical.initial_pose import ANGLES, TILT, randomize_initial_pose
+from selfmodel.physical.initial_pose import ANGLE_DEVIATION, TILT_DEVIATION, randomize_initial_pose
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state_access import signal_fields
 from selfmodel.tasks import ROBOTS
@@ -37,10 +36,12 @@ def test_starts_spread_around_the_reference_pose(robot: Robot):
         turns.append(data.qpos[where["base_orientation"].columns].copy())
         places_.append(data.qpos[:2].copy())
 
-    np.testing.assert_allclose(np.std(angles, axis=0), level * ANGLES, rtol=0.25)
-    np.testing.assert_allclose(np.mean(angles, axis=0), 0, atol=5 * level * ANGLES / draws**0.5)
+    np.testing.assert_allclose(np.std(angles, axis=0), level * ANGLE_DEVIATION, rtol=0.25)
+    np.testing.assert_allclose(
+        np.mean(angles, axis=0), 0, atol=5 * level * ANGLE_DEVIATION / draws**0.5
+    )
     tilts = Rotation.from_quat(turns, scalar_first=True).as_rotvec()
-    np.testing.assert_allclose(tilts[:, :2].std(axis=0), level * TILT, rtol=0.25)
+    np.testing.assert_allclose(tilts[:, :2].std(axis=0), level * TILT_DEVIATION, rtol=0.25)
     np.testing.assert_allclose(tilts[:, 2], 0, atol=1e-9)
     np.testing.assert_array_equal(places_, np.zeros((draws, 2)))
 

@@ -6,24 +6,30 @@ import json
 import mujoco
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from selfmodel.errors import InputError
 from selfmodel.faults.build import apply_faults
 from selfmodel.faults.notation import parse
-from selfmodel.physical.reality_gap import FLOOR, LONGEST_DELAY, WIDEST, Gap, draw_gap, perturbed
+from selfmodel.physical.reality_gap import (
+    MAX_EXTRA_DELAY,
+    MAX_GAP_LEVEL,
+    MIN_FACTOR,
+    RealityGap,
+    draw_gap,
+    perturbed_model,
+)
 from selfmodel.recovery.random_streams import gap_stream
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 
 QUADRUPED = ROBOTS["quadruped"].robot()
 DRAWS = 400
 
 
-def drawn(level: float, seed: int = 0, robot: Robot = QUADRUPED) -> Gap:
+def drawn(level: float, seed: int = 0, robot: Robot = QUADRUPED) -> RealityGap:
     return draw_gap(robot, level, np.random.default_rng(seed))
 
 
@@ -34,7 +40,7 @@ def bits(model: mujoco.MjModel) -> bytes:
     return buffer.tobytes()
 
 
-def factors(gap: Gap) -> list[float]:
+def factors(gap: RealityGap) -> list[float]:
     each = (gap.mass, gap.inertia, gap.motors)
     return [gap.friction, gap.damping, *(f for kind in each for f in kind.values())]
 
@@ -44,21 +50,21 @@ def test_at_level_0_nothing_differs(robot: Robot):
 
     assert set(factors(gap)) == {1.0}
     assert gap.delay == 0
-    assert bits(perturbed(robot.model, gap)) == bits(robot.model)
+    assert bits(perturbed_model(robot.model, gap)) == bits(robot.model)
 
 
-@given(seed=st.integers(0, 2**32), level=st.floats(0, WIDEST))
+@given(seed=st.integers(0, 2**32), level=st.floats(0, MAX_GAP_LEVEL))
 @settings(max_examples=50, deadline=None)
 def test_the_same_seed_draws_the_same_gap_within_its_bounds(seed: int, level: float):
     gap = drawn(level, seed)
 
     assert gap == drawn(level, seed)
-    assert min(factors(gap)) >= FLOOR
-    assert 0 <= gap.delay <= LONGEST_DELAY
+    assert min(factors(gap)) >= MIN_FACTOR
+    assert 0 <= gap.delay <= MAX_EXTRA_DELAY
     assert set(gap.motors) == set(QUADRUPED.anatomy.motors)
     assert set(gap.mass) == set(gap.inertia)
     assert len(gap.mass) == QUADRUPED.model.nbody - 1
-    assert json.loads(json.dumps(gap.as_values())) == gap.as_values()
+    assert json.loads(json.dumps(gap.as_dict())) == gap.as_dict()
 
 
 @given(seed=st.integers(0, 2**32), level=st.floats(0.01, 0.09))
@@ -67,8 +73,8 @@ def test_a_wider_gap_is_the_same_robot_further_from_its_model(seed: int, level: 
     narrow, wide = drawn(level, seed), drawn(2 * level, seed)
 
     further = 2 * (np.array(factors(narrow)) - 1)
-    reached = np.array(factors(narrow)) > FLOOR
-    kept = reached & (1 + further > FLOOR)
+    reached = np.array(factors(narrow)) > MIN_FACTOR
+    kept = reached & (1 + further > MIN_FACTOR)
     np.testing.assert_allclose((np.array(factors(wide)) - 1)[kept], further[kept], atol=1e-12)
     assert (narrow.delay, narrow.seed) == (wide.delay, wide.seed)
 
@@ -101,7 +107,7 @@ def test_the_delay_is_none_one_or_two_steps_equally_often():
     delays = [drawn(0.05, seed).delay for seed in range(DRAWS)]
 
     counts = np.bincount(delays)
-    assert len(counts) == LONGEST_DELAY + 1
+    assert len(counts) == MAX_EXTRA_DELAY + 1
     assert np.abs(counts - DRAWS / 3).max() < 5 * np.sqrt(DRAWS * 2 / 9)
 
 
@@ -113,7 +119,7 @@ def test_a_level_out_of_range_is_refused(level: float):
 
 def test_a_perturbed_model_is_what_the_gap_says_and_leaves_the_robot_as_it_was(robot: Robot):
     gap, model, before = drawn(0.2, 1, robot), robot.model, bits(robot.model)
-    found = perturbed(model, gap)
+    found = perturbed_model(model, gap)
 
     for b in range(1, model.nbody):
         name = model.body(b).name
@@ -135,7 +141,7 @@ def test_a_weaker_servo_aims_at_the_same_angle():
     gap = dataclasses.replace(
         drawn(0.0), level=0.3, motors=dict.fromkeys(QUADRUPED.anatomy.motors, 0.5)
     )
-    model = perturbed(QUADRUPED.model, gap)
+    model = perturbed_model(QUADRUPED.model, gap)
     nominal, weaker = mujoco.MjData(QUADRUPED.model), mujoco.MjData(model)
     for data in (nominal, weaker):
         data.ctrl[:] = 0.1
@@ -151,7 +157,7 @@ def test_contact_pairs_slip_and_curved_damping_damps_as_the_rest_does():
     ).replace('damping="0.2"', 'damping="0.2 0.02"')
     robot = Robot("paired", mjcf, QUADRUPED.control_timestep)
     gap = drawn(0.1, robot=robot)
-    found, model = perturbed(robot.model, gap), robot.model
+    found, model = perturbed_model(robot.model, gap), robot.model
 
     assert model.npair
     assert model.dof_dampingpoly.any()
@@ -164,7 +170,7 @@ def test_contact_pairs_slip_and_curved_damping_damps_as_the_rest_does():
 
 def test_derived_numbers_follow_the_masses():
     heavier = dataclasses.replace(drawn(0.0), level=0.1, mass={"torso": 2.0})
-    model = perturbed(QUADRUPED.model, heavier)
+    model = perturbed_model(QUADRUPED.model, heavier)
 
     torso = model.body("torso").id
     added = QUADRUPED.model.body_mass[torso]
@@ -180,7 +186,7 @@ def test_perturbed_self_models_share_a_batch(robot: Robot):
     texts = ["intact", f"break:{robot.anatomy.joints[0].name}"]
     ends = []
     for seed in range(2):
-        model = perturbed(robot.model, drawn(0.1, seed, robot))
+        model = perturbed_model(robot.model, drawn(0.1, seed, robot))
         simulator._embodiment = lambda hypothesis, model=model: apply_faults(
             model, robot.anatomy, hypothesis
         )

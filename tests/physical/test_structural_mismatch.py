@@ -6,34 +6,33 @@ import json
 import mujoco
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from selfmodel.faults.notation import parse
 from selfmodel.physical.reality_gap import draw_gap
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.physical.structural_mismatch import (
-    BEND,
+    BACKLASH_RANGE,
+    BEND_RANGE,
     BENDING_TORQUE,
-    FOOT,
+    FOOT_RADIUS_FACTORS,
     OUTPUT_ARMATURE,
-    PLAY,
-    Structure,
-    draw_structure,
+    StructuralMismatch,
+    draw_structural_mismatch,
 )
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import SIGNALS, collect
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 
 QUADRUPED = ROBOTS["quadruped"].robot()
 
 
-def drawn(robot: Robot, seed: int = 0) -> Structure:
-    return draw_structure(robot, np.random.default_rng(seed))
+def drawn(robot: Robot, seed: int = 0) -> StructuralMismatch:
+    return draw_structural_mismatch(robot, np.random.default_rng(seed))
 
 
-def model_of(robot: Robot, structure: Structure) -> mujoco.MjModel:
+def model_of(robot: Robot, structure: StructuralMismatch) -> mujoco.MjModel:
     return SimulatedRobot(robot, structure=structure)._embodiment.model
 
 
@@ -44,13 +43,13 @@ def test_the_same_seed_draws_the_same_structure_within_its_bounds(seed: int):
 
     assert structure == drawn(QUADRUPED, seed)
     assert set(structure.play) == set(QUADRUPED.anatomy.hinges)
-    assert all(PLAY[0] <= play <= PLAY[1] for play in structure.play.values())
-    assert BEND[0] <= BENDING_TORQUE / structure.stiffness <= BEND[1]
-    assert FOOT[0] <= structure.foot_factor <= FOOT[1]
+    assert all(BACKLASH_RANGE[0] <= play <= BACKLASH_RANGE[1] for play in structure.play.values())
+    assert BEND_RANGE[0] <= BENDING_TORQUE / structure.stiffness <= BEND_RANGE[1]
+    assert FOOT_RADIUS_FACTORS[0] <= structure.foot_factor <= FOOT_RADIUS_FACTORS[1]
     assert structure.soft.endswith("knee")
     assert structure.foot.endswith("lower")
     assert structure.weak in QUADRUPED.anatomy.motors
-    assert json.loads(json.dumps(structure.as_values())) == structure.as_values()
+    assert json.loads(json.dumps(structure.as_dict())) == structure.as_dict()
 
 
 def test_every_part_is_struck_in_some_drawing():

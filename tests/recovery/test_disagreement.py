@@ -6,8 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.spatial.transform import Rotation
 
 from selfmodel.controllers.controller import Controller
@@ -29,7 +28,7 @@ from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.trials.behaviour import Behaviour, Names, Signal
 from selfmodel.trials.signal_scales import DISAGREEMENT_SCALES
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 
 NAMES = Names(sensors=("touch",), motors=("motor",), hinges=("hinge",))
 UP = np.array([0.0, 0.0, 1.0])

@@ -23,7 +23,7 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 from tests.helpers.gaits import changed, gait, logged
 
 SMALL = dataclasses.replace(Settings().scaled(20), generations=4, steps=200)

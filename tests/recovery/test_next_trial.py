@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, Verdict
@@ -31,7 +30,7 @@ from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.trials.behaviour import Behaviour, Signal
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 
 SMALL = dataclasses.replace(Settings().scaled(12), steps=150)
 

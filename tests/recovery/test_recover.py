@@ -32,10 +32,24 @@ from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.trials.behaviour import Sample, Signal
 from selfmodel.trials.trial import Stage, Trial
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 from tests.helpers.memory import MemoryJournal, in_memory
 
+TINY = dataclasses.replace(Settings().scaled(6), generations=2, steps=60)
 SMALL = dataclasses.replace(Settings().scaled(20), generations=5, steps=200)
+BUDGET = TINY
+"""The settings of every recovery here: each test runs with both budgets."""
+
+
+@pytest.fixture(
+    autouse=True,
+    params=[
+        pytest.param(TINY, id="tiny"),
+        pytest.param(SMALL, id="small", marks=pytest.mark.search),
+    ],
+)
+def _budget(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(globals(), "BUDGET", request.param)
 
 
 class CountingSimulator(Simulator):
@@ -91,7 +105,7 @@ def recovery(
         comparator=FORWARD_DISPLACEMENT,
         run_trial=in_memory(robot),
         journal=MemoryJournal(),
-        settings=dataclasses.replace(SMALL, trials=trials),
+        settings=dataclasses.replace(BUDGET, trials=trials),
         seed=seed,
         on_event=events.append,
         gait=gait,
@@ -120,7 +134,9 @@ def test_a_recovery_tells_the_papers_story(robot: Robot):
     diagnoses = [event for event in events if isinstance(event, Diagnosis)]
     assert [diagnosis.trials for diagnosis in diagnoses] == [1, 2, 3, 4]
     assert [diagnosis.best for diagnosis in diagnoses[:3]] == list(outcome.tried[2:])
-    assert outcome.repair_evaluations == outcome.diagnostic_evaluations == 4 * (20 + 4 * 10)
+    children = BUDGET.population // 2
+    evaluations = BUDGET.population + (BUDGET.generations - 1) * children
+    assert outcome.repair_evaluations == outcome.diagnostic_evaluations == 4 * evaluations
     assert outcome.recovered == max(trial.displacement for trial in outcome.trials[2:])
 
 
@@ -180,7 +196,7 @@ def test_the_truth_changes_a_diagnosis_only_through_what_the_robot_did(quadruped
             comparator=FORWARD_DISPLACEMENT,
             run_trial=in_memory(quadruped),
             journal=MemoryJournal(),
-            settings=dataclasses.replace(SMALL, trials=1),
+            settings=dataclasses.replace(BUDGET, trials=1),
             seed=1,
             on_event=events.append,
         )
@@ -219,7 +235,7 @@ def test_every_search_starts_from_what_the_database_holds(
     genomes = [trial.plan.controller.genome.tobytes() for trial in outcome.trials]
     space = HypothesisSpace(quadruped.anatomy, PAPER_KINDS)
     encoded = [
-        [space.encode(c.hypothesis, SMALL.genes).tobytes() for c in d.ranked] for d in diagnoses
+        [space.encode(c.hypothesis, BUDGET.genes).tobytes() for c in d.ranked] for d in diagnoses
     ]
 
     def newest_first(count: int) -> list[bytes]:
@@ -280,9 +296,9 @@ def recovery_in_files(
         damaged=SimulatedRobot(robot, truth),
         simulator=Simulator(robot, 2),
         comparator=FORWARD_DISPLACEMENT,
-        run_trial=TrialRunner(journal.trials, robot, SMALL, hidden).__call__,
+        run_trial=TrialRunner(journal.trials, robot, BUDGET, hidden).__call__,
         journal=SealedJournal(),
-        settings=dataclasses.replace(SMALL, trials=1),
+        settings=dataclasses.replace(BUDGET, trials=1),
         seed=1,
         on_event=lambda _: None,
     )
@@ -347,6 +363,7 @@ def test_the_way_to_choose_is_asked_before_each_trial_and_obeyed(quadruped: Robo
     assert not [e for e in events if isinstance(e, SearchBegins) and e.kind == "repair"][1:]
 
 
+@pytest.mark.search
 def test_trials_that_tell_apart_differ_from_the_one_before_and_are_the_same_at_any_threads(
     quadruped: Robot,
 ):

@@ -12,7 +12,7 @@ from selfmodel.faults.registry import KINDS
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import SIGNALS
-from tests.helpers.bodies import BODIES, swung
+from tests.helpers.bodies import BODIES, EVERY_BODY, swung
 
 MJCF = """
 <mujoco>
@@ -111,7 +111,7 @@ def test_an_angle_reads_from_minus_one_to_one_over_its_hinge_s_range():
     assert robot.anatomy.joint("knee").limits == ((-math.pi, math.pi),)
 
 
-@pytest.mark.parametrize("name", sorted(BODIES))
+@pytest.mark.parametrize("name", EVERY_BODY)
 def test_what_a_controller_receives_is_what_a_sensor_says_an_angle_reads_as(name: str):
     robot = BODIES[name]()
     run = (

@@ -16,11 +16,11 @@ from selfmodel.robot.designs import network_for
 from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.replay import replay
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.simulation.trial_replay import replay
 from selfmodel.trials.behaviour import SIGNALS
 from selfmodel.trials.trial import TrialPlan
-from tests.conftest import random_controllers, random_of
+from tests.helpers.drivers import random_controllers, random_of
 
 
 def of_0_1(robot: Robot, hidden: str) -> Robot:

@@ -3,8 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from scipy.spatial.transform import Rotation
 
 from selfmodel.robot.floating_base import SlidingRoot, root_of

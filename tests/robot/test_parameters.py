@@ -5,8 +5,7 @@ import dataclasses
 import mujoco
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from selfmodel.robot.custom_numerics import CONTROL_DELAY
 from selfmodel.robot.parameters import (

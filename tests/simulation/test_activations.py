@@ -3,11 +3,10 @@
 import mujoco
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.activations import starting_activations
+from selfmodel.simulation.activations import initial_activations
 from selfmodel.simulation.requests import Past, Segments
 
 MJCF = """
@@ -74,7 +73,7 @@ def test_they_are_what_the_commands_since_the_start_made_of_them(
     segments = cut(commands, starts, 3, Past(commands, starts))
 
     np.testing.assert_allclose(
-        starting_activations(robot, segments, delay),
+        initial_activations(robot, segments, delay),
         physics(robot, commands, delay)[starts],
         atol=1e-12,
     )
@@ -89,7 +88,7 @@ def test_a_command_that_is_not_known_is_the_one_before():
     starts = np.array([20])
 
     np.testing.assert_allclose(
-        starting_activations(robot, cut(commands, starts, 0, Past(holes, starts)), 0),
+        initial_activations(robot, cut(commands, starts, 0, Past(holes, starts)), 0),
         physics(robot, commands, 0)[starts],
         atol=1e-12,
     )
@@ -99,7 +98,7 @@ def test_without_the_past_what_followed_the_same_command_for_long_is_right():
     robot = made("Euler")
     commands = np.full((400, robot.model.nu), 0.4)
     starts = np.array([399])
-    found = starting_activations(robot, cut(commands, starts, 3, None), 1)
+    found = initial_activations(robot, cut(commands, starts, 3, None), 1)
     adding = 3  # of those with an activation
 
     np.testing.assert_allclose(
@@ -115,7 +114,7 @@ def test_without_the_past_the_commands_before_a_segment_count(delay: int):
     commands = np.random.default_rng(1).normal(size=(STEPS, robot.model.nu))
     commands[: STEPS - 10] = commands[STEPS - 10]
     starts = np.array([STEPS - 1])
-    found = starting_activations(robot, cut(commands, starts, 12, None), delay)
+    found = initial_activations(robot, cut(commands, starts, 12, None), delay)
     fast = slice(4, None)
 
     np.testing.assert_allclose(
@@ -126,4 +125,4 @@ def test_without_the_past_the_commands_before_a_segment_count(delay: int):
 def test_motors_without_a_state_have_none(quadruped: Robot):
     commands = np.zeros((STEPS, quadruped.model.nu))
 
-    assert starting_activations(quadruped, cut(commands, np.arange(4), 0, None), 0).shape == (4, 0)
+    assert initial_activations(quadruped, cut(commands, np.arange(4), 0, None), 0).shape == (4, 0)

@@ -21,7 +21,8 @@ from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import Signal, collect
 from selfmodel.trials.state_estimation import BASE, ONBOARD, STATE, estimated_states
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.conftest import lacking, random_motion
+from tests.helpers.drivers import random_motion
+from tests.helpers.hostile import lacking
 
 STEPS = 201
 QUADRUPED = ROBOTS["quadruped"].robot()

@@ -22,7 +22,7 @@ from selfmodel.faults.terrain import (
 from selfmodel.physical.simulated_robot import OWN_SEED, SimulatedRobot
 from selfmodel.robot.designs import cpg_for
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.ground_contacts import felt_points
+from selfmodel.simulation.ground_contacts import ground_contact_points
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import suite_bodies
 from selfmodel.trials.behaviour import Behaviour, collect
@@ -61,7 +61,7 @@ def observed(robot: Robot, truth: str, walk: Controller) -> Behaviour:
 
 @pytest.mark.parametrize("roughness", [0.02, 0.04])
 def test_feet_feel_the_ground_where_they_are(quadruped: Robot, walk: Controller, roughness: float):
-    points = felt_points(quadruped, observed(quadruped, f"roughness={roughness}", walk))
+    points = ground_contact_points(quadruped, observed(quadruped, f"roughness={roughness}", walk))
     x, y, z = points.T
 
     assert len(points) > STEPS / 2
@@ -70,7 +70,7 @@ def test_feet_feel_the_ground_where_they_are(quadruped: Robot, walk: Controller,
 
 
 def test_on_level_ground_they_feel_no_height(quadruped: Robot, walk: Controller):
-    z = felt_points(quadruped, observed(quadruped, "intact", walk))[:, 2]
+    z = ground_contact_points(quadruped, observed(quadruped, "intact", walk))[:, 2]
 
     assert np.median(np.abs(z - MARGIN)) < 0.001
 
@@ -135,8 +135,13 @@ def test_what_was_not_observed_is_not_felt(quadruped: Robot, walk: Controller):
     silent = {signal: values.copy() for signal, values in whole.signals.items()}
     silent["sensors"][:, :4] = np.nan
 
-    assert 0 < len(felt_points(quadruped, dataclasses.replace(whole, signals=blind))) <= 400
-    assert felt_points(quadruped, dataclasses.replace(whole, signals=silent)).shape == (0, 3)
+    assert (
+        0 < len(ground_contact_points(quadruped, dataclasses.replace(whole, signals=blind))) <= 400
+    )
+    assert ground_contact_points(quadruped, dataclasses.replace(whole, signals=silent)).shape == (
+        0,
+        3,
+    )
 
 
 def test_a_robot_on_its_back_or_far_away_feels_nothing_and_is_diagnosed_all_the_same(
@@ -154,7 +159,7 @@ def test_a_robot_on_its_back_or_far_away_feels_nothing_and_is_diagnosed_all_the_
         evidence = Evidence(Simulator(quadruped, 1), SEGMENT_PREDICTION)
         rough = parse("roughness=0.02", quadruped.anatomy)
 
-        assert felt_points(quadruped, behaviour).shape == (0, 3)
+        assert ground_contact_points(quadruped, behaviour).shape == (0, 3)
         assert np.isfinite(evidence.distances([rough], [trial])).all()
 
 
@@ -164,7 +169,9 @@ def test_the_ground_is_the_plane_that_lies_level_not_a_wall(quadruped: Robot, wa
     behaviour = observed(quadruped, "intact", walk)
 
     np.testing.assert_allclose(
-        felt_points(walled, behaviour), felt_points(quadruped, behaviour), atol=1e-9
+        ground_contact_points(walled, behaviour),
+        ground_contact_points(quadruped, behaviour),
+        atol=1e-9,
     )
 
 
@@ -172,4 +179,4 @@ def test_a_robot_without_touch_feels_nothing():
     swimmer = suite_bodies.robot("swimmer", "swimmer6")
     behaviour = Behaviour(swimmer.anatomy.names, np.arange(2.0), {})
 
-    assert felt_points(swimmer, behaviour).shape == (0, 3)
+    assert ground_contact_points(swimmer, behaviour).shape == (0, 3)

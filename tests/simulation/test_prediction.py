@@ -25,7 +25,8 @@ from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import SIGNALS, Behaviour, Signal, collect
 from selfmodel.trials.rotation import rotation_between
 from selfmodel.trials.state_estimation import ONBOARD, STATE
-from tests.conftest import exploding, random_motion
+from tests.helpers.drivers import random_motion
+from tests.helpers.hostile import exploding
 
 HORIZON, STEPS = 12, 100
 RECORD: tuple[Signal, ...] = (*STATE, "sensors")
@@ -176,7 +177,7 @@ def test_segments_that_do_not_say_what_is_still_on_its_way_are_refused(quadruped
     segments = cut(trial(quadruped), range(0, STEPS - HORIZON, 10), lead=1)
     Simulator(late(quadruped, 1), 1).predict([INTACT], segments)
 
-    said = "take effect 2 steps late, and segments have 1"
+    said = "take effect 2 steps late, and segments have a lead of 1"
     with pytest.raises(InputError, match=said):
         Simulator(late(quadruped, 2), 1).predict([INTACT], segments)
     with pytest.raises(InputError, match=said):

@@ -11,7 +11,8 @@ from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
 from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.trials.behaviour import SIGNALS, collect
-from tests.conftest import exploding, random_controllers
+from tests.helpers.drivers import random_controllers
+from tests.helpers.hostile import exploding
 
 STEPS = 150
 

@@ -1,4 +1,4 @@
-"""Promises of the suite's bodies: its own time steps, environment and rewards, to the bit."""
+"""Tests of the suite's bodies: time steps, environments and rewards are the suite's to the bit."""
 
 import numpy as np
 import pytest
@@ -14,12 +14,17 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS, entry, load, suite_bodies
 from selfmodel.trials.behaviour import SIGNALS, Behaviour, collect
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 
 STEPS = 60
-FIRST = [(domain, tasks[0]) for domain, tasks in suite_bodies.DOMAINS.items()]
+FIRST = [
+    pytest.param(
+        *(domain, tasks[0]), marks=() if domain in ("walker", "hopper") else pytest.mark.bodies
+    )
+    for domain, tasks in suite_bodies.DOMAINS.items()
+]
 TOUCHING = ("dog",)
-"""Domains whose reward is also of contact forces, which are those of another physics step."""
+"""Domains whose reward depends on contact forces, which are those of another physics step."""
 
 
 @pytest.mark.parametrize(("domain", "task"), FIRST)
@@ -29,7 +34,7 @@ def test_the_simulated_return_is_that_of_the_suites_own_environment(domain: str,
     assert score is not None
     driver = random_controllers(robot, 1)[0]
     simulated = Simulator(robot, 1).run([(INTACT, driver)], STEPS, score.record).behaviour
-    # The suite's own model and task; only the start is the model's and not one that is drawn.
+    # The suite's own model and task, with the model's initial pose instead of a random one.
     env = suite.load(domain, task, task_kwargs={"random": 0})
     targets = env.physics.model.geom_pos.copy()
     env.reset()
@@ -56,7 +61,7 @@ def test_the_environment_of_a_damaged_body_is_its_simulation_to_the_bit(name: st
     assert score is not None
     physical = own.physical(robot, truth)
     expected = collect(robot.anatomy.names, SimulatedRobot(robot, truth).run(driver, STEPS))
-    for _ in range(2):  # every episode begins alike
+    for _ in range(2):  # every episode has the same initial pose
         got = collect(robot.anatomy.names, physical.run(driver, STEPS))
         for signal in SIGNALS:
             assert got[signal].tobytes() == expected[signal].tobytes(), signal
@@ -131,7 +136,7 @@ def test_hypotheses_of_a_body_take_little_memory():
     walker, dog = (entry(name).robot() for name in ("suite-walker-walk", "suite-dog-walk"))
     kept = Simulator(dog, 1)._embodiment.cache_parameters()["maxsize"]
 
-    assert walker.model.nbuffer < 2**18  # as the suite has it, 12 MB of sky and floor
+    assert walker.model.nbuffer < 2**18  # 12 MB of sky and floor textures in the suite
     assert kept * dog.model.nbuffer <= 2**29
 
 

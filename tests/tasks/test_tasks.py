@@ -1,7 +1,6 @@
-"""Promises of our tasks in dm_control's world: the checks that its own suite passes, and more.
+"""Tests of the dm_control tasks: the checks of dm_control's own suite, and further ones.
 
-They run over every task with every failure of Table I and with every environment: a damaged body is
-as good a task as a whole one.
+They are parametrised over every task, with every failure of Table I and every environment.
 """
 
 import os
@@ -29,14 +28,14 @@ from selfmodel.tasks import ALL_TASKS, ROBOTS, SUITE, TASKS_BY_DOMAIN
 from tests.helpers.opengl import WORKS, draws
 
 FASTEST = 50.0
-"""A speed that no robot of ours has, m/s."""
+"""Upper bound on the robots' speed, m/s."""
 
 WORLDS = ("friction=0.4", "slope=0.17", "roughness=0.03", "wind=-5", "crosswind=3")
 OTHERS = ("motor:{joint}=0.5+sensor:{sensor}=gain0.5", "jam:{joint}=0.2+slope=-0.1+friction=0.6")
 
 
 def damages(domain: str) -> Iterator[str]:
-    """The failures of Table I, every environment, and faults of degree beside environments."""
+    """The failures of Table I, every environment, and faults with severities in environments."""
     yield from ROBOTS[domain].cases.values()
     yield from WORLDS
     anatomy = ROBOTS[domain].robot().anatomy
@@ -98,7 +97,7 @@ def test_every_time_step_is_finite_and_in_its_specs(domain: str, task: str, hypo
         environment.reward_spec().validate(step.reward)
         environment.discount_spec().validate(step.discount)
         assert abs(step.reward) < FASTEST
-        assert step.discount == 1  # to walk has no end but time's
+        assert step.discount == 1  # an episode ends at the time limit only
         assert np.abs(step.observation["sensors"]).max() < 2  # touch is 0 or 1, angles nearly
 
 
@@ -167,7 +166,9 @@ def test_the_time_limit_ends_an_episode_and_none_never_does(domain: str, task: s
     assert lengths == [round(t / control_timestep) for t in (0.05, 0.2)]
     steps = list(episodes(environment, 1))
     assert steps[-1].last()
-    assert environment.step(np.zeros(environment.action_spec().shape)).first()  # begins anew
+    assert environment.step(
+        np.zeros(environment.action_spec().shape)
+    ).first()  # starts a new episode
     endless = load(domain, task, limit=float("inf"))
     endless.reset()
     action = np.zeros(endless.action_spec().shape)
@@ -204,7 +205,7 @@ def test_an_observation_stays_as_it_is_while_the_robot_goes_on(domain: str, task
 
 @every_task
 def test_all_that_is_observed_of_a_whole_robot_changes(domain: str, task: str):
-    """What never changes in an observation tells an agent nothing."""
+    """Constant observations carry no information."""
     seen: dict[str, list[np.ndarray]] = {}
     for step in episodes(load(domain, task, limit=1.0), 2):
         for name, values in step.observation.items():
@@ -238,7 +239,7 @@ def test_the_suites_own_arguments_are_taken_by_place_and_by_name(domain: str, ta
 
 @every_body
 def test_the_viewers_runtime_runs_episodes(domain: str, task: str, hypothesis: str):
-    """What ``dm_control.viewer.launch`` does with an environment, but for the window."""
+    """Runs the steps of ``dm_control.viewer.launch`` without a window."""
     environment = partial(load, domain, task, hypothesis, limit=0.06)()
     viewed = runtime.Runtime(environment, policy=None)
     errors: list[object] = []
@@ -290,14 +291,15 @@ for camera in range(-1, environment.physics.model.ncam):
 print("seen")
 sys.stdout.flush()
 import os
-os._exit(0)  # the order in which OpenGL's parts go is not ours
+os._exit(0)  # skips OpenGL's cleanup at exit, whose order is undefined
 """
 
 
+@pytest.mark.opengl
 @draws
 @every_task
 def test_the_viewer_shows_a_damaged_robot_in_a_window_of_ours(domain: str, task: str):
-    """``dm_control.viewer.launch`` itself, with a window that needs no screen."""
+    """Runs ``dm_control.viewer.launch`` with an off-screen window."""
     done = subprocess.run(
         [sys.executable, "-c", LAUNCHED, domain, task],
         env={**os.environ, "MUJOCO_GL": str(WORKS)},

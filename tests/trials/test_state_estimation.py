@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from selfmodel.controllers.command_source import CommandSource
 from selfmodel.controllers.playback import played_back
@@ -15,7 +14,7 @@ from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS, entry
 from selfmodel.trials.behaviour import SIGNALS, Behaviour, Signal
 from selfmodel.trials.state_estimation import IMU, JOINTS, STATE, estimated_states
-from tests.conftest import random_controllers, random_motion
+from tests.helpers.drivers import random_controllers, random_motion
 
 QUADRUPED = ROBOTS["quadruped"].robot()
 REACH = {"joint_positions": 3, "base_position": 6}

@@ -1,18 +1,14 @@
-"""``selfmodel logs``: what can be done with logs as files."""
+"""``selfmodel logs``: commands that work on log files."""
 
-import typer
+from selfmodel.cli.lazy import group
 
-from selfmodel.cli.logs.import_ import import_
-from selfmodel.cli.logs.info import info
-from selfmodel.cli.logs.salvage import salvage
-from selfmodel.cli.logs.verify import verify
-
-app = typer.Typer(
-    name="logs",
-    help="Look into trial logs, verify them, salvage damaged ones, import recordings.",
-    no_args_is_help=True,
+app = group(
+    "logs",
+    "Inspect and verify trial logs, salvage damaged ones, import recordings.",
+    {
+        "info": ("selfmodel.cli.logs.info:info", "Show what logs contain."),
+        "verify": ("selfmodel.cli.logs.verify:verify", "Check every checksum, count and digest."),
+        "salvage": ("selfmodel.cli.logs.salvage:salvage", "Save the complete data of a bad log."),
+        "import": ("selfmodel.cli.logs.import_:import_", "Import a rosbag2 recording as a log."),
+    },
 )
-app.command()(info)
-app.command()(verify)
-app.command()(salvage)
-app.command("import")(import_)

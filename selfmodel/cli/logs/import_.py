@@ -1,50 +1,53 @@
-"""``selfmodel logs import``: a rosbag2 recording of a real robot becomes a trial's log."""
+"""``selfmodel logs import``: a rosbag2 recording of a robot as a trial log."""
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
+import mujoco
 import typer
 
-from selfmodel.cli.options import Json, check_log_name
-from selfmodel.cli.output.plain import plain
+from selfmodel.cli.inputs import check_log_name
+from selfmodel.cli.options import Json
+from selfmodel.cli.output.plain import counted, plain
+from selfmodel.cli.output.tables import show
+from selfmodel.controllers.controller import Controller
 from selfmodel.errors import InputError
-
-if TYPE_CHECKING:
-    from selfmodel.controllers.controller import Controller
-    from selfmodel.logs.rosbag.importer import Recording
-    from selfmodel.logs.rosbag.mapping import BagMapping
-    from selfmodel.robot.robot import Robot
+from selfmodel.experiments import robots, trial_logs
+from selfmodel.experiments.robots import is_model
+from selfmodel.logs.files import refuse_existing
+from selfmodel.logs.rosbag.bag import open_bag
+from selfmodel.logs.rosbag.importer import Recording, import_bag, write_recording
+from selfmodel.logs.rosbag.mapping import BagMapping
+from selfmodel.logs.rosbag.mapping_file import read_mapping
+from selfmodel.logs.rosbag.suggest import suggest as suggest_mapping
+from selfmodel.robot.robot import Robot
 
 TIMESTEP = 0.01
-"""Seconds between two commands that ``--suggest`` assumes of an MJCF file, or nearly so."""
+"""Approximate control time step that ``--suggest`` assumes for an MJCF file, s."""
 
 
 def import_(
-    bag: Annotated[Path, typer.Argument(metavar="BAG", help="A bag's folder, .mcap or .db3.")],
+    bag: Annotated[Path, typer.Argument(metavar="BAG", help="Folder of a bag, .mcap or .db3.")],
     *,
     out: Annotated[
         Path | None,
-        typer.Option(
-            "--out", "-o", metavar="TRIAL.mcap", help="The log to write; it must not exist."
-        ),
+        typer.Option(*("--out", "-o"), metavar="NEW.mcap", help="Log to write; it must not exist."),
     ] = None,
     mapping: Annotated[
         Path | None,
-        typer.Option(metavar="MAP.toml", help="Which topic plays which role for which joint."),
+        typer.Option(metavar="MAP.toml", help="Topics and message fields per signal and joint."),
     ] = None,
     suggest: Annotated[
-        bool, typer.Option("--suggest", help="Print a mapping to start from, and import nothing.")
+        bool, typer.Option("--suggest", help="Print a mapping to edit, and import nothing.")
     ] = False,
     robot: Annotated[
         str | None,
-        typer.Option(
-            metavar="NAME|MODEL.xml", help="Whose mapping to suggest; for --suggest only."
-        ),
+        typer.Option(metavar="ROBOT", help="Robot of --suggest: a robot's name, or MODEL.xml."),
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Import a rosbag2 recording of a real robot as a trial's log, without ROS."""
+    """Import a rosbag2 recording of a robot as a trial log, without ROS."""
     if suggest:
         if robot is None or out or mapping or as_json:
             raise InputError(
@@ -53,36 +56,25 @@ def import_(
         typer.echo(_suggestion(bag, robot), nl=False)
         return
     if robot is not None:
-        raise InputError("--robot goes with --suggest; an import's robot stands in its mapping")
+        raise InputError("--robot goes with --suggest; the robot of an import is in its mapping")
     if out is None or mapping is None:
         raise InputError(
             "an import needs --out TRIAL.mcap and --mapping MAP.toml; "
-            "--suggest --robot NAME|MODEL.xml prints a mapping to start from"
+            "--suggest --robot NAME|MODEL.xml prints a mapping to edit"
         )
     check_log_name(out)
     _import(bag, out, mapping, as_json=as_json)
 
 
 def _suggestion(bag: Path, name: str) -> str:
-    # Whatever brings MuJoCo or ROS's messages waits until the command runs.
-    from selfmodel.experiments import robots  # noqa: PLC0415
-    from selfmodel.logs.rosbag.bag import open_bag  # noqa: PLC0415
-    from selfmodel.logs.rosbag.suggest import suggest  # noqa: PLC0415
-
-    own = not _is_model(name)
+    own = not is_model(name)
     made = robots.robot(name, TIMESTEP if own else _timestep(Path(name)))
     with open_bag(bag) as opened:
-        return suggest(opened, made, name, with_timestep=not own)
-
-
-def _is_model(name: str) -> bool:
-    return Path(name).suffix.lower() == ".xml"
+        return suggest_mapping(opened, made, name, with_timestep=not own)
 
 
 def _timestep(path: Path) -> float:
-    """The multiple of a model's physics time step that is nearest to ``TIMESTEP``."""
-    import mujoco  # noqa: PLC0415  # with the other work
-
+    """Returns the multiple of a model's physics time step nearest to ``TIMESTEP``, s."""
     try:
         physics = float(mujoco.MjModel.from_xml_path(str(path)).opt.timestep)
     except ValueError as error:
@@ -92,11 +84,6 @@ def _timestep(path: Path) -> float:
 
 
 def _import(bag: Path, out: Path, path: Path, *, as_json: bool) -> None:
-    # Whatever brings MuJoCo or ROS's messages waits until the command runs.
-    from selfmodel.logs.files import refuse_existing  # noqa: PLC0415
-    from selfmodel.logs.rosbag.importer import import_bag, write_recording  # noqa: PLC0415
-    from selfmodel.logs.rosbag.mapping_file import read_mapping  # noqa: PLC0415
-
     refuse_existing(out)
     mapping = read_mapping(path)
     made = _mapped_robot(mapping, path.parent)
@@ -109,19 +96,17 @@ def _import(bag: Path, out: Path, path: Path, *, as_json: bool) -> None:
         _print(out, recording)
 
 
-def _mapped_robot(mapping: "BagMapping", folder: Path) -> "Robot":
-    """The robot that a mapping names: one that comes with selfmodel, or a file beside it."""
-    from selfmodel.experiments import robots  # noqa: PLC0415
-
+def _mapped_robot(mapping: BagMapping, folder: Path) -> Robot:
+    """Returns the robot of a mapping: one of selfmodel's, or an MJCF file beside the mapping."""
     name, timestep = mapping.robot, mapping.control_timestep
-    own = not _is_model(name)
+    own = not is_model(name)
     if own and timestep is not None:
         raise mapping.document.error(
             ("control_timestep",), f"{name} has a control time step of its own: remove this one"
         )
     if not own and timestep is None:
         raise mapping.document.error(
-            ("robot",), f"{name} does not say how often it is controlled: add control_timestep, s"
+            ("robot",), f"{name} has no control time step: add control_timestep, s"
         )
     try:
         return robots.robot(name if own else str(folder / name), timestep or TIMESTEP)
@@ -129,9 +114,7 @@ def _mapped_robot(mapping: "BagMapping", folder: Path) -> "Robot":
         raise mapping.document.error(("robot",), str(error)) from error
 
 
-def _controller(mapping: "BagMapping", folder: Path, robot: "Robot") -> "Controller | None":
-    from selfmodel.experiments import trial_logs  # noqa: PLC0415
-
+def _controller(mapping: BagMapping, folder: Path, robot: Robot) -> Controller | None:
     if mapping.controller is None:
         return None
     try:
@@ -140,7 +123,7 @@ def _controller(mapping: "BagMapping", folder: Path, robot: "Robot") -> "Control
         raise mapping.document.error(("controller",), str(error)) from error
 
 
-def _facts(out: Path, mapping: "BagMapping", recording: "Recording") -> dict[str, Any]:
+def _facts(out: Path, mapping: BagMapping, recording: Recording) -> dict[str, Any]:
     return {
         "log": str(out),
         "robot": mapping.robot,
@@ -152,9 +135,7 @@ def _facts(out: Path, mapping: "BagMapping", recording: "Recording") -> dict[str
     }
 
 
-def _print(out: Path, recording: "Recording") -> None:
-    from selfmodel.cli.output.tables import show  # noqa: PLC0415  # only where a table is drawn
-
+def _print(out: Path, recording: Recording) -> None:
     rows = [
         (
             plain(topic),
@@ -169,10 +150,9 @@ def _print(out: Path, recording: "Recording") -> None:
     ]
     show(("topic", "msgs", "Hz", "jitter, ms", "gaps", "longest, ms", "late, ms"), rows)
     valid = ", ".join(f"{signal} {share:.0%}" for signal, share in recording.valid.items())
-    # Not through rich: a folder's name may look like markup.
     for note in recording.notes:
         typer.echo(f"note: {plain(note)}")
-    typer.echo(f"observed: {valid}\n{recording.behaviour.steps} steps: {out}")
+    typer.echo(f"observed: {valid}\n{counted(recording.behaviour.steps, 'step')}: {out}")
 
 
 def _number(value: float | None, scale: float = 1.0) -> str:

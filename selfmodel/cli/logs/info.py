@@ -1,23 +1,27 @@
-"""``selfmodel logs info``: what is in a log, at a glance."""
+"""``selfmodel logs info``: the contents of logs."""
 
 import json
 import math
+from importlib.resources import files as package_files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import typer
 
 from selfmodel.cli.options import Json, LogFiles
-from selfmodel.cli.output.plain import plain
+from selfmodel.cli.output.plain import counted, plain
+from selfmodel.cli.output.tables import show
 from selfmodel.errors import InputError
-
-if TYPE_CHECKING:
-    from selfmodel.logs import TrialLog
-    from selfmodel.logs.info import Info
+from selfmodel.logs import LogError, TrialLog
+from selfmodel.logs.info import Info, has_truth, read_info
+from selfmodel.logs.salvage import salvageable_steps
 
 
 def info(files: LogFiles, *, as_json: Json = False) -> None:
-    """Show what is in logs, and how to open them in a viewer. Exits with 1 if one is damaged."""
+    """Show what logs contain, and how to open them in a viewer.
+
+    The exit status is 1 if a log is damaged.
+    """
     found = [_facts(path) for path in files]
     if as_json:
         typer.echo(json.dumps({"files": found}, indent=2, allow_nan=False))
@@ -25,21 +29,20 @@ def info(files: LogFiles, *, as_json: Json = False) -> None:
         for one in found:
             _print(one)
         if any("error" not in one for one in found):
-            typer.echo(_OPENING)
+            typer.echo(_viewers())
     raise typer.Exit(1 if any("error" in one for one in found) else 0)
 
 
-_OPENING = """\
-To look at one:
-  Foxglove  Open local file; import docs/foxglove-layout.json as layout
-  Rerun     rerun FILE.mcap   (pip install rerun-sdk)"""
+def _viewers() -> str:
+    layout = package_files("selfmodel.cli.logs") / "foxglove-layout.json"
+    return (
+        "To view a log:\n"
+        f"  Foxglove  Open local file; import the layout {layout}\n"
+        "  Rerun     rerun FILE.mcap   (pip install rerun-sdk)"
+    )
 
 
 def _facts(path: Path) -> dict[str, Any]:
-    from selfmodel.logs.errors import LogError  # noqa: PLC0415  # with the other work
-    from selfmodel.logs.info import read_info  # noqa: PLC0415  # the same
-    from selfmodel.logs.salvage import salvageable_steps  # noqa: PLC0415  # the same
-
     try:
         return _as_object(path, read_info(path))
     except LogError as error:
@@ -57,9 +60,7 @@ def _damage(path: Path, error: Exception, steps: int) -> dict[str, Any]:
     }
 
 
-def _as_object(path: Path, found: "Info") -> dict[str, Any]:
-    from selfmodel.logs.info import has_truth  # noqa: PLC0415  # with the other work
-
+def _as_object(path: Path, found: Info) -> dict[str, Any]:
     trial = found.log.trial
     displacement = trial.displacement
     return {
@@ -90,22 +91,20 @@ def _as_object(path: Path, found: "Info") -> dict[str, Any]:
     }
 
 
-def _clock(log: "TrialLog") -> dict[str, int] | None:
+def _clock(log: TrialLog) -> dict[str, int] | None:
     if log.timing is None:
         return None
     return {"late": int(log.timing.late.sum()), "missing": int(log.timing.missing.sum())}
 
 
 def _print(one: dict[str, Any]) -> None:
-    from selfmodel.cli.output.tables import show  # noqa: PLC0415  # only where a table is drawn
-
     if "error" in one:
         typer.echo(plain(f"error: {one['error']}"))
         typer.echo(f"complete steps that can be salvaged: {one['salvageable_steps']}\n")
         return
     seconds = one["steps"] * one["control_timestep"]
     way = one["displacement"]
-    told = (
+    text = (
         f"{one['file']} ({one['bytes'] / 1000:.0f} kB)\n"
         f"trial {one['trial']} ({one['stage']}) of {one['robot']}, {one['status']}"
         f"{': ' + one['reason'] if one['reason'] else ''}\n"
@@ -114,11 +113,15 @@ def _print(one: dict[str, Any]) -> None:
         f"seed {one['seed']}\n"
         f"driven by {one['driver']}\n"
         f"written with {', '.join(f'{name} {text}' for name, text in one['software'].items())}\n"
-        f"what was wrong: {_TRUTH[one['truth']]}"
+        f"true hypothesis: {_TRUTH[one['truth']]}"
     )
-    typer.echo(plain(told))
+    typer.echo(plain(text))
     if clock := one["clock"]:
-        typer.echo(f"clock: {clock['late']} steps late, {clock['missing']} observations missing")
+        late, missing = (
+            counted(clock["late"], "step"),
+            counted(clock["missing"], "observation"),
+        )
+        typer.echo(f"clock: {late} late, {missing} missing")
     for name, text in one["source"].items():
         typer.echo(plain(f"{name}: {text if len(text) <= 100 else text[:97] + '...'}"))
     rows = [
@@ -130,7 +133,7 @@ def _print(one: dict[str, Any]) -> None:
     typer.echo(
         "observed: everything"
         if not partly
-        else "not all was observed: "
+        else "partly observed: "
         + ", ".join(f"{signal} {share:.1%}" for signal, share in partly.items())
     )
     sizes = ", ".join(f"{name} {size / 1000:.1f} kB" for name, size in one["attachments"].items())
@@ -138,6 +141,6 @@ def _print(one: dict[str, Any]) -> None:
 
 
 _TRUTH = {
-    "hidden": "a simulated robot; its log says it, where no diagnosis looks",
-    "unknown": "nobody knows",
+    "hidden": "recorded in the log of a simulated robot; no diagnosis reads it",
+    "unknown": "not recorded",
 }

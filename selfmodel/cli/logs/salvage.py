@@ -1,4 +1,4 @@
-"""``selfmodel logs salvage``: saves what is complete of a damaged log."""
+"""``selfmodel logs salvage``: the complete data of a damaged log in a new log."""
 
 import dataclasses
 import json
@@ -7,39 +7,38 @@ from typing import Annotated
 
 import typer
 
-from selfmodel.cli.options import Json, check_log_name
+from selfmodel.cli.inputs import check_log_name
+from selfmodel.cli.options import Json, NewLog
+from selfmodel.cli.output.plain import counted
+from selfmodel.logs.salvage import salvage as save
 
 
 def salvage(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A damaged log, or a .part.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Damaged log, or NAME.mcap.part.")],
     *,
-    out: Annotated[
-        Path,
-        typer.Option("--out", "-o", metavar="OUT.mcap", help="The new log; it must not exist."),
-    ],
+    out: NewLog,
     as_json: Json = False,
 ) -> None:
     """Save all complete data of a truncated or damaged log in a new, valid one."""
-    from selfmodel.logs.salvage import salvage as save  # noqa: PLC0415  # with the other work
-
     check_log_name(out)
     saved = save(file, out)
     if as_json:
         typer.echo(json.dumps({"source": str(file), **dataclasses.asdict(saved)}))
         return
-    typer.echo(f"saved {saved.steps} of {saved.planned} steps in {saved.log}")
+    typer.echo(f"saved {saved.steps} of {counted(saved.planned, 'step')} in {saved.log}")
     if saved.span > saved.steps:
         typer.echo(
-            f"it spans {saved.span} steps; what is lost of the others is marked as not observed"
+            f"it spans {counted(saved.span, 'step')}; lost data of the others is marked as not "
+            f"observed"
         )
     for topic, count in saved.missing.items():
-        typer.echo(f"{topic}: {count} {'message is' if count == 1 else 'messages are'} lost")
+        typer.echo(f"{topic}: {counted(count, 'message')} lost")
     for name in saved.lost:
         typer.echo(f"{name} is lost: {_CONSEQUENCES[name]}")
 
 
 _CONSEQUENCES = {
-    "controller.npz": "the commands that were logged will be played back instead",
-    "/robot_description": "viewers will not draw the robot",
-    "settings.json": "the paper's numbers stand in its place",
+    "controller.npz": "the logged commands are played back instead",
+    "/robot_description": "viewers do not draw the robot",
+    "settings.json": "the paper's settings are used instead",
 }

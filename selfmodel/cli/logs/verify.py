@@ -1,4 +1,4 @@
-"""``selfmodel logs verify``: every check, on every file."""
+"""``selfmodel logs verify``: every check on every log."""
 
 import json
 from pathlib import Path
@@ -7,12 +7,17 @@ from typing import Any
 import typer
 
 from selfmodel.cli.options import Json, LogFiles
-from selfmodel.cli.output.plain import plain
+from selfmodel.cli.output.plain import counted, plain
 from selfmodel.errors import InputError
+from selfmodel.logs import LogError
+from selfmodel.logs.verify import verify as check
 
 
 def verify(files: LogFiles, *, as_json: Json = False) -> None:
-    """Verify logs: checksums, counts, digests, layout, times, names, model. Exits with 0 or 1."""
+    """Verify checksums, counts, digests, layout, times, names and the model of logs.
+
+    The exit status is 0 if every log is good, otherwise 1.
+    """
     checked = [_checked(path) for path in files]
     if as_json:
         typer.echo(json.dumps({"ok": all(one["ok"] for one in checked), "files": checked}))
@@ -23,9 +28,6 @@ def verify(files: LogFiles, *, as_json: Json = False) -> None:
 
 
 def _checked(path: Path) -> dict[str, Any]:
-    from selfmodel.logs.errors import LogError  # noqa: PLC0415  # with the other work
-    from selfmodel.logs.verify import verify as check  # noqa: PLC0415  # the same
-
     try:
         log, loaded = check(path)
     except (LogError, InputError) as error:
@@ -42,7 +44,8 @@ def _checked(path: Path) -> dict[str, Any]:
 
 def _line(one: dict[str, Any]) -> str:
     if one["ok"]:
-        unloaded = "" if one["model_loaded"] else " (no MuJoCo here: its model was not loaded)"
+        unloaded = "" if one["model_loaded"] else " (without MuJoCo, its model was not loaded)"
         why = f" ({one['reason']})" if one["reason"] else ""
-        return f"ok: {one['file']}: {one['steps']} steps, {one['status']}{why}{unloaded}"
+        steps = counted(one["steps"], "step")
+        return f"ok: {one['file']}: {steps}, {one['status']}{why}{unloaded}"
     return f"error: {one['error']}"

@@ -1,7 +1,7 @@
-"""What ``selfmodel recover`` shows while it works: a line for all that is done, a bar for the rest.
+"""Progress of a recovery or a diagnosis: lines for finished work, and a bar on a terminal.
 
-The bar is for terminals; its hypothesis stands in the line that follows, so that no terminal is too
-narrow for the numbers.
+The hypothesis of a search is in the line after the search, not in the bar: the bar's numbers fit a
+narrow terminal.
 """
 
 import sys
@@ -11,16 +11,17 @@ from contextlib import contextmanager
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn
 
+from selfmodel.cli.output.plain import counted
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.evolution import Generation
 from selfmodel.recovery.events import DiscriminatingTrial, Event, SearchBegins
-from selfmodel.simulation.calibrate import Calibration
+from selfmodel.simulation.calibration import Calibration
 from selfmodel.trials.trial import Trial
 
 
 @contextmanager
 def display() -> Iterator[Callable[[Event], None]]:
-    """Gives a function that shows the events it is told of, on standard error."""
+    """Yields a function that displays events on standard error."""
     console = Console(stderr=True, highlight=False, markup=False, emoji=False)
     if not sys.stderr.isatty():
         yield _Lines(console)
@@ -39,7 +40,7 @@ def display() -> Iterator[Callable[[Event], None]]:
 
 
 class _Lines:
-    """A line for the end of each search, for every trial and every diagnosis."""
+    """Prints a line per finished search, trial, calibration and diagnosis."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
@@ -51,24 +52,24 @@ class _Lines:
                 self._search = f"{kind} EA" if hypothesis is None else f"{kind} EA for {hypothesis}"
             case Generation() if event.number == event.total:
                 self._say(
-                    f"{self._search}: {event.number} generations, {event.evaluations} "
-                    f"evaluations, {_rate(event)}/s, best {event.best:.4f}"
+                    f"{self._search}: {counted(event.number, 'generation')}, "
+                    f"{counted(event.evaluations, 'evaluation')}, {_rate(event)}/s, "
+                    f"best {event.best:.4f}"
                 )
             case Calibration():
                 self._say(
                     f"calibration: error {event.error_before:.3f} before, {event.error:.3f} after; "
-                    f"delay {event.parameters.delay} "
-                    f"{'step' if event.parameters.delay == 1 else 'steps'}"
+                    f"delay {counted(event.parameters.delay, 'step')}"
                 )
             case DiscriminatingTrial():
                 apart = ", ".join(map(str, event.hypotheses))
-                self._say(f"the next trial is to tell apart: {apart}")
+                self._say(f"the next trial discriminates between: {apart}")
             case Trial():
                 self._say(f"trial {event.plan.name}: {event.displacement:.3f} m forward")
             case Diagnosis():
-                best, trials = event.ranked[0], event.trials
+                best = event.ranked[0]
                 self._say(
-                    f"diagnosis from {trials} {'trial' if trials == 1 else 'trials'}: "
+                    f"diagnosis from {counted(event.trials, 'trial')}: "
                     f"{best.hypothesis} (distance {best.distance:.4f}), {event.verdict}"
                 )
 
@@ -77,7 +78,7 @@ class _Lines:
 
 
 class _Bar:
-    """The same lines, above a bar for the search that is going on."""
+    """Prints the same lines above a bar for the current search."""
 
     def __init__(self, progress: Progress) -> None:
         self._progress = progress

@@ -1,9 +1,11 @@
-"""What a command shows while it runs a grid: a bar on a terminal, a line a part elsewhere."""
+"""Progress and end of a command that runs a grid: a bar on a terminal, lines elsewhere."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 
+import typer
 from rich.console import Console
 from rich.progress import (
     BarColumn,
@@ -19,15 +21,15 @@ from selfmodel.experiments.grid import GridBegins, PartEnds
 
 
 class Watch:
-    """Shows the events of grids, and remembers how far the last one has come.
+    """Displays the events of grids and counts the parts of the current one.
 
     Args:
-        console: Where lines go.
-        progress: The bar, if there is one: then only failures are lines.
+        console: Console of the lines.
+        progress: Progress bar, if any: then only failures are lines.
 
     Attributes:
-        done: Parts that are done, or have failed, in the grid that goes on.
-        total: All its parts.
+        done: Parts of the current grid that are done or have failed.
+        total: Parts of the current grid.
     """
 
     def __init__(self, console: Console, progress: Progress | None) -> None:
@@ -37,7 +39,7 @@ class Watch:
         self._task: TaskID | None = None
 
     def __call__(self, event: GridBegins | PartEnds) -> None:
-        """Shows an event."""
+        """Displays an event."""
         match event:
             case GridBegins():
                 self.done, self.total = event.finished, event.total
@@ -62,7 +64,7 @@ class Watch:
 
 @contextmanager
 def grid_display() -> Iterator[Watch]:
-    """Gives what shows the events of grids, on standard error."""
+    """Yields a display of grid events on standard error."""
     console = Console(stderr=True, highlight=False, markup=False, emoji=False)
     if not sys.stderr.isatty():
         yield Watch(console, None)
@@ -83,3 +85,40 @@ def grid_display() -> Iterator[Watch]:
 def _line(event: PartEnds) -> str:
     what = f"failed: {event.error}" if event.error else f"done in {event.seconds:.1f} s"
     return f"[{event.number}/{event.total}] {event.key} {event.part}: {what}"
+
+
+def run_shown(run: Callable[[Watch], Sequence[PartEnds]], out: Path) -> Sequence[PartEnds]:
+    """Runs a grid with a progress display; returns the failed parts.
+
+    Ctrl-C ends the command with status 130, and a line that says how to continue.
+
+    Args:
+        run: Runs the grid; calls its argument with each event.
+        out: Folder of the grid.
+    """
+    with grid_display() as on_event:
+        try:
+            return run(on_event)
+        except KeyboardInterrupt:
+            typer.echo(
+                f"interrupted: {on_event.done} of {on_event.total} are done and kept in {out}; the "
+                f"same command continues with the rest",
+                err=True,
+            )
+            raise typer.Exit(130) from None
+
+
+def as_objects(failed: Sequence[PartEnds]) -> list[dict[str, str | None]]:
+    """Returns failed parts as JSON values."""
+    return [{"run": one.key, "part": one.part, "error": one.error} for one in failed]
+
+
+def end(failed: Sequence[PartEnds]) -> None:
+    """Ends the command with status 1 and a line if a part failed."""
+    if failed:
+        typer.echo(
+            f"{len(failed)} failed, the first of them {failed[0].key} {failed[0].part}: "
+            f"{failed[0].error}; the same command tries them again",
+            err=True,
+        )
+        raise typer.Exit(1)

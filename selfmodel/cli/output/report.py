@@ -1,13 +1,14 @@
-"""What ``selfmodel recover`` says at the end, for people and for programs."""
+"""Outcome of ``selfmodel recover``, as text and as JSON."""
 
 import json
 from typing import Any
 
 import typer
 from rich.console import Console
-from rich.table import Table
 
+from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.ranking import in_words, ranking_table
+from selfmodel.cli.output.tables import folding
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
 from selfmodel.experiments.experiment import Experiment, Outcome
 from selfmodel.experiments.fitting import calibration_to_dict
@@ -20,25 +21,29 @@ def as_object(experiment: Experiment, outcome: Outcome) -> str:
 
 
 def print_report(experiment: Experiment, outcome: Outcome) -> None:
-    """Prints the trials, and the diagnosis beside the truth."""
+    """Prints the trials, the diagnosis, and the true hypothesis."""
     found = facts(experiment, outcome)
     console = Console()
-    trials = Table("trial", "what was then believed", "forward, m", title="physical trials")
-    trials.columns[1].overflow = "fold"
-    trials.columns[2].justify = "right"
-    for trial in found["trials"]:
-        trials.add_row(trial["stage"], trial["hypothesis"], f"{trial['displacement']:.3f}")
+    trials = folding(
+        ("trial", "best hypothesis so far", "forward, m"),
+        [
+            (trial["stage"], trial["hypothesis"], f"{trial['displacement']:.3f}")
+            for trial in found["trials"]
+        ],
+        title="physical trials",
+        texts=2,
+    )
     console.print(trials, ranking_table(found["diagnosis"], found["truth"]))
     evaluations, trials_since = found["evaluations"], found["physical_trials"]
     verdict = "right" if found["correct"] else "wrong"
-    # Not through rich: a folder's name may look like markup, and must not be folded.
+    # Not through rich, which reads markup in a folder's name and folds it.
     typer.echo(
         f"truth: {found['truth']}{_reality(found)}; the diagnosis is {verdict}.\n"
         f"{in_words(found)}\n"
         f"The robot went {found['displacement']['before']:.2f} m before, "
         f"{found['displacement']['after']:.2f} m after the failure, and "
         f"{found['displacement']['recovered']:.2f} m at best in "
-        f"{'1 trial' if trials_since == 1 else f'{trials_since} trials'} since.\n"
+        f"{counted(trials_since, 'trial')} since.\n"
         f"{evaluations['repair']} controllers and {evaluations['distinct_hypotheses']} distinct "
         f"hypotheses in {found['seconds']:.0f} s; diverged: {evaluations['diverged']}.\n"
         f"Logs: {experiment.folder}"
@@ -46,13 +51,13 @@ def print_report(experiment: Experiment, outcome: Outcome) -> None:
 
 
 def _reality(found: dict[str, Any]) -> str:
-    """How the physical robot differed from its model beside the truth, in words."""
+    """Returns the reality gap of the physical robot as a clause."""
     gap = f", at a reality gap of {found['gap']:g}" if found["gap"] else ""
-    return gap + (", built differently" if found["structure"] else "")
+    return gap + (", with structural mismatch" if found["structure"] else "")
 
 
 def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
-    """Returns the outcome as plain values, as ``recover --json`` prints it."""
+    """Returns the outcome as the JSON values that ``recover --json`` prints."""
     recovery, stats = outcome.recovery, outcome.stats
     design = experiment.design or network_for(experiment.robot)
     return {

@@ -1,12 +1,11 @@
-"""The parts of one robot, and what can go wrong with each, for people and for programs."""
+"""The parts of a robot and the faults that apply to them, as JSON values and as tables."""
 
 from typing import Any
 
 import mujoco
 from rich.console import Console
-from rich.table import Table
 
-from selfmodel.cli.output.plain import plain
+from selfmodel.cli.output.tables import folding
 from selfmodel.faults.registry import ALL_KINDS
 from selfmodel.robot.actuator_ranges import command_ranges
 from selfmodel.robot.robot import Robot
@@ -14,7 +13,7 @@ from selfmodel.robot.transmission import motor_joints
 
 
 def parts(robot: Robot) -> dict[str, Any]:
-    """Returns a robot's root, joints, sensors, motors and possible faults as plain values."""
+    """Returns root body, joints, sensors, motors and applicable faults as JSON values."""
     anatomy, model = robot.anatomy, robot.model
     floats = model.jnt_type[model.body(robot.root).jntadr[0]] == mujoco.mjtJoint.mjJNT_FREE
     ranges = command_ranges(model)
@@ -59,64 +58,62 @@ def parts(robot: Robot) -> dict[str, Any]:
 
 
 def print_parts(facts: dict[str, Any]) -> None:
-    """Prints what ``parts`` found, with the names of the robot above it."""
-    root = "moves freely" if facts["root"]["floats"] else "slides, and turns about one axis"
+    """Prints the parts and the cases of Table I.
+
+    Args:
+        facts: Result of ``parts``, with the robot's name, its controller and its cases.
+    """
+    root = "floating" if facts["root"]["floats"] else "slides, and turns about one axis"
     tables = [
-        _table(
-            "part",
-            "what was found",
-            title=facts["robot"],
-            rows=[
+        folding(
+            ("part", "value"),
+            [
                 ("root", f"{facts['root']['body']}, {root}"),
                 ("commands", f"every {facts['control_timestep']:g} s"),
                 ("physics", f"every {facts['physics_timestep']:g} s"),
                 ("controller", f"{facts['hidden_neurons']} neurons, {facts['weights']} weights"),
             ],
+            title=facts["robot"],
         ),
-        _table(
-            *("joint", "hinges, rad", "motors", "limb beyond it"),
-            title="joints, which can break or jam",
-            rows=[
+        folding(
+            ("joint", "hinges, rad", "motors", "limb beyond it"),
+            [
                 (one["name"], _limits(one), ", ".join(one["motors"]), ", ".join(one["limb"]))
                 for one in facts["joint_details"]
             ],
+            title="joints, which can break or jam",
         ),
-        _table(
-            *("sensor", "kind", "of"),
+        folding(
+            ("sensor", "kind", "of"),
+            [(one["name"], one["kind"], one["of"]) for one in facts["sensor_details"]],
             title="sensors, which can fail",
-            rows=[(one["name"], one["kind"], one["of"]) for one in facts["sensor_details"]],
         ),
-        _table(
-            *("motor", "drives", "commands", "force"),
-            title="motors",
-            rows=[
+        folding(
+            ("motor", "drives", "commands", "force"),
+            [
                 (one["name"], ", ".join(one["drives"]), _span(one["commands"]), _span(one["force"]))
                 for one in facts["motor_details"]
             ],
+            title="motors",
         ),
-        _table(
-            *("kind", "faults", "such as"),
+        folding(
+            ("kind", "faults", "such as"),
+            [(one["kind"], str(one["parts"]), one["example"]) for one in facts["faults"]],
             title="faults that can be hypothesised",
-            rows=[(one["kind"], str(one["parts"]), one["example"]) for one in facts["faults"]],
         ),
     ]
+    if facts["cases"]:
+        tables.append(
+            folding(("case", "damage"), facts["cases"].items(), title="failures of Table I")
+        )
     Console(markup=False).print(*tables)
 
 
-def _table(*columns: str, title: str, rows: list[tuple[str, ...]]) -> Table:
-    table = Table(*columns, title=plain(title))
-    for column in table.columns:
-        column.overflow = "fold"
-    for row in rows:
-        table.add_row(*map(plain, row))
-    return table
-
-
 def _limits(joint: dict[str, Any]) -> str:
-    told = zip(joint["hinges"], joint["limits"], joint["limited"], strict=True)
+    hinges = zip(joint["hinges"], joint["limits"], joint["limited"], strict=True)
     return ", ".join(
         f"{hinge} {_span(ends)}" if limited else f"{hinge}, no limits"
-        for hinge, ends, limited in told
+        for hinge, ends, limited in hinges
     )
 
 

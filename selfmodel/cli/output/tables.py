@@ -1,20 +1,22 @@
-"""Tables that lose nothing on a narrow terminal: where one does not fit, its rows are lines."""
+"""Tables that keep every character on a narrow terminal."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import typer
-from rich.console import Console
+from rich.console import Console, JustifyMethod
 from rich.measure import Measurement
 from rich.table import Table
 
+from selfmodel.cli.output.plain import plain
+
 
 def show(columns: Sequence[str], rows: Sequence[Sequence[str]], *, texts: int = 1) -> None:
-    """Prints a table, or what stands in it.
+    """Prints a table; if it is too wide, each row as one line per cell.
 
     Args:
-        columns: Their titles.
-        rows: A text for each column.
-        texts: How many of the first columns are texts; the others are numbers.
+        columns: Titles of the columns.
+        rows: A text per column.
+        texts: Number of leading columns that are left-justified texts; the others are numbers.
     """
     table = Table()
     for place, title in enumerate(columns):
@@ -30,3 +32,27 @@ def show(columns: Sequence[str], rows: Sequence[Sequence[str]], *, texts: int = 
         typer.echo(f"{columns[0]}: {row[0]}")
         for title, cell in zip(columns[1:], row[1:], strict=True):
             typer.echo(f"  {title}: {cell}")
+
+
+def folding(
+    columns: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    *,
+    title: str | None = None,
+    texts: int | None = None,
+) -> Table:
+    """Returns a table whose cells are wrapped where they are too wide.
+
+    Args:
+        columns: Titles of the columns.
+        rows: A text per column.
+        title: Title of the table.
+        texts: Number of leading columns that are left-justified texts; None for all.
+    """
+    table = Table(title=plain(title) if title else None)
+    for place, name in enumerate(columns):
+        justify: JustifyMethod = "left" if texts is None or place < texts else "right"
+        table.add_column(name, overflow="fold", justify=justify)
+    for row in rows:
+        table.add_row(*map(plain, row))
+    return table

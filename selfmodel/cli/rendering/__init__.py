@@ -1,1 +1,1 @@
-"""Pictures of a trial: the logged motion beside that of a model."""
+"""Pictures of a trial: the logged motion beside the simulated one."""

@@ -1,4 +1,4 @@
-"""Frames drawn by MuJoCo: each motion in a picture of its own, side by side."""
+"""Frames rendered by MuJoCo: one picture per motion, side by side."""
 
 import copy
 from collections.abc import Iterator
@@ -13,42 +13,42 @@ from selfmodel.cli.rendering.film import Film
 from selfmodel.cli.rendering.view import ELEVATION, azimuth, gaze, size
 
 WIDTH, HEIGHT = 480, 360
-"""Pixels of each motion's picture."""
+"""Size of a motion's picture, pixels."""
 
-FAR = 2.7
-"""How far away the camera is, in sizes of the robot."""
+CAMERA_DISTANCE = 2.7
+"""Distance of the camera, in sizes of the robot."""
 
-GHOST = (1.0, 1.0, 1.0, 0.4)
-"""What is left of the colour of a body that fell off: red, green, blue, opacity."""
+DETACHED = (1.0, 1.0, 1.0, 0.4)
+"""Colour of a detached body: red, green, blue, opacity."""
 
 JAMMED = (0.85, 0.15, 0.15, 1.0)
-"""The colour of what a jammed joint holds."""
+"""Colour of a body at a jammed joint: red, green, blue, opacity."""
 
 
 def filmed(film: Film) -> Iterator[NDArray[np.uint8]]:
-    """Draws each frame, ``(height, width, 3)``.
+    """Yields each frame, ``(height, width, 3)``.
 
-    Nothing else may draw in this thread meanwhile.
+    The thread's OpenGL context is in use until the last frame.
     """
     model = painted(film)
     data = mujoco.MjData(model)
     camera = mujoco.MjvCamera()
     camera.azimuth, camera.elevation = azimuth(film), ELEVATION
-    camera.distance = FAR * size(film)
-    ways = [gaze(film, shot) for shot in film.shots]
+    camera.distance = CAMERA_DISTANCE * size(film)
+    targets = [gaze(film, shot) for shot in film.shots]
     with mujoco.Renderer(model, HEIGHT, WIDTH) as renderer:
         for frame in range(len(film.time)):
             pictures = []
-            for shot, way in zip(film.shots, ways, strict=True):
-                _stand(model, data, shot.qpos[frame])
-                camera.lookat[:] = way[frame]
+            for shot, target in zip(film.shots, targets, strict=True):
+                _set_pose(model, data, shot.qpos[frame])
+                camera.lookat[:] = target[frame]
                 renderer.update_scene(data, camera)
                 pictures.append(captioned(renderer.render(), film, shot, frame))
             yield np.concatenate(pictures, axis=1)
 
 
-def _stand(model: mujoco.MjModel, data: mujoco.MjData, qpos: FloatArray) -> None:
-    """Puts the robot there, as far as it is seen: nothing is simulated."""
+def _set_pose(model: mujoco.MjModel, data: mujoco.MjData, qpos: FloatArray) -> None:
+    """Computes what a pose shows: positions of bodies, camera and lights, without a step."""
     data.qpos = qpos
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
@@ -56,13 +56,13 @@ def _stand(model: mujoco.MjModel, data: mujoco.MjData, qpos: FloatArray) -> None
 
 
 def painted(film: Film) -> mujoco.MjModel:
-    """Returns a copy of the model in the colours of what is wrong with it."""
+    """Returns a copy of the model with its detached and jammed bodies coloured."""
     model = copy.copy(film.model)
-    # On wide ground, shadows are grainy at any size that a program that draws can afford.
+    # On wide ground, shadows are grainy at any affordable size of the shadow map.
     model.light_castshadow[:] = 0
     model.vis.global_.offwidth = max(model.vis.global_.offwidth, WIDTH)
     model.vis.global_.offheight = max(model.vis.global_.offheight, HEIGHT)
-    for bodies, colour in ((film.jammed, JAMMED), (film.lost, GHOST)):
+    for bodies, colour in ((film.jammed, JAMMED), (film.detached, DETACHED)):
         geoms = np.isin(model.geom_bodyid, list(bodies))
         sites = np.isin(model.site_bodyid, list(bodies))
         model.geom_rgba[geoms], model.geom_matid[geoms] = colour, -1

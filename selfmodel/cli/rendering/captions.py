@@ -1,4 +1,4 @@
-"""What stands in a frame beside the robot: whose motion it is, when, and how far it has come."""
+"""Captions of a frame: title of the motion, time, and forward displacement."""
 
 import textwrap
 
@@ -9,10 +9,10 @@ from PIL import Image, ImageDraw, ImageFont
 from selfmodel.cli.rendering.film import Film, Shot
 
 SIZE = 16
-"""Height of the letters, pixels."""
+"""Height of the font, pixels."""
 
-LETTERS = 54
-"""How many fit into a line."""
+LINE_LENGTH = 54
+"""Most characters of a line."""
 
 INK, ALARM, PAPER = (20, 24, 30), (190, 20, 20), (255, 255, 255, 150)
 
@@ -22,21 +22,23 @@ def captioned(picture: NDArray[np.uint8], film: Film, shot: Shot, frame: int) ->
     image = Image.fromarray(picture)
     draw = ImageDraw.Draw(image, "RGBA")
     font = ImageFont.load_default(SIZE)
-    title = "\n".join(textwrap.wrap(shot.title, LETTERS))
+    title = "\n".join(textwrap.wrap(shot.title, LINE_LENGTH))
     _write(draw, (8, 6), title, font, INK)
-    _write(draw, (8, image.height - SIZE - 10), told(film, shot, frame), font, INK)
+    _write(draw, (8, image.height - SIZE - 10), caption(film, shot, frame), font, INK)
     if shot.held[frame]:
-        _write(draw, (8, image.height - 2 * SIZE - 18), "not observed: as last seen", font, ALARM)
+        _write(
+            draw, (8, image.height - 2 * SIZE - 18), "not observed: last known pose", font, ALARM
+        )
     return np.asarray(image)
 
 
-def told(film: Film, shot: Shot, frame: int) -> str:
-    """Returns when it is, and how far the base has come."""
+def caption(film: Film, shot: Shot, frame: int) -> str:
+    """Returns the time and the forward displacement of the base, as text."""
     forward = shot.forward[frame]
-    way = (
+    displacement = (
         f"{round(forward, 2) + 0.0:.2f} m forward" if np.isfinite(forward) else "base not observed"
     )
-    return f"{film.time[frame]:.2f} s   {way}"
+    return f"{film.time[frame]:.2f} s   {displacement}"
 
 
 def _write(

@@ -1,4 +1,4 @@
-"""The best hypothesis of a diagnosis that a command wrote down."""
+"""The best hypothesis in the file of a diagnosis."""
 
 import json
 from pathlib import Path
@@ -6,21 +6,21 @@ from pathlib import Path
 from selfmodel.errors import InputError
 from selfmodel.files import read_file
 
-LARGEST = 16 * 2**20
-"""Bytes that a diagnosis in a file may have."""
+MAX_BYTES = 16 * 2**20
+"""Largest file of a diagnosis, bytes."""
 
 
 def diagnosed(path: Path) -> str:
-    """Returns the notation of the hypothesis that a diagnosis puts first.
+    """Returns the notation of the best hypothesis of a diagnosis.
 
     Args:
-        path: What ``recover`` left in its folder (``result.json``; ``diagnoses.json``, of which the
-            last counts), or what ``diagnose --json`` or ``recover --json`` printed.
+        path: ``result.json`` or ``diagnoses.json`` of a recovery (the last diagnosis counts), or
+            the output of ``diagnose --json`` or ``recover --json``.
 
     Raises:
-        InputError: The file cannot be read as one of them.
+        InputError: The file is none of these.
     """
-    data = read_file(path, "a diagnosis as JSON", LARGEST)
+    data = read_file(path, "a diagnosis as JSON", MAX_BYTES)
     try:
         found = json.loads(data)
         ranked = found[-1]["ranked"] if isinstance(found, list) else found["diagnosis"]
@@ -30,6 +30,6 @@ def diagnosed(path: Path) -> str:
     if not isinstance(best, str):
         raise InputError(
             f"{path}: expected a diagnosis: the result.json or diagnoses.json of a recovery, or "
-            f"what selfmodel diagnose --json prints"
+            f"the output of selfmodel diagnose --json"
         )
     return best

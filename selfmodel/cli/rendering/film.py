@@ -1,4 +1,4 @@
-"""What is drawn of a trial: one body in two motions, at some moments."""
+"""Data of a film: the poses of one robot in several motions, at the times of the frames."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,13 +18,13 @@ from selfmodel.trials.behaviour import Behaviour
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """One motion.
+    """One motion of a film.
 
     Attributes:
-        title: Whose it is.
-        qpos: ``(frames, nq)`` positions of the model.
-        held: ``(frames,)`` where the picture shows what was seen last.
-        forward: ``(frames,)`` how far the base has come along the world's x axis, m.
+        title: Title of the motion.
+        qpos: Positions of the model, ``(frames, nq)``.
+        held: Frames that show the last observation of a missing one, ``(frames,)``.
+        forward: Displacement of the base along the world's x axis, ``(frames,)``, m.
     """
 
     title: str
@@ -35,22 +35,22 @@ class Shot:
 
 @dataclass(frozen=True, eq=False)
 class Film:
-    """Motions of one body side by side.
+    """Motions of one robot side by side.
 
     Attributes:
-        model: The robot with what is taken to be wrong with it.
-        root: The body that is followed.
-        lost: The bodies that fell off.
-        jammed: The bodies that a jammed joint holds.
-        time: ``(frames,)`` seconds since the start.
+        model: Model of the hypothesis.
+        root: Id of the body that the camera follows.
+        detached: Ids of the detached bodies.
+        jammed: Ids of the bodies at a jammed joint.
+        time: Time since the start, ``(frames,)``, s.
         shots: The motions.
-        missing: What was not observed at all.
-        normal: Unit vector that stands on the ground, ``(3,)``.
+        missing: Names of hinges and signals without any observation.
+        normal: Unit normal of the ground, ``(3,)``.
     """
 
     model: mujoco.MjModel
     root: int
-    lost: frozenset[int]
+    detached: frozenset[int]
     jammed: frozenset[int]
     time: FloatArray
     shots: tuple[Shot, ...]
@@ -64,18 +64,18 @@ def film_of(
     motions: Sequence[tuple[str, Behaviour]],
     moments: FloatArray,
 ) -> Film:
-    """Returns what is to be drawn.
+    """Returns the film of some motions.
 
     Args:
-        robot: The robot with nothing wrong.
-        hypothesis: What is taken to be wrong: nothing in a log says so.
-        motions: A title and the motion under it, all with the same times.
-        moments: ``(frames,)`` seconds: of each, the last step that was not later is drawn.
+        robot: The healthy robot.
+        hypothesis: Hypothesis whose detached and jammed bodies are marked.
+        motions: Title and behaviour of each motion, all with the same times.
+        moments: Times of the frames, ``(frames,)``, s; each shows the last step not after it.
     """
     embodiment = build(robot, hypothesis)
     model = embodiment.model
     time = motions[0][1].time
-    # A moment that is a step but for rounding is that step.
+    # 1e-9 s: a time that equals a step but for rounding shows that step.
     steps = np.searchsorted(time, moments + 1e-9, side="right") - 1
     shots: list[Shot] = []
     missing: list[str] = []
@@ -89,8 +89,8 @@ def film_of(
     return Film(
         model=model,
         root=int(model.body(robot.root).id),
-        lost=_bodies(robot, model, hypothesis, lost=True),
-        jammed=_bodies(robot, model, hypothesis, lost=False),
+        detached=_detached(robot, model, hypothesis),
+        jammed=_jammed(robot, model, hypothesis),
         time=time[steps],
         shots=tuple(shots),
         missing=tuple(missing),
@@ -99,24 +99,32 @@ def film_of(
 
 
 def evenly(time: FloatArray, pictures: int) -> FloatArray:
-    """Returns moments of a trial, evenly spread from its first step to its last, none twice.
+    """Returns distinct times of a trial, evenly spaced from its first step to its last.
 
     Args:
-        time: ``(steps,)`` seconds.
-        pictures: How many, where there are so many steps.
+        time: Times of the steps, ``(steps,)``, s.
+        pictures: Number of times, at most the number of steps.
     """
     return np.asarray(time[np.unique(np.linspace(0, len(time) - 1, pictures).astype(int))])
 
 
-def _bodies(
-    robot: Robot, model: mujoco.MjModel, hypothesis: Hypothesis, *, lost: bool
-) -> frozenset[int]:
-    """The bodies that a hypothesis says are lost, or held by a joint that jammed."""
-    found: set[int] = set()
-    for fault in hypothesis.faults:
-        if fault.kind is BROKEN and lost:
-            found |= {int(model.body(name).id) for name in robot.anatomy.joint(fault.part).bodies}
-        elif fault.kind in (JAMMED, JAMMED_AT_ANGLE) and not lost:
-            hinges = robot.anatomy.joint(fault.part).hinges
-            found |= {int(model.joint(hinge).bodyid[0]) for hinge in hinges}
-    return frozenset(found)
+def _detached(robot: Robot, model: mujoco.MjModel, hypothesis: Hypothesis) -> frozenset[int]:
+    """Returns the ids of the bodies that a hypothesis detaches."""
+    names = (
+        name
+        for fault in hypothesis.faults
+        if fault.kind is BROKEN
+        for name in robot.anatomy.joint(fault.part).bodies
+    )
+    return frozenset(int(model.body(name).id) for name in names)
+
+
+def _jammed(robot: Robot, model: mujoco.MjModel, hypothesis: Hypothesis) -> frozenset[int]:
+    """Returns the ids of the bodies at the joints that a hypothesis jams."""
+    hinges = (
+        hinge
+        for fault in hypothesis.faults
+        if fault.kind in (JAMMED, JAMMED_AT_ANGLE)
+        for hinge in robot.anatomy.joint(fault.part).hinges
+    )
+    return frozenset(int(model.joint(hinge).bodyid[0]) for hinge in hinges)

@@ -1,4 +1,4 @@
-"""Stick figures by matplotlib: a strip of some moments, or the frames of a film."""
+"""Stick figures by matplotlib: a strip of pictures, or the frames of a film."""
 
 import io
 import textwrap
@@ -10,21 +10,21 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from selfmodel.cli.rendering.captions import told
+from selfmodel.cli.rendering.captions import caption
 from selfmodel.cli.rendering.film import Film, Shot
 from selfmodel.cli.rendering.sticks import draw, draw_ground, lines_of, plane_of
 from selfmodel.cli.rendering.view import gaze, size
 
 WIDTH, HEIGHT = 480, 360
-"""Pixels of each motion's picture in a film."""
+"""Size of a motion's picture in a film, pixels."""
 
 
 def strip(film: Film, kind: str) -> bytes:
-    """Returns a row of pictures for each motion, a column for each moment.
+    """Returns a figure file with a row per motion and a column per frame.
 
     Args:
-        film: What is drawn; each of its frames.
-        kind: The file's, such as ``png``.
+        film: The film; every frame is drawn.
+        kind: File format, such as ``png``.
     """
     rows, columns = len(film.shots), len(film.time)
     figure = Figure(figsize=(1.9 * columns, 1.85 * rows), layout="constrained")
@@ -40,7 +40,7 @@ def strip(film: Film, kind: str) -> bytes:
 
 
 def stick_frames(film: Film) -> Iterator[NDArray[np.uint8]]:
-    """Draws each frame, ``(height, width, 3)``."""
+    """Yields each frame, ``(height, width, 3)``."""
     figure = Figure(figsize=(len(film.shots) * WIDTH / 100, HEIGHT / 100), dpi=100)
     artists = [_Artist(film, shot) for shot in film.shots]
     for frame in range(len(film.time)):
@@ -63,11 +63,16 @@ class _Artist:
         self.shot = shot
         self._film = film
         self._data = mujoco.MjData(film.model)
-        self._way, self._plane, self._reach = gaze(film, shot), plane_of(film), size(film)
+        self._targets, self._plane, self._reach = gaze(film, shot), plane_of(film), size(film)
 
     def draw(self, axes: Axes, frame: int) -> None:
-        """Draws one frame, and writes under it when it is."""
-        film, data, centre, held = self._film, self._data, self._way[frame], self.shot.held[frame]
+        """Draws a frame with its caption below."""
+        film, data, centre, held = (
+            self._film,
+            self._data,
+            self._targets[frame],
+            self.shot.held[frame],
+        )
         data.qpos = self.shot.qpos[frame]
         mujoco.mj_kinematics(film.model, data)
         draw_ground(axes, film.normal, centre, self._plane, self._reach)
@@ -77,7 +82,7 @@ class _Artist:
         axes.set_aspect("equal")
         axes.set_xticks([])
         axes.set_yticks([])
-        when = told(film, self.shot, frame)
+        when = caption(film, self.shot, frame)
         axes.set_xlabel(
             f"{when}, not observed" if held else when,
             fontsize=8,
@@ -86,5 +91,5 @@ class _Artist:
 
 
 def _plain(text: str) -> str:
-    """A text that matplotlib does not take for a formula."""
+    """Returns text with every ``$`` escaped: between two, matplotlib reads a formula."""
     return text.replace("$", r"\$")

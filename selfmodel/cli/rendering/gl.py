@@ -1,4 +1,4 @@
-"""Which of the libraries that draw without a screen this machine has."""
+"""Choice of the OpenGL library with which MuJoCo renders off screen."""
 
 import os
 import subprocess
@@ -7,16 +7,16 @@ import sys
 from selfmodel.errors import WorkError
 
 VARIABLE = "MUJOCO_GL"
-"""The environment variable by which MuJoCo chooses, when it is first imported."""
+"""Environment variable that MuJoCo reads as it is imported."""
 
 NOTHING = "disable"
-"""Its value where nothing is to be drawn: MuJoCo then looks for no library."""
+"""Value of the variable without rendering: MuJoCo then loads no library."""
 
 WITHOUT_SCREEN = ("egl", "osmesa") if sys.platform == "linux" else ("",)
-"""What is tried, in this order; elsewhere than on Linux, MuJoCo's own choice."""
+"""Values that are tried, in this order; other systems than Linux use MuJoCo's default."""
 
-PATIENCE = 60
-"""Seconds that a library may take for one picture."""
+TIMEOUT = 60
+"""Time limit for one picture, s."""
 
 TRIAL = (
     "import mujoco\n"
@@ -28,16 +28,16 @@ TRIAL = (
 
 
 def choose_gl() -> str:
-    """Makes MuJoCo draw with a library that works; to be called before it is imported.
+    """Sets ``MUJOCO_GL`` to a library that works; call it before MuJoCo is imported.
 
-    Where ``MUJOCO_GL`` is set, it is that one or none. Each is tried in a process of its own: one
-    that fails cannot always be undone.
+    If ``MUJOCO_GL`` is set, only that library is tried. Each is tried in a process of its own,
+    because a failed initialisation cannot always be undone.
 
     Returns:
         The value of ``MUJOCO_GL``.
 
     Raises:
-        WorkError: None works.
+        WorkError: No library works.
     """
     wanted = os.environ.get(VARIABLE, "")
     tried = (wanted,) if wanted else WITHOUT_SCREEN
@@ -58,19 +58,19 @@ def choose_gl() -> str:
 
 
 def choose_nothing() -> None:
-    """Makes MuJoCo look for no library, of which none may work; before it is imported."""
+    """Disables rendering by MuJoCo; call it before MuJoCo is imported."""
     os.environ[VARIABLE] = NOTHING
 
 
 def works(name: str) -> bool:
-    """Whether a picture can be drawn with a library, by its value of ``MUJOCO_GL``."""
+    """Returns whether MuJoCo renders a picture with that value of ``MUJOCO_GL``."""
     try:
         done = subprocess.run(  # noqa: S603  # this Python, and a text from above
             [sys.executable, "-c", TRIAL],
             env={**os.environ, VARIABLE: name},
             capture_output=True,
             check=False,
-            timeout=PATIENCE,
+            timeout=TIMEOUT,
         )
     except subprocess.TimeoutExpired:
         return False

@@ -1,4 +1,4 @@
-"""From what was observed of a robot to how its model stands, for whoever draws it."""
+"""Poses of a robot's model from the observations of a behaviour."""
 
 from dataclasses import dataclass
 
@@ -11,18 +11,18 @@ from selfmodel.robot.state_access import writer
 from selfmodel.trials.behaviour import Behaviour, Signal
 
 POSE: tuple[Signal, ...] = ("joint_positions", "base_position", "base_orientation")
-"""The signals that say how a robot stands."""
+"""Signals that determine a pose."""
 
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """How a robot stood at each step.
+    """Pose of a robot at each step.
 
     Attributes:
-        qpos: ``(steps, nq)`` positions of the model; of what was not observed, the last that was.
-        held: ``(steps,)`` where something was not observed that was at other steps.
-        missing: What was observed at no step, and stands as it does at the start: hinges by name,
-            ``base_position`` and ``base_orientation``.
+        qpos: Positions of the model, ``(steps, nq)``; the last observation where one is missing.
+        held: Steps at which an observation is missing, ``(steps,)``.
+        missing: Hinges, ``base_position`` and ``base_orientation`` without any observation; they
+            are as in the reference pose.
     """
 
     qpos: FloatArray
@@ -31,13 +31,13 @@ class Poses:
 
 
 def poses_of(robot: Robot, model: mujoco.MjModel, behaviour: Behaviour) -> Poses:
-    """Returns how a robot stood, as far as a behaviour tells.
+    """Returns the poses of a behaviour.
 
-    Before the first observation of something stands the first one.
+    A missing value is the last observation before it, or the first one.
 
     Args:
-        robot: Whose behaviour it is.
-        model: Of the robot's layout; what stands in no signal is as in its reference pose.
+        robot: Robot of the behaviour.
+        model: Model with the robot's layout; positions in no signal are as in its reference pose.
         behaviour: One run with the signals of ``POSE``.
     """
     qpos = np.tile(model.qpos0, (behaviour.steps, 1))
@@ -49,7 +49,7 @@ def poses_of(robot: Robot, model: mujoco.MjModel, behaviour: Behaviour) -> Poses
         values = behaviour[signal]
         seen = np.isfinite(values)
         if signal != "joint_positions":
-            # A part of a position or of a quaternion is none.
+            # A position or a quaternion with a missing component is missing.
             seen[:] = seen.all(axis=1, keepdims=True)
         known: BoolArray = np.any(seen, axis=0)
         held |= (~seen & known).any(axis=1)
@@ -67,7 +67,7 @@ def poses_of(robot: Robot, model: mujoco.MjModel, behaviour: Behaviour) -> Poses
 
 
 def _filled(values: FloatArray, seen: BoolArray) -> FloatArray:
-    """Each value, or the last one seen before it, or the first."""
+    """Returns each value, or else the last observation before it, or else the first one."""
     rows = np.arange(len(values))[:, np.newaxis]
     last = np.maximum.accumulate(np.where(seen, rows, -1), axis=0)
     chosen = np.where(last < 0, seen.argmax(axis=0), last)

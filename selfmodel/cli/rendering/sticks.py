@@ -1,4 +1,4 @@
-"""A robot as lines in a plane: what can be drawn without any library for three dimensions."""
+"""Stick figures: a robot as lines in the plane of a picture."""
 
 from dataclasses import dataclass
 
@@ -21,7 +21,7 @@ TURNS = np.linspace(0, 2 * np.pi, 12, endpoint=False)
 CIRCLE = np.stack([np.cos(TURNS), np.sin(TURNS)], axis=1)
 
 GRID = 0.5
-"""Metres between the lines on the ground."""
+"""Distance between the lines on the ground, m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,8 +29,8 @@ class Lines:
     """Lines in the plane of a picture.
 
     Attributes:
-        ends: ``(lines, 2, 2)`` beginning and end of each, right and up, m.
-        bodies: ``(lines,)`` the body that each is part of.
+        ends: Both ends of each line, right and up, ``(lines, 2, 2)``, m.
+        bodies: Id of each line's body, ``(lines,)``.
     """
 
     ends: FloatArray
@@ -38,18 +38,21 @@ class Lines:
 
 
 def plane_of(film: Film) -> FloatArray:
-    """Returns ``(3, 2)`` what turns a point in the world into one in the plane of a picture."""
+    """Returns the projection from the world to the plane of a picture, ``(3, 2)``."""
     return np.stack(axes_of_view(film), axis=1)
 
 
 def lines_of(film: Film, data: mujoco.MjData, centre: FloatArray, plane: FloatArray) -> Lines:
-    """Returns a robot as lines: the axes of what is long, the rims of balls, the edges of the rest.
+    """Returns the lines of a robot.
+
+    They are the axes of capsules and cylinders, the rims of spheres, and the edges of the bounding
+    boxes of other geoms.
 
     Args:
-        film: Whose body it is.
-        data: Where its parts are.
-        centre: ``(3,)`` what stands at 0 in the plane.
-        plane: ``plane_of`` the film.
+        film: Film of the robot.
+        data: State of the film's model.
+        centre: World point at the origin of the plane, ``(3,)``, m.
+        plane: Result of ``plane_of``.
     """
     model = film.model
     ends: list[FloatArray] = []
@@ -60,16 +63,16 @@ def lines_of(film: Film, data: mujoco.MjData, centre: FloatArray, plane: FloatAr
         kind = mujoco.mjtGeom(int(model.geom_type[geom]))
         if kind in FLAT:
             continue
-        turned = data.geom_xmat[geom].reshape(3, 3)
+        rotation = data.geom_xmat[geom].reshape(3, 3)
         if kind in LONG:
-            half = turned[:, 2] * model.geom_size[geom, 1]
+            half = rotation[:, 2] * model.geom_size[geom, 1]
             found = [np.stack([data.geom_xpos[geom] - half, data.geom_xpos[geom] + half])]
         elif kind == mujoco.mjtGeom.mjGEOM_SPHERE:
             rim = data.geom_xpos[geom] + model.geom_size[geom, 0] * CIRCLE @ plane.T
             found = [rim[[i - 1, i]] for i in range(len(rim))]
         else:
             middle, reach = model.geom_aabb[geom, :3], model.geom_aabb[geom, 3:]
-            corners = data.geom_xpos[geom] + (middle + CORNERS * reach) @ turned.T
+            corners = data.geom_xpos[geom] + (middle + CORNERS * reach) @ rotation.T
             found = [corners[[i, j]] for i, j in EDGES]
         ends += found
         bodies += [int(model.geom_bodyid[geom])] * len(found)
@@ -77,12 +80,12 @@ def lines_of(film: Film, data: mujoco.MjData, centre: FloatArray, plane: FloatAr
 
 
 def draw(axes: Axes, film: Film, lines: Lines, *, held: bool) -> None:
-    """Draws a robot: what is lost dotted, what is jammed red, and all pale if not observed."""
-    lost = np.isin(lines.bodies, list(film.lost))
-    jammed = np.isin(lines.bodies, list(film.jammed)) & ~lost
-    whole = ~lost & ~jammed
+    """Draws a robot: detached bodies dotted, jammed ones red, a held pose pale."""
+    detached = np.isin(lines.bodies, list(film.detached))
+    jammed = np.isin(lines.bodies, list(film.jammed)) & ~detached
+    whole = ~detached & ~jammed
     for chosen, colour, style in (
-        (lost, "0.6", ":"),
+        (detached, "0.6", ":"),
         (whole, "#20435f", "-"),
         (jammed, "#c22020", "-"),
     ):
@@ -101,7 +104,7 @@ def draw(axes: Axes, film: Film, lines: Lines, *, held: bool) -> None:
 def draw_ground(
     axes: Axes, normal: FloatArray, centre: FloatArray, plane: FloatArray, reach: float
 ) -> None:
-    """Draws lines on the ground around a point, which show that the robot moves over it."""
+    """Draws a grid on the ground around a point."""
     low = np.floor((centre[:2] - 3 * reach) / GRID) * GRID
     high = centre[:2] + 3 * reach
     across = [

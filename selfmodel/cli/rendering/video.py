@@ -1,4 +1,4 @@
-"""Frames as a film in a file: GIF by Pillow, MP4 by the program ffmpeg."""
+"""Encoding of frames: GIF by Pillow, MP4 by the program ffmpeg."""
 
 import importlib
 import shutil
@@ -16,13 +16,13 @@ from PIL import Image
 from selfmodel.errors import WorkError
 
 RATE = 25
-"""Frames a second, in real time; a GIF counts in hundredths of a second."""
+"""Frames per second of real time; the unit of a GIF is a hundredth of a second."""
 
 Frames = Iterator[NDArray[np.uint8]]
 
 
 def gif(frames: Frames) -> bytes:
-    """Returns a GIF that begins again at its end."""
+    """Returns a GIF that repeats for ever."""
     pictures = (_indexed(frame) for frame in frames)
     file = BytesIO()
     next(pictures).save(
@@ -37,47 +37,47 @@ def gif(frames: Frames) -> bytes:
 
 
 def _indexed(frame: NDArray[np.uint8]) -> Image.Image:
-    """A frame in 128 colours of its own, without the dither that makes files large."""
+    """Returns a frame with its own palette of 128 colours, undithered for small files."""
     return Image.fromarray(frame).quantize(
         128, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE
     )
 
 
 def mp4(frames: Frames) -> bytes:
-    """Returns an MP4 in the best encoding that ffmpeg has for it, which is H.264 nearly always.
+    """Returns an MP4 in ffmpeg's default encoding, H.264 in most builds.
 
     Raises:
-        WorkError: There is no ffmpeg, or it failed.
+        WorkError: ffmpeg is missing, or it failed.
     """
     program = ffmpeg()
     first = next(frames)
     height, width, _ = first.shape
     with tempfile.TemporaryDirectory() as folder:
-        path, said = Path(folder) / "film.mp4", Path(folder) / "said"
+        path, messages = Path(folder) / "film.mp4", Path(folder) / "messages"
         command = [program, "-nostdin", "-loglevel", "error"]
         command += ["-f", "rawvideo", "-pixel_format", "rgb24", "-video_size", f"{width}x{height}"]
         command += ["-framerate", str(RATE), "-i", "pipe:0"]
-        # What every player can show; and what it needs first stands first.
+        # yuv420p: every player shows it; faststart: the index comes first.
         command += ["-pix_fmt", "yuv420p", "-movflags", "+faststart", str(path)]
         with (
-            said.open("wb") as errors,
-            subprocess.Popen(  # noqa: S603  # a program that was found, and names from above
+            messages.open("wb") as errors,
+            subprocess.Popen(  # noqa: S603  # a program from the path, and names from above
                 command, stdin=subprocess.PIPE, stdout=errors, stderr=errors
             ) as encoder,
         ):
             _feed(encoder, first, frames)
         if encoder.returncode != 0 or not path.exists():
-            told = " ".join(said.read_text(errors="replace").split())
-            raise WorkError(f"ffmpeg could not make the film: {told or 'it said nothing'}")
+            text = " ".join(messages.read_text(errors="replace").split())
+            raise WorkError(f"ffmpeg could not make the film: {text or 'it printed nothing'}")
         return path.read_bytes()
 
 
 def _feed(encoder: subprocess.Popen[bytes], first: NDArray[np.uint8], frames: Frames) -> None:
     if encoder.stdin is None:
-        raise WorkError("ffmpeg takes no frames")
+        raise WorkError("ffmpeg does not read frames")
     with ExitStack() as unfinished:
         unfinished.callback(encoder.kill)
-        # Where it has ended before, its status and its words say why.
+        # An ffmpeg that has ended is explained by its status and its messages.
         with suppress(BrokenPipeError):
             encoder.stdin.write(first.tobytes())
             for frame in frames:
@@ -87,18 +87,18 @@ def _feed(encoder: subprocess.Popen[bytes], first: NDArray[np.uint8], frames: Fr
 
 
 def ffmpeg() -> str:
-    """Returns the program: the one on the path, or the one that imageio-ffmpeg brings.
+    """Returns the path of ffmpeg: the system's, or else that of imageio-ffmpeg.
 
     Raises:
-        WorkError: There is neither.
+        WorkError: ffmpeg is not installed.
     """
     found = shutil.which("ffmpeg")
     if found:
         return found
     try:
         return str(importlib.import_module("imageio_ffmpeg").get_ffmpeg_exe())
-    except (ImportError, RuntimeError):  # not there, or there without the program
+    except (ImportError, RuntimeError):  # not installed, or installed without the program
         raise WorkError(
-            "an .mp4 needs the program ffmpeg, and there is none: install it (apt-get install "
+            "an .mp4 needs the program ffmpeg, which is not installed: install it (apt-get install "
             "ffmpeg, or pip install 'selfmodel[render]'), or write a .gif"
         ) from None

@@ -1,4 +1,4 @@
-"""From where a robot is looked at, the same for every kind of picture."""
+"""The camera of a film, the same for every kind of picture."""
 
 import mujoco
 import numpy as np
@@ -7,17 +7,17 @@ from selfmodel.arrays import FloatArray
 from selfmodel.cli.rendering.film import Film, Shot
 
 ASIDE, ELEVATION = 65.0, -22.0
-"""How far to the side of the robot's heading the camera looks, and how far up, degrees: from the
-side, a little from behind and above."""
+"""Azimuth of the camera from the robot's heading, and elevation, degrees: from the side, a little
+from behind and above."""
 
-STEADY = 0.5
-"""Seconds over which the camera's way is averaged, so that it does not sway with each step."""
+SMOOTHING = 0.5
+"""Time over which the camera's path is averaged, s, so that it does not sway at each step."""
 
 
 def gaze(film: Film, shot: Shot) -> FloatArray:
-    """Returns where the camera looks in each frame, ``(frames, 3)``, m.
+    """Returns the point that the camera looks at in each frame, ``(frames, 3)``, m.
 
-    It follows the base, but in height only where the ground would be out of sight.
+    It is the smoothed position of the root body.
     """
     data = mujoco.MjData(film.model)
     way = np.empty((len(film.time), 3))
@@ -25,8 +25,8 @@ def gaze(film: Film, shot: Shot) -> FloatArray:
         data.qpos = qpos
         mujoco.mj_kinematics(film.model, data)
         point[:] = data.xpos[film.root]
-    step = np.median(np.diff(film.time)) if len(film.time) > 1 else STEADY
-    reach = round(STEADY / step / 2)
+    step = np.median(np.diff(film.time)) if len(film.time) > 1 else SMOOTHING
+    reach = round(SMOOTHING / step / 2)
     padded = np.pad(way, ((reach, reach), (0, 0)), mode="edge")
     window = np.ones(2 * reach + 1) / (2 * reach + 1)
     smooth = [np.convolve(padded[:, axis], window, mode="valid") for axis in range(3)]
@@ -34,7 +34,7 @@ def gaze(film: Film, shot: Shot) -> FloatArray:
 
 
 def size(film: Film) -> float:
-    """Returns how far the robot reaches from its root in its reference pose, m."""
+    """Returns the radius of the robot around its root in the reference pose, m."""
     model, data = film.model, mujoco.MjData(film.model)
     mujoco.mj_kinematics(model, data)
     own = model.body_rootid[model.geom_bodyid] == model.body_rootid[film.root]
@@ -45,18 +45,18 @@ def size(film: Film) -> float:
 def azimuth(film: Film) -> float:
     """Returns the heading of the camera, degrees from the world's x axis.
 
-    It stands where what is lost or jammed is in sight: on the robot's left, or else on its right,
-    where forward is to the right.
+    The camera is on the side of the detached and jammed bodies; by default on the robot's right,
+    with forward to the right.
     """
     model, data = film.model, mujoco.MjData(film.model)
     mujoco.mj_kinematics(model, data)
-    wrong = sorted(film.lost | film.jammed)
+    wrong = sorted(film.detached | film.jammed)
     left = float((data.xipos[wrong, 1] - data.xpos[film.root, 1]).sum())
     return -ASIDE if left > 0 else ASIDE
 
 
 def axes(film: Film) -> tuple[FloatArray, FloatArray]:
-    """Returns the directions that are to the right and up in a picture, ``(3,)`` each."""
+    """Returns the world directions right and up in a picture, ``(3,)`` each."""
     heading, elevation = np.radians(azimuth(film)), np.radians(ELEVATION)
     right = np.array([np.sin(heading), -np.cos(heading), 0.0])
     ahead = np.array([np.cos(heading), np.sin(heading), 0.0]) * np.cos(elevation)

@@ -1,14 +1,12 @@
-"""``selfmodel suite``: the bodies of dm_control's suite, and one's own beside them."""
+"""``selfmodel suite``: studies of the bodies of dm_control's suite and of MJCF files."""
 
-import typer
+from selfmodel.cli.lazy import group
 
-from selfmodel.cli.suite.list_ import list_bodies
-from selfmodel.cli.suite.run import run
-
-app = typer.Typer(
-    name="suite",
-    help="Let the bodies of dm_control's suite fail and recover, beside ours and your own.",
-    no_args_is_help=True,
+app = group(
+    "suite",
+    "Fail and recover the bodies of dm_control's suite, selfmodel's robots and your own.",
+    {
+        "list": ("selfmodel.cli.suite.list_:list_bodies", "List the domains and their cases."),
+        "run": ("selfmodel.cli.suite.run:run", "Run a study: bodies x cases x seeds."),
+    },
 )
-app.command("list")(list_bodies)
-app.command()(run)

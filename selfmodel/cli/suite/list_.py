@@ -1,4 +1,4 @@
-"""``selfmodel suite list``: every body that comes with selfmodel or with dm_control's suite."""
+"""``selfmodel suite list``: the bodies of selfmodel and of dm_control's suite."""
 
 import json
 from typing import Any
@@ -6,14 +6,14 @@ from typing import Any
 import typer
 
 from selfmodel.cli.options import Json
+from selfmodel.cli.output.tables import show
+from selfmodel.experiments.robots import robot_entry
+from selfmodel.experiments.suite.bodies import DOMAINS, bodies
+from selfmodel.robot.designs import network_for
 
 
 def list_bodies(*, as_json: Json = False) -> None:
-    """List the domains: their tasks, joints, sensors, motors, time steps and failures."""
-    # Whatever brings MuJoCo waits until the command runs.
-    from selfmodel.cli.output.tables import show  # noqa: PLC0415
-    from selfmodel.experiments.suite.bodies import DOMAINS  # noqa: PLC0415
-
+    """List the domains with their tasks, cases, joints, sensors, motors and time steps."""
     found = [_facts(domain) for domain in DOMAINS]
     if as_json:
         typer.echo(json.dumps({"domains": found}, indent=2, allow_nan=False))
@@ -30,14 +30,12 @@ def list_bodies(*, as_json: Json = False) -> None:
         for one in found
     ]
     show(columns, rows, texts=3)
-    typer.echo("A robot's name is DOMAIN-TASK for those of the suite: `selfmodel robots NAME`.")
+    typer.echo(
+        "Robots of the suite are called DOMAIN-TASK: `selfmodel robots NAME` lists the parts."
+    )
 
 
 def _facts(domain: str) -> dict[str, Any]:
-    from selfmodel.experiments.robots import robot_entry  # noqa: PLC0415
-    from selfmodel.experiments.suite.bodies import DOMAINS, bodies  # noqa: PLC0415
-    from selfmodel.robot.designs import network_for  # noqa: PLC0415
-
     entry = robot_entry(bodies([domain], None)[0])
     robot = entry.robot()
     return {
@@ -57,7 +55,7 @@ def _facts(domain: str) -> dict[str, Any]:
 
 
 def _ranges(numbers: list[int]) -> str:
-    """Numbers in their order, what follows on one another as ``1 to 3``."""
+    """Returns ascending numbers as text, with three or more consecutive ones as ``1 to 3``."""
     runs: list[list[int]] = []
     for number in numbers:
         if runs and runs[-1][-1] == number - 1:

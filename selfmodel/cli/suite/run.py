@@ -1,16 +1,42 @@
-"""``selfmodel suite run``: many bodies fail in the ways of Table I, and recover."""
+"""``selfmodel suite run``: a study in which many bodies fail as in Table I, and recover."""
 
 import json
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from selfmodel.cli.options import ComparatorName, ControllerKind, Generations, Json, Population
+from selfmodel.cli import inputs
+from selfmodel.cli.options import (
+    CONTROLLER,
+    DEFAULT_KINDS,
+    STUDY,
+    Cases,
+    ComparatorName,
+    ControllerKind,
+    FirstSeed,
+    GapLevel,
+    Generations,
+    Json,
+    KindNames,
+    Neurons,
+    Only,
+    Population,
+    Seeds,
+    Structural,
+    StudyFolder,
+    Trials,
+    Workers,
+)
+from selfmodel.cli.output import grid_display
+from selfmodel.cli.output.tables import show
 from selfmodel.comparators import DEFAULT
-
-if TYPE_CHECKING:
-    from selfmodel.experiments.suite.rows import Summary
+from selfmodel.experiments.suite.bodies import DOMAINS, bodies, tasks_of
+from selfmodel.experiments.suite.plan import Study, known_cases
+from selfmodel.experiments.suite.results import write_results
+from selfmodel.experiments.suite.rows import Summary
+from selfmodel.experiments.suite.work import run_study
+from selfmodel.settings import Settings
+from selfmodel.simulation.threads import thread_count
 
 COLUMNS = (
     *("robot", "case", "truth", "right", "before", "after", "recovered", "recovered ÷ before"),
@@ -20,104 +46,107 @@ COLUMNS = (
 
 def run(
     *,
-    out: Annotated[
-        Path,
-        typer.Option(
-            "--out", metavar="DIR", help="Folder of the runs; one that was stopped goes on."
-        ),
-    ],
+    out: StudyFolder,
     domains: Annotated[
         str,
         typer.Option(
-            metavar="A,B,ROBOT.xml|all", help="As `selfmodel suite list` has them, or MJCF files."
+            metavar="A,B|all",
+            help="Domains that `selfmodel suite list` lists, or MJCF files, ROBOT.xml.",
+            rich_help_panel=STUDY,
         ),
     ] = "all",
     tasks: Annotated[
         str | None,
-        typer.Option(metavar="A,B|all", help="Tasks.", show_default="the first of each domain"),
+        typer.Option(
+            metavar="A,B|all",
+            help="Tasks of the domains.",
+            show_default="the first of each domain",
+            rich_help_panel=STUDY,
+        ),
     ] = None,
-    cases: Annotated[
-        str, typer.Option(metavar="1,7|all", help="Failures like those of the paper's Table I.")
-    ] = "all",
-    seeds: Annotated[int, typer.Option(min=1, help="Runs of each body and case.")] = 1,
-    seed: Annotated[int, typer.Option(min=0, help="The first of their seeds.")] = 0,
+    cases: Cases = "all",
+    seeds: Seeds = 1,
+    seed: FirstSeed = 0,
+    only: Only = "1/1",
+    gap: GapLevel = 0.0,
+    structure: Structural = False,
     score: Annotated[
         str,
         typer.Option(
-            metavar="displacement|return",
-            help="What controllers are evolved for: the way forward, or the task's own rewards.",
+            metavar="NAME",
+            help="Fitness of controllers: displacement, or return, the sum of the task's rewards.",
+            rich_help_panel=CONTROLLER,
         ),
     ] = "displacement",
     controller: ControllerKind = "network",
+    neurons: Neurons = None,
     comparator: ComparatorName = DEFAULT.name,
+    kinds: KindNames = DEFAULT_KINDS,
     steps: Annotated[
         int | None,
         typer.Option(
-            min=2, help="Control steps of a trial.", show_default="1000, an episode of the suite"
+            min=2,
+            max=10**6,
+            metavar="N",
+            help="Control steps of a trial.",
+            show_default="1000, an episode of the suite",
+            rich_help_panel=CONTROLLER,
         ),
     ] = None,
     population: Population = 100,
     generations: Generations = 30,
-    trials: Annotated[
-        int, typer.Option(min=1, max=99, help="Physical trials after the failing one.")
-    ] = 3,
-    workers: Annotated[
-        int, typer.Option(min=0, max=1024, help="Processes; 0 means one for each processor.")
-    ] = 0,
+    trials: Trials = 3,
+    workers: Workers = 0,
     as_json: Json = False,
 ) -> None:
-    """Let bodies of the suite, ours and your own fail and recover: bodies x cases x seeds."""
-    # Whatever brings MuJoCo waits until the command runs.
-    from selfmodel.cli import lists  # noqa: PLC0415
-    from selfmodel.cli.output import grid_command  # noqa: PLC0415
-    from selfmodel.experiments.suite.bodies import DOMAINS, bodies, tasks_of  # noqa: PLC0415
-    from selfmodel.experiments.suite.plan import Study, known_cases  # noqa: PLC0415
-    from selfmodel.experiments.suite.results import write_results  # noqa: PLC0415
-    from selfmodel.experiments.suite.work import run_study  # noqa: PLC0415
-    from selfmodel.settings import Settings  # noqa: PLC0415
-    from selfmodel.simulation.threads import thread_count  # noqa: PLC0415
+    """Fail and recover bodies of the suite, selfmodel's and your own: bodies x cases x seeds.
 
-    asked = lists.texts("--domains", domains, DOMAINS)
-    wanted = None if tasks is None else lists.texts("--tasks", tasks, tasks_of(asked))
+    An interrupted study is continued by the same command.
+    """
+    asked = inputs.texts("--domains", domains, DOMAINS)
+    wanted = None if tasks is None else inputs.texts("--tasks", tasks, tasks_of(asked))
     chosen = bodies(asked, wanted)
-    # A last sample without a consequence: an episode of the suite has 1000 rewards.
+    # The last sample of a trial has no reward: an episode of the suite has 1000 rewards.
     length = steps if steps is not None else 1001 if score == "return" else 1000
     study = Study(
         bodies=chosen,
-        cases=lists.whole_numbers("--cases", cases, known_cases(chosen)),
+        cases=inputs.whole_numbers("--case", cases, known_cases(chosen)),
         seeds=range(seed, seed + seeds),
         folder=out,
         settings=Settings(steps=length, trials=trials, generations=generations).scaled(population),
         score=score,
         controller=controller,
         comparator=comparator,
+        kinds=kinds,
+        gap=gap,
+        structure=structure,
+        neurons=neurons,
     )
-    failed = grid_command.run_shown(
+    share = inputs.share("--only", only)
+    failed = grid_display.run_shown(
         lambda on_progress: run_study(
-            study, workers=thread_count(workers), on_progress=on_progress
+            study, workers=thread_count(workers), on_progress=on_progress, only=share
         ),
         out,
     )
     results = write_results(out)
     if as_json:
-        found = {**results.as_dict(), "failures": grid_command.as_objects(failed)}
+        found = {**results.as_dict(), "failures": grid_display.as_objects(failed)}
         typer.echo(json.dumps(found, indent=1, allow_nan=False))
     else:
         _print(results.summaries)
         for path in results.files:
             typer.echo(str(path))
-    grid_command.end(failed)
+    grid_display.end(failed)
 
 
-def _print(summaries: "tuple[Summary, ...]") -> None:
-    from selfmodel.cli.output.tables import show  # noqa: PLC0415  # only where a table is drawn
-
+def _print(summaries: tuple[Summary, ...]) -> None:
     if summaries:
         show(COLUMNS, [_texts(summary) for summary in summaries], texts=3)
         typer.echo("Medians over the runs; right with its 95 % interval, %.")
 
 
-def _texts(summary: "Summary") -> list[str]:
+def _texts(summary: Summary) -> list[str]:
     share = summary.correct
     return [
         summary.robot,

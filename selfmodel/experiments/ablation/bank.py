@@ -5,7 +5,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from selfmodel import __version__
 from selfmodel.controllers.controller import Controller
 from selfmodel.experiments import robots, trial_logs
 from selfmodel.experiments.ablation.plan import Ablation, Cell, model_digest
@@ -13,6 +12,7 @@ from selfmodel.experiments.gaits import evolve_gait, gait_settings
 from selfmodel.experiments.grid import GridBegins, Job, PartEnds, run_grid
 from selfmodel.experiments.study_files import key_of
 from selfmodel.settings import Settings
+from selfmodel.version import __version__
 
 
 def fill(

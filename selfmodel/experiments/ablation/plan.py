@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from selfmodel import __version__
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.experiments import plugins, robots
 from selfmodel.experiments.grid import Job, check_shared
@@ -18,8 +17,9 @@ from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS, notation_kinds
-from selfmodel.physical.reality_gap import WIDEST
+from selfmodel.physical.reality_gap import MAX_GAP_LEVEL
 from selfmodel.settings import Settings
+from selfmodel.version import __version__
 
 NEXT_TRIAL = ("bank", "repair", "disagreement")
 """Choices of the trials' controllers: gaits from the bank, the same for every comparator; or, after
@@ -121,8 +121,8 @@ def check(ablation: Ablation) -> None:
         raise InputError("expected at least one case or one damage of an ablation, got neither")
     _check_names(ablation)
     for gap in ablation.gaps:
-        if not 0 <= gap <= WIDEST:
-            raise InputError(f"expected a gap from 0 to {WIDEST}, such as 0.05, got {gap}")
+        if not 0 <= gap <= MAX_GAP_LEVEL:
+            raise InputError(f"expected a gap from 0 to {MAX_GAP_LEVEL}, such as 0.05, got {gap}")
     _check_trials(ablation)
     check_shared(ablation.folder, _shared(ablation), "an ablation")
 

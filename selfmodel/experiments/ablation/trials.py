@@ -15,7 +15,7 @@ from selfmodel.logs.physical_trial import run_trial
 from selfmodel.logs.reader import read_log
 from selfmodel.logs.records import TrialHeader
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.calibrate import calibrate
+from selfmodel.simulation.calibration import calibrate
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
 
 

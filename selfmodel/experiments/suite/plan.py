@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from selfmodel import __version__
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.experiments import plugins, robots
 from selfmodel.experiments.gaits import gait_settings
@@ -15,8 +14,18 @@ from selfmodel.experiments.grid import Job, check_shared, finished
 from selfmodel.experiments.study_files import check_keys, key_of
 from selfmodel.faults.neuron import silent_neurons
 from selfmodel.faults.notation import parse
+from selfmodel.faults.registry import PAPER_KINDS
+from selfmodel.physical.reality_gap import MAX_GAP_LEVEL
 from selfmodel.settings import Settings
 from selfmodel.tasks import Entry
+from selfmodel.version import __version__
+
+GAIT_PARAMETERS = ("selfmodel", "score", "controller", "neurons")
+"""Names of the parameters that affect a gait."""
+
+OPTIONAL_PARAMETERS = ("kinds", "gap", "structure", "neurons")
+"""Names of the parameters that ``run.json`` contains only if they differ from their defaults, so
+that folders of version 0.1, which has no such parameters, are resumable."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +42,10 @@ class Study:
         score: Fitness of the repair EA, also reported per trial.
         controller: Name of the controller design.
         comparator: Name of the comparator, or ``package.module:object``.
+        kinds: Fault kinds to search, as in ``--kinds``.
+        gap: Level of the reality gap.
+        structure: Whether the physical robots have structural mismatches.
+        neurons: Number of hidden neurons; None for the design's default.
     """
 
     bodies: Sequence[str]
@@ -43,6 +56,10 @@ class Study:
     score: str
     controller: str
     comparator: str
+    kinds: str = ",".join(kind.name for kind in PAPER_KINDS)
+    gap: float = 0.0
+    structure: bool = False
+    neurons: int | None = None
 
 
 def known_cases(bodies: Sequence[str]) -> tuple[int, ...]:
@@ -57,11 +74,14 @@ def check(study: Study) -> None:
         InputError: The definition is invalid, or its folder contains another study.
     """
     plugins.comparator(study.comparator)
+    plugins.kinds(study.kinds)
     check_keys(study.bodies)
     for body in study.bodies:
         entry = robots.robot_entry(body)
-        plugins.design(study.controller, entry.robot())
+        plugins.design(study.controller, entry.robot(), study.neurons)
         plugins.score(study.score, body, entry)
+    if not 0 <= study.gap <= MAX_GAP_LEVEL:
+        raise InputError(f"expected a gap from 0 to {MAX_GAP_LEVEL}, such as 0.05, got {study.gap}")
     known = known_cases(study.bodies)
     for case in study.cases:
         if case not in known:
@@ -69,16 +89,22 @@ def check(study: Study) -> None:
     check_shared(study.folder, _shared(study), "a study")
 
 
-def gait_jobs(study: Study) -> list[Job]:
-    """Returns the jobs that evolve the gaits before the failure, one per body and seed."""
+def gait_jobs(study: Study, only: tuple[int, int] = (1, 1)) -> list[Job]:
+    """Returns the jobs that evolve the gaits before the failure, one per body and seed.
+
+    Args:
+        study: The study.
+        only: ``(i, n)``: share i of n of the gaits, from 1.
+    """
     shared = _shared(study)
-    return [
+    part, parts = only
+    jobs = [
         Job(
             key=f"{key_of(body)}-seed{seed:03d}",
             parameters={
                 **_body(body),
                 "settings": gait_settings(study.settings),
-                **{name: shared[name] for name in ("selfmodel", "score", "controller")},
+                **{name: shared[name] for name in GAIT_PARAMETERS if name in shared},
             },
             seed=seed,
             parts=("gait",),
@@ -86,16 +112,21 @@ def gait_jobs(study: Study) -> list[Job]:
         for seed in study.seeds
         for body in study.bodies
     ]
+    return jobs[part - 1 :: parts]
 
 
-def recovery_jobs(study: Study) -> list[Job]:
+def recovery_jobs(study: Study, only: tuple[int, int] = (1, 1)) -> list[Job]:
     """Returns the jobs of the recoveries with an evolved gait, one seed after another.
+
+    Args:
+        study: The study.
+        only: ``(i, n)``: the recoveries of share i of n of the gaits, from 1.
 
     Raises:
         InputError: The file of an evolved gait is missing.
     """
     found = []
-    for gait in gait_jobs(study):
+    for gait in gait_jobs(study, only):
         path = gait_path(study.folder, gait.key)
         if not path.exists():
             if any(part.key == gait.key for part in finished(study.folder / "gaits")):
@@ -130,7 +161,7 @@ def _applies(study: Study, entry: Entry, case: int) -> bool:
     """Returns whether the study's controllers have the hidden neurons that a failure silences."""
     robot = entry.robot()
     silent = silent_neurons(parse(entry.cases[case], robot.anatomy))
-    return max(silent, default=-1) < plugins.design(study.controller, robot).hidden
+    return max(silent, default=-1) < plugins.design(study.controller, robot, study.neurons).hidden
 
 
 def gait_path(folder: Path, key: str) -> Path:
@@ -162,4 +193,9 @@ def _shared(study: Study) -> dict[str, Any]:
         "score": study.score,
         "controller": study.controller,
         "comparator": study.comparator,
+        **{
+            field.name: getattr(study, field.name)
+            for field in dataclasses.fields(study)
+            if field.name in OPTIONAL_PARAMETERS and getattr(study, field.name) != field.default
+        },
     }

@@ -9,8 +9,7 @@ import numpy as np
 
 from selfmodel.controllers.controller import check_silent_neurons
 from selfmodel.experiments import plugins, robots, trial_logs
-from selfmodel.experiments.experiment import Experiment
-from selfmodel.experiments.experiment import run as run_experiment
+from selfmodel.experiments.experiment import Experiment, run as run_experiment
 from selfmodel.experiments.gaits import evolve_gait
 from selfmodel.experiments.grid import GridBegins, Job, PartEnds, run_grid
 from selfmodel.experiments.study_files import as_dicts
@@ -19,6 +18,7 @@ from selfmodel.experiments.suite.rows import SuiteRow
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.neuron import silent_neurons
 from selfmodel.faults.notation import parse
+from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.recovery.events import Event
 from selfmodel.recovery.fitness import Score
 from selfmodel.robot.robot import Robot
@@ -28,7 +28,11 @@ from selfmodel.trials.trial import Trial
 
 
 def run_study(
-    study: Study, *, workers: int, on_progress: Callable[[GridBegins | PartEnds], None]
+    study: Study,
+    *,
+    workers: int,
+    on_progress: Callable[[GridBegins | PartEnds], None],
+    only: tuple[int, int] = (1, 1),
 ) -> tuple[PartEnds, ...]:
     """Runs the unfinished parts of a study and returns the failed ones.
 
@@ -36,6 +40,8 @@ def run_study(
         study: The study.
         workers: Number of worker processes, each with one thread of physics.
         on_progress: Callback of the grid of gaits, then of the grid of recoveries.
+        only: ``(i, n)``: share i of n of the gaits and their recoveries, from 1, for n machines
+            with a folder each.
 
     Raises:
         InputError: The study is invalid, or its folder contains another study.
@@ -43,12 +49,12 @@ def run_study(
     check(study)
     no_gait = run_grid(
         study.folder / "gaits",
-        gait_jobs(study),
+        gait_jobs(study, only),
         _evolve,
         workers=workers,
         on_progress=on_progress,
     )
-    jobs = recovery_jobs(study)
+    jobs = recovery_jobs(study, only)
     failed = run_grid(
         study.folder / "runs", jobs, _recover, workers=workers, on_progress=on_progress
     )
@@ -65,7 +71,7 @@ def _evolve(job: Job, _part: str, run: Path) -> Any:  # noqa: ANN401  # JSON
         robot,
         Settings(**parameters["settings"]),
         job.seed,
-        design=plugins.design(parameters["controller"], robot),
+        design=plugins.design(parameters["controller"], robot, parameters.get("neurons")),
         score=plugins.score(parameters["score"], parameters["body"], entry),
     )
 
@@ -76,7 +82,7 @@ def _recover(job: Job, _part: str, run: Path) -> Any:  # noqa: ANN401  # JSON
     entry = robots.robot_entry(parameters["body"])
     robot = entry.robot()
     truth = parse(parameters["truth"], robot.anatomy)
-    design = plugins.design(shared["controller"], robot)
+    design = plugins.design(shared["controller"], robot, shared.get("neurons"))
     check_silent_neurons(design, silent_neurons(truth))
     folder = run / "recovery"
     shutil.rmtree(folder, ignore_errors=True)  # files of a killed run
@@ -85,6 +91,9 @@ def _recover(job: Job, _part: str, run: Path) -> Any:  # noqa: ANN401  # JSON
         case=parameters["case"],
         truth=truth,
         comparator=plugins.comparator(shared["comparator"]),
+        kinds=plugins.kinds(shared["kinds"]) if "kinds" in shared else PAPER_KINDS,
+        gap=shared.get("gap", 0.0),
+        structure=shared.get("structure", False),
         settings=Settings(**shared["settings"]),
         seed=job.seed,
         threads=1,

@@ -1,9 +1,8 @@
-"""Promises of poses: what was observed stands, and what was not is as it was seen last."""
+"""Poses from observations; a missing one is the last before it."""
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from hypothesis.extra import numpy as arrays
 
 from selfmodel.cli.rendering.poses import POSE, Poses, poses_of
@@ -13,7 +12,7 @@ from selfmodel.robot.state_access import signal_fields
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import Behaviour, Signal
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 
 STEPS = 12
 

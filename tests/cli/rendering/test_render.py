@@ -1,4 +1,4 @@
-"""Promises of ``selfmodel render``: pictures of a trial from its log, on any machine."""
+"""``selfmodel render``: pictures of a trial from its log, on any machine."""
 
 import json
 import os
@@ -31,8 +31,8 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import SIGNALS, Behaviour
 from selfmodel.trials.trial import TrialPlan
-from tests.conftest import random_controllers
-from tests.helpers.command import selfmodel
+from tests.helpers.command import selfmodel, selfmodel_process
+from tests.helpers.drivers import random_controllers
 from tests.helpers.opengl import WORKS, draws
 
 STEPS = 31
@@ -64,11 +64,12 @@ def film(robot: Robot, text: str, frames: int = 2, unseen: slice = slice(0)) -> 
     return film_of(robot, hypothesis, [("logged: $x_1", seen), ("model", seen)], moments)
 
 
+@pytest.mark.process
 def test_a_strip_is_drawn_whatever_there_is_of_opengl(folder: Path, tmp_path: Path):
     """Even where the library that MuJoCo is told to take would end any program."""
     out = tmp_path / "strip.png"
     arguments = ("render", "a.mcap", "-o", str(out), "--hypothesis", DAMAGE, "--pictures", "3")
-    done = selfmodel(*arguments, "--json", cwd=folder, MUJOCO_GL="nothing-like-it")
+    done = selfmodel_process(*arguments, "--json", cwd=folder, MUJOCO_GL="nothing-like-it")
     told = json.loads(done.stdout)
 
     assert (done.returncode, done.stderr) == (0, "")
@@ -80,13 +81,16 @@ def test_a_strip_is_drawn_whatever_there_is_of_opengl(folder: Path, tmp_path: Pa
     assert [p.name for p in tmp_path.iterdir()] == ["strip.png"]
 
 
+@pytest.mark.opengl
 @draws
+@pytest.mark.process
+@pytest.mark.opengl
 def test_a_film_is_drawn_by_mujoco_with_what_works_of_itself(folder: Path, tmp_path: Path):
     frames = {}
     for text in ("intact", DAMAGE):
         out = tmp_path / f"{len(frames)}.gif"
         arguments = ("render", "a.mcap", "-o", str(out), "--hypothesis", text, "--json")
-        done = selfmodel(*arguments, cwd=folder, MUJOCO_GL="")
+        done = selfmodel_process(*arguments, cwd=folder, MUJOCO_GL="")
         assert (done.returncode, done.stderr) == (0, "")
         assert json.loads(done.stdout)["gl"] == WORKS
         with Image.open(out) as image:
@@ -98,6 +102,7 @@ def test_a_film_is_drawn_by_mujoco_with_what_works_of_itself(folder: Path, tmp_p
     assert np.abs(frames["intact"] - frames[DAMAGE]).max() > 50  # the limb is pale
 
 
+@pytest.mark.process
 def test_where_nothing_draws_a_sentence_says_what_to_do(folder: Path):
     done = selfmodel("render", "a.mcap", cwd=folder, MUJOCO_GL="disable")
 
@@ -153,6 +158,7 @@ def test_what_cannot_be_drawn_is_refused_in_a_sentence(
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.opengl
 def test_the_best_of_a_diagnosis_is_drawn(folder: Path, tmp_path: Path):
     (tmp_path / "result.json").write_text(
         json.dumps({"diagnosis": [{"hypothesis": DAMAGE}, {"hypothesis": "intact"}]})
@@ -187,7 +193,7 @@ def test_a_diagnosis_is_read_or_refused(text: str, best: str | None, tmp_path: P
 def test_what_is_lost_is_dotted_and_what_is_jammed_red(robot: Robot):
     broken, jammed = robot.anatomy.joints[0], robot.anatomy.joints[-2]
     drawn = film(robot, f"break:{broken.name}+jam:{jammed.name}=0.1")
-    names = {robot.model.body(body).name for body in drawn.lost}
+    names = {robot.model.body(body).name for body in drawn.detached}
     axes = Figure().add_subplot()
     lines = lines_of(drawn, _standing(drawn), np.zeros(3), plane_of(drawn))
     draw(axes, drawn, lines, held=False)

@@ -13,8 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from selfmodel.errors import InputError
 from selfmodel.experiments.ablation import Ablation, AblationRow, ablate, collect, write_results
@@ -97,6 +96,7 @@ def test_a_run_keeps_its_trials_and_has_a_row_for_the_diagnosis_after_each(done:
     assert all(row.intact_distance >= row.distance >= 0 for row in rows)
 
 
+@pytest.mark.search
 def test_the_rows_do_not_depend_on_the_number_of_workers_or_on_how_runs_are_shared_out(
     done: Path, tmp_path: Path
 ):
@@ -106,6 +106,7 @@ def test_the_rows_do_not_depend_on_the_number_of_workers_or_on_how_runs_are_shar
     assert timeless(collect(tmp_path / "shared")) == timeless(collect(done))
 
 
+@pytest.mark.search
 def test_one_more_comparator_diagnoses_from_the_same_logs_and_nothing_is_done_again(
     done: Path, tmp_path: Path
 ):
@@ -139,6 +140,7 @@ def test_what_fails_is_told_and_stops_nothing(done: Path, tmp_path: Path):
     assert timeless(collect(ablation.folder)) == timeless(collect(done))
 
 
+@pytest.mark.process
 def test_a_command_with_a_failure_ends_with_status_one_and_prints_one_object(
     done: Path, tmp_path: Path
 ):
@@ -195,6 +197,7 @@ def test_repairs_are_tried_and_their_way_is_told(done: Path, tmp_path: Path):
     assert len(list(ablation.folder.glob("runs/*/forward-displacement/trials/*.mcap"))) == 3
 
 
+@pytest.mark.search
 @pytest.mark.parametrize("way", ["repair", "disagreement"])
 def test_trials_that_are_chosen_are_a_comparators_own(tmp_path: Path, way: str):
     ablation = small(
@@ -231,6 +234,7 @@ def test_a_way_to_choose_needs_a_trial_to_choose(tmp_path: Path, way: str):
         run(small(tmp_path / "out", next_trial=way, settings=settings))
 
 
+@pytest.mark.process
 def test_a_killed_ablation_goes_on_and_finds_what_an_unbroken_one_finds(done: Path, tmp_path: Path):
     out = tmp_path / "out"
     script = tmp_path / "script.py"
@@ -289,6 +293,7 @@ def otherwise(tmp_path_factory: pytest.TempPathFactory, done: Path) -> Path:
     return folder
 
 
+@pytest.mark.search
 def test_a_damage_without_a_number_has_rows_like_a_case(otherwise: Path):
     rows = collect(otherwise)
 
@@ -303,6 +308,7 @@ def test_a_damage_without_a_number_has_rows_like_a_case(otherwise: Path):
     assert len({folder.name for folder in (otherwise / "runs").iterdir()}) == 3
 
 
+@pytest.mark.search
 def test_a_diagnosis_of_an_ablation_considers_the_kinds_that_were_chosen(otherwise: Path):
     words = {
         term.partition("=")[0].partition(":")[0]
@@ -313,6 +319,7 @@ def test_a_diagnosis_of_an_ablation_considers_the_kinds_that_were_chosen(otherwi
     assert words <= {"break", "friction", "intact"}
 
 
+@pytest.mark.search
 def test_rows_say_how_sure_each_diagnosis_is(otherwise: Path, done: Path):
     rows = [*collect(otherwise), *collect(done)]
 
@@ -325,6 +332,7 @@ def test_rows_say_how_sure_each_diagnosis_is(otherwise: Path, done: Path):
             assert not row.rivals
 
 
+@pytest.mark.search
 def test_every_trial_of_a_robot_built_differently_hides_how(otherwise: Path, done: Path):
     logs = sorted(otherwise.glob("runs/*/trials/*.mcap"))
 

@@ -44,6 +44,7 @@ def test_there_are_as_many_trials_without_a_gap_as_there_are_gaits(tmp_path: Pat
         check(small(tmp_path, settings=Settings(trials=7), gaps=[0.05, 0.0]))
 
 
+@pytest.mark.search
 def test_a_robot_of_ones_own_is_ablated_by_the_name_of_its_file(
     quadruped: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

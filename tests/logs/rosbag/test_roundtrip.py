@@ -23,7 +23,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour, collect
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 from tests.logs.rosbag.driver import mapping, record
 
 STEPS = 400
@@ -87,6 +87,7 @@ def test_what_is_imported_is_what_was_simulated(
     assert displacement[0] == pytest.approx(displacement[1], abs=1e-3)  # m
 
 
+@pytest.mark.search
 def test_the_right_fault_is_found_in_an_imported_trial(
     quadruped: Robot, driven: Path, truth: Hypothesis, tmp_path: Path
 ):
@@ -131,6 +132,7 @@ def test_the_suggested_mapping_needs_only_what_is_marked(quadruped: Robot, drive
     assert import_bag(driven, suggested, quadruped).behaviour.steps > STEPS
 
 
+@pytest.mark.process
 def test_the_command_suggests_imports_and_reports(driven: Path, tmp_path: Path):
     done = selfmodel("logs", "import", driven, "--suggest", "--robot", "quadruped")
     assert done.returncode == 0, done.stderr

@@ -49,7 +49,7 @@ def test_a_name_that_might_be_either_is_a_guess():
 def test_commands_without_names_get_an_order_to_check(biped: Robot, bag: Path):
     with open_bag(bag) as opened:
         text = suggest(opened, biped, "biped.xml", with_timestep=True)
-    assert 'order = ["LHX", "LHY", "RHX", "RHY"]  # CHECK: the bag does not say it' in text
+    assert 'order = ["LHX", "LHY", "RHX", "RHY"]  # CHECK: the bag has no names' in text
     assert "control_timestep = 0.01" in text
     assert "# No topic is like right_touch" in text
     assert 'left_hip_x = "LHX"\n' in text
@@ -62,7 +62,7 @@ def test_what_the_bag_lacks_must_be_filled_in(biped: Robot, tmp_path: Path):
         text = suggest(opened, biped, "biped.xml", with_timestep=True)
     assert 'left_hip_x = "?"  # CHANGE: the bag has arm' in text
     assert 'order = ["arm"]  # CHECK' in text
-    assert "# No topic tells where the robot is" in text
+    assert "# No topic has the position of the base" in text
 
 
 def test_states_and_commands_of_one_type_are_told_apart_by_name(biped: Robot, tmp_path: Path):

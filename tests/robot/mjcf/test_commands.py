@@ -17,6 +17,7 @@ def ant(tmp_path: Path) -> Path:
     return Path(shutil.copy(SAMPLES["gymnasium ant"], tmp_path / "ant.xml"))
 
 
+@pytest.mark.search
 def test_a_robot_of_ones_own_is_recovered_and_diagnosed_from_its_logs(ant: Path, tmp_path: Path):
     before = ant.read_bytes()
     damage = ("--damage", "break:ankle_1", "--trials", "1", *SMALL)
@@ -35,6 +36,7 @@ def test_a_robot_of_ones_own_is_recovered_and_diagnosed_from_its_logs(ant: Path,
     assert ant.read_bytes() == before
 
 
+@pytest.mark.process
 def test_the_file_of_a_logs_robot_is_made_ready_as_the_logs_was(tmp_path: Path):
     key = '<keyframe><key qpos="0 0 .6 1 0 0 0 .3 -.3"/></keyframe>'
     felt = "".join(

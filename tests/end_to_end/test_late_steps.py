@@ -19,14 +19,14 @@ from selfmodel.logs.robots import robot_of
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.environment_robot import EnvironmentRobot
 from selfmodel.settings import Settings
-from selfmodel.simulation.calibrate import EXACT, prediction_error
+from selfmodel.simulation.calibration import EXACT_ERROR, prediction_error
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS, load
 from selfmodel.tasks.walking import motion_capture
 from selfmodel.trials.behaviour import SIGNALS, Behaviour, collect
 from selfmodel.trials.state_estimation import estimated_states
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.conftest import random_motion
+from tests.helpers.drivers import random_motion
 
 QUADRUPED = ROBOTS["quadruped"].robot()
 NAMES = QUADRUPED.anatomy.names
@@ -132,8 +132,8 @@ def test_a_log_with_late_and_lost_steps_fits_the_robot_as_it_was_and_no_fault(tm
 
 
 def test_a_model_that_is_exact_predicts_it_exactly_for_calibration_too(trial: Trial):
-    assert prediction_error(QUADRUPED, [trial], 1) < EXACT
-    assert prediction_error(QUADRUPED, [without_marks(trial)], 1) > EXACT
+    assert prediction_error(QUADRUPED, [trial], 1) < EXACT_ERROR
+    assert prediction_error(QUADRUPED, [without_marks(trial)], 1) > EXACT_ERROR
 
 
 def noisy(behaviour: Behaviour) -> Behaviour:

@@ -6,8 +6,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
@@ -16,7 +15,7 @@ from selfmodel.robot.mjcf.adaptation import adapt
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings, parse_setting, read_settings
 from selfmodel.simulation.simulator import Simulator
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 from tests.robot.mjcf.awkward import GROUND, LEGS, MOTORS, TORSO, mjcf
 from tests.robot.mjcf.samples import SAMPLES
 

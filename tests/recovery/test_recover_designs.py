@@ -18,7 +18,7 @@ from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
-from tests.conftest import random_controllers, random_cpgs
+from tests.helpers.drivers import random_controllers, random_cpgs
 from tests.helpers.memory import MemoryJournal, in_memory
 
 FEW = dataclasses.replace(Settings(generations=2, steps=60, trials=2).scaled(8), kept=4)

@@ -15,7 +15,7 @@ from selfmodel.logs import LogError, read_gap, read_log, read_truth
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.measurement_noise import NoisyMeasurement
-from selfmodel.physical.reality_gap import Gap, draw_gap
+from selfmodel.physical.reality_gap import RealityGap, draw_gap
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
@@ -23,13 +23,13 @@ from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import SIGNALS, Behaviour, collect
 from selfmodel.trials.signal_scales import MEASUREMENT_FULL_SCALES
 from selfmodel.trials.trial import TrialPlan
-from tests.conftest import random_controllers, random_motion
 from tests.helpers.command import SMALL, selfmodel
+from tests.helpers.drivers import random_controllers, random_motion
 
 STEPS = 60
 
 
-def drawn(robot: Robot, level: float, seed: int = 0) -> Gap:
+def drawn(robot: Robot, level: float, seed: int = 0) -> RealityGap:
     return draw_gap(robot, level, np.random.default_rng(seed))
 
 
@@ -189,7 +189,7 @@ def test_the_log_hides_the_gap_where_only_scoring_looks(quadruped: Robot, tmp_pa
     plan = TrialPlan("trial", "single", controller, STEPS, 0)
     samples = list(SimulatedRobot(quadruped, gap=gap).run(controller, STEPS))
     texts = {
-        "told": json.dumps(gap.as_values()),
+        "told": json.dumps(gap.as_dict()),
         "other": "{}",
         "not": None,
         "bad": "[1",
@@ -203,7 +203,7 @@ def test_the_log_hides_the_gap_where_only_scoring_looks(quadruped: Robot, tmp_pa
             samples,
             TrialHeader(Settings(), hidden="intact", gap=text),
         )
-    assert read_gap(tmp_path / "told.mcap") == gap.as_values()
+    assert read_gap(tmp_path / "told.mcap") == gap.as_dict()
     assert read_gap(tmp_path / "other.mcap") == {}
     assert read_gap(tmp_path / "not.mcap") is None
     for name in ("bad", "list"):
@@ -217,6 +217,7 @@ def test_the_log_hides_the_gap_where_only_scoring_looks(quadruped: Robot, tmp_pa
         assert "delay" not in repr(log)
 
 
+@pytest.mark.process
 def test_a_trial_across_a_gap_from_the_command_line(tmp_path: Path):
     def trial(name: str, *options: str) -> dict:
         done = selfmodel(
@@ -258,6 +259,7 @@ def test_a_level_out_of_range_is_refused_by_the_command_line(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.search
 def test_a_recovery_across_a_gap_is_of_one_robot_whose_trials_all_differ(tmp_path: Path):
     done = selfmodel(
         "recover", "quadruped", "--damage", "intact", *SMALL, "--trials", "1", "--gap", "0.1",

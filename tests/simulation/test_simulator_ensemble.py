@@ -14,7 +14,7 @@ from selfmodel.robot.noise import SensorNoise
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.requests import Ensemble
 from selfmodel.simulation.simulator import Simulator
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 
 RECORD = ("sensors", "joint_positions", "base_position")
 STEPS = 40

@@ -12,7 +12,7 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import SIGNALS
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 from tests.robot.mjcf.awkward import AWKWARD
 
 SECONDS_EACH = 5

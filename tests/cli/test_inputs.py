@@ -1,13 +1,12 @@
-"""Promises of the lists on the command line of an ablation."""
+"""Option values: lists with commas, shares of a study."""
 
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from typer.testing import CliRunner
 
-from selfmodel.cli import app, lists
+from selfmodel.cli import app, inputs
 from selfmodel.errors import InputError
 
 
@@ -16,18 +15,18 @@ from selfmodel.errors import InputError
     [
         ("--robots", "quadrupde", "unknown robot 'quadrupde': did you mean quadruped?"),
         ("--robots", "quadruped,,hexapod", "--robots needs a list with commas"),
-        ("--cases", "1,11", "unknown case of quadruped '11'"),
-        ("--cases", "1,two", "--cases needs whole numbers"),
-        ("--comparators", "forward-displacment", "did you mean forward-displacement?"),
-        ("--gaps", "0,big", "--gaps needs numbers with commas between them"),
-        ("--gaps", "-0.1", "a gap is a number from 0 to 0.5, such as 0.05, got -0.1"),
-        ("--gaps", "nan", "a gap is a number from 0 to 0.5"),
+        ("--case", "1,11", "unknown case of quadruped '11'"),
+        ("--case", "1,two", "--case needs whole numbers"),
+        ("--comparator", "forward-displacment", "did you mean forward-displacement?"),
+        ("--gap", "0,big", "--gap needs numbers with commas between them"),
+        ("--gap", "-0.1", "a gap is a number from 0 to 0.5, such as 0.05, got -0.1"),
+        ("--gap", "nan", "a gap is a number from 0 to 0.5"),
         ("--gaps", "5", "a gap is a number from 0 to 0.5"),
         ("--trials", "7", "the same gait gives the same trial, and the bank has 6"),
         ("--next-trial", "repairs", "did you mean repair?"),
         ("--only", "3/2", "--only needs i/n"),
         ("--only", "0/2", "--only needs i/n"),
-        ("--damages", "break:nose", "unknown part in the term 'break:nose'"),
+        ("--damage", "break:nose", "unknown part in the term 'break:nose'"),
         ("--damages", "brek:front_left_knee", "did you mean break?"),
         (
             "--kinds",
@@ -35,7 +34,7 @@ from selfmodel.errors import InputError
             "no diagnosis may propose neuron: leave it out",
         ),
         ("--kinds", "break,frction", "unknown kind 'frction': did you mean friction?"),
-        ("--cases", " none ", "needs at least one case or one damage, got neither"),
+        ("--case", " none ", "needs at least one case or one damage, got neither"),
     ],
 )
 def test_a_bad_list_is_refused_in_a_sentence_before_anything_is_run(
@@ -52,8 +51,8 @@ def test_a_bad_list_is_refused_in_a_sentence_before_anything_is_run(
 
 @given(st.lists(st.text("abc:._", min_size=1), min_size=1))
 def test_a_list_is_what_stands_between_the_commas_each_once(items: list[str]):
-    assert lists.texts("--any", " , ".join(items)) == tuple(dict.fromkeys(items))
+    assert inputs.texts("--any", " , ".join(items)) == tuple(dict.fromkeys(items))
 
 
 def test_a_number_is_one_number_however_it_is_written():
-    assert lists.whole_numbers("--any", "2,02,1,+2", ()) == (2, 1)
+    assert inputs.whole_numbers("--any", "2,02,1,+2", ()) == (2, 1)

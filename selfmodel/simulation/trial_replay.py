@@ -1,4 +1,4 @@
-"""A logged trial simulated again: whether it is the same, and where it parts."""
+"""Replay: a logged trial is simulated again and compared with its log."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,26 +14,26 @@ from selfmodel.trials.trial import Trial
 
 @dataclass(frozen=True, eq=False)
 class Replay:
-    """A trial beside its simulation. What was not observed is not compared.
+    """Comparison of a logged trial with its simulation, on the observed numbers.
 
     Attributes:
-        simulated: What the simulation did, ``(steps, width)`` for each signal.
-        identical: Whether every number that was observed is the simulated one, to the bit.
-        first_divergence_step: The first step at which some signal differs by more than the
-            tolerance; None if there is none.
-        errors: For each signal the root mean square over its columns of what differs at each step,
-            ``(steps,)`` in the signal's unit; NaN where nothing was observed.
-        broke_down: Whether the simulation diverged, so that it means nothing.
+        simulated: Simulated signals, ``(steps, width)`` each.
+        identical: Whether all observed numbers are bit-identical to the simulated ones.
+        first_divergence_step: First step at which a signal differs by more than the tolerance;
+            None without such a step.
+        errors: Root mean square error of each signal over its columns, ``(steps,)`` in the signal's
+            unit; NaN where nothing was observed.
+        diverged: Whether the simulation diverged; its signals are then invalid.
     """
 
     simulated: Behaviour
     identical: bool
     first_divergence_step: int | None
     errors: Mapping[Signal, FloatArray]
-    broke_down: bool
+    diverged: bool
 
     def rms(self, signal: Signal, steps: slice = slice(None)) -> float:
-        """Returns the root mean square of a signal's error over some steps; NaN without any."""
+        """Returns the root mean square error of a signal over some steps; NaN if not observed."""
         squares = self.errors[signal][steps] ** 2
         observed = squares[~np.isnan(squares)]
         return float(np.sqrt(observed.mean())) if len(observed) else np.nan
@@ -42,37 +42,37 @@ class Replay:
 def replay(
     trial: Trial, hypothesis: Hypothesis, simulator: Simulator, tolerance: float = 0.0
 ) -> Replay:
-    """Simulates what a trial did, and compares.
+    """Simulates a logged trial under a hypothesis and compares the simulation with the log.
 
     Args:
         trial: The logged trial.
-        hypothesis: What is taken to be wrong with the robot.
-        simulator: Of the trial's robot.
-        tolerance: By how much a number may differ and count as the same, in its unit: more than 0
-            where another version of MuJoCo made the log.
+        hypothesis: Assumed faults of the robot.
+        simulator: Simulator of the trial's robot.
+        tolerance: Largest difference of two equal numbers, in the unit of the signal; a log of
+            another MuJoCo version requires a tolerance above 0.
     """
     logged = trial.behaviour
     outcome = simulator.run([(hypothesis, trial.plan.controller)], logged.steps, SIGNALS)
     batch = outcome.behaviour
     simulated = Behaviour(batch.names, batch.time, {signal: batch[signal][0] for signal in SIGNALS})
-    apart = np.zeros(logged.steps, dtype=bool)
+    differs = np.zeros(logged.steps, dtype=bool)
     identical = True
     errors: dict[Signal, FloatArray] = {}
     for signal in SIGNALS:
-        told, made = logged[signal], simulated[signal]
-        observed = ~np.isnan(told)
-        with np.errstate(invalid="ignore", over="ignore"):  # a simulation that broke down
-            difference = np.where(observed, made - told, 0.0)
-            apart |= (~(np.abs(difference) <= tolerance) & observed).any(axis=1)
+        recorded, predicted = logged[signal], simulated[signal]
+        observed = ~np.isnan(recorded)
+        with np.errstate(invalid="ignore", over="ignore"):  # of a simulation that diverged
+            difference = np.where(observed, predicted - recorded, 0.0)
+            differs |= (~(np.abs(difference) <= tolerance) & observed).any(axis=1)
             errors[signal] = _rms_of_rows(difference, observed)
-        identical &= bool(np.all((_bits(made) == _bits(told)) | ~observed))
-    steps = np.flatnonzero(apart)
+        identical &= bool(np.all((_bits(predicted) == _bits(recorded)) | ~observed))
+    steps = np.flatnonzero(differs)
     return Replay(
         simulated=simulated,
         identical=identical,
         first_divergence_step=int(steps[0]) if len(steps) else None,
         errors=errors,
-        broke_down=bool(outcome.diverged[0]),
+        diverged=bool(outcome.diverged[0]),
     )
 
 

@@ -12,12 +12,19 @@ from selfmodel.physical.reality_gap import draw_gap
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.parameters import Parameters, factor_names, nominal, with_parameters
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.calibrate import BOUND, PRIOR, Calibration, calibrate, prediction_error
+from selfmodel.simulation.calibration import (
+    MAX_LOG_FACTOR,
+    PRIOR_DEVIATION,
+    Calibration,
+    calibrate,
+    prediction_error,
+)
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import SIGNALS, Signal, collect
 from selfmodel.trials.state_estimation import BASE
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.conftest import lacking, random_motion
+from tests.helpers.drivers import random_motion
+from tests.helpers.hostile import lacking
 
 STEPS = 400
 QUADRUPED = ROBOTS["quadruped"].robot()
@@ -56,12 +63,13 @@ def test_the_factors_go_from_nominal_towards_the_truth():
     assert np.linalg.norm(found - true) < 0.9 * np.linalg.norm(true)
 
 
+@pytest.mark.search
 def test_with_a_weak_prior_the_factors_of_a_robot_without_noise_are_found(
     monkeypatch: pytest.MonkeyPatch,
 ):
     """As calibration is set, the prior keeps factors near nominal, for the sake of noisy logs."""
-    monkeypatch.setattr("selfmodel.simulation.calibrate.SHARE", 0.005)
-    monkeypatch.setattr("selfmodel.simulation.calibrate.ITERATIONS", 20)
+    monkeypatch.setattr("selfmodel.simulation.calibration.PRIOR_WEIGHT", 0.005)
+    monkeypatch.setattr("selfmodel.simulation.calibration.MAX_ITERATIONS", 20)
     found = calibrate(QUADRUPED, trials(with_parameters(QUADRUPED, TRUE)), threads=2)
     off = np.abs(np.log(found.parameters.factors) - np.log(TRUE.factors))
 
@@ -90,9 +98,10 @@ def test_a_model_that_is_exact_is_left_as_it_is_to_the_bit(robot: Robot):
 
     assert found.robot is robot
     assert found.parameters == nominal(robot)
-    assert set(found.deviations) == {PRIOR}
+    assert set(found.deviations) == {PRIOR_DEVIATION}
 
 
+@pytest.mark.search
 def test_the_number_of_threads_does_not_matter():
     again = calibrate(QUADRUPED, trials(with_parameters(QUADRUPED, TRUE)), threads=3)
 
@@ -101,17 +110,19 @@ def test_the_number_of_threads_does_not_matter():
     assert again.deviations.tobytes() == fitted().deviations.tobytes()
 
 
+@pytest.mark.search
 def test_under_noise_factors_stay_near_nominal_and_within_bounds():
     gap = draw_gap(QUADRUPED, 0.1, np.random.default_rng(1))
     physical = SimulatedRobot(QUADRUPED, gap=gap)
     found = calibrate(QUADRUPED, [trial(QUADRUPED, physical, 0)], threads=1)
 
     assert found.parameters.delay == gap.delay
-    assert np.abs(np.log(found.parameters.factors)).max() <= BOUND
+    assert np.abs(np.log(found.parameters.factors)).max() <= MAX_LOG_FACTOR
     assert found.error < found.error_before
-    assert ((found.deviations > 0) & (found.deviations <= PRIOR)).all()
+    assert ((found.deviations > 0) & (found.deviations <= PRIOR_DEVIATION)).all()
 
 
+@pytest.mark.search
 def test_what_the_trials_do_not_show_is_as_uncertain_as_before_them_however_many_they_are():
     """A robot that floats shows nothing of the ground's friction."""
     mjcf = QUADRUPED.mjcf.replace("<option ", '<option gravity="0 0 0" ', 1)
@@ -121,17 +132,18 @@ def test_what_the_trials_do_not_show_is_as_uncertain_as_before_them_however_many
     several = [trial(adrift, SimulatedRobot(adrift, gap=gap, stream=k), k) for k in range(3)]
     found = [calibrate(adrift, several[:count], threads=1).deviations for count in (1, 3)]
 
-    np.testing.assert_allclose([each[friction] for each in found], PRIOR, rtol=1e-3)
-    assert all((np.delete(each, friction) < PRIOR).all() for each in found)
+    np.testing.assert_allclose([each[friction] for each in found], PRIOR_DEVIATION, rtol=1e-3)
+    assert all((np.delete(each, friction) < PRIOR_DEVIATION).all() for each in found)
 
 
 def test_what_the_trials_show_is_less_uncertain_than_before_them():
     motors = slice(factor_names(QUADRUPED).index("damping") + 1, None)
 
-    assert (fitted().deviations[motors] < 0.7 * PRIOR).all()
-    assert (fitted().deviations > 0.2 * PRIOR).all()
+    assert (fitted().deviations[motors] < 0.7 * PRIOR_DEVIATION).all()
+    assert (fitted().deviations > 0.2 * PRIOR_DEVIATION).all()
 
 
+@pytest.mark.search
 def test_a_robot_that_nobody_sees_is_calibrated_from_what_it_has_on_board():
     real = with_parameters(QUADRUPED, TRUE)
     seen = [trial(real, SimulatedRobot(real), 7)]
@@ -145,16 +157,17 @@ def test_a_robot_that_nobody_sees_is_calibrated_from_what_it_has_on_board():
     assert after < 0.75 * before
     # It knows no more of the factors than one that is seen.
     assert np.median(found.deviations / fitted().deviations) > 0.7
-    assert (found.deviations < PRIOR).all()
+    assert (found.deviations < PRIOR_DEVIATION).all()
 
 
 def test_an_exact_model_of_a_robot_that_nobody_sees_is_left_as_it_is(robot: Robot):
     found = calibrate(robot, [lacking(one, BASE) for one in trials(robot, 1)], threads=1)
 
     assert found.robot is robot
-    assert set(found.deviations) == {PRIOR}
+    assert set(found.deviations) == {PRIOR_DEVIATION}
 
 
+@pytest.mark.search
 def test_trials_in_which_the_base_was_seen_and_others_are_fitted_to_together():
     real = with_parameters(QUADRUPED, TRUE)
     one, other = trials(real)
@@ -187,7 +200,7 @@ def test_a_trial_with_no_stretch_of_all_of_it_is_refused():
 
 
 def test_no_trials_are_refused():
-    with pytest.raises(InputError, match="at least one trial of the intact robot, got none"):
+    with pytest.raises(InputError, match="at least one trial of the healthy robot, got none"):
         calibrate(QUADRUPED, [], 1)
 
 

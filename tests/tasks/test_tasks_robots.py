@@ -1,4 +1,4 @@
-"""The contract of every registered robot: add one, and it is tested."""
+"""Contract tests of every robot, parametrised over the registry."""
 
 import numpy as np
 import pytest
@@ -15,10 +15,10 @@ from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ALL_TASKS, ROBOTS
 from selfmodel.trials.behaviour import forward_displacement
-from tests.conftest import random_controllers
+from tests.helpers.drivers import random_controllers
 
 STANDING_DRIFT = 0.05
-"""How far a robot told to stand may be from its start after a run, m."""
+"""Maximum drift of a standing robot in one run, m."""
 
 
 def test_its_parts_are_named_for_their_limbs(robot: Robot):

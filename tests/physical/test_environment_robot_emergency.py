@@ -58,7 +58,7 @@ EMERGENCIES: dict[str, tuple[dict[int, object], dict[str, object], type[BaseExce
         dict.fromkeys(range(4, 30)),
         {"patience": 3},
         TrialError,
-        "nothing was read of .* for more than 3 steps, at step 7",
+        "no reading of .* for more than 3 steps, at step 7",
     ),
     "joint": (
         {7: observation(7, joint_positions=ANGLES + 3.0)},
@@ -70,19 +70,19 @@ EMERGENCIES: dict[str, tuple[dict[int, object], dict[str, object], type[BaseExce
         {7: observation(7, base_orientation=leaning(1.2))},
         {"limits": [tilt_limit(1.1)]},
         TrialError,
-        "at step 7: it leans by 1.20 rad, more than 1.1 rad",
+        "at step 7: the base is tilted by 1.20 rad, more than 1.1 rad",
     ),
     "no rotation": (
         {7: observation(7, base_orientation=np.zeros(4))},
         {"limits": [tilt_limit(1.1)]},
         TrialError,
-        "at step 7: base_orientation is no rotation: a quaternion of length 0.00",
+        "at step 7: base_orientation must be a unit quaternion, got the norm 0.00",
     ),
     "blind limit": (
         {k: observation(k, base_orientation=None) for k in range(4, 30)},
         {"limits": [tilt_limit(1.1)], "patience": 3},
         TrialError,
-        r"base_orientation \(w, x, y, z\), which a limit needs, for more than 3 .* at step 7",
+        r"base_orientation \(w, x, y, z\), which a limit requires, for more than 3 .* at step 7",
     ),
     "another robot": (
         {7: observation(7, sensors=[0.0])},
@@ -133,7 +133,7 @@ def test_a_robot_that_does_not_observe_what_a_limit_needs_is_not_driven(
 ):
     bench = Bench({k: observation(k, **{signal: None}) for k in range(STEPS)})
     driver = Playback(NAMES.motors, np.zeros((5, len(NAMES.motors))))
-    with pytest.raises(TrialError, match=r"nothing was read of .* at step 0"):
+    with pytest.raises(TrialError, match=r"no reading of .* at step 0"):
         list(bench_robot(bench, limits=[limit]).run(driver, STEPS))
     assert bench.done == ["stop", "reset", "stop"]
 

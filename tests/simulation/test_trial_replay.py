@@ -17,12 +17,12 @@ from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.replay import replay
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.simulation.trial_replay import replay
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import SIGNALS, Behaviour
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.conftest import random_controllers, random_cpgs, random_of
+from tests.helpers.drivers import random_controllers, random_cpgs, random_of
 
 STEPS = 1000
 

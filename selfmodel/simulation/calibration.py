@@ -1,0 +1,256 @@
+"""Calibration of the self-model: fits its continuous parameters to trials of the healthy robot.
+
+The fit is a box-constrained nonlinear least squares over short predictions from logged states
+(``mujoco.minimize``), with a Gaussian prior for parameters that the trials do not determine. The
+control delay, an integer, is found by exhaustive search.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import mujoco.minimize
+import numpy as np
+
+from selfmodel.arrays import FloatArray
+from selfmodel.errors import InputError
+from selfmodel.faults.build import apply_faults
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.robot.control_delay import MAX_CONTROL_DELAY
+from selfmodel.robot.parameters import (
+    Parameters,
+    edited_model,
+    from_factors,
+    nominal,
+    with_parameters,
+)
+from selfmodel.robot.robot import Robot
+from selfmodel.simulation.calibration_segments import (
+    CalibrationSegments,
+    calibration_segments_of,
+)
+from selfmodel.simulation.outcome import SimulationStats
+from selfmodel.simulation.prediction import predict
+from selfmodel.simulation.requests import Segments
+from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.signal_difference import difference
+from selfmodel.trials.signal_scales import CALIBRATION_ERROR_SCALES
+from selfmodel.trials.state_estimation import BASE
+from selfmodel.trials.trial import Trial
+
+PRIOR_DEVIATION = 0.15
+"""Standard deviation of the prior on the logarithm of each parameter's factor."""
+
+PRIOR_WEIGHT = 0.05
+"""Weight of the prior relative to the data. All errors together count as 1 / PRIOR_WEIGHT**2
+independent errors, whatever their number: errors of neighbouring steps and columns are strongly
+correlated."""
+
+MAX_LOG_FACTOR = 1.2
+"""Bound on the absolute logarithm of a parameter's factor: factors of 0.3 to 3.3."""
+
+DIFFERENCE_STEP = 0.1
+"""Step of the finite differences of a logarithm. Smaller steps are dominated by noise: a parameter
+changes the time at which a foot makes contact."""
+
+CANDIDATE_DELAYS = range(MAX_CONTROL_DELAY + 1)
+"""Control delays of the exhaustive search, control steps."""
+
+MAX_ITERATIONS = 3
+
+EXACT_ERROR = 0.01
+"""Root mean square error, in ``CALIBRATION_ERROR_SCALES``, below which the model is taken to be
+exact."""
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """Result of a calibration.
+
+    Attributes:
+        robot: The robot with the fitted parameters in its MJCF.
+        parameters: The fitted parameters.
+        deviations: Posterior standard deviation of each factor's logarithm, ``(factors,)`` in the
+            order of ``Parameters.factors``; ``PRIOR_DEVIATION`` for a factor without influence on
+            the trials.
+        error_before: Root mean square error of the predictions with the nominal parameters, in
+            units of ``CALIBRATION_ERROR_SCALES``.
+        error: Root mean square error with the fitted parameters, in the same units.
+    """
+
+    robot: Robot
+    parameters: Parameters
+    deviations: FloatArray
+    error_before: float
+    error: float
+
+
+def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibration:
+    """Fits the continuous parameters of a robot to trials of the healthy robot.
+
+    The result does not depend on the number of threads. A model that predicts the trials exactly
+    is returned unchanged, to the bit.
+
+    If the base's position and linear velocity were rarely observed together in a trial, the trial
+    is assumed to begin in the model's initial pose, and the state of the base is predicted from
+    there on. After a late step, an unknown command, or an unknown state at the beginning of a
+    segment (every tenth step), the rest of such a trial is not used.
+
+    Args:
+        robot: The robot as its model describes it.
+        trials: At least one trial with commands and state; the base's position and linear velocity
+            may be NaN.
+        threads: Threads of MuJoCo's steps.
+
+    Raises:
+        InputError: There are no trials, or too little of a trial was observed.
+    """
+    if not trials:
+        raise InputError("expected at least one trial of the healthy robot, got none")
+    data = [calibration_segments_of(trial) for trial in trials]
+    start = nominal(robot)
+    before = _error(robot, start, data, threads)
+    deviations = np.full(len(start.factors), PRIOR_DEVIATION)
+    if before < EXACT_ERROR:
+        return Calibration(robot, start, deviations, before, before)
+    zero = np.zeros((len(start.factors), 1))
+
+    def residuals_at(delay: int, of: Sequence[CalibrationSegments]) -> Residual:
+        return partial(_residuals, robot, of, delay, threads)
+
+    delay = min(
+        CANDIDATE_DELAYS, key=lambda steps: float(np.sum(residuals_at(steps, data)(zero) ** 2))
+    )
+    residual = residuals_at(delay, data)
+    fitted, _ = mujoco.minimize.least_squares(
+        zero,
+        residual,
+        bounds=[np.full_like(zero, -MAX_LOG_FACTOR), np.full_like(zero, MAX_LOG_FACTOR)],
+        jacobian=lambda x, _residual: _slopes(residual, x),
+        max_iter=MAX_ITERATIONS,
+        xtol=1e-3,
+        verbose=mujoco.minimize.Verbosity.SILENT,
+    )
+    found = from_factors(np.exp(fitted.ravel()), delay)
+    # Independent segments: long simulations are chaotic, so their derivatives are meaningless.
+    independent = _with_estimated_base(robot, found, data, threads)
+    slopes = _slopes(residuals_at(delay, independent), fitted)
+    count = len(slopes) - len(zero)  # number of errors; the other rows are the prior
+    spread = np.linalg.inv(slopes.T @ slopes) * count * PRIOR_WEIGHT**2
+    return Calibration(
+        robot=with_parameters(robot, found),
+        parameters=found,
+        deviations=np.sqrt(np.diag(spread)),
+        error_before=before,
+        error=_error(robot, found, data, threads),
+    )
+
+
+def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> float:
+    """Returns the prediction error of a self-model on trials.
+
+    Args:
+        robot: The self-model.
+        trials: The trials, as for ``calibrate``.
+        threads: Threads of MuJoCo's steps.
+
+    Returns:
+        The root mean square error over all columns after all judged steps, in units of
+        ``CALIBRATION_ERROR_SCALES``.
+
+    Raises:
+        InputError: Too little of a trial was observed.
+    """
+    data = [calibration_segments_of(trial) for trial in trials]
+    return _error(robot, nominal(robot), data, threads)
+
+
+Residual = Callable[[FloatArray], FloatArray]
+"""Function from logarithms of factors, ``(factors, m)``, to residuals, ``(residuals, m)``."""
+
+
+def _slopes(residual: Residual, x: FloatArray) -> FloatArray:
+    """Returns the Jacobian of the residuals by central differences, ``(residuals, factors)``."""
+    steps = DIFFERENCE_STEP * np.eye(len(x))
+    ahead, behind = residual(x + steps), residual(x - steps)
+    return np.asarray((ahead - behind) / (2 * DIFFERENCE_STEP))
+
+
+def _residuals(
+    robot: Robot,
+    data: Sequence[CalibrationSegments],
+    delay: int,
+    threads: int,
+    logarithms: FloatArray,
+) -> FloatArray:
+    """Returns the residuals of the data, then those of the prior; see ``Residual``."""
+    logarithms = np.reshape(logarithms, (len(logarithms), -1))
+    models = [from_factors(np.exp(row), delay) for row in logarithms.T]
+    errors = _errors(robot, models, data, threads)
+    weight = np.sqrt(len(errors)) * PRIOR_WEIGHT / PRIOR_DEVIATION
+    return np.concatenate([_damped(errors), weight * logarithms])
+
+
+def _error(
+    robot: Robot, parameters: Parameters, data: Sequence[CalibrationSegments], threads: int
+) -> float:
+    return float(np.sqrt(np.mean(_errors(robot, [parameters], data, threads) ** 2)))
+
+
+def _with_estimated_base(
+    robot: Robot, found: Parameters, data: Sequence[CalibrationSegments], threads: int
+) -> list[CalibrationSegments]:
+    """Returns independent segments; an unobserved base begins in its predicted state."""
+    predict_with = _predictor(robot, [found], threads)
+
+    def independent(own: CalibrationSegments) -> CalibrationSegments:
+        segments = own.segments
+        if "base_position" in segments.states:
+            return own
+        predicted = predict_with(replace(segments, record=BASE))
+        states = {**segments.states, **{signal: predicted[signal][0, :, 0] for signal in BASE}}
+        return replace(own, segments=replace(segments, states=states))
+
+    return [independent(own) for own in data]
+
+
+def _errors(
+    robot: Robot, models: Sequence[Parameters], data: Sequence[CalibrationSegments], threads: int
+) -> FloatArray:
+    """Returns prediction errors divided by their scales, ``(errors, models)``."""
+    predict_with = _predictor(robot, models, threads)
+    rows = []
+    for own in data:
+        predicted = predict_with(own.segments)
+        for signal, scale in CALIBRATION_ERROR_SCALES.items():
+            if signal in own.observed:
+                error = difference(signal, predicted[signal][:, :, 1:], own.observed[signal])
+                rows.append((error / scale)[:, own.judged].reshape(len(models), -1))
+    return np.concatenate(rows, axis=1).T
+
+
+def _predictor(
+    robot: Robot, models: Sequence[Parameters], threads: int
+) -> Callable[[Segments], Behaviour]:
+    """Returns a function that predicts segments with models of equal delay.
+
+    The signals of its result are ``(models, segments, horizon + 1, width)``.
+    """
+    delay = models[0].delay
+    embodiments = [
+        apply_faults(edited_model(robot, parameters), robot.anatomy, INTACT)
+        for parameters in models
+    ]
+
+    def predict_with(segments: Segments) -> Behaviour:
+        outcome = predict(
+            robot, embodiments, segments, threads=threads, stats=SimulationStats(), delay=delay
+        )
+        return outcome.behaviour
+
+    return predict_with
+
+
+def _damped(errors: FloatArray) -> FloatArray:
+    """Returns pseudo-Huber residuals: their squares grow linearly with errors above 1."""
+    return np.asarray(np.sign(errors) * np.sqrt(2 * (np.sqrt(1 + errors**2) - 1)))

@@ -1,0 +1,30 @@
+"""Random controllers and commands for the tests of any robot."""
+
+import numpy as np
+
+from selfmodel.controllers.controller import Controller, Design, draw_genomes
+from selfmodel.robot.designs import cpg_for, network_for
+from selfmodel.robot.robot import Robot
+
+
+def random_controllers(robot: Robot, count: int, seed: int = 0) -> list[Controller]:
+    """Returns networks with random weights for a robot."""
+    return random_of(network_for(robot), count, seed)
+
+
+def random_cpgs(robot: Robot, count: int, seed: int = 0) -> list[Controller]:
+    """Returns CPGs with random genomes for a robot."""
+    return random_of(cpg_for(robot), count, seed)
+
+
+def random_of(design: Design, count: int, seed: int = 0) -> list[Controller]:
+    """Returns controllers of a design with random genomes."""
+    genomes = draw_genomes(np.random.default_rng(seed), (count, design.weights))
+    return [Controller(design, genome) for genome in genomes]
+
+
+def random_motion(robot: Robot, steps: int, seed: int = 0) -> np.ndarray:
+    """Returns smooth motor targets that move every joint, ``(steps, motors)``, rad."""
+    rng = np.random.default_rng(seed)
+    phase = rng.uniform(0, 2 * np.pi, len(robot.anatomy.motors))
+    return 0.6 * np.sin(2 * np.pi * np.arange(steps)[:, None] * robot.control_timestep + phase)

@@ -1,0 +1,28 @@
+"""Inputs that are hard to judge: a model that diverges, and trials with missing signals."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.faults.notation import parse
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.behaviour import Signal
+from selfmodel.trials.trial import Trial
+
+
+def exploding(simulator: Simulator, text: str) -> Hypothesis:
+    """Returns a hypothesis whose model in this simulator diverges: its joints amplify motion."""
+    hypothesis = parse(text, simulator.robot.anatomy)
+    built = simulator._embodiment(hypothesis)
+    built.model.dof_damping[6:] = -1e3
+    return hypothesis
+
+
+def lacking(trial: Trial, signals: tuple[Signal, ...], steps: slice = slice(None)) -> Trial:
+    """Returns the trial with signals that are NaN, not observed, at some steps."""
+    run = trial.behaviour
+    lost = {signal: run[signal].copy() for signal in signals}
+    for values in lost.values():
+        values[steps] = np.nan
+    return replace(trial, behaviour=replace(run, signals={**run.signals, **lost}))

@@ -1,0 +1,25 @@
+"""The repair search: its start, and the fitness of a diverged gait."""
+
+import dataclasses
+
+import numpy as np
+
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.recovery.repair import RepairSearch
+from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.behaviour import forward_displacement
+from tests.helpers.drivers import random_controllers
+
+SMALL = dataclasses.replace(Settings().scaled(20), generations=1, steps=200)
+
+
+def test_a_repair_starts_from_the_controllers_it_is_given(quadruped: Robot):
+    seeds = random_controllers(quadruped, 20, seed=3)
+    simulator = Simulator(quadruped, 2)
+    best = RepairSearch(simulator, SMALL)(INTACT, seeds, np.random.default_rng(0), lambda _: None)
+    runs = [(INTACT, seed) for seed in seeds]
+    behaviour = simulator.run(runs, SMALL.steps, ["base_position"]).behaviour
+
+    assert best == seeds[int(np.argmax(forward_displacement(behaviour)))]

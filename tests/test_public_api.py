@@ -1,0 +1,70 @@
+"""Promises of the public interface: its names, lazy imports, documented and runnable examples."""
+
+import ast
+import doctest
+import importlib
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import selfmodel
+
+ROOT = Path(__file__).parents[1]
+FACES = sorted(path.parent for path in (ROOT / "selfmodel").glob("*/__init__.py"))
+FACES = [folder for folder in FACES if "lazy_loader" in (folder / "__init__.py").read_text()]
+
+PUBLIC = {
+    *("load_robot", "Robot", "Hypothesis", "FaultKind", "ALL_KINDS", "PAPER_KINDS"),
+    *("parse_hypothesis", "Simulator", "simulated_robot", "EnvironmentRobot", "PhysicalRobot"),
+    *("Controller", "Trial", "Behaviour", "evolve_controller", "run_trial", "read_log"),
+    *("calibrate", "diagnose", "Diagnosis", "recover", "Recovery", "replay", "Settings"),
+    *("Comparator", "check_comparator", "check_fault_kind", "__version__"),
+}
+
+
+def names_for_type_checkers(file: Path) -> set[str]:
+    """The names that a face imports under TYPE_CHECKING."""
+    tree = ast.parse(file.read_text(encoding="utf-8"))
+    (branch,) = (node for node in tree.body if isinstance(node, ast.If))
+    return {alias.name for node in branch.body for alias in node.names}
+
+
+def test_the_public_names_are_these():
+    assert set(selfmodel.__all__) == PUBLIC
+
+
+@pytest.mark.parametrize("name", sorted(PUBLIC - {"__version__", "ALL_KINDS", "PAPER_KINDS"}))
+def test_every_public_name_has_a_docstring(name: str):
+    assert len(getattr(selfmodel, name).__doc__.splitlines()[0]) > 20
+
+
+@pytest.mark.parametrize("folder", [ROOT / "selfmodel", *FACES], ids=lambda folder: folder.name)
+def test_a_face_exports_the_names_that_type_checkers_see(folder: Path):
+    package = ".".join(folder.relative_to(ROOT).parts)
+    face = importlib.import_module(package)
+
+    assert set(face.__all__) == names_for_type_checkers(folder / "__init__.py")
+    assert all(hasattr(face, name) for name in face.__all__)
+
+
+def test_the_faces_of_nine_rooms_are_held():
+    assert len(FACES) == 9
+
+
+@pytest.mark.parametrize(
+    "module", ["selfmodel.experiments.one_call", "selfmodel.experiments.reality"]
+)
+def test_the_examples_of_the_public_functions_run(module: str):
+    result = doctest.testmod(importlib.import_module(module))
+
+    assert result.attempted > 0
+    assert result.failed == 0
+
+
+@pytest.mark.process
+def test_importing_selfmodel_loads_neither_numpy_nor_mujoco():
+    code = "import sys, selfmodel; assert not {'numpy', 'mujoco', 'scipy'} & set(sys.modules)"
+
+    subprocess.run([sys.executable, "-c", code], check=True)
