@@ -1,4 +1,4 @@
-"""How bodies recover, from the rows of studies that ``selfmodel suite run`` made.
+"""Recoveries of bodies, from the rows of studies that ``selfmodel suite run`` made.
 
 ``python -m benchmarks.bodies FOLDER...`` prints the tables of ``docs/results/bodies.md`` and draws
 ``docs/figures/bodies.png``.
@@ -31,8 +31,8 @@ def main() -> None:
     print("|---|---:|---:|---:|---:|---:|")
     for body in bodies:
         one = found[body, None]
-        told = f"{one.before:.2f} | {one.after:.2f} | {one.recovered:.2f} | {_recovery(one)}"
-        print(f"| `{body}` | {told} | {one.right} of {one.runs} |")
+        scores = f"{one.before:.2f} | {one.after:.2f} | {one.recovered:.2f} | {_recovery(one)}"
+        print(f"| `{body}` | {scores} | {one.right} of {one.runs} |")
     right, parts = sum(row.correct for row in rows), [row.recovered / row.before for row in rows]
     print(f"| all | | | | {median(parts):.2f} | {right} of {len(rows)} |\n")
     print(f"| body | {' | '.join(f'case {case}' for case in SINGLE)} |")

@@ -51,7 +51,7 @@ def main() -> None:
         raise SystemExit(f"{options.folder} has no run of an ablation with these robots and seeds")
     diagnose = partial(_diagnoses, options.folder / "runs")
     failed = run_grid(
-        options.out / "runs", jobs, diagnose, workers=options.workers, on_progress=_tell
+        options.out / "runs", jobs, diagnose, workers=options.workers, on_progress=_print_progress
     )
     print(table(write_results(options.out).scores))
     if failed:
@@ -85,7 +85,7 @@ def table(scores: Sequence[ComparatorScore]) -> str:
     return "\n".join(lines)
 
 
-def _tell(event: GridBegins | PartEnds) -> None:
+def _print_progress(event: GridBegins | PartEnds) -> None:
     if isinstance(event, PartEnds):
         print(f"{event.number} of {event.total}: {event.key}, {event.seconds:.0f} s", flush=True)
 

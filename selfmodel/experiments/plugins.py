@@ -57,7 +57,7 @@ def next_trial(name: str) -> str:
         InputError: The name is unknown; the message has the nearest names.
     """
     if name not in NEXT_TRIAL:
-        raise unknown_name("way to choose the next trial", name, NEXT_TRIAL)
+        raise unknown_name("choice of the next trial", name, NEXT_TRIAL)
     return name
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def key_of(robot: str) -> str:
-    """Returns the part of a file name that stands for a robot: its name, or its MJCF file's."""
+    """Returns the robot's part of a file name: its name, or the name of its MJCF file."""
     name = Path(robot).stem if robots.is_model(robot) else robot
     return re.sub(r"[^\w.-]", "_", name, flags=re.ASCII).lstrip(".-") or "robot"
 

@@ -232,7 +232,7 @@ def _check_names(ablation: Ablation) -> None:
     for comparator in ablation.comparators:
         plugins.comparator(comparator)
     if ablation.next_trial not in NEXT_TRIAL:
-        raise unknown_name("way to choose the next trial", ablation.next_trial, NEXT_TRIAL)
+        raise unknown_name("choice of the next trial", ablation.next_trial, NEXT_TRIAL)
 
 
 def _shared(ablation: Ablation) -> dict[str, Any]:

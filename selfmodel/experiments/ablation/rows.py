@@ -21,7 +21,7 @@ class AblationRow:
         distance: Distance of the best hypothesis, in the comparator's unit.
         intact_distance: Distance of the empty hypothesis, in the comparator's unit.
         verdict: Verdict of the diagnosis.
-        rivals: Number of hypotheses indistinguishable from the best, ten at most.
+        ``rivals``: Number of hypotheses indistinguishable from the best, ten at most.
         evaluations: Number of hypotheses evaluated since the first trial.
         distinct_hypotheses: Number of distinct hypotheses among the evaluations.
         seconds: Wall time of the diagnoses since the first trial, on one thread.

@@ -131,10 +131,11 @@ def run_grid(
         failed = []
         with closing(run_tasks(partial(_perform, folder, work), chains, workers)) as answers:
             for number, ((job, part), answer) in enumerate(answers, start=before + 1):
-                if isinstance(answer, WorkerExit):
-                    seconds, error = 0.0, _exit_error(folder / job.key, part, answer)
-                else:
-                    seconds, error = answer
+                seconds, error = (
+                    (0.0, _write_exit(folder / job.key, part, answer))
+                    if isinstance(answer, WorkerExit)
+                    else answer
+                )
                 ends = PartEnds(job.key, part, number, total, seconds, error)
                 if error is not None:
                     failed.append(ends)
@@ -155,7 +156,7 @@ def _perform(folder: Path, work: Work, task: tuple[Job, str]) -> tuple[float, st
     return seconds, outcome.get("error")
 
 
-def _exit_error(run: Path, part: str, answer: WorkerExit) -> str:
+def _write_exit(run: Path, part: str, answer: WorkerExit) -> str:
     """Writes and returns the error of a part whose worker process exited."""
     error = f"its process ended with status {answer.status}; standard error may have the reason"
     write_part(run, part, {"status": "failed", "error": error})

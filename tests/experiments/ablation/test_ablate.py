@@ -33,7 +33,7 @@ from selfmodel.errors import InputError
 
 @dataclass(frozen=True)
 class Picky(ForwardDisplacement):
-    def request(self, trial):
+    def prepare(self, trial):
         raise InputError("this trial does not please")
 
 SAME = ForwardDisplacement(name="same")
