@@ -122,7 +122,8 @@ def _gaits(robots: list[str], walks: list[Facts]) -> str:
         low, high = min(w["lowest"] for w in same), max(w["highest"] for w in same)
         rows.append(
             f"| {robot} | {median(displacements):.2f} | {min(displacements):.2f} "
-            f"| {max(displacements):.2f} | {low:.2f} to {high:.2f} | {1000 * max(w['deepest'] for w in same):.1f} "
+            f"| {max(displacements):.2f} | {low:.2f} to {high:.2f} "
+            f"| {1000 * max(w['deepest'] for w in same):.1f} "
             f"| {sum(w['walking'] for w in same)} of {len(same)} "
             f"| {median(w['seconds'] for w in same):.0f} |"
         )

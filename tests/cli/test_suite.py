@@ -206,7 +206,7 @@ REFUSED = [
     ({"comparator": "no-such"}, "unknown comparator"),
     ({"controller": "brain"}, "unknown kind of controller"),
     ({"kinds": "brek"}, "unknown kind 'brek'"),
-    ({"gap": 0.7}, "a gap is a number from 0 to 0.5"),
+    ({"gap": 0.7}, "expected a gap from 0 to 0.5"),
     ({"controller": "cpg", "neurons": 4}, "--neurons 4 is of a network"),
     ({"bodies": ["biped.xml", "other/biped.xml"]}, "would have the same file names"),
 ]

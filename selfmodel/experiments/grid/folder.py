@@ -104,7 +104,7 @@ def exclusive(folder: Path) -> Iterator[None]:
         InputError: Another process runs a grid in the folder.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    with (folder / "lock").open("wb") as file:
+    with folder.with_name(f"{folder.name}.lock").open("wb") as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)  # released when the file is closed
         except BlockingIOError as error:
