@@ -18,7 +18,7 @@ from absl import logging
 from selfmodel.arrays import FloatArray
 from selfmodel.robot.parameters import Parameters, edited_model, factor_names, from_factors
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state_access import signal_fields, writer
+from selfmodel.robot.state_access import signal_fields, state_writer
 from selfmodel.simulation.calibration import CANDIDATE_DELAYS, MAX_LOG_FACTOR
 from selfmodel.simulation.calibration_segments import HORIZON, MAX_SEGMENTS
 from selfmodel.simulation.requests import LEAD
@@ -113,7 +113,7 @@ def _vectors(robot: Robot, states: Theirs) -> FloatArray:
     """Returns the state in MuJoCo's order, ``(steps, nq + nv)``."""
     model, steps = robot.model, len(states[STATE[0]])
     fields = {"qpos": np.zeros((steps, model.nq)), "qvel": np.zeros((steps, model.nv))}
-    writer(robot, fields.__getitem__)(states)
+    state_writer(robot, fields.__getitem__)(states)
     return np.concatenate([fields["qpos"], fields["qvel"]], axis=1)
 
 

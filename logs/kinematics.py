@@ -6,7 +6,7 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.logs.topics import WORLD
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state_access import fields_of, writer
+from selfmodel.robot.state_access import bind_data, state_writer
 from selfmodel.trials.rotation import product
 
 _POSITION_XYZW = [0, 1, 2, 4, 5, 6, 3]
@@ -33,7 +33,7 @@ class Kinematics:
     def __init__(self, robot: Robot) -> None:
         self._model = robot.model
         self._data = mujoco.MjData(robot.model)
-        self._write = writer(robot, fields_of(self._data))
+        self._write = state_writer(robot, bind_data(self._data))
 
     def transforms(
         self, joint_positions: FloatArray, position: FloatArray, orientation: FloatArray

@@ -8,7 +8,7 @@ import mujoco
 from selfmodel.errors import InputError
 from selfmodel.logs.errors import SchemaMismatchError
 from selfmodel.logs.reader import TrialLog
-from selfmodel.robot.mjcf.adaptation import MOST_SUBSTEPS
+from selfmodel.robot.mjcf.adaptation import MAX_SUBSTEPS
 from selfmodel.robot.mjcf.untrusted import checked_model
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Names
@@ -34,11 +34,11 @@ def robot_of(log: TrialLog) -> Robot:
         raise SchemaMismatchError(
             path, f"its model cannot be loaded: {_line(error)}", good=GOOD
         ) from error
-    if robot.substeps > MOST_SUBSTEPS:
+    if robot.substeps > MAX_SUBSTEPS:
         raise SchemaMismatchError(
             path,
             f"its model takes {robot.substeps:.6g} physics steps for each of "
-            f"{log.control_timestep} s, expected at most {MOST_SUBSTEPS}",
+            f"{log.control_timestep} s, expected at most {MAX_SUBSTEPS}",
             good=GOOD,
         )
     names = log.trial.behaviour.names

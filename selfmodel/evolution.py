@@ -1,4 +1,4 @@
-"""The generational EA of the paper, with an ask / tell / stop interface."""
+"""The generational EA of the paper, with the interface ``ask``, ``tell``, ``stop``."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ GenerationCallback = Callable[[Generation], None]
 
 
 class Evolution:
-    """Generational EA with an ask / tell interface; fitness is maximised.
+    """Generational EA with the interface ``ask``, ``tell``, ``stop``; fitness is maximised.
 
     The best half of the population survives. The other half are children: copies of tournament
     winners among the survivors, mutated, some pairs with one-point crossover. Source: the paper,

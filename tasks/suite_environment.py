@@ -17,10 +17,10 @@ from selfmodel.physical.environment_robot import EnvironmentRobot
 from selfmodel.physical.simulated_robot import OWN_SEED
 from selfmodel.recovery.fitness import Score
 from selfmodel.robot.embodiment import Embodiment
-from selfmodel.robot.mjcf.mujoco_errors import told_by_mujoco
+from selfmodel.robot.mjcf.mujoco_errors import mujoco_errors_as_input_errors
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
-from selfmodel.robot.state_access import present, signal_fields, writer
+from selfmodel.robot.state_access import current_value, signal_fields, state_writer
 from selfmodel.simulation.activations import activations_since_rest
 from selfmodel.trials.behaviour import SIGNALS, Behaviour, Sample, Signal
 
@@ -102,7 +102,7 @@ class _Stepped:
         observation: OrderedDict[str, FloatArray | float] = OrderedDict(sensors=readings[0])
         for signal in SIGNALS:
             if signal not in ("sensors", "commands"):
-                observation[signal] = present(self._fields[signal], data)
+                observation[signal] = current_value(self._fields[signal], data)
         observation["time"] = physics.time()
         return observation
 
@@ -117,7 +117,7 @@ def episode_parts(domain: str, task: str) -> tuple[Callable[[mujoco.MjModel], An
     # Imported here, because dm_control's physics initialises a display when imported.
     suite = importlib.import_module("dm_control.suite")
     wrapper = importlib.import_module("dm_control.mujoco.wrapper.core")
-    with told_by_mujoco():  # MuJoCo warns about the cheetah
+    with mujoco_errors_as_input_errors():  # MuJoCo warns about the cheetah
         env = suite.load(domain, task, task_kwargs={"random": 0})
     env.reset()
     own = type(env.physics)
@@ -147,7 +147,7 @@ def _sum(robot: Robot, physics: Any, task: Any, behaviour: Behaviour, run: int) 
     model, data, commands = physics.model, physics.data, behaviour["commands"][run]
     fields = {"qpos": np.zeros((len(commands), model.nq))}
     fields["qvel"] = np.zeros((len(commands), model.nv))
-    writer(robot, fields.__getitem__)({signal: behaviour[signal][run] for signal in STATE})
+    state_writer(robot, fields.__getitem__)({signal: behaviour[signal][run] for signal in STATE})
     activations = activations_since_rest(robot, commands)
     total = 0.0
     for k in range(1, len(commands)):

@@ -17,7 +17,7 @@ from selfmodel.faults.notation import parse
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
-from selfmodel.robot.state_access import present, signal_fields
+from selfmodel.robot.state_access import current_value, signal_fields
 from selfmodel.trials.behaviour import Signal
 
 
@@ -133,7 +133,7 @@ class Walk(base.Task):
 
     def observe(self, physics: mujoco.Physics, signal: Signal) -> FloatArray:
         """Returns a signal of the state, ``(width,)``."""
-        return present(self._fields[signal], physics.data)
+        return current_value(self._fields[signal], physics.data)
 
     def _forward(self, physics: mujoco.Physics) -> float:
         """Position of the root body along the world's x axis, m."""

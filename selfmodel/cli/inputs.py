@@ -50,7 +50,7 @@ def texts(option: str, given: str, every: Iterable[str] | None = None) -> tuple[
     Args:
         option: Name of the option, such as ``--robots``, for the message.
         given: Value of the option.
-        every: Texts that ``all`` stands for; None if ``all`` has no meaning.
+        every: Texts meant by ``all``; None if ``all`` has no meaning.
 
     Raises:
         InputError: The list or an item of it is empty.

@@ -70,7 +70,7 @@ class Design(Protocol):
 
     @property
     def description(self) -> str:
-        """Sizes of the design in words, for error messages."""
+        """Sizes of the design as text, for error messages."""
         ...
 
     def summary(self, genome: FloatArray) -> str:

@@ -65,14 +65,14 @@ class Cpg:
 
     @property
     def description(self) -> str:
-        """Numbers of sensors and motors and the time step, in words."""
+        """Numbers of sensors and motors and the time step as text."""
         return (
             f"a CPG of {len(self.sensors)} sensors and {len(self.motors)} motors with steps of "
             f"{self.timestep:g} s"
         )
 
     def summary(self, genome: FloatArray) -> str:
-        """Returns the stride frequency, in words."""
+        """Returns the stride frequency as text."""
         return f"a CPG of {self.decode(genome).frequency:.2f} Hz"
 
     def decode(self, genome: FloatArray) -> "CpgParameters":

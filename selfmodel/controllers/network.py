@@ -47,14 +47,14 @@ class Network:
 
     @property
     def description(self) -> str:
-        """Numbers of sensors, hidden neurons and motors, in words."""
+        """Numbers of sensors, hidden neurons and motors as text."""
         return (
             f"a network of {len(self.sensors)} sensors, {self.hidden} hidden neurons and "
             f"{len(self.motors)} motors"
         )
 
     def summary(self, _genome: FloatArray) -> str:
-        """Returns the number of hidden neurons, in words."""
+        """Returns the number of hidden neurons as text."""
         return f"a network of {self.hidden} hidden neurons"
 
     def batch(self, genomes: FloatArray, silent: Sequence[AbstractSet[int]]) -> "NetworkBatch":

@@ -1,21 +1,22 @@
 """The diagnostic search: an EA over hypotheses, local refinement, and the verdict."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis.comparator import Comparator
-from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, UnsearchedFault, Verdict
+from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
 from selfmodel.diagnosis.evidence import Evidence
 from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
 from selfmodel.diagnosis.model_error import any_fault_is_model_error
 from selfmodel.diagnosis.refine import refined
-from selfmodel.diagnosis.significance import TEST, exceeds_healthy_loss, is_better
+from selfmodel.diagnosis.significance import TEST, is_better
 from selfmodel.diagnosis.surrogate import Surrogate, own_surrogate, surrogate_of
 from selfmodel.diagnosis.undetectable import undetectable_faults
 from selfmodel.diagnosis.unsearched import best_unsearched_fault
+from selfmodel.diagnosis.verdict import verdict_of
 from selfmodel.evolution import Evolution, GenerationCallback, evolve
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import GENE_VALUES, HypothesisSpace
@@ -105,7 +106,12 @@ class DiagnosticSearch:
             trials=len(trials),
             intact_distance=totals[INTACT],
             indistinguishable=indistinguishable[:kept],
-            verdict=self._verdict(best, indistinguishable, unsearched, losses),
+            verdict=verdict_of(
+                losses=partial(losses.damaged, [best]),
+                healthy=self._healthy_losses,
+                indistinguishable=indistinguishable,
+                unsearched=unsearched,
+            ),
             test=TEST if is_piecewise else EQUAL_DISTANCES,
             unsearched=unsearched,
             undetectable=tuple(undetectable[:kept]),
@@ -171,6 +177,11 @@ class DiagnosticSearch:
             else None,
         )
 
+    @property
+    def _healthy_losses(self) -> Callable[[], FloatArray] | None:
+        """The losses of the empty hypothesis on healthy trials; None without such trials."""
+        return partial(self.evidence.losses, [INTACT], self._intact) if self._intact else None
+
     def _refined(
         self, known: Sequence[Hypothesis], losses: LossFunctions, compared: set[Hypothesis]
     ) -> Hypothesis:
@@ -212,21 +223,6 @@ class DiagnosticSearch:
         return tuple(
             one for one in indistinct if not any_fault_is_model_error(one, losses, self._space)
         )
-
-    def _verdict(
-        self,
-        best: Hypothesis,
-        indistinguishable: Sequence[Hypothesis],
-        unsearched: UnsearchedFault | None,
-        losses: LossFunctions,
-    ) -> Verdict:
-        if unsearched is not None:
-            return "unexplained"
-        if self._intact:
-            healthy = self.evidence.losses([INTACT], self._intact)[0]
-            if exceeds_healthy_loss(losses.damaged([best])[0], healthy):
-                return "unexplained"
-        return "ambiguous" if indistinguishable else "explained"
 
 
 def _recorded(losses: Losses, into: set[Hypothesis]) -> Losses:

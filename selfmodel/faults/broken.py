@@ -25,9 +25,11 @@ def _absorbs(fault: Fault, other: Fault, anatomy: Anatomy) -> bool:
     if other.part == fault.part:
         return other.kind != fault.kind
     broken = anatomy.joint(fault.part)
-    if other.kind == WEAK_MOTOR and broken.slack.issuperset(anatomy.joint(other.part).motors):
+    if other.kind == WEAK_MOTOR and broken.motors_lost_if_broken.issuperset(
+        anatomy.joint(other.part).motors
+    ):
         return True
-    return other.part in broken.lost
+    return other.part in broken.descendants
 
 
 def _joints_with_limbs(anatomy: Anatomy) -> tuple[str, ...]:

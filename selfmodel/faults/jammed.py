@@ -62,7 +62,7 @@ def _absorbs_motor(fault: Fault, other: Fault, anatomy: Anatomy) -> bool:
     if other.part != fault.part or other.kind != WEAK_MOTOR:
         return False
     joint = anatomy.joint(fault.part)
-    return joint.idle.issuperset(joint.motors)
+    return joint.motors_lost_if_jammed.issuperset(joint.motors)
 
 
 def _joints_with_angles(anatomy: Anatomy) -> tuple[str, ...]:

@@ -52,7 +52,7 @@ def cases_of(anatomy: Anatomy) -> Mapping[int, str]:
 
 def _limbs(anatomy: Anatomy) -> Sequence[_Limb]:
     joints = {joint.name: joint for joint in anatomy.joints}
-    beyond = {name: joint.lost & joints.keys() for name, joint in joints.items()}
+    beyond = {name: joint.descendants & joints.keys() for name, joint in joints.items()}
     ends = [name for name in joints if not beyond[name]]
     limbs = []
     for end in ends:

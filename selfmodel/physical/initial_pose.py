@@ -6,7 +6,7 @@ import numpy as np
 from selfmodel.physical.measurement_noise import rotated_by_vector
 from selfmodel.robot.embodiment import WELD_ARMATURE
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state_access import fields_of, present, signal_fields, writer
+from selfmodel.robot.state_access import bind_data, current_value, signal_fields, state_writer
 
 ANGLE_DEVIATION = 0.2
 """Standard deviation of the initial joint angles, rad, at a gap level of 1."""
@@ -30,7 +30,7 @@ def randomize_initial_pose(
         level: Level of the reality gap.
         rng: Random numbers of the pose.
     """
-    fields, write = signal_fields(robot, model), writer(robot, fields_of(data), model)
+    fields, write = signal_fields(robot, model), state_writer(robot, bind_data(data), model)
     reference_depth = _penetration_depth(robot, model, data)
     angles = level * ANGLE_DEVIATION * rng.standard_normal(len(robot.anatomy.hinges))
     for name, angle in zip(robot.anatomy.hinges, angles, strict=True):
@@ -40,12 +40,12 @@ def randomize_initial_pose(
         moved = data.qpos[hinge.qposadr[0]] + angle
         data.qpos[hinge.qposadr[0]] = np.clip(moved, *hinge.range) if hinge.limited[0] else moved
     tilt = np.append(level * TILT_DEVIATION * rng.standard_normal(2), 0.0)
-    base = rotated_by_vector(present(fields["base_orientation"], data), tilt)
+    base = rotated_by_vector(current_value(fields["base_orientation"], data), tilt)
     write({"base_orientation": base[np.newaxis]})
     # Penetration no deeper than in the reference pose: deeper contacts would throw the robot up.
     depth = _penetration_depth(robot, model, data)
     lift = [0.0, 0.0, max(0.0, depth - reference_depth)]
-    write({"base_position": (present(fields["base_position"], data) + lift)[np.newaxis]})
+    write({"base_position": (current_value(fields["base_position"], data) + lift)[np.newaxis]})
 
 
 def _penetration_depth(robot: Robot, model: mujoco.MjModel, data: mujoco.MjData) -> float:

@@ -20,7 +20,7 @@ from selfmodel.physical.structural_mismatch import StructuralMismatch, add_struc
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
-from selfmodel.robot.state_access import fields_of, signal_fields
+from selfmodel.robot.state_access import bind_data, signal_fields
 from selfmodel.trials.behaviour import SIGNALS, Sample
 
 OWN_SEED = 1
@@ -113,7 +113,7 @@ class SimulatedRobot:
         delay_line = deque(np.zeros((delay, model.nu)))
         # Logged commands are the controller's outputs, before the control delay.
         state_fields = signal_fields(robot, model)
-        live = {signal: field.reader(fields_of(data)) for signal, field in state_fields.items()}
+        live = {signal: field.reader(bind_data(data)) for signal, field in state_fields.items()}
         live |= {"sensors": lambda: controllers.readings, "commands": lambda: commands}
         for k in range(steps):
             reader.read(data.sensordata[np.newaxis], data.qpos[np.newaxis], controllers.readings)

@@ -1,4 +1,4 @@
-"""What a robot is made of, as names: the parts that can fail and what hangs on them."""
+"""Anatomy of a robot: its joints, sensors, motors and hinges by name."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -8,42 +8,44 @@ from selfmodel.trials.behaviour import Names
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint that fails as one; it has one hinge, or several on the same body.
+    """A joint that fails as a unit: one hinge, or several hinges of the same body.
 
     Attributes:
-        name: As in notation, such as ``front_left_knee``.
-        hinges: The model's joints that it consists of.
-        motors: The actuators that drive them; one that moves several joints through a tendon
-            counts to the first of them.
-        bodies: Every body that is lost when it breaks: the one it moves and all beyond.
-        lost: The joints and sensors that are lost with them, without the joint itself.
-        limits: Lower and upper angle of each hinge, rad; a half turn where it has none.
-        slack: The motors that move nothing once it is broken.
-        idle: The motors that move nothing once it is held.
+        name: Name in notation, such as ``front_left_knee``.
+        hinges: Hinge joints of the model that form the joint.
+        motors: Actuators that drive the joint; an actuator that moves several joints through a
+            tendon belongs to the first of them.
+        bodies: Bodies that are lost when the joint breaks: the body that the joint moves, and all
+            its descendants.
+        descendants: Joints and sensors on ``bodies``, without the joint itself.
+        limits: Lower and upper angle per hinge, rad; -pi and pi for an unlimited hinge.
+        motors_lost_if_broken: Actuators that act on nothing once the joint is broken.
+        motors_lost_if_jammed: Actuators that move nothing once the joint is welded.
     """
 
     name: str
     hinges: tuple[str, ...]
     motors: tuple[str, ...]
     bodies: frozenset[str]
-    lost: frozenset[str]
+    descendants: frozenset[str]
     limits: tuple[tuple[float, float], ...]
-    slack: frozenset[str]
-    idle: frozenset[str]
+    motors_lost_if_broken: frozenset[str]
+    motors_lost_if_jammed: frozenset[str]
 
 
 @dataclass(frozen=True)
 class Sensor:
-    """One reading that the controller receives.
+    """A sensor whose reading the controller receives.
 
     Attributes:
-        name: As in notation and in the model, such as ``front_left_touch``.
-        kind: ``touch`` is 1 while the force is above zero, else 0; ``angle`` is the hinge's angle
-            from ``centre`` divided by ``half_range``: from -1 to 1 over the hinge's range.
-        body: The body it sits on; for an angle, the one that the hinge moves.
-        hinge: The hinge whose angle is measured, or "" for touch.
-        half_range: How far from the centre an angle reads as 1, rad; 1 for touch.
-        centre: The angle that reads as 0, rad; 0 for touch.
+        name: Name in notation and in the model, such as ``front_left_touch``.
+        kind: Kind of the reading. ``touch`` is 1 while the contact force is above zero, else 0.
+            ``angle`` is the angle of a hinge from ``centre`` divided by ``half_range``: from -1 to
+            1 over the range of the hinge.
+        body: Body that carries the sensor; for an angle, the body that the hinge moves.
+        hinge: Hinge whose angle is measured; "" for touch.
+        half_range: Distance from the centre to the angle with the reading 1, rad; 1 for touch.
+        centre: Angle with the reading 0, rad; 0 for touch.
     """
 
     name: str
@@ -54,19 +56,19 @@ class Sensor:
     centre: float
 
     def reading(self, angle: float) -> float:
-        """Returns what an angle reads as."""
+        """Returns the normalised reading of an angle, rad."""
         return (angle - self.centre) / self.half_range
 
 
 @dataclass(frozen=True)
 class Anatomy:
-    """The joints, sensors and motors of one robot.
+    """The joints, sensors and motors of a robot.
 
     Attributes:
-        joints: What can break or jam.
-        sensors: What feeds the controller, touch before angle, in its order.
-        motors: What the controller commands, in its order.
-        hinges: Every hinge of the model but its root's, in its order.
+        joints: Joints that can break or jam.
+        sensors: Inputs of the controller in its order, touch before angle.
+        motors: Actuators that the controller commands, in its order.
+        hinges: Hinges of the model except those of the root body, in the order of the model.
     """
 
     joints: tuple[Joint, ...]
@@ -78,7 +80,7 @@ class Anatomy:
         """Returns the joint of that name.
 
         Raises:
-            KeyError: There is none.
+            KeyError: The robot has no joint of that name.
         """
         return {joint.name: joint for joint in self.joints}[name]
 
@@ -86,11 +88,11 @@ class Anatomy:
         """Returns the sensor of that name.
 
         Raises:
-            KeyError: There is none.
+            KeyError: The robot has no sensor of that name.
         """
         return {sensor.name: sensor for sensor in self.sensors}[name]
 
     @property
     def names(self) -> Names:
-        """The column names of this robot's behaviours."""
+        """Column names of this robot's behaviours."""
         return Names(tuple(sensor.name for sensor in self.sensors), self.motors, self.hinges)

@@ -1,11 +1,11 @@
-"""Reads the parts of a robot off its compiled model."""
+"""Reads the anatomy of a robot from its compiled model."""
 
 import math
 
 import mujoco
 
 from selfmodel.robot.anatomy import Anatomy, Joint, Sensor
-from selfmodel.robot.floating_base import joints_of
+from selfmodel.robot.floating_base import joints_of_body
 from selfmodel.robot.transmission import descends, motor_bodies, motor_joints
 
 _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
@@ -14,26 +14,26 @@ _ANGLE = int(mujoco.mjtSensor.mjSENS_JOINTPOS)
 
 
 def driven_joints(model: mujoco.MjModel) -> frozenset[int]:
-    """Returns the numbers of the joints that motors move."""
+    """Returns the ids of the joints that motors move."""
     return frozenset[int]().union(*(motor_joints(model, m) for m in range(model.nu)))
 
 
 def read_anatomy(model: mujoco.MjModel, root: int) -> Anatomy:
-    """Returns the parts of a robot that its model names.
+    """Returns the named parts of a robot.
 
-    The hinges of one body are one joint if a motor moves any of them. It is called by what their
-    names begin with, or else by the body. Touch sensors and joint position sensors feed the
-    controller.
+    The hinges of one body form one joint if a motor moves at least one of them. The joint has the
+    common prefix of their names, or else the name of the body. Touch sensors and joint position
+    sensors are the inputs of the controller.
 
     Args:
-        model: A compiled MJCF that ``carried.check_model`` lets through.
-        root: The number of the root body, whose own joints are not the limbs'.
+        model: A compiled MJCF that ``check_model`` accepts.
+        root: Id of the root body, whose joints belong to no limb.
 
     Raises:
-        ValueError: Two joints would be called alike.
+        ValueError: Two joints would have the same name.
     """
-    own = joints_of(model, root)
-    hinges = [j for j in range(model.njnt) if model.jnt_type[j] == _HINGE and j not in own]
+    base_joints = joints_of_body(model, root)
+    hinges = [j for j in range(model.njnt) if model.jnt_type[j] == _HINGE and j not in base_joints]
     driven = driven_joints(model)
     groups: dict[int, list[int]] = {}
     for j in hinges:
@@ -56,9 +56,10 @@ def _joint(
     names: dict[int, str],
     sensors: tuple[Sensor, ...],
 ) -> Joint:
+    """Returns the joint of a body, given the hinges and the joint name of each body."""
     group = groups[body]
-    beyond = frozenset(b for b in range(body, model.nbody) if descends(model, b, body))
-    lost = frozenset(model.body(b).name for b in beyond)
+    subtree = frozenset(b for b in range(body, model.nbody) if descends(model, b, body))
+    bodies = frozenset(model.body(b).name for b in subtree)
     moved = {m: motor_joints(model, m) for m in range(model.nu)}
     return Joint(
         name=names[body],
@@ -66,14 +67,16 @@ def _joint(
         motors=tuple(
             model.actuator(m).name for j in group for m in moved if j == min(moved[m], default=-1)
         ),
-        bodies=lost,
-        lost=frozenset(
-            [names[b] for b in groups if b != body and b in beyond]
-            + [sensor.name for sensor in sensors if sensor.body in lost]
+        bodies=bodies,
+        descendants=frozenset(
+            [names[b] for b in groups if b != body and b in subtree]
+            + [sensor.name for sensor in sensors if sensor.body in bodies]
         ),
         limits=tuple(_limits(model, j) for j in group),
-        slack=frozenset(model.actuator(m).name for m in moved if motor_bodies(model, m) & beyond),
-        idle=frozenset(
+        motors_lost_if_broken=frozenset(
+            model.actuator(m).name for m in moved if motor_bodies(model, m) & subtree
+        ),
+        motors_lost_if_jammed=frozenset(
             model.actuator(m).name for m in moved if moved[m] and moved[m].issubset(group)
         ),
     )
@@ -87,31 +90,32 @@ def _limits(model: mujoco.MjModel, hinge: int) -> tuple[float, float]:
 
 
 def _joint_names(model: mujoco.MjModel, groups: dict[int, list[int]]) -> dict[int, str]:
-    """What each joint is called, by its body: what its hinges share, or what its body is called."""
-    names = {
-        body: _shared_name([model.joint(j).name for j in group]) or str(model.body(body).name)
+    """Returns the joint name per body: the common prefix of its hinges, or the body's name."""
+    prefixes = {
+        body: _common_prefix([model.joint(j).name for j in group]) or str(model.body(body).name)
         for body, group in groups.items()
     }
-    told = list(names.values())
+    found = list(prefixes.values())
     names = {
-        body: name if told.count(name) == 1 else str(model.body(body).name)
-        for body, name in names.items()
+        body: name if found.count(name) == 1 else str(model.body(body).name)
+        for body, name in prefixes.items()
     }
-    twice = {name for name in names.values() if list(names.values()).count(name) > 1}
-    if twice:
+    repeated = {name for name in names.values() if list(names.values()).count(name) > 1}
+    if repeated:
         raise ValueError(
-            f"two joints of the model would both be called {min(twice)!r}, by what the names of "
-            f"their hinges begin with or by their bodies: give their hinges other names"
+            f"expected a different name for each joint, got two joints that would both be called "
+            f"{min(repeated)!r}, by the common prefix of their hinges or by their bodies: rename "
+            f"their hinges"
         )
     return names
 
 
-def _shared_name(hinges: list[str]) -> str:
-    """What all names have in common: ``front_left_hip`` of its ``_swing`` and ``_lift``."""
-    shared = hinges[0]
-    while not all(name.startswith(shared) for name in hinges):
-        shared = shared[:-1]
-    return shared.rstrip("_")
+def _common_prefix(hinges: list[str]) -> str:
+    """Returns the common prefix: ``front_left_hip`` for ``_swing`` and ``_lift`` of one body."""
+    prefix = hinges[0]
+    while not all(name.startswith(prefix) for name in hinges):
+        prefix = prefix[:-1]
+    return prefix.rstrip("_")
 
 
 def _sensors(model: mujoco.MjModel, hinges: list[int]) -> tuple[Sensor, ...]:

@@ -1,4 +1,4 @@
-"""Tendons and equality constraints: what couples joints, and what a fault leaves of it."""
+"""Edits of couplings: tendons, equality constraints and contact pairs of a faulty robot."""
 
 import mujoco
 import numpy as np
@@ -9,48 +9,55 @@ from selfmodel.robot.transmission import tendon_bodies, tendon_joints
 _EQ_JOINT, _EQ_TENDON = int(mujoco.mjtEq.mjEQ_JOINT), int(mujoco.mjtEq.mjEQ_TENDON)
 _SITE = int(mujoco.mjtObj.mjOBJ_SITE)
 
+NO_CONTACT_MARGIN = -100.0
+"""Contact margin that disables a contact pair, m: a contact has a force only while the distance of
+its geoms is below the margin."""
 
-def cut(model: mujoco.MjModel, body: int) -> None:
-    """Slackens the tendons that need a body, and ends the constraints that involve it.
+
+def release(model: mujoco.MjModel, body: int) -> None:
+    """Removes the forces of tendons, equality constraints and contact pairs of a detached body.
 
     Args:
-        model: Changed; its layout is not.
-        body: The number of a body that is lost.
+        model: The model, edited in place; its layout stays.
+        body: Id of the detached body.
     """
     for tendon in range(model.ntendon):
         if body in tendon_bodies(model, tendon):
             _slacken(model, tendon)
     for constraint in range(model.neq):
-        if body in _bodies(model, constraint):
+        if body in _constrained_bodies(model, constraint):
             model.eq_active0[constraint] = 0
-    _separate(model, body)
+    _disable_pairs(model, body)
 
 
-def settle(model: mujoco.MjModel, welded: frozenset[int]) -> None:
-    """Ends the limits and constraints of joints that are all held: they would push against a weld.
+def disable_welded(model: mujoco.MjModel, welded: frozenset[int]) -> None:
+    """Disables tendons and equality constraints that couple welded joints only.
+
+    Their forces would act against the weld.
 
     Args:
-        model: Changed; its layout is not.
-        welded: The numbers of all joints that are held still.
+        model: The model, edited in place; its layout stays.
+        welded: Ids of all welded joints.
     """
     for tendon in range(model.ntendon):
         if tendon_joints(model, tendon) <= welded:
             _slacken(model, tendon)
     for constraint in range(model.neq):
-        joints = _joints(model, constraint)
+        joints = _constrained_joints(model, constraint)
         if joints and joints <= welded:
             model.eq_active0[constraint] = 0
 
 
-def keep_meaning(model: mujoco.MjModel, joint: int, shift: float) -> None:
-    """Has constraints between joints mean the same, though a joint's reference has moved.
+def rebase_equality(model: mujoco.MjModel, joint: int, shift: float) -> None:
+    """Rewrites joint equality constraints for a new reference angle, so that they stay the same.
 
-    They are told from the references, and by a polynomial of the second joint's angle.
+    A joint equality constraint relates the angles from the references of both joints, by a
+    polynomial of the second joint's angle.
 
     Args:
-        model: Changed.
-        joint: The number of the joint.
-        shift: How far its reference has moved, rad.
+        model: The model, edited in place.
+        joint: Id of the joint whose reference has changed.
+        shift: New minus old reference angle, rad.
     """
     for constraint in np.flatnonzero(model.eq_type == _EQ_JOINT):
         if model.eq_obj2id[constraint] == joint:
@@ -62,6 +69,7 @@ def keep_meaning(model: mujoco.MjModel, joint: int, shift: float) -> None:
 
 
 def _slacken(model: mujoco.MjModel, tendon: int) -> None:
+    """Removes the limits and the passive forces of a tendon."""
     model.tendon_limited[tendon] = 0
     for force in (
         *(model.tendon_stiffness, model.tendon_stiffnesspoly, model.tendon_frictionloss),
@@ -70,19 +78,15 @@ def _slacken(model: mujoco.MjModel, tendon: int) -> None:
         force[tendon] = 0.0
 
 
-def _separate(model: mujoco.MjModel, body: int) -> None:
-    """Has the body touch nothing in pairs of geoms that the model names, whatever their masks."""
+def _disable_pairs(model: mujoco.MjModel, body: int) -> None:
+    """Disables the explicit contact pairs of a body, which contype does not affect."""
     for geoms in (model.pair_geom1, model.pair_geom2):
         pairs = model.geom_bodyid[geoms] == body
-        model.pair_margin[pairs] = NEVER
+        model.pair_margin[pairs] = NO_CONTACT_MARGIN
 
 
-NEVER = -100.0
-"""A distance of geoms, m, that no contact is ever below; only below it would there be a force."""
-
-
-def _joints(model: mujoco.MjModel, constraint: int) -> frozenset[int]:
-    """The joints that a constraint between joints or tendons is about."""
+def _constrained_joints(model: mujoco.MjModel, constraint: int) -> frozenset[int]:
+    """Returns the ids of the joints of a joint or tendon equality constraint; else none."""
     kind = int(model.eq_type[constraint])
     objects = [int(o) for o in (model.eq_obj1id[constraint], model.eq_obj2id[constraint]) if o >= 0]
     if kind == _EQ_JOINT:
@@ -92,8 +96,8 @@ def _joints(model: mujoco.MjModel, constraint: int) -> frozenset[int]:
     return frozenset()
 
 
-def _bodies(model: mujoco.MjModel, constraint: int) -> frozenset[int]:
-    """The bodies that a constraint is about."""
+def _constrained_bodies(model: mujoco.MjModel, constraint: int) -> frozenset[int]:
+    """Returns the ids of the bodies that an equality constraint involves."""
     kind = int(model.eq_type[constraint])
     objects = [int(o) for o in (model.eq_obj1id[constraint], model.eq_obj2id[constraint]) if o >= 0]
     if kind == _EQ_TENDON:

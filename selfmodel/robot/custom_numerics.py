@@ -1,7 +1,7 @@
 """Custom numerics that selfmodel writes into an MJCF: the control delay.
 
-Logs of version 0.1 may contain a further one, ``selfmodel_hidden_neurons``. It is ignored: the
-controller in the log has the number of its hidden neurons.
+Logs of version 0.1 may contain a further one, ``selfmodel_hidden_neurons``. Readers ignore it:
+the controller in the log contains the number of hidden neurons.
 """
 
 import mujoco

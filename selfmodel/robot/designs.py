@@ -39,7 +39,7 @@ def cpg_for(robot: Robot, hidden: int | None = None) -> Cpg:
         InputError: A number of hidden neurons is given, or a motor has no command range.
     """
     if hidden is not None:
-        raise InputError(f"--neurons {hidden} is of a network: leave it out with 'cpg'")
+        raise InputError(f"a CPG has no hidden neurons, got --neurons {hidden}: leave it out")
     names = robot.anatomy.names
     ranges = command_ranges(robot.model)
     return Cpg(names.sensors, names.motors, robot.control_timestep, ranges)
@@ -48,4 +48,4 @@ def cpg_for(robot: Robot, hidden: int | None = None) -> Cpg:
 DESIGNS: Mapping[str, Callable[[Robot, int | None], Design]] = MappingProxyType(
     {Network.name: network_for, Cpg.name: cpg_for}
 )
-"""Design for a robot with a number of hidden neurons, or the default number for None, by name."""
+"""Function from a robot and a number of hidden neurons (None: the default) to a design, by name."""

@@ -1,7 +1,7 @@
-"""A robot built with a hypothesis: a model of the same layout, edited by name.
+"""Editable copy of a robot's model and sensors, to which fault kinds are applied.
 
-A hypothesis never changes the layout of the model, so that all hypotheses share one batch: a lost
-limb stays as a ghost that touches nothing, a jammed joint stays as one that nothing can turn.
+Edits keep the layout of the model, so that all hypotheses share one batch: a detached limb stays in
+the model without mass and contacts, a welded joint stays as a joint of near-infinite inertia.
 """
 
 import copy
@@ -14,34 +14,35 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.robot import couplings
 from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.frames import turn_about_origin, turned_by_hinge
 from selfmodel.robot.transmission import motor_bodies, motor_joints
 
 DETACHED_ARMATURE = 1.0
-"""Rotor inertia of a lost hinge, kg m^2; any positive value keeps the mass matrix invertible, and
-nothing couples it to what is left of the robot."""
+"""Rotor inertia of a hinge of a detached body, kg m^2. Any positive value keeps the mass matrix
+invertible; a detached body is not coupled to the rest of the robot."""
 
 WELD_ARMATURE = 1e10
-"""Rotor inertia of a held hinge, kg m^2. In the limit of infinite inertia the equations of motion
-are those of welded bodies; at this value a torque of 10 N m turns it by 5e-8 rad in 10 s."""
+"""Rotor inertia of a welded hinge, kg m^2. In the limit of infinite inertia the equations of motion
+are those of welded bodies; at this value a torque of 10 N m turns the hinge by 5e-8 rad in 10 s."""
 
 
 @dataclass(frozen=True, eq=False)
 class Embodiment:
-    """What a hypothesis makes of a robot; the kinds of fault work themselves into it.
+    """Copy of a robot's model and sensor parameters, edited by fault kinds.
 
     A run starts in the model's reference configuration, ``model.qpos0``.
 
     Attributes:
-        model: A copy of the robot's model, of the same layout.
-        gain: Multiplies each nominal sensor reading, ``(sensors,)``.
-        offset: Is added to it then, ``(sensors,)``.
-        bias: Is added to that, whatever the sensor measures, ``(sensors,)``.
-        noise: Standard deviation of what is added last, ``(sensors,)``; see ``robot.noise``.
+        model: Copy of the robot's model, of the same layout.
+        gain: Factor of each nominal sensor reading, ``(sensors,)``.
+        offset: Summand of each reading after the gain, scaled with the reading, ``(sensors,)``.
+        bias: Summand of each reading after the gain, independent of it, ``(sensors,)``.
+        noise: Standard deviation of the sensor noise, ``(sensors,)``; see ``SensorNoise``.
         silent_neurons: Indices of the silent hidden neurons of the controller.
-        welded: Of each hinge that is held still its places in ``qpos`` and ``qvel`` and its angle.
-        detached: The joints of lost bodies, by name: nothing moves them.
-        seed: Of what is random in it: the noise, and the shape of rough terrain.
-        normal: Unit vector that stands on the ground, world frame, ``(3,)``.
+        welded: Index in ``qpos``, index in ``qvel`` and angle (rad) of each welded hinge.
+        detached: Names of the joints of detached bodies.
+        seed: Seed of the random parts of faults: sensor noise and the shape of rough terrain.
+        normal: Unit normal of the ground, world frame, ``(3,)``.
     """
 
     model: mujoco.MjModel
@@ -75,111 +76,118 @@ class Embodiment:
         )
 
     def detach_body(self, name: str) -> None:
-        """Makes a body a ghost: no mass, no collisions, no force from its motors and couplings."""
+        """Detaches a body: zeroes its mass, inertia, collisions, actuation and couplings."""
         model, body = self.model, self.model.body(name).id
         self.detached.update(model.joint(j).name for j in np.flatnonzero(model.jnt_bodyid == body))
         model.body_mass[body] = 0.0
         model.body_inertia[body] = 0.0
         model.geom_contype[model.geom_bodyid == body] = 0
         model.geom_conaffinity[model.geom_bodyid == body] = 0
-        degrees = model.dof_bodyid == body
-        model.dof_armature[degrees] = DETACHED_ARMATURE
-        model.dof_frictionloss[degrees] = 0.0
+        dofs = model.dof_bodyid == body
+        model.dof_armature[dofs] = DETACHED_ARMATURE
+        model.dof_frictionloss[dofs] = 0.0
         model.jnt_stiffness[model.jnt_bodyid == body] = 0.0
         model.jnt_stiffnesspoly[model.jnt_bodyid == body] = 0.0
-        # A limit pushes, where a robot starts beyond it or an encoder errs.
+        # A limit has a force where the initial pose or an encoder error is beyond the range.
         model.jnt_limited[model.jnt_bodyid == body] = 0
         for motor in range(model.nu):
             if body in motor_bodies(model, motor):
                 self.release_motor(motor)
-        couplings.cut(model, body)
+        couplings.release(model, body)
 
     def weld_hinge(self, name: str, angle: float) -> None:
-        """Holds a hinge rigidly at an angle, rad.
+        """Welds a hinge at an angle, rad.
 
-        The angle becomes the reference of the hinge and part of its body's frame, as in a model
-        whose bodies are welded there. All hinges of a body are held together, in their order.
-        Motors that move nothing else are released.
+        The angle becomes the reference of the hinge and part of the body's frame, as in a model
+        whose bodies are welded at that angle. The hinges of one body are welded together, in
+        their order. Motors that move welded joints only are released.
         """
         model, hinge = self.model, self.model.joint(name)
         body = model.body(hinge.bodyid[0])
-        turn, frame = np.empty(4), np.empty(4)
         shift = angle - float(hinge.qpos0[0])
-        mujoco.mju_axisAngle2Quat(turn, hinge.axis, shift)
-        mujoco.mju_mulQuat(frame, body.quat, turn)
-        before, after = np.empty(3), np.empty(3)
-        mujoco.mju_rotVecQuat(before, hinge.pos, body.quat)
-        mujoco.mju_rotVecQuat(after, hinge.pos, frame)
-        body.pos += before - after
-        body.quat = frame
+        position, orientation = turned_by_hinge(body.pos, body.quat, hinge.axis, hinge.pos, shift)
+        body.pos, body.quat = position, orientation
         hinge.qpos0 = angle
         model.dof_armature[hinge.dofadr[0]] = WELD_ARMATURE
-        # A limit that it touches must not push against the weld.
+        # The force of a limit would act against the weld.
         model.jnt_limited[hinge.id] = 0
         self.welded.append((int(hinge.qposadr[0]), int(hinge.dofadr[0]), angle))
-        couplings.keep_meaning(model, int(hinge.id), shift)
-        places = [position for position, _, _ in self.welded]
-        welded = frozenset(np.flatnonzero(np.isin(model.jnt_qposadr, places)).tolist())
-        couplings.settle(model, welded)
+        couplings.rebase_equality(model, int(hinge.id), shift)
+        addresses = [address for address, _, _ in self.welded]
+        welded = frozenset(np.flatnonzero(np.isin(model.jnt_qposadr, addresses)).tolist())
+        couplings.disable_welded(model, welded)
         for motor in range(model.nu):
             moved = motor_joints(model, motor)
             if moved and moved <= welded:
                 self.release_motor(motor)
 
     def release_motor(self, motor: int) -> None:
-        """Takes all force from the motor of that number."""
+        """Zeroes the force of a motor.
+
+        Args:
+            motor: Id of the motor.
+        """
         self.model.actuator_gainprm[motor] = 0.0
         self.model.actuator_biasprm[motor] = 0.0
 
-    def weaken_motors(self, motors: Sequence[int], part: float) -> None:
-        """Leaves the motors of these numbers a part of their torque, and of their largest."""
-        self.model.actuator_gainprm[motors] *= part
-        self.model.actuator_biasprm[motors] *= part
-        self.model.actuator_forcerange[motors] *= part
-        # Once, however many of them pull at a joint.
+    def weaken_motors(self, motors: Sequence[int], factor: float) -> None:
+        """Scales the forces and the force limits of motors.
+
+        Args:
+            motors: Ids of the motors.
+            factor: Factor of the force, from 0 to 1.
+        """
+        self.model.actuator_gainprm[motors] *= factor
+        self.model.actuator_biasprm[motors] *= factor
+        self.model.actuator_forcerange[motors] *= factor
+        # A joint that several of the motors drive is scaled once.
         joints = {joint for motor in motors for joint in motor_joints(self.model, motor)}
-        self.model.jnt_actfrcrange[sorted(joints)] *= part
+        self.model.jnt_actfrcrange[sorted(joints)] *= factor
 
     def set_friction(self, coefficient: float) -> None:
-        """Sets the sliding friction between the world and everything that can touch it."""
+        """Sets the sliding friction between static geoms and the geoms that can touch them."""
         model = self.model
         world = model.body_weldid[model.geom_bodyid] == 0
         contype, conaffinity = model.geom_contype, model.geom_conaffinity
         touching = (contype & np.bitwise_or.reduce(conaffinity[world])) | (
             conaffinity & np.bitwise_or.reduce(contype[world])
         )
-        # Of two geoms that touch, the larger coefficient counts.
+        # A contact has the larger coefficient of its two geoms.
         model.geom_friction[world | (touching != 0), 0] = coefficient
         paired = world[model.pair_geom1] | world[model.pair_geom2]
         model.pair_friction[paired, :2] = coefficient
 
     def tilt_ground(self, angle: float) -> None:
-        """Turns the world's shapes, and whatever stands in it, uphill along x by an angle, rad."""
+        """Tilts the static geoms and the root bodies by an angle, rad, uphill along x."""
         model = self.model
         tilt = np.empty(4)
         mujoco.mju_axisAngle2Quat(tilt, np.array([0.0, 1.0, 0.0]), -angle)
         mujoco.mju_rotVecQuat(self.normal, self.normal.copy(), tilt)
         for geom in np.flatnonzero(model.geom_bodyid == 0):
-            _turn(model.geom_pos[geom], model.geom_quat[geom], tilt)
+            turn_about_origin(model.geom_pos[geom], model.geom_quat[geom], tilt)
         for body in np.flatnonzero(model.body_parentid == 0)[1:]:
-            _turn(model.body_pos[body], model.body_quat[body], tilt)
+            turn_about_origin(model.body_pos[body], model.body_quat[body], tilt)
             joint = model.body_jntadr[body]
             if joint >= 0 and model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE:
-                start = model.qpos0[model.jnt_qposadr[joint] :]
-                start[:3], start[3:7] = model.body_pos[body], model.body_quat[body]
+                pose = model.qpos0[model.jnt_qposadr[joint] :]
+                pose[:3], pose[3:7] = model.body_pos[body], model.body_quat[body]
 
     def scale_reading(self, sensor: int, factor: float) -> None:
-        """Multiplies what the sensor of that column measures."""
+        """Scales the reading of a sensor.
+
+        Args:
+            sensor: Column of the sensor.
+            factor: Factor of the reading.
+        """
         self.gain[sensor] *= factor
         self.offset[sensor] *= factor
 
     def fix_reading(self, sensor: int, value: float) -> None:
-        """Makes the sensor of that column read ``value`` whatever happens."""
+        """Sets the reading of a sensor to a constant.
+
+        Args:
+            sensor: Column of the sensor.
+            value: The reading.
+        """
         self.gain[sensor] = 0.0
         self.offset[sensor] = value
-
-
-def _turn(position: FloatArray, orientation: FloatArray, by: FloatArray) -> None:
-    """Turns a frame about the world's origin, in place."""
-    mujoco.mju_rotVecQuat(position, position.copy(), by)
-    mujoco.mju_mulQuat(orientation, by, orientation.copy())

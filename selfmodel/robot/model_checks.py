@@ -1,16 +1,16 @@
-"""What a model may not have: what would be lost from logs, or cannot be started in mid-motion."""
+"""Rejects models with state that a log does not record or that cannot be restored mid-trial."""
 
 import mujoco
 
-from selfmodel.robot.floating_base import joints_of
-from selfmodel.robot.transmission import TRANSMISSIONS
+from selfmodel.robot.floating_base import joints_of_body
+from selfmodel.robot.transmission import SUPPORTED_TRANSMISSIONS
 
 _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
-_REFUSED_JOINTS = {
-    int(mujoco.mjtJoint.mjJNT_SLIDE): "slides",
+_UNSUPPORTED_JOINTS = {
+    int(mujoco.mjtJoint.mjJNT_SLIDE): "is a slide joint",
     int(mujoco.mjtJoint.mjJNT_BALL): "is a ball joint",
 }
-DYNAMICS = tuple(
+_SUPPORTED_DYNAMICS = tuple(
     int(kind)
     for kind in (
         mujoco.mjtDyn.mjDYN_NONE,
@@ -19,10 +19,8 @@ DYNAMICS = tuple(
         mujoco.mjtDyn.mjDYN_FILTEREXACT,
     )
 )
-"""The activation dynamics that a robot's motors may have."""
-
-_GAINS = (int(mujoco.mjtGain.mjGAIN_FIXED), int(mujoco.mjtGain.mjGAIN_AFFINE))
-_BIASES = (int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_AFFINE))
+_SUPPORTED_GAINS = (int(mujoco.mjtGain.mjGAIN_FIXED), int(mujoco.mjtGain.mjGAIN_AFFINE))
+_SUPPORTED_BIASES = (int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_AFFINE))
 
 
 def check_model(model: mujoco.MjModel, root: int) -> None:
@@ -30,23 +28,23 @@ def check_model(model: mujoco.MjModel, root: int) -> None:
 
     Args:
         model: A compiled MJCF.
-        root: The number of its root body.
+        root: Id of the root body.
 
     Raises:
-        ValueError: It has something that cannot; the sentence names what.
+        ValueError: The model has an unsupported part; the sentence contains its name.
     """
-    own = joints_of(model, root)
+    base_joints = joints_of_body(model, root)
     for j in range(model.njnt):
         kind = int(model.jnt_type[j])
-        if j not in own and kind in _REFUSED_JOINTS:
+        if j not in base_joints and kind in _UNSUPPORTED_JOINTS:
             raise ValueError(
-                f"the model's joint {_called(model.joint(j))} {_REFUSED_JOINTS[kind]}: beyond the "
-                f"root, a robot's joints are hinges"
+                f"the model's joint {_label(model.joint(j))} {_UNSUPPORTED_JOINTS[kind]}: expected "
+                f"hinges only, except between the world and the root body"
             )
     if model.nflex or model.nplugin:
         raise ValueError(
-            "the model has soft bodies (flex) or plugins, whose state no log holds: a robot is of "
-            "rigid bodies"
+            "the model has soft bodies (flex) or plugins, whose state a log does not contain: "
+            "expected rigid bodies only"
         )
     for m in range(model.nu):
         _check_motor(model, m)
@@ -54,39 +52,39 @@ def check_model(model: mujoco.MjModel, root: int) -> None:
 
 
 def _check_motor(model: mujoco.MjModel, motor: int) -> None:
-    name = _called(model.actuator(motor))
-    sited = int(model.actuator_trntype[motor]) == int(mujoco.mjtTrn.mjTRN_SITE)
-    if int(model.actuator_trntype[motor]) not in TRANSMISSIONS or (
-        sited and model.actuator_trnid[motor, 1] >= 0
+    name = _label(model.actuator(motor))
+    on_site = int(model.actuator_trntype[motor]) == int(mujoco.mjtTrn.mjTRN_SITE)
+    if int(model.actuator_trntype[motor]) not in SUPPORTED_TRANSMISSIONS or (
+        on_site and model.actuator_trnid[motor, 1] >= 0
     ):
         raise ValueError(
-            f"the model's motor {name} has a transmission that is not known here: expected a "
+            f"the model's motor {name} has a transmission that is not supported: expected a "
             f"joint, a tendon, a body, or a site without a reference site"
         )
     if (
-        int(model.actuator_dyntype[motor]) not in DYNAMICS
-        or int(model.actuator_gaintype[motor]) not in _GAINS
-        or int(model.actuator_biastype[motor]) not in _BIASES
+        int(model.actuator_dyntype[motor]) not in _SUPPORTED_DYNAMICS
+        or int(model.actuator_gaintype[motor]) not in _SUPPORTED_GAINS
+        or int(model.actuator_biastype[motor]) not in _SUPPORTED_BIASES
         or model.actuator_actnum[motor] > 1
         or model.actuator_delay[motor] > 0
     ):
         raise ValueError(
             f"the model's motor {name} is a muscle, has a delay, or has dynamics of a kind that is "
-            f"not known here: expected none, integrator, filter or filterexact"
+            f"not supported: expected none, integrator, filter or filterexact"
         )
 
 
 def _check_names(model: mujoco.MjModel) -> None:
     motors = [model.actuator(m) for m in range(model.nu)]
     hinges = [model.joint(j) for j in range(model.njnt) if model.jnt_type[j] == _HINGE]
-    for what, parts in (("motor", motors), ("hinge", hinges)):
+    for kind, parts in (("motor", motors), ("hinge", hinges)):
         for part in parts:
             if not part.name:
                 raise ValueError(
-                    f"the model's {what} number {int(part.id)} has no name: give it one, because "
-                    f"logs and faults tell parts by their names"
+                    f"the model's {kind} number {int(part.id)} has no name: give it one, because "
+                    f"logs and faults identify parts by name"
                 )
 
 
-def _called(part: mujoco.MjModel) -> str:
+def _label(part: mujoco.MjModel) -> str:
     return repr(part.name) if part.name else f"number {int(part.id)}"

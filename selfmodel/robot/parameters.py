@@ -1,4 +1,4 @@
-"""The continuous parameters of a self-model, and the robot that has others."""
+"""Continuous parameters of a self-model, and robots with other parameters."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -14,15 +14,15 @@ from selfmodel.robot.scaling import scale_model
 
 @dataclass(frozen=True)
 class Parameters:
-    """By what factors a robot differs from its nominal model.
+    """Parameters of a self-model as factors of its nominal parameters.
 
     Attributes:
-        root_mass: Of the root body's mass and inertia.
-        limb_mass: Of the mass and inertia of all other bodies.
-        friction: Of the sliding friction of everything.
-        damping: Of the damping of every joint.
-        motor_gains: Of each motor's torque, in the model's order.
-        delay: Control steps from a command to its effect.
+        root_mass: Factor of the mass and inertia of the root body.
+        limb_mass: Factor of the mass and inertia of all other bodies.
+        friction: Factor of the sliding friction of all geoms and contact pairs.
+        damping: Factor of the damping of all joints.
+        motor_gains: Factor of the torque per motor, in the model's order.
+        delay: Control delay, in control steps.
     """
 
     root_mass: float
@@ -34,30 +34,35 @@ class Parameters:
 
     @property
     def factors(self) -> FloatArray:
-        """The factors in one row: root, limbs, friction, damping, motors."""
+        """All factors, ``(4 + motors,)``: root, limbs, friction, damping, motors."""
         shared = (self.root_mass, self.limb_mass, self.friction, self.damping)
         return np.array([*shared, *self.motor_gains])
 
 
 def factor_names(robot: Robot) -> tuple[str, ...]:
-    """Returns what each factor is of, in the order of ``Parameters.factors``."""
+    """Returns the names of the scaled quantities, in the order of ``Parameters.factors``."""
     shared = ("mass of the root", "mass of the limbs", "friction", "damping")
     return (*shared, *(f"motor {motor}" for motor in robot.anatomy.motors))
 
 
 def nominal(robot: Robot) -> Parameters:
-    """Returns the parameters of a robot as its model describes it."""
+    """Returns the parameters of a robot's own model: factors of 1, and its control delay."""
     return Parameters(1.0, 1.0, 1.0, 1.0, (1.0,) * robot.model.nu, robot.control_delay)
 
 
 def from_factors(factors: FloatArray, delay: int) -> Parameters:
-    """Returns parameters from a row of factors; see ``Parameters.factors``."""
+    """Returns parameters from their factors.
+
+    Args:
+        factors: ``(4 + motors,)``, in the order of ``Parameters.factors``.
+        delay: Control delay, in control steps.
+    """
     root, limbs, friction, damping, *motors = (float(factor) for factor in factors)
     return Parameters(root, limbs, friction, damping, tuple(motors), delay)
 
 
 def edited_model(robot: Robot, parameters: Parameters) -> mujoco.MjModel:
-    """Returns a copy of a robot's model that has these parameters, but for the delay."""
+    """Returns a copy of a robot's model with scaled parameters; the control delay is unchanged."""
     masses = _mass_factors(robot, parameters)
     return scale_model(
         robot.model,
@@ -70,27 +75,27 @@ def edited_model(robot: Robot, parameters: Parameters) -> mujoco.MjModel:
 
 
 def with_parameters(robot: Robot, parameters: Parameters) -> Robot:
-    """Returns a robot whose MJCF says these parameters, the delay included.
+    """Returns a robot whose MJCF has scaled parameters and their control delay.
 
-    Numbers in an MJCF have six digits, so its model is that of ``edited_model`` to one part in a
-    million.
+    MuJoCo writes numbers of six digits into an MJCF, so the model of the robot equals that of
+    ``edited_model`` to one part in a million.
     """
     return with_model(robot, edited_model(robot, parameters), parameters.delay)
 
 
 def with_model(robot: Robot, model: mujoco.MjModel, delay: int) -> Robot:
-    """Returns a robot whose MJCF says what an edited copy of its compiled model does.
+    """Returns a robot whose MJCF has the parameters of an edited copy of its compiled model.
 
     Args:
-        robot: The robot that the copy is of.
-        model: The copy, with other masses, friction, damping or motor gains.
-        delay: Control steps from a command to its effect.
+        robot: The robot.
+        model: A copy of the robot's model, with other masses, friction, damping or motor gains.
+        delay: Control delay, in control steps.
     """
     spec = robot.specification()
-    spec.compile()  # until then its parts have no numbers
+    spec.compile()  # assigns the ids of the parts
     compiler = spec.compiler
-    # What would change the masses again as the text is compiled.
-    compiler.settotalmass, compiler.inertiafromgeom = -1.0, _SAID_OR_FROM_GEOMS
+    # Settings with which the compiler would change the explicit masses.
+    compiler.settotalmass, compiler.inertiafromgeom = -1.0, _EXPLICIT_OR_FROM_GEOMS
     compiler.boundmass = compiler.boundinertia = 0.0
     for body in spec.bodies[1:]:
         body.explicitinertial = True
@@ -114,7 +119,7 @@ def with_model(robot: Robot, model: mujoco.MjModel, delay: int) -> Robot:
     return dataclasses.replace(robot, mjcf=spec.to_xml())
 
 
-_SAID_OR_FROM_GEOMS = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
+_EXPLICIT_OR_FROM_GEOMS = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
 
 
 def _mass_factors(robot: Robot, parameters: Parameters) -> FloatArray:

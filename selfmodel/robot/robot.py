@@ -1,4 +1,4 @@
-"""A robot: an MJCF model, its parts by name, and its rhythm."""
+"""Robot: an MJCF model, its parts by name, and its control time step."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,25 +9,25 @@ import numpy as np
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.anatomy_reader import driven_joints, read_anatomy
 from selfmodel.robot.custom_numerics import CONTROL_DELAY, control_delay
-from selfmodel.robot.floating_base import find_root
+from selfmodel.robot.floating_base import find_root_body
 from selfmodel.robot.model_checks import check_model
 
 
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """A body plan with nothing wrong, and how often it is controlled.
+    """A healthy robot: its MJCF model and its control time step.
 
-    Everything but the control time step is read from the MJCF, so a log that carries both carries
-    the robot. Forward is the world's x axis at the start.
+    The MJCF contains all properties but the control time step, so that a log with both contains
+    the robot. The forward direction is the world's x axis at the initial pose.
 
     Attributes:
-        name: What it is called.
-        mjcf: The model, as one XML text that needs no files but the assets.
-        control_timestep: Seconds between two commands.
-        assets: The files that the model names, such as meshes.
+        name: Name of the robot.
+        mjcf: The MJCF as one XML text without includes; ``assets`` has its files.
+        control_timestep: Time between two commands, s.
+        assets: Contents of the files that the MJCF names, such as meshes, by file name.
         model: The compiled model.
-        anatomy: Its joints, sensors and motors.
-        root: Its root body, whose travel counts.
+        anatomy: Joints, sensors and motors.
+        root: Name of the root body, whose displacement is the robot's.
     """
 
     name: str
@@ -42,7 +42,7 @@ class Robot:
         model = mujoco.MjModel.from_xml_string(self.mjcf, dict(self.assets))
         if not model.opt.timestep > 0:
             raise ValueError(f"the physics time step must be above 0 s, got {model.opt.timestep}")
-        root = find_root(model, driven_joints(model))
+        root = find_root_body(model, driven_joints(model))
         check_model(model, root)
         object.__setattr__(self, "model", model)
         object.__setattr__(self, "anatomy", read_anatomy(model, root))
@@ -56,25 +56,25 @@ class Robot:
 
     @property
     def substeps(self) -> int:
-        """Physics steps in a control step."""
+        """Number of physics steps per control step."""
         return max(1, round(self.control_timestep / float(self.model.opt.timestep)))
 
     @property
     def control_delay(self) -> int:
-        """Control steps from a command to its effect, as the model's ``CONTROL_DELAY`` says."""
+        """Control delay of the model, in control steps; see ``CONTROL_DELAY``."""
         return control_delay(self.model)
 
     @property
     def is_calibrated(self) -> bool:
-        """Whether a calibration wrote the model, and with it a ``CONTROL_DELAY``."""
+        """Whether the model is the result of a calibration: it then has a ``CONTROL_DELAY``."""
         found: int = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_NUMERIC, CONTROL_DELAY)
         return found >= 0
 
     @property
     def standing_height(self) -> float:
-        """Height of the root body above the ground at the start, m."""
+        """Height of the root body above the ground in the initial pose, m."""
         return float(self.model.body(self.root).pos[2])
 
     def specification(self) -> mujoco.MjSpec:
-        """Returns the MJCF as a specification that can be edited before it is compiled."""
+        """Returns the MJCF as an editable MjSpec."""
         return mujoco.MjSpec.from_string(self.mjcf, assets=dict(self.assets))

@@ -1,4 +1,4 @@
-"""From what MuJoCo's sensors measure to what the controllers receive."""
+"""Sensor readings of a controller, computed from MuJoCo's state."""
 
 from collections.abc import Sequence
 
@@ -8,20 +8,19 @@ import numpy as np
 from selfmodel.arrays import FloatArray, columns
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.embodiment import Embodiment
-from selfmodel.robot.noise import SensorNoise
 
 
 class SensorReader:
-    """Turns the state of many robots into readings: touch 0 or 1, angles from -1 to 1.
+    """Computes the readings of many robots: touch 0 or 1, angles from -1 to 1.
 
-    Angles are read from the joint positions themselves: after a step, MuJoCo's sensors are one
-    physics step behind them, and bringing them up to date costs a fifth of the physics.
+    Angles are read from the joint positions: after a step, MuJoCo's sensors are one physics step
+    old, and updating them takes a fifth of the time of the physics.
 
     Args:
-        model: Any of the robots' models; they share one layout.
-        anatomy: The robots' parts.
-        embodiments: What is wrong with their sensors.
-        copies: Robots of each embodiment, side by side.
+        model: Model of any of the robots; they share one layout.
+        anatomy: Parts of the robots.
+        embodiments: Embodiments with the faults of their sensors.
+        copies: Number of robots per embodiment, in adjacent rows.
     """
 
     def __init__(
@@ -49,8 +48,8 @@ class SensorReader:
         """Writes the readings of the next control step.
 
         Args:
-            sensordata: ``(n, nsensordata)``, of which the touch forces are read, N.
-            qpos: ``(n, nq)``, of which the joint angles are read, rad.
+            sensordata: ``(n, nsensordata)``, which contains the touch forces, N.
+            qpos: ``(n, nq)``, which contains the joint angles, rad.
             readings: ``(n, sensors)``, written.
         """
         np.greater(
@@ -63,3 +62,35 @@ class SensorReader:
             readings *= self._gain
             readings += self._offset
         self._noise.add(readings)
+
+
+class SensorNoise:
+    """Adds white noise to the readings of many robots, step by step.
+
+    The noise sequence of a sensor depends on the seed of the embodiment and the column of the
+    sensor only. It is the same in any batch and for all hypotheses of one seed, so that hypotheses
+    do not differ by their noise.
+
+    Args:
+        embodiments: Embodiments with the standard deviations of their sensors.
+        copies: Number of robots per embodiment, in adjacent rows; each copy has its own sequence.
+    """
+
+    def __init__(self, embodiments: Sequence[Embodiment], copies: int = 1) -> None:
+        self._copies = copies
+        deviations = np.array([embodiment.noise for embodiment in embodiments])
+        noisy: dict[tuple[int, int], list[int]] = {}
+        for row, column in zip(*np.nonzero(deviations), strict=True):
+            noisy.setdefault((embodiments[row].seed, int(column)), []).append(int(row))
+        self._noisy = [
+            (np.random.default_rng(key), rows, key[1], deviations[rows, key[1]])
+            for key, rows in noisy.items()
+        ]
+
+    def add(self, readings: FloatArray) -> None:
+        """Adds the noise of the next step to the readings, ``(embodiments * copies, sensors)``."""
+        robots, sensors = readings.shape
+        by_copy = readings.reshape(robots // self._copies, self._copies, sensors)
+        for rng, rows, column, deviations in self._noisy:
+            drawn = rng.standard_normal(self._copies)
+            by_copy[rows, :, column] += np.outer(deviations, drawn)

@@ -1,4 +1,4 @@
-"""What motors and tendons of a model act on: which hinges they turn, and which bodies they need."""
+"""Transmissions of motors and tendons: the joints they move and the bodies they act on."""
 
 import mujoco
 import numpy as np
@@ -6,8 +6,8 @@ import numpy as np
 _TRN = mujoco.mjtTrn
 _JOINT = (int(_TRN.mjTRN_JOINT), int(_TRN.mjTRN_JOINTINPARENT))
 _TENDON, _SITE, _BODY = int(_TRN.mjTRN_TENDON), int(_TRN.mjTRN_SITE), int(_TRN.mjTRN_BODY)
-TRANSMISSIONS = (*_JOINT, _TENDON, _SITE, _BODY)
-"""The transmissions that a robot's motors may have."""
+SUPPORTED_TRANSMISSIONS = (*_JOINT, _TENDON, _SITE, _BODY)
+"""Transmission types that the motors of a robot may have, as ``mjtTrn`` numbers."""
 
 _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 _WRAPPED_JOINT = int(mujoco.mjtWrap.mjWRAP_JOINT)
@@ -16,7 +16,7 @@ _WRAPPED_GEOM = (int(mujoco.mjtWrap.mjWRAP_SPHERE), int(mujoco.mjtWrap.mjWRAP_CY
 
 
 def motor_joints(model: mujoco.MjModel, motor: int) -> frozenset[int]:
-    """Returns the numbers of the joints that a motor moves, itself or through a tendon."""
+    """Returns the ids of the joints that a motor moves, directly or through a tendon."""
     kind, target = int(model.actuator_trntype[motor]), int(model.actuator_trnid[motor, 0])
     if kind in _JOINT:
         return frozenset({target})
@@ -24,7 +24,7 @@ def motor_joints(model: mujoco.MjModel, motor: int) -> frozenset[int]:
 
 
 def motor_bodies(model: mujoco.MjModel, motor: int) -> frozenset[int]:
-    """Returns the numbers of the bodies without any of which a motor moves nothing."""
+    """Returns the ids of the bodies that a motor needs: without one of them it moves nothing."""
     kind, target = int(model.actuator_trntype[motor]), int(model.actuator_trnid[motor, 0])
     if kind in _JOINT:
         return frozenset({int(model.jnt_bodyid[target])})
@@ -34,10 +34,10 @@ def motor_bodies(model: mujoco.MjModel, motor: int) -> frozenset[int]:
 
 
 def tendon_joints(model: mujoco.MjModel, tendon: int) -> frozenset[int]:
-    """Returns the numbers of the joints that change a tendon's length.
+    """Returns the ids of the joints that change the length of a tendon.
 
-    Those of a fixed tendon are in it; those of a spatial one are the hinges that move some of the
-    bodies that it runs over, and not all.
+    A fixed tendon names its joints. For a spatial tendon, the result has each hinge that moves
+    some, but not all, of the bodies on the path of the tendon.
     """
     joints = _wrapped(model, tendon, (_WRAPPED_JOINT,))
     if joints:
@@ -52,7 +52,7 @@ def tendon_joints(model: mujoco.MjModel, tendon: int) -> frozenset[int]:
 
 
 def tendon_bodies(model: mujoco.MjModel, tendon: int) -> frozenset[int]:
-    """Returns the numbers of the bodies without any of which a tendon pulls at nothing."""
+    """Returns the ids of the bodies on the path of a tendon, all of which the tendon needs."""
     joints = _wrapped(model, tendon, (_WRAPPED_JOINT,))
     sites = _wrapped(model, tendon, (_WRAPPED_SITE,))
     geoms = _wrapped(model, tendon, _WRAPPED_GEOM)
@@ -65,13 +65,14 @@ def tendon_bodies(model: mujoco.MjModel, tendon: int) -> frozenset[int]:
 
 
 def descends(model: mujoco.MjModel, body: int, ancestor: int) -> bool:
-    """Returns whether a body is another or hangs on it; a child comes after its parent."""
-    while body > ancestor:
+    """Returns whether a body is the ancestor itself or a descendant of the ancestor."""
+    while body > ancestor:  # the id of a child is larger than that of its parent
         body = int(model.body_parentid[body])
     return body == ancestor
 
 
 def _wrapped(model: mujoco.MjModel, tendon: int, kinds: tuple[int, ...]) -> list[int]:
+    """Returns the ids of the objects of some ``mjtWrap`` types on the path of a tendon."""
     first = int(model.tendon_adr[tendon])
     return [
         int(model.wrap_objid[w])

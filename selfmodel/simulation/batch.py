@@ -9,9 +9,9 @@ from mujoco.batch import Batch, SimulationError
 
 from selfmodel.arrays import BoolArray, IndexArray
 from selfmodel.robot.embodiment import Embodiment
-from selfmodel.robot.floating_base import Reader
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state_access import signal_fields
+from selfmodel.robot.state_fields import Reader
 from selfmodel.trials.behaviour import Signal
 
 

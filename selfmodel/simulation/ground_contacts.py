@@ -5,7 +5,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state_access import fields_of, writer
+from selfmodel.robot.state_access import bind_data, state_writer
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.rotation import directions
 from selfmodel.trials.state_estimation import STATE, estimated_states
@@ -34,7 +34,7 @@ def ground_contact_points(robot: Robot, behaviour: Behaviour) -> FloatArray:
     states = estimated_states(behaviour, STATE)
     known = np.logical_and.reduce([np.isfinite(values).all(axis=1) for values in states.values()])
     data = mujoco.MjData(model)
-    write = writer(robot, fields_of(data))
+    write = state_writer(robot, bind_data(data))
     points: list[FloatArray] = []
     for step in np.flatnonzero(known & (behaviour["sensors"][:, list(feet)] == 1).any(axis=1)):
         write({signal: values[[step]] for signal, values in states.items()})

@@ -12,7 +12,7 @@ from selfmodel.robot.control_delay import MAX_CONTROL_DELAY
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
-from selfmodel.robot.state_access import writer
+from selfmodel.robot.state_access import state_writer
 from selfmodel.simulation.activations import initial_activations
 from selfmodel.simulation.batch import LiveBatch, live_signals, new_batch, silence_mujoco_warnings
 from selfmodel.simulation.outcome import SimulationResult, SimulationStats
@@ -134,7 +134,7 @@ class _BatchInputs:
         self._segments = segments
         self._n = len(embodiments)
         models = [own.model for own in embodiments for _ in range(batch.nsim // len(embodiments))]
-        self._write = writer(robot, batch.bind, *models)
+        self._write = state_writer(robot, batch.bind, *models)
         self._ctrl = batch.bind("ctrl")
         self._act = batch.bind("act")
         self._qpos, self._qvel = batch.bind("qpos"), batch.bind("qvel")

@@ -243,7 +243,7 @@ def test_a_broken_joint_moves_like_a_model_without_the_limb(name: str, joint: st
     left = {truth.actuator(m).name for m in range(truth.nu)}
 
     assert truth.nv < edited.nv == robot.model.nv
-    assert broken.slack == set(robot.anatomy.motors) - left
+    assert broken.motors_lost_if_broken == set(robot.anatomy.motors) - left
     np.testing.assert_allclose(
         path(robot, edited, hinges, 40), path(robot, truth, hinges, 40), atol=1e-7, rtol=0
     )

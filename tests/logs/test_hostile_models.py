@@ -11,7 +11,8 @@ import pytest
 from selfmodel.logs import LogError, read_log
 from selfmodel.logs.reader import TrialLog
 from selfmodel.logs.robots import robot_of
-from selfmodel.robot.mjcf.untrusted import LARGEST_FILES, checked_model
+from selfmodel.robot.mjcf.resource_limits import MAX_ASSET_BYTES
+from selfmodel.robot.mjcf.untrusted import checked_model
 from tests.logs.conftest import MJCF
 from tests.logs.hostile import outcome
 
@@ -237,7 +238,7 @@ def test_a_picture_that_is_damaged_or_a_bomb_is_refused(trial: TrialLog, data: b
 def test_a_file_counts_as_often_as_it_is_named(trial: TrialLog):
     data = stl(2000)
     mjcf = asset("".join(f'<mesh name="m{k}" file="m.stl"/>' for k in range(50)))
-    with pytest.raises(LogError, match=f"more than {LARGEST_FILES} bytes"):
+    with pytest.raises(LogError, match=f"more than {MAX_ASSET_BYTES} bytes"):
         robot_of(attacked(trial, mjcf, {"m.stl": data}))
 
 

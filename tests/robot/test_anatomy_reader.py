@@ -166,11 +166,11 @@ def test_every_level_of_every_kind_is_within_the_bounds_of_its_part():
         ),
         (
             {"other": '<body name="ball"><freejoint/><geom size=".1"/></body>'},
-            "one root body that moves freely, and has torso, ball",
+            "one root body that moves freely, got torso, ball",
         ),
         (
             {"upper": '<joint name="first"/><joint name="rail" type="slide"/>'},
-            "'rail' slides",
+            "'rail' is a slide joint",
         ),
         (
             {"other": '<body name="b"><joint name="bob" type="ball"/><geom size=".1"/></body>'},

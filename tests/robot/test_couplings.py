@@ -78,10 +78,10 @@ def test_a_motor_moves_the_joints_that_its_tendon_turns_and_counts_to_the_first(
     assert joints["hip"].motors == ("hip", "whole")
     assert joints["knee"].motors == ("string",)  # which spans the knee alone
     assert joints["ankle"].motors == ()
-    assert joints["hip"].idle == {"hip"}
-    assert joints["knee"].idle == {"string"}
-    assert joints["ankle"].slack == {"whole"}
-    assert joints["knee"].slack == {"whole", "string"}
+    assert joints["hip"].motors_lost_if_jammed == {"hip"}
+    assert joints["knee"].motors_lost_if_jammed == {"string"}
+    assert joints["ankle"].motors_lost_if_broken == {"whole"}
+    assert joints["knee"].motors_lost_if_broken == {"whole", "string"}
 
 
 @pytest.mark.parametrize(

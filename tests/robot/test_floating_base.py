@@ -6,9 +6,10 @@ import pytest
 from hypothesis import given, strategies as st
 from scipy.spatial.transform import Rotation
 
-from selfmodel.robot.floating_base import SlidingRoot, root_of
+from selfmodel.robot.floating_base import read_floating_base
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state_access import fields_of, present, signal_fields, writer
+from selfmodel.robot.sliding_base import SlidingBase
+from selfmodel.robot.state_access import bind_data, current_value, signal_fields, state_writer
 
 MJCF = """
 <mujoco>
@@ -67,13 +68,13 @@ SLIDERS = {"seed": st.integers(0, 2**32), "slides": st.integers(1, 3), "turns": 
 def test_it_is_told_where_the_physics_has_it(seed: int, slides: int, turns: bool):  # noqa: FBT001
     robot = made(seed, slides, turns=turns)
     data = anywhere(robot, seed)
-    told = {signal: present(signal_fields(robot)[signal], data) for signal in BASE}
+    told = {signal: current_value(signal_fields(robot)[signal], data) for signal in BASE}
     body = data.body("torso")
     velocity = np.empty(6)
     of_body = mujoco.mjtObj.mjOBJ_XBODY
     mujoco.mj_objectVelocity(robot.model, data, of_body, int(body.id), velocity, 1)
 
-    assert isinstance(root_of([robot.model], "torso"), SlidingRoot)
+    assert isinstance(read_floating_base([robot.model], "torso"), SlidingBase)
     np.testing.assert_allclose(told["base_position"], body.xpos, atol=1e-9)
     turned = Rotation.from_quat(told["base_orientation"], scalar_first=True).as_matrix()
     np.testing.assert_allclose(turned, body.xmat.reshape(3, 3), atol=1e-9)
@@ -85,14 +86,21 @@ def test_it_is_told_where_the_physics_has_it(seed: int, slides: int, turns: bool
 def test_what_is_told_puts_it_back(seed: int, slides: int, turns: bool):  # noqa: FBT001
     robot = made(seed, slides, turns=turns)
     data, again = anywhere(robot, seed), mujoco.MjData(robot.model)
-    told = {signal: present(signal_fields(robot)[signal], data)[np.newaxis] for signal in BASE}
-    writer(robot, fields_of(again))(told)
+    told = {
+        signal: current_value(signal_fields(robot)[signal], data)[np.newaxis] for signal in BASE
+    }
+    state_writer(robot, bind_data(again))(told)
 
     for signal in ("base_position", "base_linear_velocity", "base_angular_velocity"):
         np.testing.assert_allclose(
-            present(signal_fields(robot)[signal], again), told[signal][0], atol=1e-9, err_msg=signal
+            current_value(signal_fields(robot)[signal], again),
+            told[signal][0],
+            atol=1e-9,
+            err_msg=signal,
         )
-    turns_of = [present(signal_fields(robot)["base_orientation"], one) for one in (data, again)]
+    turns_of = [
+        current_value(signal_fields(robot)["base_orientation"], one) for one in (data, again)
+    ]
     assert abs(turns_of[0] @ turns_of[1]) == pytest.approx(1, abs=1e-12)
     assert again.qpos[-1] == again.qvel[-1] == 0  # the hip was not told of
 
@@ -102,14 +110,14 @@ def test_where_it_is_stays_when_only_its_turn_is_told(seed: int):
     robot = made(seed, 3, turns=True)
     data, other = anywhere(robot, seed), anywhere(robot, seed + 5)
     where = [signal_fields(robot)[signal] for signal in ("base_position", "base_linear_velocity")]
-    before = [present(place, data) for place in where]
-    imu = {s: present(signal_fields(robot)[s], other)[np.newaxis] for s in (BASE[1], BASE[3])}
-    writer(robot, fields_of(data))(imu)
+    before = [current_value(place, data) for place in where]
+    imu = {s: current_value(signal_fields(robot)[s], other)[np.newaxis] for s in (BASE[1], BASE[3])}
+    state_writer(robot, bind_data(data))(imu)
 
     for place, was in zip(where, before, strict=True):
-        np.testing.assert_allclose(present(place, data), was, atol=1e-9)
+        np.testing.assert_allclose(current_value(place, data), was, atol=1e-9)
     np.testing.assert_allclose(
-        present(signal_fields(robot)[BASE[3]], data), imu[BASE[3]][0], atol=1e-9
+        current_value(signal_fields(robot)[BASE[3]], data), imu[BASE[3]][0], atol=1e-9
     )
 
 
@@ -122,9 +130,11 @@ def test_a_way_that_it_cannot_go_is_left_out():
         "base_position": np.array([[3.0, 4.0, 5.0]]),
         "base_orientation": tilted.as_quat(scalar_first=True)[np.newaxis],
     }
-    writer(robot, fields_of(data))(told)
+    state_writer(robot, bind_data(data))(told)
 
-    np.testing.assert_allclose(present(signal_fields(robot)["base_position"], data), [3, 0, 1])
+    np.testing.assert_allclose(
+        current_value(signal_fields(robot)["base_position"], data), [3, 0, 1]
+    )
     assert data.qpos[1] == pytest.approx(0.4, abs=0.01)
 
 
@@ -145,6 +155,6 @@ def test_a_free_root_is_read_in_place(quadruped: Robot):
     data = mujoco.MjData(quadruped.model)
     for signal in BASE:
         assert np.shares_memory(
-            signal_fields(quadruped)[signal].reader(fields_of(data))(),
+            signal_fields(quadruped)[signal].reader(bind_data(data))(),
             data.qvel if "velocity" in signal else data.qpos,
         )

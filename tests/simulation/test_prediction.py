@@ -119,7 +119,7 @@ def test_the_joints_of_a_lost_limb_rest_where_noise_hides_them(
     outcome = Simulator(robot, 1).predict(
         [INTACT, broken], dataclasses.replace(segments, states=noisy)
     )
-    beyond = [joint, *(other for other in anatomy.joints if other.name in joint.lost)]
+    beyond = [joint, *(other for other in anatomy.joints if other.name in joint.descendants)]
     lost = [anatomy.hinges.index(hinge) for each in beyond for hinge in each.hinges]
     positions = outcome.behaviour["joint_positions"][..., lost]
     velocities = outcome.behaviour["joint_velocities"][..., lost]

@@ -10,8 +10,8 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import ALL_KINDS
-from selfmodel.robot.noise import SensorNoise
 from selfmodel.robot.robot import Robot
+from selfmodel.robot.sensing import SensorNoise
 from selfmodel.simulation.requests import Ensemble
 from selfmodel.simulation.simulator import Simulator
 from tests.helpers.drivers import random_controllers

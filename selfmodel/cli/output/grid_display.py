@@ -90,7 +90,7 @@ def _line(event: PartEnds) -> str:
 def run_shown(run: Callable[[Watch], Sequence[PartEnds]], out: Path) -> Sequence[PartEnds]:
     """Runs a grid with a progress display; returns the failed parts.
 
-    Ctrl-C ends the command with status 130, and a line that says how to continue.
+    Ctrl-C ends the command with status 130, and a line with the command to continue.
 
     Args:
         run: Runs the grid; calls its argument with each event.

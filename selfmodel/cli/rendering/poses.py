@@ -7,7 +7,7 @@ import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state_access import writer
+from selfmodel.robot.state_access import state_writer
 from selfmodel.trials.behaviour import Behaviour, Signal
 
 POSE: tuple[Signal, ...] = ("joint_positions", "base_position", "base_orientation")
@@ -62,7 +62,7 @@ def poses_of(robot: Robot, model: mujoco.MjModel, behaviour: Behaviour) -> Poses
             state[signal] = _filled(values, seen)
         else:
             missing.append(signal)
-    writer(robot, {"qpos": qpos, "qvel": unmoved}.__getitem__, model)(state)
+    state_writer(robot, {"qpos": qpos, "qvel": unmoved}.__getitem__, model)(state)
     return Poses(qpos, held, tuple(missing))
 
 

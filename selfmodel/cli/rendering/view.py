@@ -15,7 +15,7 @@ SMOOTHING = 0.5
 
 
 def gaze(film: Film, shot: Shot) -> FloatArray:
-    """Returns the point that the camera looks at in each frame, ``(frames, 3)``, m.
+    """Returns the point of view of the camera in each frame, ``(frames, 3)``, m.
 
     It is the smoothed position of the root body.
     """

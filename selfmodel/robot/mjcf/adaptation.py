@@ -1,7 +1,7 @@
-"""Anybody's MJCF made ready: one text with names, a start, ground and sensors.
+"""Adapts a user's MJCF: one text with names, an initial pose, ground, sensors and command ranges.
 
-The user's file is read and never written. What is changed is changed in a copy, which says all
-that there is to say about the robot, so that a log that carries it carries the robot.
+The user's file is never written. The adapted copy contains all properties of the robot but the
+control time step, so that a log with both contains the robot.
 """
 
 import math
@@ -13,36 +13,37 @@ from selfmodel.errors import InputError
 from selfmodel.files import read_file
 from selfmodel.robot.mjcf.command_ranges import add_command_ranges
 from selfmodel.robot.mjcf.document import Document, read_document
-from selfmodel.robot.mjcf.expand import expand, refuse_unloggable
+from selfmodel.robot.mjcf.expand import check_loggable, expand
 from selfmodel.robot.mjcf.files import Folder, InMemory
+from selfmodel.robot.mjcf.forward import turn_forward
 from selfmodel.robot.mjcf.ground import add_ground
-from selfmodel.robot.mjcf.mujoco_errors import compiled
+from selfmodel.robot.mjcf.keyframe import bake_keyframe
+from selfmodel.robot.mjcf.mujoco_errors import compile_model
 from selfmodel.robot.mjcf.names import name_parts
-from selfmodel.robot.mjcf.pose import bake_keyframe, turn_forward
-from selfmodel.robot.mjcf.refusals import refuse_unusable
+from selfmodel.robot.mjcf.resource_limits import MAX_MODEL_SIZE
 from selfmodel.robot.mjcf.sensors import add_sensors
 from selfmodel.robot.mjcf.settings import MjcfSettings
-from selfmodel.robot.mjcf.untrusted import LARGEST, checked_model
+from selfmodel.robot.mjcf.untrusted import checked_model
+from selfmodel.robot.mjcf.usability import check_usable
 from selfmodel.robot.mjcf.visuals import drop_visuals
 
-CONTROL_TIMESTEP = 0.01
-"""Seconds between two commands that are wanted where nothing else is said."""
+MIN_CONTROL_TIMESTEP = 0.01
+"""Lower bound of the default control time step, s."""
 
-
-MOST_SUBSTEPS = 1000
-"""Physics steps in a control step that the log of a trial may tell of."""
+MAX_SUBSTEPS = 1000
+"""Largest number of physics steps per control step; the model of a log has the same limit."""
 
 
 @dataclass(frozen=True, eq=False)
-class Adapted:
-    """An MJCF that is ready to be a robot.
+class AdaptedMjcf:
+    """An MJCF with all that a robot needs.
 
     Attributes:
-        name: What the robot is called.
-        mjcf: One XML text that needs no files but the assets.
-        control_timestep: Seconds between two commands.
-        assets: The files that the text names.
-        notes: What was done to the user's text, a sentence each.
+        name: Name of the robot.
+        mjcf: The MJCF as one XML text without includes; ``assets`` has its files.
+        control_timestep: Time between two commands, s.
+        assets: Contents of the files that the text names, by name.
+        notes: Descriptions of the changes to the user's text, one sentence each.
     """
 
     name: str
@@ -52,17 +53,17 @@ class Adapted:
     notes: tuple[str, ...]
 
 
-def adapt(path: Path, settings: MjcfSettings) -> Adapted:
-    """Returns the robot of an MJCF file, made ready.
+def adapt(path: Path, settings: MjcfSettings) -> AdaptedMjcf:
+    """Returns the adapted MJCF of a file.
 
     Args:
-        path: The file; what it includes and names is read from its folder and below.
-        settings: What the file itself does not tell.
+        path: The file, which may include and name files of its folder and subfolders.
+        settings: Properties that the file does not contain.
 
     Raises:
-        InputError: The file cannot be used; the sentence says why, and what to do.
+        InputError: The file cannot be a robot; the sentence has the reason and the remedy.
     """
-    data = read_file(path, "an MJCF file", LARGEST)
+    data = read_file(path, "an MJCF file", MAX_MODEL_SIZE)
     try:
         document = read_document(data, Folder(path.parent), path.name)
         return _adapted(path.stem, document, settings)
@@ -72,14 +73,17 @@ def adapt(path: Path, settings: MjcfSettings) -> Adapted:
 
 def adapt_text(
     name: str, mjcf: str, files: Mapping[str, bytes | str], settings: MjcfSettings
-) -> Adapted:
-    """Returns the robot of an MJCF in memory, made ready; see ``adapt``.
+) -> AdaptedMjcf:
+    """Returns the adapted MJCF of a text in memory; see ``adapt``.
 
     Args:
-        name: What the robot is called.
-        mjcf: The text.
-        files: What it includes and names, by the paths that it says.
-        settings: What the text itself does not tell.
+        name: Name of the robot.
+        mjcf: The MJCF as text.
+        files: Contents of the files that the text includes and names, by the paths in the text.
+        settings: Properties that the text does not contain.
+
+    Raises:
+        InputError: The text cannot be a robot; the sentence has the reason and the remedy.
     """
     try:
         return _adapted(name, read_document(mjcf.encode(), InMemory(files)), settings)
@@ -87,28 +91,28 @@ def adapt_text(
         raise InputError(f"{name}: {error}") from error
 
 
-def _adapted(name: str, document: Document, settings: MjcfSettings) -> Adapted:
-    refuse_unloggable(document)
+def _adapted(name: str, document: Document, settings: MjcfSettings) -> AdaptedMjcf:
+    check_loggable(document)
     expand(document)
     name_parts(document)
     for body in document.bodies():
         if body.attrib.pop("mocap", "false") == "true":
-            document.notes.append(f"the mocap body {body.get('name')} stands still")
-    model = compiled(document.text, document.assets)
+            document.notes.append(f"the mocap body {body.get('name')} is static")
+    model = compile_model(document.text, document.assets)
     if drop_visuals(document, model):
-        model = compiled(document.text, document.assets)
-    refuse_unusable(model)
+        model = compile_model(document.text, document.assets)
+    check_usable(model)
     timestep = _control_timestep(float(model.opt.timestep), settings.control_timestep)
     bake_keyframe(document, model, settings)
-    turn_forward(document, compiled(document.text, document.assets), settings)
-    add_ground(document, compiled(document.text, document.assets))
-    add_sensors(document, compiled(document.text, document.assets), settings)
+    turn_forward(document, compile_model(document.text, document.assets), settings)
+    add_ground(document, compile_model(document.text, document.assets))
+    add_sensors(document, compile_model(document.text, document.assets), settings)
     add_command_ranges(document, model, settings)
     try:
         checked = checked_model(document.text, document.assets)
     except ValueError as error:
-        raise InputError(f"no log could carry it: {error}") from error
-    return Adapted(
+        raise InputError(f"a log cannot contain it: {error}") from error
+    return AdaptedMjcf(
         name=name,
         mjcf=checked.mjcf,
         control_timestep=timestep,
@@ -118,15 +122,24 @@ def _adapted(name: str, document: Document, settings: MjcfSettings) -> Adapted:
 
 
 def _control_timestep(physics: float, wanted: float | None) -> float:
-    """The wanted step, or the smallest multiple of the physics' that is not below 0.01 s."""
-    control = CONTROL_TIMESTEP if wanted is None else wanted
-    if control / physics > MOST_SUBSTEPS:
+    """Returns the control time step, s.
+
+    Args:
+        physics: Physics time step, s.
+        wanted: Control time step in the settings, s; None for the smallest multiple of the physics
+            time step that is at least ``MIN_CONTROL_TIMESTEP``.
+
+    Raises:
+        InputError: The control time step has too many physics steps, or no whole number of them.
+    """
+    control = MIN_CONTROL_TIMESTEP if wanted is None else wanted
+    if control / physics > MAX_SUBSTEPS:
         raise InputError(
-            f"its physics take {control / physics:.3g} steps in a control step of {control} s, "
-            f"more than {MOST_SUBSTEPS}: give it a larger <option timestep>"
+            f"expected at most {MAX_SUBSTEPS} physics steps in a control step of {control} s, got "
+            f"{control / physics:.3g}: give it a larger <option timestep>"
         )
     if wanted is None:
-        return max(1, math.ceil(CONTROL_TIMESTEP / physics - 1e-9)) * physics
+        return max(1, math.ceil(MIN_CONTROL_TIMESTEP / physics - 1e-9)) * physics
     if not math.isclose(max(1, round(wanted / physics)) * physics, wanted, rel_tol=1e-9):
         raise InputError(
             f"control_timestep must be a multiple of the physics time step {physics} s, got "

@@ -1,11 +1,11 @@
-"""Command ranges in an MJCF document."""
+"""Adds command ranges to the motors of an MJCF that have none."""
 
 import mujoco
 
 from selfmodel.errors import InputError
-from selfmodel.robot.actuator_ranges import command_ranges, says_its_range
+from selfmodel.robot.actuator_ranges import command_ranges, has_command_range
 from selfmodel.robot.mjcf.document import Document
-from selfmodel.robot.mjcf.mujoco_errors import compiled
+from selfmodel.robot.mjcf.mujoco_errors import compile_model
 from selfmodel.robot.mjcf.settings import MjcfSettings
 
 
@@ -15,7 +15,7 @@ def add_command_ranges(document: Document, model: mujoco.MjModel, settings: Mjcf
     Args:
         document: The MJCF, edited in place.
         model: The compiled document.
-        settings: How to read the MJCF.
+        settings: Settings with the command range.
 
     Raises:
         InputError: A motor has no command range, and the settings have none.
@@ -23,10 +23,12 @@ def add_command_ranges(document: Document, model: mujoco.MjModel, settings: Mjcf
     if settings.ctrlrange is not None:
         ends = f"{settings.ctrlrange[0]!r} {settings.ctrlrange[1]!r}"
         for motor, element in enumerate(document.children("actuator")):
-            if not says_its_range(model, motor):
+            if not has_command_range(model, motor):
                 element.set("ctrlrange", ends)
                 element.set("ctrllimited", "true")
     try:
-        command_ranges(compiled(document.text, document.assets))
+        command_ranges(compile_model(document.text, document.assets))
     except InputError as error:
-        raise InputError(f"{error}; or set ctrlrange=[-1, 1] for all that have none") from error
+        raise InputError(
+            f"{error}; or set ctrlrange=[-1, 1] for all motors that have none"
+        ) from error

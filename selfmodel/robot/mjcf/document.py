@@ -1,32 +1,33 @@
-"""An MJCF and the files that it names, as one document that stands alone."""
+"""MJCF document: an MJCF without includes, and the contents of the files that it names."""
 
 import re
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from posixpath import dirname, join, normpath
-from xml.etree import ElementTree as ET  # _guard refuses what makes it unsafe
+from xml.etree import ElementTree as ET  # _check_xml refuses document types and large trees
 from xml.parsers import expat  # the same
 
 from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.files import Files
-from selfmodel.robot.mjcf.untrusted import DEEPEST, LARGEST, MOST_ELEMENTS
+from selfmodel.robot.mjcf.resource_limits import MAX_DEPTH, MAX_ELEMENTS, MAX_MODEL_SIZE
 
-LARGEST_READ = 64 * 2**20
-"""Bytes of all files that a model names, before what is only seen is taken out of it."""
+MAX_SOURCE_ASSET_BYTES = 64 * 2**20
+"""Largest sum of all files that a user's MJCF names, in bytes, before visual meshes are removed."""
 
-_FOLDERS = {"meshdir": ("mesh", "skin", "flex", "hfield"), "texturedir": ("texture",)}
+_FOLDER_ATTRIBUTES = {"meshdir": ("mesh", "skin", "flex", "hfield"), "texturedir": ("texture",)}
 _NAMED_BY_FILE = ("mesh", "texture", "hfield")
-_UNUSUAL = re.compile(r"[^A-Za-z0-9_.-]")
+_SPECIAL_CHARACTERS = re.compile(r"[^A-Za-z0-9_.-]")
 
 
 @dataclass(eq=False)
 class Document:
-    """An MJCF that is being made ready.
+    """An MJCF that is being adapted.
 
     Attributes:
-        root: Its ``<mujoco>``.
-        assets: The files that it names, by plain names.
-        notes: What was done to it, a sentence each.
+        root: The ``<mujoco>`` element.
+        assets: Contents of the files that the MJCF names, by names without folders.
+        notes: Descriptions of the changes, one sentence each.
     """
 
     root: ET.Element
@@ -35,22 +36,22 @@ class Document:
 
     @property
     def text(self) -> str:
-        """The MJCF."""
+        """The MJCF as text."""
         return ET.tostring(self.root, encoding="unicode")
 
     @property
     def angle_unit(self) -> float:
-        """Units in which it gives an angle of 1 rad."""
+        """Value of an angle of 1 rad in the unit of the MJCF."""
         units = [c.get("angle") for c in self.root.iter("compiler") if c.get("angle")]
         return 1.0 if units[-1:] == ["radian"] else 180.0 / 3.141592653589793
 
     def section(self, name: str) -> ET.Element:
-        """Returns the first section of that name, made if there is none."""
+        """Returns the first section of that name, and adds the section if there is none."""
         found = self.root.find(name)
         return ET.SubElement(self.root, name) if found is None else found
 
     def children(self, section: str) -> list[ET.Element]:
-        """Returns what stands in all sections of that name, in order."""
+        """Returns the children of all sections of that name, in order."""
         return [child for part in self.root.findall(section) for child in part]
 
     def bodies(self) -> list[ET.Element]:
@@ -59,30 +60,30 @@ class Document:
 
 
 def read_document(mjcf: bytes, files: Files, name: str = "") -> Document:
-    """Returns an MJCF with its includes in their places and its files in memory.
+    """Returns the document of an MJCF: includes are inserted, and all named files are read.
 
     Args:
-        mjcf: The text.
-        files: Where those that it names are looked for.
-        name: Its own among them, which it cannot include.
+        mjcf: The MJCF.
+        files: Source of the files that the MJCF includes and names.
+        name: Name of the MJCF among the files, which it cannot include.
 
     Raises:
-        InputError: A file is missing, too large, out of bounds, or no MJCF.
+        InputError: A file is missing, too large, outside the folder, or no MJCF.
     """
-    if len(mjcf) > LARGEST:
-        raise InputError(f"expected an MJCF of at most {LARGEST} bytes, got {len(mjcf)}")
+    if len(mjcf) > MAX_MODEL_SIZE:
+        raise InputError(f"expected an MJCF of at most {MAX_MODEL_SIZE} bytes, got {len(mjcf)}")
     root = _parse(mjcf)
     if root.tag != "mujoco":
-        raise InputError(_no_mjcf(root.tag))
+        raise InputError(_no_mjcf_message(root.tag))
     _include(root, files, "", {normpath(name)})
-    if sum(1 for _ in root.iter()) > MOST_ELEMENTS:
-        raise InputError(f"it has more than {MOST_ELEMENTS} elements: take out what does not move")
+    if sum(1 for _ in root.iter()) > MAX_ELEMENTS:
+        raise InputError(f"it has more than {MAX_ELEMENTS} elements: remove static scenery")
     document = Document(root)
-    _gather(document, files)
+    _read_assets(document, files)
     return document
 
 
-def _no_mjcf(tag: str) -> str:
+def _no_mjcf_message(tag: str) -> str:
     if tag == "robot":
         return (
             "expected <mujoco>, got a URDF: save it as MJCF first, with "
@@ -92,24 +93,24 @@ def _no_mjcf(tag: str) -> str:
 
 
 def _parse(data: bytes) -> ET.Element:
-    _guard(data)
+    _check_xml(data)
     try:
-        return ET.fromstring(data)  # noqa: S314  # guarded
+        return ET.fromstring(data)  # noqa: S314  # _check_xml refuses unsafe XML
     except (ET.ParseError, ValueError) as error:
         raise InputError(f"expected an MJCF file, got no XML: {error}") from error
 
 
-def _guard(data: bytes) -> None:
-    """Refuses entities, and elements within each other without end, before a tree is built."""
+def _check_xml(data: bytes) -> None:
+    """Refuses document types (and with them entities) and large trees, before a tree is built."""
     depth = count = 0
 
     def start(_tag: str, _attributes: dict[str, str]) -> None:
         nonlocal depth, count
         depth += 1
         count += 1
-        if depth > DEEPEST or count > MOST_ELEMENTS:
+        if depth > MAX_DEPTH or count > MAX_ELEMENTS:
             raise InputError(
-                f"it has more than {MOST_ELEMENTS} elements, or {DEEPEST} within each other"
+                f"it has more than {MAX_ELEMENTS} elements, or {MAX_DEPTH} within each other"
             )
 
     def end(_tag: str) -> None:
@@ -117,7 +118,7 @@ def _guard(data: bytes) -> None:
         depth -= 1
 
     def doctype(*_: object) -> None:
-        raise InputError("it has a <!DOCTYPE>, which no MJCF needs: take it out")
+        raise InputError("it has a <!DOCTYPE>, which no MJCF needs: remove it")
 
     parser = expat.ParserCreate()
     parser.StartElementHandler, parser.EndElementHandler = start, end
@@ -130,53 +131,63 @@ def _guard(data: bytes) -> None:
         raise InputError(f"expected an MJCF file, got no XML: {error}") from error
 
 
-def _include(parent: ET.Element, files: Files, here: str, included: set[str]) -> None:
-    for place, child in reversed(list(enumerate(parent))):
+def _include(parent: ET.Element, files: Files, folder: str, included: set[str]) -> None:
+    """Replaces each ``<include>`` by the content of its file, recursively.
+
+    Args:
+        parent: Element whose descendants are replaced, in place.
+        files: Source of the files.
+        folder: Folder of the file that contains ``parent``.
+        included: Paths of the files that are included already; extended.
+    """
+    for index, child in reversed(list(enumerate(parent))):
         if child.tag != "include":
-            _include(child, files, here, included)
+            _include(child, files, folder, included)
             continue
         name = child.get("file", "")
-        # As MuJoCo looks for it: from the main file's folder, then from that of this one.
-        path = normpath(name if files.has(name) else join(here, name))
-        data = files.read(path, f"a file to <include> ({name!r})", LARGEST)
+        # MuJoCo's order: relative to the folder of the main file, then of the including file.
+        path = normpath(name if files.has(name) else join(folder, name))
+        data = files.read(path, f"a file to <include> ({name!r})", MAX_MODEL_SIZE)
         if path in included:
             raise InputError(f"it includes {name!r} twice: name each file once")
         included.add(path)
         inner = _parse(data)
         _include(inner, files, dirname(path), included)
-        parent[place : place + 1] = list(inner)
+        parent[index : index + 1] = list(inner)
 
 
-def _gather(document: Document, files: Files) -> None:
-    """Takes the files that are named into memory, under plain names."""
-    folders = _asset_folders(document.root)
-    taken: dict[str, str] = {}
+def _read_assets(document: Document, files: Files) -> None:
+    """Reads the files that the MJCF names, and renames them to names without folders."""
+    folders = _pop_asset_folders(document.root)
+    names: dict[str, str] = {}
     for element in document.root.iter():
         for attribute, name in list(element.attrib.items()):
             if not attribute.startswith("file") or not name:
                 continue
-            where = str(PurePosixPath(folders.get(element.tag, ""), name))
-            if where not in taken:
+            path = str(PurePosixPath(folders.get(element.tag, ""), name))
+            if path not in names:
                 what = f"the file of a <{element.tag}> ({name!r})"
-                data = files.read(where, what, LARGEST_READ)
-                if sum(map(len, document.assets.values())) + len(data) > LARGEST_READ:
-                    raise InputError(f"its files have over {LARGEST_READ} bytes: simplify them")
-                taken[where] = _plain(where, document.assets)
-                document.assets[taken[where]] = data
-            element.set(attribute, taken[where])
+                data = files.read(path, what, MAX_SOURCE_ASSET_BYTES)
+                if sum(map(len, document.assets.values())) + len(data) > MAX_SOURCE_ASSET_BYTES:
+                    raise InputError(
+                        f"its files have over {MAX_SOURCE_ASSET_BYTES} bytes: simplify them"
+                    )
+                names[path] = _plain_name(path, document.assets)
+                document.assets[names[path]] = data
+            element.set(attribute, names[path])
             if element.tag in _NAMED_BY_FILE and attribute == "file" and not element.get("name"):
                 element.set("name", PurePosixPath(name).stem)
 
 
-def _asset_folders(root: ET.Element) -> dict[str, str]:
-    """The folder of each kind of asset; the document keeps none of them."""
+def _pop_asset_folders(root: ET.Element) -> dict[str, str]:
+    """Removes the asset folders of the compiler, and returns the folder per kind of asset."""
     folders: dict[str, str] = {}
     for compiler in root.iter("compiler"):
-        both = compiler.attrib.pop("assetdir", None)
-        for attribute, tags in _FOLDERS.items():
-            named = compiler.attrib.pop(attribute, both)
-            if named is not None:
-                folders |= dict.fromkeys(tags, named)
+        default = compiler.attrib.pop("assetdir", None)
+        for attribute, tags in _FOLDER_ATTRIBUTES.items():
+            folder = compiler.attrib.pop(attribute, default)
+            if folder is not None:
+                folders |= dict.fromkeys(tags, folder)
         if compiler.attrib.pop("strippath", "false") == "true":
             _strip_paths(root)
     return folders
@@ -189,9 +200,9 @@ def _strip_paths(root: ET.Element) -> None:
             element.set(attribute, PurePosixPath(name).name)
 
 
-def _plain(where: str, taken: dict[str, bytes]) -> str:
-    """A name for a file that a log can carry: no folders, no unusual letters."""
-    name = _UNUSUAL.sub("_", PurePosixPath(where).name).lstrip(".-") or "file"
+def _plain_name(path: str, taken: Collection[str]) -> str:
+    """Returns a unique name for an attachment of a log: no folders, no special characters."""
+    name = _SPECIAL_CHARACTERS.sub("_", PurePosixPath(path).name).lstrip(".-") or "file"
     stem, dot, ending = name.rpartition(".")
     number = 2
     while name in taken:

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from selfmodel.errors import InputError
-from selfmodel.robot.mjcf.adaptation import Adapted, adapt
+from selfmodel.robot.mjcf.adaptation import AdaptedMjcf, adapt
 from selfmodel.robot.mjcf.settings import MjcfSettings, read_settings
 from selfmodel.robot.robot import Robot
 
@@ -12,8 +12,9 @@ def load_mjcf(path: Path | str, settings: MjcfSettings | None = None) -> Robot:
     """Returns the robot that an MJCF file describes; see docs/robots.md.
 
     Args:
-        path: The file, which is not changed. It may name others in its folder and below.
-        settings: What the file itself does not contain; None for those of the TOML beside it.
+        path: The file, which is read only. It may name files in its folder and subfolders.
+        settings: Properties that the file does not contain; None for the settings of the TOML file
+            of the same name.
 
     Raises:
         InputError: No robot can be made of the file; the message gives the reason and the remedy.
@@ -23,7 +24,7 @@ def load_mjcf(path: Path | str, settings: MjcfSettings | None = None) -> Robot:
     return robot_from(adapted, str(file))
 
 
-def robot_from(adapted: Adapted, source: str) -> Robot:
+def robot_from(adapted: AdaptedMjcf, source: str) -> Robot:
     """Returns the robot of an adapted MJCF.
 
     Args:

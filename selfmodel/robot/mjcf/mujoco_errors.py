@@ -1,4 +1,4 @@
-"""What MuJoCo says of a model, as one sentence."""
+"""Compiles an MJCF, and converts MuJoCo's errors to ``InputError``."""
 
 import warnings
 from collections.abc import Iterator
@@ -8,7 +8,7 @@ import mujoco
 
 from selfmodel.errors import InputError
 
-FAILURES = (
+MUJOCO_ERRORS = (
     ValueError,
     KeyError,
     OverflowError,
@@ -16,36 +16,36 @@ FAILURES = (
     RuntimeError,  # "unknown exception": MuJoCo is out of memory
     mujoco.FatalError,
 )
-"""Everything that MuJoCo raises over a model that is none."""
+"""Exceptions that MuJoCo raises for an invalid model."""
 
 
 @contextmanager
-def told_by_mujoco() -> Iterator[None]:
-    """Turns what MuJoCo raises into an ``InputError``, and keeps its warnings to itself.
+def mujoco_errors_as_input_errors() -> Iterator[None]:
+    """Converts MuJoCo's exceptions to ``InputError``, and suppresses its warnings.
 
     Raises:
-        InputError: MuJoCo raised.
+        InputError: MuJoCo raised an exception.
     """
-    before = mujoco.get_mju_user_warning()
+    handler = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda _: None)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             yield
-    except FAILURES as error:
+    except MUJOCO_ERRORS as error:
         if isinstance(error, InputError):
             raise
-        said = " ".join(str(error).split()).removeprefix("Error: ")
-        raise InputError(f"MuJoCo cannot load it: {said}") from error
+        message = " ".join(str(error).split()).removeprefix("Error: ")
+        raise InputError(f"MuJoCo cannot load it: {message}") from error
     finally:
-        mujoco.set_mju_user_warning(before)
+        mujoco.set_mju_user_warning(handler)
 
 
-def compiled(text: str, assets: dict[str, bytes]) -> mujoco.MjModel:
-    """Returns the model that an MJCF describes.
+def compile_model(mjcf: str, assets: dict[str, bytes]) -> mujoco.MjModel:
+    """Returns the compiled model of an MJCF.
 
     Raises:
-        InputError: MuJoCo cannot load it.
+        InputError: MuJoCo cannot compile the MJCF.
     """
-    with told_by_mujoco():
-        return mujoco.MjModel.from_xml_string(text, assets)
+    with mujoco_errors_as_input_errors():
+        return mujoco.MjModel.from_xml_string(mjcf, assets)

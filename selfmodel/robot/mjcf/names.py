@@ -1,13 +1,13 @@
-"""Names for what has none, and names that notation and logs can carry."""
+"""Gives the parts of an MJCF names, without the special characters of notation."""
 
 import re
 from collections.abc import Iterable, Mapping
-from xml.etree import ElementTree as ET  # of texts that were checked
+from xml.etree import ElementTree as ET  # of checked texts
 
 from selfmodel.robot.mjcf.document import Document
 
-_UNUSUAL = re.compile(r"[^\w.-]")
-_HINGE_TAGS = ("joint", "freejoint")
+_SPECIAL_CHARACTERS = re.compile(r"[^\w.-]")
+_JOINT_TAGS = ("joint", "freejoint")
 
 _REFERENCES: Mapping[str, tuple[str, ...]] = {
     "body": ("body", "body1", "body2", "subtree1", "subtree2", "target"),
@@ -15,36 +15,41 @@ _REFERENCES: Mapping[str, tuple[str, ...]] = {
     "actuator": ("actuator",),
     "sensor": (),
 }
-"""By kind of part, the attributes that name one. ``objname`` and ``refname`` say the kind."""
+"""Attributes that refer to a part by its name, by kind of part. ``objname`` and ``refname`` are not
+included: ``objtype`` and ``reftype`` contain their kind."""
 
 
-class Taken:
-    """The names of one kind of part, each once.
+class UniqueNames:
+    """Unique names for the parts of one kind.
 
     Args:
-        names: Those that are given away already.
+        names: Names in use.
     """
 
     def __init__(self, names: Iterable[str | None]) -> None:
         self._names = {name for name in names if name}
 
-    def new(self, wish: str) -> str:
-        """Returns the wished name, with a number behind it where that is given away."""
-        name, number = wish, 2
+    def new(self, base: str) -> str:
+        """Returns the base name, with a number appended if the name is in use."""
+        name, number = base, 2
         while name in self._names:
-            name, number = f"{wish}_{number}", number + 1
+            name, number = f"{base}_{number}", number + 1
         self._names.add(name)
         return name
 
 
 def name_parts(document: Document) -> None:
-    """Gives bodies, joints, actuators and sensors of touch and of angles a name each.
+    """Gives each body, joint, actuator and sensor a unique name.
 
-    A body without a name is called like its first joint, a joint like its body, a motor like what
-    it drives. Letters that would mean something in notation become ``_``, wherever the name stands.
+    A body without a name gets the name of its first joint, a joint that of its body, an actuator
+    that of its joint or tendon, a sensor that of its joint or its type. Special characters of
+    notation become ``_``, also in references.
+
+    Args:
+        document: The MJCF, edited in place.
     """
     bodies = document.bodies()
-    joints = [(body, joint) for body in bodies for joint in body if joint.tag in _HINGE_TAGS]
+    joints = [(body, joint) for body in bodies for joint in body if joint.tag in _JOINT_TAGS]
     actuators = document.children("actuator")
     sensors = document.children("sensor")
     parts = {
@@ -54,47 +59,50 @@ def name_parts(document: Document) -> None:
         "sensor": sensors,
     }
     for kind, elements in parts.items():
-        _make_plain(document, kind, elements)
-    before = {kind: [e.get("name") for e in elements] for kind, elements in parts.items()}
-    taken = Taken(before["body"])
+        _replace_special_characters(document, kind, elements)
+    original = {kind: [e.get("name") for e in elements] for kind, elements in parts.items()}
+    names = UniqueNames(original["body"])
     for number, body in enumerate(bodies, 1):
         first = next((j.get("name") for j in body if j.tag == "joint" and j.get("name")), None)
-        _name(body, taken, first or f"body_{number}")
-    taken = Taken(before["joint"])
+        _set_name(body, names, first or f"body_{number}")
+    names = UniqueNames(original["joint"])
     for body, joint in joints:
-        own = str(body.get("name"))
-        _name(joint, taken, f"{own}_root" if joint.tag == "freejoint" else own)
-    taken = Taken(before["actuator"])
+        body_name = str(body.get("name"))
+        _set_name(joint, names, f"{body_name}_root" if joint.tag == "freejoint" else body_name)
+    names = UniqueNames(original["actuator"])
     for motor in actuators:
-        drives = motor.get("joint") or motor.get("jointinparent") or motor.get("tendon")
-        _name(motor, taken, _UNUSUAL.sub("_", drives) if drives else "motor")
-    taken = Taken(before["sensor"])
+        driven = motor.get("joint") or motor.get("jointinparent") or motor.get("tendon")
+        _set_name(motor, names, _SPECIAL_CHARACTERS.sub("_", driven) if driven else "motor")
+    names = UniqueNames(original["sensor"])
     for sensor in sensors:
-        wish = f"{sensor.get('joint')}_angle" if sensor.tag == "jointpos" else sensor.tag
-        _name(sensor, taken, wish)
-    named = sum(n is None for kind in ("body", "joint", "actuator") for n in before[kind])
-    if named:
-        document.notes.append(f"{named} parts without a name were given one")
+        base = f"{sensor.get('joint')}_angle" if sensor.tag == "jointpos" else sensor.tag
+        _set_name(sensor, names, base)
+    unnamed = sum(n is None for kind in ("body", "joint", "actuator") for n in original[kind])
+    if unnamed:
+        document.notes.append(f"{unnamed} parts without a name got one")
 
 
-def _name(element: ET.Element, taken: Taken, wish: str) -> None:
+def _set_name(element: ET.Element, names: UniqueNames, base: str) -> None:
+    """Gives an element a name if it has none."""
     if not element.get("name"):
-        element.set("name", taken.new(wish))
+        element.set("name", names.new(base))
 
 
-def _make_plain(document: Document, kind: str, elements: list[ET.Element]) -> None:
-    odd = [name for e in elements if (name := e.get("name")) and _UNUSUAL.search(name)]
-    taken = Taken(e.get("name") for e in elements)
-    new = {name: taken.new(_UNUSUAL.sub("_", name)) for name in dict.fromkeys(odd)}
+def _replace_special_characters(document: Document, kind: str, elements: list[ET.Element]) -> None:
+    special = [
+        name for e in elements if (name := e.get("name")) and _SPECIAL_CHARACTERS.search(name)
+    ]
+    names = UniqueNames(e.get("name") for e in elements)
+    new = {name: names.new(_SPECIAL_CHARACTERS.sub("_", name)) for name in dict.fromkeys(special)}
     _rename(document, kind, elements, new)
     for old, name in new.items():
-        document.notes.append(f"the {kind} {old!r} is called {name} here")
+        document.notes.append(f"the {kind} {old!r} is renamed to {name}")
 
 
 def _rename(
     document: Document, kind: str, elements: list[ET.Element], new: Mapping[str, str]
 ) -> None:
-    """Renames parts of one kind, and what refers to them."""
+    """Renames parts of one kind, and the references to them."""
     if not new:
         return
     for element in elements:
@@ -104,7 +112,7 @@ def _rename(
         for attribute in _REFERENCES[kind]:
             if element.get(attribute) in new:
                 element.set(attribute, new[str(element.get(attribute))])
-        for whose in ("obj", "ref"):
-            told = element.get(f"{whose}type", "").removeprefix("x")
-            if told == kind and element.get(f"{whose}name") in new:
-                element.set(f"{whose}name", new[str(element.get(f"{whose}name"))])
+        for prefix in ("obj", "ref"):
+            target_kind = element.get(f"{prefix}type", "").removeprefix("x")
+            if target_kind == kind and element.get(f"{prefix}name") in new:
+                element.set(f"{prefix}name", new[str(element.get(f"{prefix}name"))])

@@ -1,4 +1,4 @@
-"""What a user says about a robot's MJCF where the file itself does not tell."""
+"""Settings of a user for the properties of a robot that its MJCF does not contain."""
 
 import sys
 import tomllib
@@ -10,13 +10,14 @@ from typing import Any
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.files import read_file
 
-LARGEST = 2**16
-"""Bytes that the file of settings may have."""
+MAX_SETTINGS_BYTES = 2**16
+"""Largest settings file, in bytes."""
 
-DIRECTIONS: Mapping[str, float] = {"x": 0.0, "y": 90.0, "-x": 180.0, "-y": 270.0}
-"""Where a robot may face in its own file, and how far to the left of x that is, degrees."""
+FORWARD_DIRECTIONS: Mapping[str, float] = {"x": 0.0, "y": 90.0, "-x": 180.0, "-y": 270.0}
+"""Angle of each possible forward direction, counterclockwise from x, degrees."""
 
 NO_KEYFRAME = "none"
+"""Setting of the keyframe for the reference pose of the MJCF."""
 
 
 @dataclass(frozen=True)
@@ -24,14 +25,14 @@ class MjcfSettings:
     """How to read a robot from its MJCF.
 
     Attributes:
-        forward: The direction of the world, in the file, in which the robot is to walk.
-        keyframe: The keyframe in which it starts; "" for the first there is, ``none`` for the
+        forward: Forward direction of the robot, in the world frame of the file.
+        keyframe: Keyframe of the initial pose; "" for the first keyframe, ``none`` for the
             reference pose.
-        control_timestep: Seconds between two commands; None for the smallest multiple of the
-            physics time step from 0.01 s on.
-        touch: The bodies that get a touch sensor; None for every distal limb.
-        angle: The joints that get an angle sensor; None for every hinge that a motor drives.
-        ctrlrange: Lowest and highest command of motors that have no range of their own.
+        control_timestep: Time between two commands, s; None for the smallest multiple of the
+            physics time step that is at least 0.01 s.
+        touch: Bodies that get a touch sensor; None for the end of each limb.
+        angle: Joints that get an angle sensor; None for every hinge that a motor drives.
+        ctrlrange: Lowest and highest command of motors without a command range.
     """
 
     forward: str = "x"
@@ -43,34 +44,34 @@ class MjcfSettings:
 
 
 def read_settings(path: Path, extra: Mapping[str, Any] | None = None) -> MjcfSettings:
-    """Returns the settings that stand beside an MJCF file, ``ROBOT.toml`` beside ``ROBOT.xml``.
+    """Returns the settings of an MJCF file: of ``ROBOT.toml`` in the folder of ``ROBOT.xml``.
 
     Args:
         path: The MJCF file.
-        extra: What counts in the place of what stands there.
+        extra: Settings that override those of the file.
 
     Raises:
-        InputError: A setting is unknown or has no meaning, or the file cannot be read.
+        InputError: A setting is unknown or invalid, or the file cannot be read.
     """
-    beside = path.with_suffix(".toml")
+    file = path.with_suffix(".toml")
     found: dict[str, Any] = {}
-    if beside.exists():
-        data = read_file(beside, "a file of settings", LARGEST)
+    if file.exists():
+        data = read_file(file, "a file of settings", MAX_SETTINGS_BYTES)
         try:
             found = tomllib.loads(data.decode())
-        except (ValueError, RecursionError) as error:  # also of numbers and brackets without end
-            raise InputError(f"{beside}: expected a file of settings in TOML: {error}") from error
+        except (ValueError, RecursionError) as error:  # also raised by endless digits and brackets
+            raise InputError(f"{file}: expected a file of settings in TOML: {error}") from error
     try:
         return checked_settings({**found, **(extra or {})})
     except InputError as error:
-        raise InputError(f"{beside}: {error}") if found else error from None
+        raise InputError(f"{file}: {error}") if found else error from None
 
 
 def parse_setting(text: str) -> dict[str, Any]:
     """Returns the setting in a text such as ``forward=-x`` or ``touch=["left_foot"]``.
 
     Raises:
-        InputError: It is none.
+        InputError: The text has no key or no value.
     """
     key, equals, value = text.partition("=")
     if not equals or not value.strip():
@@ -78,14 +79,17 @@ def parse_setting(text: str) -> dict[str, Any]:
     try:
         return {key.strip(): tomllib.loads(f"value = {value}")["value"]}
     except (ValueError, RecursionError):
-        return {key.strip(): value.strip()}  # a word without quotes
+        return {key.strip(): value.strip()}  # an unquoted word
 
 
 def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
-    """Returns settings once each is known and has a meaning.
+    """Returns validated settings.
+
+    Args:
+        given: Values by setting.
 
     Raises:
-        InputError: One is not; the sentence says which and what it may be.
+        InputError: A setting is unknown or invalid; the sentence has its name and the valid values.
     """
     for key in given:
         if key == "neurons":
@@ -99,8 +103,8 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
     if step is not None and not (_is_number(step) and 0 < step <= 10):
         raise InputError(f"control_timestep needs a number from above 0 to 10 s, got {step!r}")
     forward, keyframe = given.get("forward", "x"), given.get("keyframe", "")
-    if not isinstance(forward, str) or forward not in DIRECTIONS:
-        raise InputError(f"forward needs one of {', '.join(DIRECTIONS)}, got {forward!r}")
+    if not isinstance(forward, str) or forward not in FORWARD_DIRECTIONS:
+        raise InputError(f"forward needs one of {', '.join(FORWARD_DIRECTIONS)}, got {forward!r}")
     if not isinstance(keyframe, str):
         raise InputError(f"keyframe needs the name of a keyframe, or none, got {keyframe!r}")
     return MjcfSettings(
@@ -116,7 +120,7 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
 def _is_number(value: object) -> bool:
     if not isinstance(value, int | float) or isinstance(value, bool):
         return False
-    return abs(value) <= sys.float_info.max  # a whole number of Python may be larger
+    return abs(value) <= sys.float_info.max  # a Python int may be larger than any float
 
 
 def _range(given: Mapping[str, Any]) -> tuple[float, float] | None:

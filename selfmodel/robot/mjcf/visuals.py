@@ -1,73 +1,77 @@
-"""Takes out of a model what is only seen, where a log could not carry all its files."""
+"""Removes visual assets from an MJCF, so that the files of the MJCF fit into a log."""
 
-from xml.etree import ElementTree as ET  # of texts that were checked
+from xml.etree import ElementTree as ET  # of checked texts
 
 import mujoco
 
 from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.document import Document
 from selfmodel.robot.mjcf.expand import write_masses
-from selfmodel.robot.mjcf.untrusted import LARGEST_FILES
+from selfmodel.robot.mjcf.resource_limits import MAX_ASSET_BYTES
 
-_MEANT_BY_NAME = ("tendon", "sensor", "contact", "actuator", "equality", "deformable")
+_REFERRING_SECTIONS = ("tendon", "sensor", "contact", "actuator", "equality", "deformable")
 _MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
-_PIXELS = 64
-"""Width and height of a pattern that MuJoCo makes: each hypothesis has a copy of the model."""
+_MAX_PATTERN_PIXELS = 64
+"""Largest width and height of a procedural texture; each hypothesis has a copy of the model."""
 
 
 def drop_visuals(document: Document, model: mujoco.MjModel) -> bool:
-    """Takes out skins; and meshes and pictures that nothing can touch, if the files are too large.
+    """Removes skins; and visual meshes and image textures, if the files are too large for a log.
 
-    Patterns that MuJoCo makes become small, so that a model takes kilobytes and not megabytes. The
-    bodies keep the masses that the meshes gave them.
+    Procedural textures are shrunk, so that a model takes kilobytes in place of megabytes. The
+    bodies keep the masses that the removed meshes gave them.
+
+    Args:
+        document: The MJCF, edited in place.
+        model: The compiled document.
 
     Returns:
-        Whether anything was taken out.
+        Whether any element was removed.
 
     Raises:
-        InputError: What is left is still too large.
+        InputError: The remaining files are too large.
     """
-    skins = _remove(document.root, ("skin",))
+    skins = _remove_skins(document.root)
     _shrink_patterns(document)
-    before = _bytes(document)
-    if before <= LARGEST_FILES:
-        _forget_files(document)
+    if _asset_bytes(document) <= MAX_ASSET_BYTES:
+        _drop_unnamed_files(document)
         return bool(skins)
     write_masses(document, model)
-    geoms = _drop_geoms(document, model)
-    _drop_pictures(document)
+    geoms = _drop_visual_meshes(document, model)
+    _drop_image_textures(document)
     used = {geom.get("mesh") for geom in document.root.iter("geom")}
     for asset in document.root.findall("asset"):
         for mesh in [m for m in asset.findall("mesh") if m.get("name") not in used]:
             asset.remove(mesh)
-    _forget_files(document)
+    _drop_unnamed_files(document)
     document.notes.append(
-        f"{geoms} meshes that are only seen are left out, because a log could not carry their files"
+        f"{geoms} visual meshes are removed, because their files are too large for a log"
     )
-    if _bytes(document) > LARGEST_FILES:
+    if _asset_bytes(document) > MAX_ASSET_BYTES:
         raise InputError(
-            f"its files have {_bytes(document)} bytes, and every trial's log carries them, "
-            f"{LARGEST_FILES} at most: simplify the meshes that it touches things with"
+            f"expected files of at most {MAX_ASSET_BYTES} bytes, because every trial's log carries "
+            f"them, got {_asset_bytes(document)} bytes: simplify the meshes of colliding geoms"
         )
     return True
 
 
-def _bytes(document: Document) -> int:
+def _asset_bytes(document: Document) -> int:
     return sum(map(len, document.assets.values()))
 
 
-def _remove(root: ET.Element, tags: tuple[str, ...]) -> int:
-    found = [(parent, child) for parent in root.iter() for child in parent if child.tag in tags]
-    for parent, child in found:
-        parent.remove(child)
+def _remove_skins(root: ET.Element) -> int:
+    """Removes all skins; returns their number."""
+    found = [(parent, child) for parent in root.iter() for child in parent if child.tag == "skin"]
+    for parent, skin in found:
+        parent.remove(skin)
     return len(found)
 
 
-def _drop_geoms(document: Document, model: mujoco.MjModel) -> int:
-    """Takes out the mesh geoms that nothing can touch and nothing else names; returns how many."""
-    meant = {
+def _drop_visual_meshes(document: Document, model: mujoco.MjModel) -> int:
+    """Removes mesh geoms without contacts and without references; returns their number."""
+    referenced = {
         value
-        for section in _MEANT_BY_NAME
+        for section in _REFERRING_SECTIONS
         for part in document.root.findall(section)
         for element in part.iter()
         for value in element.attrib.values()
@@ -79,37 +83,39 @@ def _drop_geoms(document: Document, model: mujoco.MjModel) -> int:
         first = int(model.body_geomadr[body])
         for number, geom in enumerate(element.findall("geom")):
             touches = model.geom_contype[first + number] | model.geom_conaffinity[first + number]
-            seen = model.geom_type[first + number] == _MESH and not touches
-            if seen and geom.get("name") not in meant:
+            visual = model.geom_type[first + number] == _MESH and not touches
+            if visual and geom.get("name") not in referenced:
                 element.remove(geom)
                 dropped += 1
     return dropped
 
 
 def _shrink_patterns(document: Document) -> None:
+    """Limits the width and height of procedural textures."""
     for texture in document.root.iter("texture"):
         if texture.get("builtin", "none") != "none":
             for side in ("width", "height"):
-                if int(texture.get(side, "0").strip() or 0) > _PIXELS:
-                    texture.set(side, str(_PIXELS))
+                if int(texture.get(side, "0").strip() or 0) > _MAX_PATTERN_PIXELS:
+                    texture.set(side, str(_MAX_PATTERN_PIXELS))
 
 
-def _drop_pictures(document: Document) -> None:
-    """Takes out textures that come from files, and leaves their materials without them."""
-    gone = set()
+def _drop_image_textures(document: Document) -> None:
+    """Removes textures with files, and the references of materials to them."""
+    removed = set()
     for asset in document.root.findall("asset"):
         for texture in asset.findall("texture"):
             if any(attribute.startswith("file") for attribute in texture.attrib):
-                gone.add(texture.get("name"))
+                removed.add(texture.get("name"))
                 asset.remove(texture)
         for material in asset.findall("material"):
-            if material.get("texture") in gone:
+            if material.get("texture") in removed:
                 material.attrib.pop("texture")
-            for layer in [m for m in material.findall("layer") if m.get("texture") in gone]:
+            for layer in [m for m in material.findall("layer") if m.get("texture") in removed]:
                 material.remove(layer)
 
 
-def _forget_files(document: Document) -> None:
+def _drop_unnamed_files(document: Document) -> None:
+    """Removes the files that no element names."""
     named = {
         value
         for element in document.root.iter()

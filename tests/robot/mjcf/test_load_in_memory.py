@@ -11,8 +11,8 @@ from dm_control.suite import dog, quadruped, swimmer
 from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.adaptation import adapt_text
 from selfmodel.robot.mjcf.load import robot_from
+from selfmodel.robot.mjcf.resource_limits import MAX_ASSET_BYTES
 from selfmodel.robot.mjcf.settings import MjcfSettings
-from selfmodel.robot.mjcf.untrusted import LARGEST_FILES
 from selfmodel.robot.robot import Robot
 from tests.robot.mjcf.awkward import CUBE, MESH, TORSO, mjcf
 
@@ -35,7 +35,7 @@ def test_bones_that_are_only_seen_are_left_out_and_still_weigh():
     theirs = mujoco.MjModel.from_xml_string(mjcf_text, files)
     robot = made("dog", mjcf_text, files)
 
-    assert sum(map(len, robot.assets.values())) <= LARGEST_FILES
+    assert sum(map(len, robot.assets.values())) <= MAX_ASSET_BYTES
     for name in (theirs.body(body).name for body in range(1, theirs.nbody)):
         mine, other = robot.model.body(name), theirs.body(name)
         assert np.allclose(mine.mass, other.mass)
@@ -45,7 +45,7 @@ def test_bones_that_are_only_seen_are_left_out_and_still_weigh():
 
 def test_meshes_that_touch_and_are_too_large_are_refused():
     text = mjcf(more=MESH.format("m", "m.obj"), torso=TORSO + '<geom type="mesh" mesh="m"/>')
-    large = CUBE + "# a comment of many bytes\n" * (LARGEST_FILES // 20)
+    large = CUBE + "# a comment of many bytes\n" * (MAX_ASSET_BYTES // 20)
 
     with pytest.raises(InputError, match=r"every trial's log carries them.*: simplify the meshes"):
         made("cube", text, {"m.obj": large})

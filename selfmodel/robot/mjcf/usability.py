@@ -1,0 +1,92 @@
+"""Checks that a compiled model can be a robot, with the name of the part that prevents it."""
+
+import mujoco
+import numpy as np
+
+from selfmodel.errors import InputError
+from selfmodel.robot.anatomy_reader import driven_joints
+from selfmodel.robot.floating_base import find_root_body, joints_of_body
+from selfmodel.robot.mjcf.mujoco_errors import mujoco_errors_as_input_errors
+from selfmodel.robot.model_checks import check_model
+from selfmodel.robot.transmission import motor_joints
+
+_PROBE_SECONDS = 0.2
+_MAX_PROBE_STEPS = 200
+_MAX_LISTED_NAMES = 12
+
+
+def check_usable(model: mujoco.MjModel) -> None:
+    """Checks that a model can be simulated, driven, logged and diagnosed.
+
+    Raises:
+        InputError: The model cannot be a robot; the sentence has the reason and the part.
+    """
+    if not model.opt.timestep > 0 or not np.isfinite(model.opt.timestep):
+        raise InputError(f"its <option timestep> must be above 0 s, got {model.opt.timestep}")
+    _check_finite(model)
+    if not model.nu:
+        raise InputError(
+            "it has no actuators, and nothing to control: give each joint that a motor is to "
+            "drive one in <actuator>"
+        )
+    _check_one_tree(model)
+    driven = driven_joints(model)
+    if not driven:
+        raise InputError(
+            "its motors drive no joint, and no fault of it could be diagnosed: give the joints of "
+            "its limbs motors in <actuator>"
+        )
+    try:
+        root = find_root_body(model, driven)
+        check_model(model, root)
+    except ValueError as error:
+        raise InputError(str(error)) from error
+    _check_passive_base(model, root)
+    _check_stable(model)
+
+
+def _check_finite(model: mujoco.MjModel) -> None:
+    for name in ("body_mass", "body_inertia", "body_pos", "geom_size", "jnt_range", "qpos0"):
+        if not np.isfinite(getattr(model, name)).all():
+            raise InputError(f"expected finite numbers, got others in its {name.replace('_', ' ')}")
+
+
+def _check_one_tree(model: mujoco.MjModel) -> None:
+    """Checks that all moving bodies belong to one tree: a log contains the state of one robot."""
+    roots = {int(model.body_rootid[body]) for body in model.jnt_bodyid}
+    if len(roots) > 1:
+        raise InputError(
+            f"expected one tree of moving bodies, got {_listed(model, sorted(roots))}: keep the "
+            f"robot, and remove the other bodies or fix them to the world"
+        )
+
+
+def _check_passive_base(model: mujoco.MjModel, root: int) -> None:
+    base_joints = joints_of_body(model, root)
+    for motor in range(model.nu):
+        for joint in motor_joints(model, motor).intersection(base_joints):
+            raise InputError(
+                f"its motor {model.actuator(motor).name} drives {model.joint(joint).name} of the "
+                f"root body {model.body(root).name}, which only the limbs may move: remove the "
+                f"motor"
+            )
+
+
+def _check_stable(model: mujoco.MjModel) -> None:
+    """Checks that a short simulation without commands does not diverge."""
+    data = mujoco.MjData(model)
+    steps = min(_MAX_PROBE_STEPS, max(1, round(_PROBE_SECONDS / model.opt.timestep)))
+    with mujoco_errors_as_input_errors():
+        for _ in range(steps):
+            mujoco.mj_step(model, data)
+    unstable = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL)
+    if any(data.warning[w].number for w in (*unstable, mujoco.mjtWarning.mjWARN_BADQACC)):
+        raise InputError(
+            f"its simulation diverges within {steps * model.opt.timestep:.2g} s, with its motors "
+            f"at rest: give it a smaller <option timestep>, or masses and joints of sane size"
+        )
+
+
+def _listed(model: mujoco.MjModel, bodies: list[int]) -> str:
+    names = [model.body(body).name for body in bodies[:_MAX_LISTED_NAMES]]
+    return ", ".join(names) + (" and others" if len(bodies) > _MAX_LISTED_NAMES else "")
