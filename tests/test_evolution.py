@@ -8,7 +8,6 @@ import pytest
 from selfmodel.errors import InputError
 from selfmodel.evolution import Evolution, Generation, evolve
 from selfmodel.settings import Settings
-from selfmodel.simulation.cache import Cache
 
 LENGTH = 12
 
@@ -184,30 +183,3 @@ def test_another_population_keeps_the_papers_proportions(population: int):
     assert scaled.population == population
     assert scaled.survivors == population // 2
     assert abs(scaled.crossovers - 0.12 * population) <= 1
-
-
-def test_a_memo_computes_every_key_once():
-    computed: list[str] = []
-
-    def compute(keys: list[str]) -> np.ndarray:
-        computed.extend(keys)
-        return np.array([[len(key), -len(key)] for key in keys])
-
-    memo: Cache[str] = Cache()
-
-    assert np.array_equal(
-        memo.get_or_compute(["a", "bb", "a"], compute), [[1, -1], [2, -2], [1, -1]]
-    )
-    assert np.array_equal(memo.get_or_compute(["bb", "ccc"], compute), [[2, -2], [3, -3]])
-    assert list(memo) == computed == ["a", "bb", "ccc"]
-    assert len(memo) == 3
-
-
-def test_a_memo_learns_from_another_what_is_asked_for_and_no_more():
-    other: Cache[str] = Cache()
-    other.get_or_compute(["a", "bb"], lambda keys: np.array([[len(key)] for key in keys]))
-    memo: Cache[str] = Cache()
-    memo.update_from(other, ["bb", "ccc"])
-
-    assert list(memo) == ["bb"]
-    assert memo["bb"] == other["bb"] == 2

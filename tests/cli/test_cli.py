@@ -237,7 +237,7 @@ def test_a_trial_takes_a_controller_from_a_file_or_from_a_log(tmp_path: Path, qu
         *("trial", "hexapod", "--controller", "a.mcap", "--out", "d.mcap"), cwd=tmp_path
     )
     assert refused.returncode == 2
-    assert "give one that was made for it" in refused.stderr
+    assert "give a controller of this robot" in refused.stderr
 
 
 def test_a_trial_without_a_controller_draws_one_from_its_seed(tmp_path: Path):

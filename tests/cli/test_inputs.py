@@ -19,9 +19,9 @@ from selfmodel.errors import InputError
         ("--case", "1,two", "--case needs whole numbers"),
         ("--comparator", "forward-displacment", "did you mean forward-displacement?"),
         ("--gap", "0,big", "--gap needs numbers with commas between them"),
-        ("--gap", "-0.1", "a gap is a number from 0 to 0.5, such as 0.05, got -0.1"),
-        ("--gap", "nan", "a gap is a number from 0 to 0.5"),
-        ("--gaps", "5", "a gap is a number from 0 to 0.5"),
+        ("--gap", "-0.1", "expected a gap from 0 to 0.5, such as 0.05, got -0.1"),
+        ("--gap", "nan", "expected a gap from 0 to 0.5"),
+        ("--gaps", "5", "expected a gap from 0 to 0.5"),
         ("--trials", "7", "the same gait gives the same trial, and the bank has 6"),
         ("--next-trial", "repairs", "did you mean repair?"),
         ("--only", "3/2", "--only needs i/n"),
@@ -34,7 +34,11 @@ from selfmodel.errors import InputError
             "no diagnosis may propose neuron: leave it out",
         ),
         ("--kinds", "break,frction", "unknown kind 'frction': did you mean friction?"),
-        ("--case", " none ", "needs at least one case or one damage, got neither"),
+        (
+            "--case",
+            " none ",
+            "expected at least one case or one damage of an ablation, got neither",
+        ),
     ],
 )
 def test_a_bad_list_is_refused_in_a_sentence_before_anything_is_run(

@@ -163,8 +163,11 @@ def test_kinds_are_chosen_by_name(monkeypatch: pytest.MonkeyPatch):
         ("neuron", "unknown kind 'neuron'"),
         ("nowhere:KIND", "cannot find the kind 'nowhere:KIND'"),
         ("selfmodel.faults:FaultKind", "is no kind: expected a selfmodel.faults.FaultKind"),
-        ("tests.faults.test_kinds:SECOND_WIND", "are called 'second-wind', or 'wind' in notation"),
-        ("tests.faults.test_kinds:OTHER_JAM", "are called 'jam', or 'cling' in notation"),
+        (
+            "tests.faults.test_kinds:SECOND_WIND",
+            "have the name 'second-wind', or 'wind' in notation",
+        ),
+        ("tests.faults.test_kinds:OTHER_JAM", "have the name 'jam', or 'cling' in notation"),
     ],
 )
 def test_a_name_of_no_kind_says_what_was_meant(names: str, said: str):

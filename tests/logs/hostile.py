@@ -56,5 +56,5 @@ def _run(call: Callable[[], object], sender: Connection) -> None:
     except LogError as failure:
         error = str(failure)
     seconds = time.perf_counter() - start
-    amplitude_rise = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
-    sender.send(Outcome(error, seconds, amplitude_rise / 1000))
+    growth = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+    sender.send(Outcome(error, seconds, growth / 1000))
