@@ -29,7 +29,8 @@ from selfmodel.logs.rosbag.tracks import Tracks, read_tracks, required
 from selfmodel.logs.writer import write_trial
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trials.behaviour import SIGNALS, Behaviour, Sample, Signal
+from selfmodel.trials.behaviour import Behaviour, Sample
+from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.trial import TrialPlan
 
 MAX_STEPS = 1_000_000

@@ -13,8 +13,8 @@ from selfmodel.logs.rosbag.start_frame import heading_removal, rotate_world
 from selfmodel.logs.rosbag.tracks import Tracks
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.behaviour import Signal
 from selfmodel.trials.rotation import rotated
+from selfmodel.trials.signals import Signal
 
 Interpolation = Callable[[FloatArray, FloatArray, FloatArray, float], FloatArray]
 

@@ -12,13 +12,13 @@ from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_controllers
-from tests.helpers.memory import MemoryJournal
+from tests.helpers.memory import in_memory
 
 
 def logged(robot: Robot, truth: str, controller: Controller) -> Trial:
     """A trial of a damaged robot."""
     physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
-    return MemoryJournal(robot).record(physical, TrialPlan(truth, "after", controller, 300, 0))
+    return in_memory(robot)(physical, TrialPlan(truth, "after", controller, 300, 0))
 
 
 def test_a_diagnosis_is_correct_if_it_cannot_be_told_from_the_truth(quadruped: Robot):

@@ -11,7 +11,7 @@ from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import KINDS
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import SIGNALS
+from selfmodel.trials.signals import SIGNALS
 from tests.helpers.bodies import BODIES, EVERY_BODY, swung
 
 MJCF = """
