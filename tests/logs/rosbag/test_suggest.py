@@ -51,7 +51,7 @@ def test_commands_without_names_get_an_order_to_check(biped: Robot, bag: Path):
         text = suggest(opened, biped, "biped.xml", with_timestep=True)
     assert 'order = ["LHX", "LHY", "RHX", "RHY"]  # CHECK: the bag has no names' in text
     assert "control_timestep = 0.01" in text
-    assert "# No topic is like right_touch" in text
+    assert "# No topic is similar to right_touch" in text
     assert 'left_hip_x = "LHX"\n' in text
     assert imported(bag, biped, text).behaviour.steps == 99
 
