@@ -1,4 +1,4 @@
-"""How bodies recover, from the rows of studies that ``selfmodel suite run`` made.
+"""Recoveries of bodies, from the rows of studies that ``selfmodel suite run`` made.
 
 ``python -m benchmarks.bodies FOLDER...`` prints the tables of ``docs/results/bodies.md`` and draws
 ``docs/figures/bodies.png``.
@@ -16,7 +16,7 @@ mpl.use("Agg")  # a figure in a file needs no display
 
 from matplotlib import pyplot as plt
 
-from selfmodel.experiments.suite.rows import SINGLE, Row, Summary, summarise
+from selfmodel.experiments.suite.rows import SINGLE, SuiteRow, Summary, summarise
 
 FIGURE = Path("docs/figures/bodies.png")
 
@@ -31,8 +31,8 @@ def main() -> None:
     print("|---|---:|---:|---:|---:|---:|")
     for body in bodies:
         one = found[body, None]
-        told = f"{one.before:.2f} | {one.after:.2f} | {one.recovered:.2f} | {_recovery(one)}"
-        print(f"| `{body}` | {told} | {one.right} of {one.runs} |")
+        scores = f"{one.before:.2f} | {one.after:.2f} | {one.recovered:.2f} | {_recovery(one)}"
+        print(f"| `{body}` | {scores} | {one.right} of {one.runs} |")
     right, parts = sum(row.correct for row in rows), [row.recovered / row.before for row in rows]
     print(f"| all | | | | {median(parts):.2f} | {right} of {len(rows)} |\n")
     print(f"| body | {' | '.join(f'case {case}' for case in SINGLE)} |")
@@ -42,9 +42,9 @@ def main() -> None:
     _draw(rows, bodies)
 
 
-def _single_faults(folder: Path) -> list[Row]:
+def _single_faults(folder: Path) -> list[SuiteRow]:
     found = json.loads((folder / "results.json").read_text(encoding="utf-8"))
-    rows = [Row(**row) for row in found["rows"]]
+    rows = [SuiteRow(**row) for row in found["rows"]]
     return [row for row in rows if row.case in SINGLE]
 
 
@@ -54,7 +54,7 @@ def _recovery(summary: Summary | None) -> str:
     return f"{summary.recovery:.2f}"
 
 
-def _draw(rows: Sequence[Row], bodies: Sequence[str]) -> None:
+def _draw(rows: Sequence[SuiteRow], bodies: Sequence[str]) -> None:
     figure, axes = plt.subplots(figsize=(8, 0.4 * len(bodies) + 1.2), layout="constrained")
     for y, body in enumerate(reversed(bodies)):
         own = [row for row in rows if row.robot == body]

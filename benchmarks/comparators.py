@@ -152,7 +152,7 @@ def _share_once(known: Known, comparator: Comparator, threads: int, settings: Se
     trial = known.failed[CASES[0]]
     start = perf_counter()
     prepared = comparator.prepare(trial)
-    asked = perf_counter() - start
+    request_seconds = perf_counter() - start
     simulated = simulate(simulator, prepared.request, trial, hypotheses).behaviour
     start = perf_counter()
     if isinstance(prepared, PiecewiseTrial):
@@ -160,7 +160,7 @@ def _share_once(known: Known, comparator: Comparator, threads: int, settings: Se
     else:
         prepared.distances(simulated)
     return {
-        "arithmetic_seconds": asked + perf_counter() - start,
+        "arithmetic_seconds": request_seconds + perf_counter() - start,
         "physics_seconds": simulator.stats.physics_seconds,
     }
 

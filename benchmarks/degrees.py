@@ -80,22 +80,22 @@ def _by_place(faults: Iterable[Fault]) -> dict[tuple[str, str, str], Fault]:
     return {(fault.kind.keyword, fault.kind.prefix, fault.part): fault for fault in faults}
 
 
-def _near(said: Fault, true: Fault) -> bool:
-    if said.severity is None and true.severity is None:
+def _near(found: Fault, true: Fault) -> bool:
+    if found.severity is None and true.severity is None:
         return True
-    return _NEAR.get(true.kind.name, _within)(said.severity or 0.0, true.severity or 0.0)
+    return _NEAR.get(true.kind.name, _within)(found.severity or 0.0, true.severity or 0.0)
 
 
-def _within(said: float, true: float) -> bool:
-    return abs(said - true) <= 0.15
+def _within(found: float, true: float) -> bool:
+    return abs(found - true) <= 0.15
 
 
 _NEAR: Mapping[str, Callable[[float, float], bool]] = {
-    "friction": lambda said, true: abs(said / true - 1) <= 0.15,
-    "slope": lambda said, true: abs(math.degrees(said - true)) <= 1.5,
-    "wind": lambda said, true: abs(said / true - 1) <= 0.2,
-    "crosswind": lambda said, true: abs(said / true - 1) <= 0.2,
-    "roughness": lambda said, true: _class(said) == _class(true),
+    "friction": lambda found, true: abs(found / true - 1) <= 0.15,
+    "slope": lambda found, true: abs(math.degrees(found - true)) <= 1.5,
+    "wind": lambda found, true: abs(found / true - 1) <= 0.2,
+    "crosswind": lambda found, true: abs(found / true - 1) <= 0.2,
+    "roughness": lambda found, true: _class(found) == _class(true),
 }
 
 
@@ -109,13 +109,13 @@ def _sides(hypothesis: Hypothesis) -> set[bool]:
 
 def _print_line(name: str, rows: list[Found]) -> None:
     verdicts = [row.verdict for row in rows]
-    said = ", ".join(f"{verdicts.count(one)} {one}" for one in sorted(set(verdicts)))
+    found = ", ".join(f"{verdicts.count(one)} {one}" for one in sorted(set(verdicts)))
     parts = [
         _share([row.named for row in rows]),
         _share([row.near for row in rows]),
         _share([row.side for row in rows]),
     ]
-    print(f"| {name} | {' | '.join(parts)} | {said} |")
+    print(f"| {name} | {' | '.join(parts)} | {found} |")
 
 
 def _share(right: list[bool]) -> str:

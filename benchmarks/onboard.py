@@ -18,10 +18,10 @@ import numpy as np
 
 from selfmodel.experiments.ablation.plan import spec
 from selfmodel.experiments.ablation.results import write_results
-from selfmodel.experiments.ablation.rows import as_objects
-from selfmodel.experiments.ablation.run_one import diagnosed, setting_of
-from selfmodel.experiments.ablation.scores import Score
+from selfmodel.experiments.ablation.run_one import diagnose_run, setting_of
+from selfmodel.experiments.ablation.scores import ComparatorScore
 from selfmodel.experiments.grid import GridBegins, Job, PartEnds, finished, run_grid
+from selfmodel.experiments.study_files import as_dicts
 from selfmodel.logs.reader import read_log
 from selfmodel.simulation.calibration import calibrate
 from selfmodel.trials.state_estimation import BASE
@@ -50,7 +50,9 @@ def main() -> None:
     if not jobs:
         raise SystemExit(f"{options.folder} has no run of an ablation with these robots and seeds")
     diagnose = partial(_diagnoses, options.folder / "runs")
-    failed = run_grid(options.out / "runs", jobs, diagnose, workers=options.workers, on_event=_tell)
+    failed = run_grid(
+        options.out / "runs", jobs, diagnose, workers=options.workers, on_progress=_print_progress
+    )
     print(table(write_results(options.out).scores))
     if failed:
         raise SystemExit("\n".join(f"{part.key} failed: {part.error}" for part in failed))
@@ -64,7 +66,7 @@ def without_base(trial: Trial) -> Trial:
     return dataclasses.replace(trial, behaviour=behaviour)
 
 
-def table(scores: Sequence[Score]) -> str:
+def table(scores: Sequence[ComparatorScore]) -> str:
     """Returns the number of right diagnoses as Markdown."""
     gaps = sorted({score.gap for score in scores})
     lines = [
@@ -83,7 +85,7 @@ def table(scores: Sequence[Score]) -> str:
     return "\n".join(lines)
 
 
-def _tell(event: GridBegins | PartEnds) -> None:
+def _print_progress(event: GridBegins | PartEnds) -> None:
     if isinstance(event, PartEnds):
         print(f"{event.number} of {event.total}: {event.key}, {event.seconds:.0f} s", flush=True)
 
@@ -97,7 +99,7 @@ def _diagnoses(runs: Path, of: Job, comparator: str, _folder: Path) -> list[dict
     intact = [trial for trial in trials if trial.plan.stage == "before"]
     failed = [trial for trial in trials if trial.plan.stage == "after"]
     fitted = calibrate(setting.robot, intact, threads=1).robot
-    return as_objects(diagnosed(setting, fitted, intact, failed))
+    return as_dicts(diagnose_run(setting, fitted, intact, failed))
 
 
 if __name__ == "__main__":

@@ -72,11 +72,11 @@ def _table_one(robot: str, runs: list[Facts]) -> str:
     ]
     for run in runs:
         if run["robot"] == robot and run["seed"] == 0:
-            ways = run["displacement"]
+            displacements = run["displacement"]
             best = "" if run["correct"] else f"`{run['diagnosis'][0]['hypothesis']}`"
             rows.append(
-                f"| {run['case']} | `{run['truth']}` | {_short(ways['before'])} "
-                f"| {_short(ways['after'])} | {_short(ways['recovered'])} "
+                f"| {run['case']} | `{run['truth']}` | {_short(displacements['before'])} "
+                f"| {_short(displacements['after'])} | {_short(displacements['recovered'])} "
                 f"| {_short(run['recovery'])} "
                 f"| {'yes' if run['correct'] else 'no'} | {best} "
                 f"| {run['evaluations']['distinct_hypotheses']} | {run['seconds']:.0f} |"
@@ -118,11 +118,12 @@ def _gaits(robots: list[str], walks: list[Facts]) -> str:
     ]
     for robot in robots:
         same = [walk for walk in walks if walk["robot"] == robot]
-        ways = [walk["displacement"] for walk in same]
+        displacements = [walk["displacement"] for walk in same]
         low, high = min(w["lowest"] for w in same), max(w["highest"] for w in same)
         rows.append(
-            f"| {robot} | {median(ways):.2f} | {min(ways):.2f} | {max(ways):.2f} "
-            f"| {low:.2f} to {high:.2f} | {1000 * max(w['deepest'] for w in same):.1f} "
+            f"| {robot} | {median(displacements):.2f} | {min(displacements):.2f} "
+            f"| {max(displacements):.2f} | {low:.2f} to {high:.2f} "
+            f"| {1000 * max(w['deepest'] for w in same):.1f} "
             f"| {sum(w['walking'] for w in same)} of {len(same)} "
             f"| {median(w['seconds'] for w in same):.0f} |"
         )

@@ -45,7 +45,7 @@ def main() -> None:
     for truth in single_faults(robot):
         with tempfile.TemporaryDirectory() as folder:
             logs = recorded(Path(folder), robot, truth, gait)
-            print(f"| `{truth}` | {' | '.join(judged(log, truth) for log in logs)} |", flush=True)
+            print(f"| `{truth}` | {' | '.join(compared(log, truth) for log in logs)} |", flush=True)
 
 
 def single_faults(robot: Robot) -> list[Hypothesis]:
@@ -72,14 +72,14 @@ def recorded(folder: Path, robot: Robot, truth: Hypothesis, gait: Controller) ->
     return [read_log(path) for path in (exact, *imported)]
 
 
-def judged(log: TrialLog, truth: Hypothesis) -> str:
+def compared(log: TrialLog, truth: Hypothesis) -> str:
     """Returns the best hypothesis for a log, and the distance of the truth."""
     simulator = Simulator(robot_of(log), os.cpu_count() or 1)
     search = DiagnosticSearch(simulator, FORWARD_DISPLACEMENT, log.settings)
     best = diagnose_trials([log.trial], search, SEED, lambda _: None).best
     distance = 1000 * float(search.evidence.distances([truth], [log.trial])[0])
-    said = "right" if best == truth else f"`{best}`"
-    return f"{said}, {distance:.2f} mm"
+    text = "right" if best == truth else f"`{best}`"
+    return f"{text}, {distance:.2f} mm"
 
 
 if __name__ == "__main__":

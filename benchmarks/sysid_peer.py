@@ -31,7 +31,7 @@ from selfmodel.trials.trial import Trial
 Theirs = Any
 """Object or argument of mujoco.sysid, which has no types."""
 
-# Imported so, because it says that it is typed, and MuJoCo itself is not.
+# Imported by name: the package is marked as typed, and MuJoCo, which it uses, is not.
 sysid: Theirs = import_module("mujoco.sysid")
 
 States = dict[Signal, FloatArray]

@@ -21,7 +21,7 @@ def main(folder: Path) -> None:
         folder=folder,
         settings=Settings(steps=200, generations=3).scaled(10),
     )
-    failed = ablate(ablation, workers=2, on_event=print)
+    failed = ablate(ablation, workers=2, on_progress=print)
     results = write_results(folder)
     for score in results.scores:
         print(f"{score.comparator}, {score.trials} trials: {score.right} of {score.runs} right")

@@ -1,9 +1,6 @@
 """Atomic writes: a file holds its old content or all of its new content."""
 
-import fcntl
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
@@ -40,14 +37,3 @@ def sync_folder(folder: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
-
-
-@contextmanager
-def lock_folder(folder: Path) -> Iterator[None]:
-    """Context manager that holds an exclusive, advisory lock on a folder.
-
-    Only callers of this function exclude each other. The lock of a process that dies is released.
-    """
-    with (folder / "lock").open("wb") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)  # released when the file is closed
-        yield

@@ -31,9 +31,9 @@ from selfmodel.cli.options import (
 from selfmodel.cli.output import grid_display
 from selfmodel.cli.output.tables import show
 from selfmodel.comparators import COMPARATORS
-from selfmodel.experiments.ablation import Ablation, Results, ablate as run, write_results
-from selfmodel.experiments.ablation.results import as_object
-from selfmodel.experiments.ablation.scores import Score
+from selfmodel.experiments.ablation import Ablation, AblationResults, ablate as run, write_results
+from selfmodel.experiments.ablation.results import as_dict
+from selfmodel.experiments.ablation.scores import ComparatorScore
 from selfmodel.experiments.confidence_intervals import Interval
 from selfmodel.settings import Settings
 from selfmodel.simulation.threads import thread_count
@@ -112,13 +112,15 @@ def ablate(
     )
     part = inputs.share("--only", only)
     failed = grid_display.run_shown(
-        lambda on_event: run(ablation, workers=thread_count(workers), on_event=on_event, only=part),
+        lambda on_progress: run(
+            ablation, workers=thread_count(workers), on_progress=on_progress, only=part
+        ),
         out,
     )
     results = write_results(out)
     if as_json:
         found = {
-            **as_object(results.rows, results.scores),
+            **as_dict(results.rows, results.scores),
             "failures": grid_display.as_objects(failed),
         }
         typer.echo(json.dumps(found, indent=1, allow_nan=False))
@@ -127,7 +129,7 @@ def ablate(
     grid_display.end(failed)
 
 
-def _print(results: Results) -> None:
+def _print(results: AblationResults) -> None:
     ends = {score.trials for score in results.scores}
     rows = [_texts(score) for score in results.scores if score.trials in (min(ends), max(ends))]
     columns = ["robot", "gap", "comparator", "trials", "right", "right, %", "time"]
@@ -140,7 +142,7 @@ def _print(results: Results) -> None:
         typer.echo(str(path))
 
 
-def _texts(score: Score) -> list[str]:
+def _texts(score: ComparatorScore) -> list[str]:
     share = score.correct
     return [
         score.robot,

@@ -297,7 +297,7 @@ Seeds = Annotated[
 Only = Annotated[
     str,
     typer.Option(
-        metavar="i/n", help="Only the i-th of every n runs, for a cluster.", rich_help_panel=STUDY
+        metavar="i/n", help="Only share i of n of the runs, for n machines.", rich_help_panel=STUDY
     ),
 ]
 

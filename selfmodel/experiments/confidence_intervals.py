@@ -1,4 +1,4 @@
-"""95 % intervals: of a proportion, and of a ratio of means over pairs."""
+"""95 % confidence intervals of a proportion and of a ratio of paired means."""
 
 import math
 from collections.abc import Sequence
@@ -13,12 +13,12 @@ RESAMPLES = 2000
 
 @dataclass(frozen=True)
 class Interval:
-    """An estimate and the interval about it.
+    """Estimate with its 95 % confidence interval.
 
     Attributes:
-        estimate: What was observed; NaN where nothing was.
-        low: The lower end.
-        high: The upper end.
+        estimate: The estimate; NaN without data.
+        low: Lower end of the interval.
+        high: Upper end of the interval.
     """
 
     estimate: float
@@ -27,17 +27,17 @@ class Interval:
 
 
 def proportion(successes: int, trials: int) -> Interval:
-    """Returns how often something succeeds, with Wilson's score interval.
+    """Returns a proportion of successes with Wilson's score interval.
 
     Source: E. B. Wilson, *Probable inference, the law of succession, and statistical inference*,
     JASA 22 (1927), without a correction for continuity.
 
     Args:
-        successes: How often it did.
-        trials: How often it could; of 0, nothing is known: NaN, between 0 and 1.
+        successes: Number of successes.
+        trials: Number of trials; for 0 trials the estimate is NaN and the interval 0 to 1.
 
     Raises:
-        ValueError: There are more successes than trials.
+        ValueError: The number of successes is negative or above the number of trials.
     """
     if not 0 <= successes <= trials:
         raise ValueError(f"expected 0 to {trials} successes in {trials} trials, got {successes}")
@@ -48,19 +48,19 @@ def proportion(successes: int, trials: int) -> Interval:
 
 
 def ratio(numerators: Sequence[float], denominators: Sequence[float]) -> Interval:
-    """Returns the mean of one number over the mean of another, with a percentile bootstrap.
+    """Returns the ratio of the means of pairs, with a percentile bootstrap interval.
 
-    The pairs are drawn anew together, from the same seed for every call: the same numbers give the
-    same interval.
+    Pairs are resampled together, with the same seed in every call, so that the same numbers give
+    the same interval.
 
     Source: B. Efron and R. Tibshirani, *An Introduction to the Bootstrap* (1993), chapter 13.
 
     Args:
-        numerators: One number a pair.
-        denominators: As many, each above 0.
+        numerators: One number per pair.
+        denominators: One number per pair, above 0.
 
     Returns:
-        NaN for no pairs; with a single one nothing is known of the interval, and its ends are NaN.
+        Estimate and interval; both are NaN without pairs, and the interval is NaN for one pair.
 
     Raises:
         ValueError: The lengths differ, or a denominator is not above 0.

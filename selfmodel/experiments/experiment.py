@@ -1,4 +1,4 @@
-"""A recovery whose truth is known: what is hidden from the algorithm, and how well it did."""
+"""Recovery of a simulated physical robot with known faults, and its score."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -29,27 +29,27 @@ from selfmodel.simulation.simulator import Simulator
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """What to run.
+    """Definition of a recovery with known truth.
 
     Attributes:
-        robot: The robot as its model describes it.
-        case: Which failure of Table I it is, if it is one.
-        truth: What goes wrong with the physical robot.
-        comparator: Judges hypotheses by the logged trials.
-        settings: The paper's numbers.
-        seed: Every random choice comes from it.
-        threads: Threads for the physics.
-        folder: Where the run is kept.
-        gait: How the robot walks before it fails; evolved if there is none.
-        gap: How far the physical robot is from its model, a level.
-        structure: Whether it is built differently, too.
-        kinds: What a diagnosis considers.
+        robot: The nominal robot.
+        case: Number of the failure in Table I; None for a failure that is not in it.
+        truth: Faults of the physical robot after the failure.
+        comparator: The comparator.
+        settings: Parameters of the recovery.
+        seed: Seed of all random numbers.
+        threads: Number of threads of the physics.
+        folder: Folder of the run.
+        gait: Controller before the failure; None to evolve one.
+        gap: Level of the reality gap.
+        structure: Whether the physical robot has structural mismatches.
+        kinds: Fault kinds to search.
         calibrated: Whether the self-model is fitted to the trials before the failure.
-        next_trial: How each trial after the failing one is chosen, one of ``NEXT_TRIAL``.
-        design: The kind of controller to evolve; the robot's network if none is given.
-        score: What controllers are evolved for.
-        physical: Makes the physical robot with something wrong, if it is more than a simulation of
-            the model; it has no gap then.
+        next_trial: Choice of each trial after the failing one, one of ``NEXT_TRIAL``.
+        design: Controller design; None for the robot's network.
+        score: Fitness of the repair EA.
+        physical: Returns the physical robot with a hypothesis, for robots beyond a simulation of
+            the model; unused with a reality gap or structural mismatches.
     """
 
     robot: Robot
@@ -73,13 +73,13 @@ class Experiment:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What came of it.
+    """Result of an experiment.
 
     Attributes:
-        recovery: How the recovery went.
-        correct: Whether the diagnosis is right.
-        stats: What the self-model simulated, up to the judgement.
-        seconds: Wall time of the recovery.
+        recovery: The recovery.
+        correct: Whether the last diagnosis is right.
+        stats: Simulations of the self-model during the recovery.
+        seconds: Wall time of the recovery, s.
     """
 
     recovery: Recovery
@@ -89,7 +89,7 @@ class Outcome:
 
 
 def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
-    """Runs an experiment; the algorithm gets physical robots and a journal, and no truth."""
+    """Runs an experiment. The algorithm has access to the trials, not to the truth."""
     start = perf_counter()
     robot, truth = experiment.robot, experiment.truth
     simulator = Simulator(robot, experiment.threads)
@@ -132,7 +132,7 @@ def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
             recovery.diagnosis.best,
             truth,
             recovery.trials[1:],
-            # Another simulator: judging is no part of what the recovery cost.
+            # A separate simulator: scoring does not count as cost of the recovery.
             Simulator(robot, experiment.threads),
         ),
     )

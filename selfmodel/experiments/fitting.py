@@ -1,4 +1,4 @@
-"""A calibration as the commands make it and tell of it."""
+"""Calibration in experiments and commands, and its JSON."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -11,10 +11,10 @@ from selfmodel.trials.trial import Trial
 
 
 def fitted(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibration:
-    """Calibrates where nobody asked for it; see ``calibrate``.
+    """Returns a self-model fitted to healthy trials, for callers that calibrate by default.
 
     Raises:
-        InputError: It cannot be done; the message names the option that does without.
+        InputError: The fit failed; the message names the option that omits calibration.
     """
     try:
         return calibrate(robot, trials, threads)
@@ -22,8 +22,8 @@ def fitted(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibration:
         raise InputError(f"{error}, or give --no-calibrate") from error
 
 
-def calibration_values(fit: Calibration | None) -> dict[str, Any] | None:
-    """Returns a calibration as JSON has it; None where there was none."""
+def calibration_to_dict(fit: Calibration | None) -> dict[str, Any] | None:
+    """Returns a calibration as JSON; None without a calibration."""
     if fit is None:
         return None
     return {

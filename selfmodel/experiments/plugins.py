@@ -1,8 +1,12 @@
-"""From the names on the command line to the objects that they stand for."""
+"""Objects by name: comparators, fault kinds, designs and scores, built in or from plug-ins.
+
+A plug-in is an entry point of an installed package, or ``package.module:object``.
+"""
 
 import importlib
 import sys
 from collections.abc import Iterable, Mapping
+from importlib.metadata import entry_points
 from pathlib import Path
 from types import MappingProxyType
 
@@ -21,55 +25,64 @@ from selfmodel.tasks import Entry
 NEXT_TRIAL: Mapping[str, NextTrial] = MappingProxyType(
     {"repair": by_repair, "disagreement": by_disagreement}
 )
-"""The ways to choose the next trial of a recovery."""
+"""Choices of the next trial of a recovery, by name."""
 
 RETURN = "return"
-"""The score that is the sum of a task's rewards."""
+"""Name of the score that is the sum of a task's rewards."""
+
+COMPARATOR_GROUP = "selfmodel.comparators"
+FAULT_KIND_GROUP = "selfmodel.fault_kinds"
+"""Groups of the entry points of plug-ins."""
 
 
 def comparator(name: str) -> Comparator:
-    """Returns a comparator that comes with selfmodel, or another's ``package.module:object``.
+    """Returns a comparator by name.
+
+    Args:
+        name: Name of a comparator of selfmodel, name of an entry point in the group
+            ``selfmodel.comparators``, or ``package.module:object``.
 
     Raises:
-        InputError: There is none of that name, or the object is no comparator.
+        InputError: The name is unknown, or the object is no comparator.
     """
     if name in COMPARATORS:
         return COMPARATORS[name]
-    return as_comparator(_plugged_in("comparator", name, COMPARATORS), name)
+    return as_comparator(_plug_in("comparator", name, COMPARATOR_GROUP, COMPARATORS), name)
 
 
 def next_trial(name: str) -> str:
-    """Returns the name of a way to choose the next trial, checked.
+    """Returns a name of ``NEXT_TRIAL``, checked.
 
     Raises:
-        InputError: There is none; the message names the nearest.
+        InputError: The name is unknown; the message has the nearest names.
     """
     if name not in NEXT_TRIAL:
-        raise unknown_name("way to choose the next trial", name, NEXT_TRIAL)
+        raise unknown_name("choice of the next trial", name, NEXT_TRIAL)
     return name
 
 
 def kinds(names: str) -> tuple[FaultKind, ...]:
-    """Returns the kinds of fault and of environment that are meant, for a diagnosis or in notation.
+    """Returns fault kinds by name.
 
     Args:
-        names: Those of kinds that come with selfmodel, or another's ``package.module:object``,
-            separated by commas; ``all`` stands for all that come with it.
+        names: Names separated by commas: of fault kinds of selfmodel, of entry points in the group
+            ``selfmodel.fault_kinds``, or ``package.module:object``; ``all`` is every fault kind of
+            selfmodel.
 
     Raises:
-        InputError: There is none of a name, an object is no kind, or notation could not tell two
-            kinds apart.
+        InputError: A name is unknown, an object is no fault kind, or two fault kinds have the same
+            name or notation.
     """
     chosen: list[FaultKind] = []
     for name in (name.strip() for name in names.split(",")):
         chosen += ALL_KINDS if name == "all" else [_kind(name)]
     taken: dict[object, FaultKind] = {}
     for kind in (*KINDS.values(), *chosen):
-        for called in (kind.name, (kind.keyword, kind.prefix, kind.severity_bounds is None)):
-            if taken.setdefault(called, kind) is not kind:
+        for key in (kind.name, (kind.keyword, kind.prefix, kind.severity_bounds is None)):
+            if taken.setdefault(key, kind) is not kind:
                 raise InputError(
-                    f"two of the kinds are called {kind.name!r}, or {kind.keyword!r} in notation: "
-                    f"give yours a name and a word of its own"
+                    f"two fault kinds have the name {kind.name!r}, or {kind.keyword!r} in "
+                    f"notation: give yours a unique name and a unique keyword"
                 )
     return tuple(dict.fromkeys(chosen))
 
@@ -78,7 +91,7 @@ def _kind(name: str) -> FaultKind:
     own = {kind.name: kind for kind in ALL_KINDS}
     if name in own:
         return own[name]
-    found = _plugged_in("kind", name, (*own, "all"))
+    found = _plug_in("kind", name, FAULT_KIND_GROUP, (*own, "all"))
     if not isinstance(found, FaultKind):
         raise InputError(
             f"{name!r} is no kind: expected a selfmodel.faults.FaultKind, got {found!r}"
@@ -86,16 +99,26 @@ def _kind(name: str) -> FaultKind:
     return found
 
 
-def _plugged_in(what: str, name: str, known: Iterable[str]) -> object:
-    """The object that ``package.module:object`` names.
+def _plug_in(what: str, name: str, group: str, built_in: Iterable[str]) -> object:
+    """Returns the object of an entry point, or of ``package.module:object``.
 
     Raises:
-        InputError: It names none; the message names the nearest of those that are known.
+        InputError: The name is unknown (the message has the nearest names), its object cannot be
+            imported, or two packages have an entry point of that name.
     """
-    module, colon, attribute = name.partition(":")
+    installed = entry_points(group=group)
+    known = dict.fromkeys([*built_in, *sorted(installed.names)])
+    paths = {point.value for point in installed if point.name == name}
+    if len(paths) > 1:
+        raise InputError(
+            f"two installed packages have the {what} {name!r}: {', '.join(sorted(paths))}; give "
+            f"one as package.module:object"
+        )
+    path = paths.pop() if paths else name
+    module, colon, attribute = path.partition(":")
     if not colon:
         raise unknown_name(what, name, known)
-    # As with ``python -m selfmodel``, which an installed command does not do by itself.
+    # As with ``python -m selfmodel``; an installed command has no current folder in its path.
     if (here := str(Path.cwd())) not in sys.path:
         sys.path.append(here)
     try:
@@ -116,7 +139,7 @@ def design(name: str, robot: Robot, neurons: int | None = None) -> Design:
         neurons: Number of hidden neurons; the design's default if not given.
 
     Raises:
-        InputError: There is no such design, it cannot have that many hidden neurons, or a motor
+        InputError: The design is unknown, it cannot have that many hidden neurons, or a motor
             has no command range.
     """
     if name not in DESIGNS:
@@ -125,10 +148,15 @@ def design(name: str, robot: Robot, neurons: int | None = None) -> Design:
 
 
 def score(name: str, robot: str, entry: Entry) -> Score:
-    """Returns the measure of that name of how well a robot does.
+    """Returns the fitness of the repair EA by name.
+
+    Args:
+        name: ``displacement``, or ``return`` for the sum of the rewards of the robot's task.
+        robot: Name of the robot.
+        entry: The robot's entry.
 
     Raises:
-        InputError: There is none, or the robot has no task whose rewards could be added up.
+        InputError: The name is unknown, or the robot has no task with rewards.
     """
     if name == DISPLACEMENT.name:
         return DISPLACEMENT
@@ -136,7 +164,6 @@ def score(name: str, robot: str, entry: Entry) -> Score:
         raise unknown_name("score", name, (DISPLACEMENT.name, RETURN))
     if entry.episode_return is None:
         raise InputError(
-            f"{robot} has no task of dm_control, so no rewards: leave --score at "
-            f"{DISPLACEMENT.name}"
+            f"{robot} has no task of dm_control, so no rewards: give --score {DISPLACEMENT.name}"
         )
     return entry.episode_return

@@ -1,4 +1,4 @@
-"""What a simulated physical robot is like beside its fault, drawn from the command's seed."""
+"""Reality gap and structural mismatch of a simulated physical robot, drawn from a seed."""
 
 import json
 from dataclasses import dataclass
@@ -13,11 +13,11 @@ from selfmodel.robot.robot import Robot
 
 @dataclass(frozen=True)
 class Reality:
-    """How a physical robot differs from its model, whatever fails.
+    """Difference between a physical robot and its model, apart from faults.
 
     Attributes:
-        gap: What is drawn at a level; at level 0, nothing differs.
-        structure: Mismatches of structure, if there are any.
+        gap: The reality gap; level 0 is none.
+        structure: Structural mismatches; None without any.
     """
 
     gap: RealityGap
@@ -25,14 +25,14 @@ class Reality:
 
     @property
     def text(self) -> str | None:
-        """What a log hides of it, as JSON; None where the robot is as its model."""
+        """Hidden record of a trial log, as JSON; None if the robot equals its model."""
         if self.gap.level == 0 and self.structure is None:
             return None
         structure = None if self.structure is None else self.structure.as_dict()
         return json.dumps({**self.gap.as_dict(), "structure": structure}, allow_nan=False)
 
     def robot(self, robot: Robot, hidden: Hypothesis = INTACT, stream: int = 0) -> SimulatedRobot:
-        """Returns the physical robot; see ``SimulatedRobot``."""
+        """Returns the physical robot with hidden faults; see ``SimulatedRobot``."""
         return SimulatedRobot(robot, hidden, self.gap, self.structure, stream)
 
 
@@ -70,13 +70,13 @@ def simulated_robot(
 
 
 def draw_reality(robot: Robot, seed: int, level: float, *, structure: bool) -> Reality:
-    """Returns what a physical robot is like.
+    """Returns the reality gap and the structural mismatch of a physical robot.
 
     Args:
-        robot: The robot as its model describes it.
-        seed: The command's; a search of the same seed draws nothing of this.
-        level: The gap's.
-        structure: Whether there are mismatches of structure.
+        robot: The nominal robot.
+        seed: Seed; a search with the same seed draws other numbers.
+        level: Level of the reality gap.
+        structure: Whether structural mismatches are drawn.
 
     Raises:
         InputError: The level is out of range.

@@ -1,4 +1,4 @@
-"""Robots by name or MJCF file."""
+"""Robots by name or by MJCF file."""
 
 import os
 from collections.abc import Iterable
@@ -13,34 +13,34 @@ from selfmodel.robot.robot import Robot
 from selfmodel.tasks import Entry, entry
 
 LARGEST_MODEL = 64 * 2**20
-"""Bytes that an MJCF file may have."""
+"""Largest size of an MJCF file, bytes."""
 
 
 def robot_entry(name: str, settings: Iterable[str] = ()) -> Entry:
-    """Returns the robot of that name, or the one that somebody's MJCF describes.
+    """Returns a robot, its cases and its tasks, by name or by MJCF file.
 
     Args:
-        name: One of those that come with selfmodel, or a path that ends in ``.xml``.
-        settings: What the MJCF does not tell, such as ``forward=-x``; they count before those of
-            the TOML beside it.
+        name: Name of a robot of selfmodel, or a path that ends in ``.xml``.
+        settings: Settings of the MJCF file, such as ``forward=-x``; they override those of the
+            TOML file beside it.
 
     Raises:
-        InputError: There is none, and the message names the nearest; or none can be made of the
-            MJCF, or settings are given for a robot that needs none.
+        InputError: The name is unknown (the message has the nearest names), the MJCF file is no
+            valid robot, or settings are given for a robot by name.
     """
     given = tuple(settings)
     if is_model(name):
         made = load_mjcf(Path(name), _settings(name, given))
         return Entry(robot=lambda: made)
     if given:
-        raise InputError(f"--set {given[0]} is for a robot's MJCF: {name!r} has all that it needs")
-    # Nothing is drawn here, and dm_control would look for what to draw with.
+        raise InputError(f"--set {given[0]} is for an MJCF file: {name!r} is the name of a robot")
+    # dm_control would load an OpenGL library.
     os.environ.setdefault("MUJOCO_GL", "disable")
     return entry(name)
 
 
 def notes_on(name: str, settings: Iterable[str]) -> tuple[str, ...]:
-    """Returns what was done to an MJCF to make a robot of it; see ``robot_entry``."""
+    """Returns the changes that made an MJCF file a robot; see ``robot_entry``."""
     return adapt(Path(name), _settings(name, settings)).notes
 
 
@@ -55,14 +55,14 @@ def is_model(name: str) -> bool:
 
 
 def robot(name: str, control_timestep: float) -> Robot:
-    """Returns the robot of that name, or the one that an MJCF file describes.
+    """Returns a robot by name, or the robot of an unadapted MJCF file.
 
     Args:
-        name: One that ``selfmodel robots`` lists, or a path that ends in ``.xml``.
-        control_timestep: Seconds between two commands, for the MJCF file.
+        name: Name of a robot of selfmodel, or a path that ends in ``.xml``.
+        control_timestep: Duration of a control step of an MJCF file, s.
 
     Raises:
-        InputError: There is none, or the model cannot be used.
+        InputError: The name is unknown, or the model is unusable.
     """
     path = Path(name)
     if not is_model(name):
@@ -71,7 +71,7 @@ def robot(name: str, control_timestep: float) -> Robot:
     try:
         return Robot(path.stem, data.decode(), control_timestep)
     except (ValueError, KeyError) as error:
-        what = " ".join(str(error).split())
+        reason = " ".join(str(error).split())
         raise InputError(
-            f"{path}: expected an MJCF file of a robot that needs no other file: {what}"
+            f"{path}: expected an MJCF file of a robot without other files: {reason}"
         ) from error

@@ -1,4 +1,4 @@
-"""Whether a diagnosis is right, for experiments in which the truth is known."""
+"""Correctness of a diagnosis when the true hypothesis is known."""
 
 from collections.abc import Sequence
 
@@ -13,16 +13,16 @@ from selfmodel.trials.trial import Trial
 def is_correct(
     best: Hypothesis, truth: Hypothesis, trials: Sequence[Trial], simulator: Simulator
 ) -> bool:
-    """Returns whether a hypothesis is the truth, or cannot be told from it by these trials.
+    """Returns whether a hypothesis is the truth, or behaves like the truth in all trials.
 
-    Two hypotheses cannot be told apart if their simulated behaviour, all signals of it, is the
-    same to the bit under the controller of every trial.
+    Two hypotheses behave alike if all signals of their simulations are the same to the bit under
+    the controller of every trial.
 
     Args:
-        best: The hypothesis that a diagnosis ranks first, in canonical form.
-        truth: What is really wrong, in canonical form.
-        trials: The trials that the diagnosis explains.
-        simulator: The self-model.
+        best: Best hypothesis of a diagnosis, in canonical form.
+        truth: Hypothesis of the physical robot, in canonical form.
+        trials: Trials that the diagnosis explains.
+        simulator: Self-model.
     """
     return best == truth or all(_same_bits(best, truth, trial, simulator) for trial in trials)
 

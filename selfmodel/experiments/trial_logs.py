@@ -17,10 +17,10 @@ from selfmodel.robot.robot import Robot
 
 
 def logs(paths: Sequence[Path]) -> list[TrialLog]:
-    """Returns the trials in some logs.
+    """Returns the trials in log files.
 
     Raises:
-        InputError: One cannot be used, or is given twice.
+        InputError: A log is unusable, or is given twice.
     """
     try:
         found = [read_log(path) for path in paths]
@@ -36,15 +36,15 @@ def logs(paths: Sequence[Path]) -> list[TrialLog]:
 
 
 def robot_of_logs(found: Sequence[TrialLog], override: str | None) -> Robot:
-    """Returns the robot that logs are of.
+    """Returns the robot of logs.
 
     Args:
         found: At least one log.
-        override: The name of a robot, or an MJCF file, to take in the place of the logs' model.
+        override: Name of a robot, or an MJCF file, that replaces the model in the logs.
 
     Raises:
-        InputError: The logs are of different robots, their model cannot be used, or the other does
-            not have their sensors, motors and hinges.
+        InputError: The logs have different robots, their model is unusable, or the replacement has
+            other sensors, motors or hinges.
     """
     try:
         own = common_robot(found)
@@ -62,7 +62,7 @@ def robot_of_logs(found: Sequence[TrialLog], override: str | None) -> Robot:
 
 
 def _override(name: str, own: Robot) -> Robot:
-    """The model to take in the place of a log's: made ready as the log's was, or as it stands."""
+    """Returns the robot that replaces the model in a log, adapted like it or as the file is."""
     if not is_model(name):
         return robot_entry(name).robot()
     try:
@@ -101,8 +101,8 @@ def controller(path: Path, robot: Robot, neurons: int | None = None) -> Controll
         raise InputError(str(error)) from error
     if isinstance(loaded, Playback):
         raise InputError(
-            f"{path} has no controller, only the commands that were recorded: give the log of a "
-            f"robot that selfmodel drove, or a .npz"
+            f"{path} has recorded commands and no controller: give the log of a trial that "
+            f"selfmodel ran, or a .npz file"
         )
     found = loaded.design
     hidden = (found.hidden or None) if neurons is None else neurons
@@ -110,7 +110,7 @@ def controller(path: Path, robot: Robot, neurons: int | None = None) -> Controll
     if _connections(found) != _connections(needed):
         raise InputError(
             f"{path} has a controller for {_connections(found)}; this robot needs one for "
-            f"{_connections(needed)}: give one that was made for it"
+            f"{_connections(needed)}: give a controller of this robot"
         )
     return loaded
 

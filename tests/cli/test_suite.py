@@ -23,7 +23,7 @@ from selfmodel.experiments.suite.plan import (
     known_cases,
     recovery_jobs,
 )
-from selfmodel.experiments.suite.rows import Row, summarise
+from selfmodel.experiments.suite.rows import SuiteRow, summarise
 from selfmodel.experiments.suite.work import run_study
 from selfmodel.logs import load_controller, read_gap
 from selfmodel.settings import Settings
@@ -160,7 +160,7 @@ def test_a_study_that_was_made_otherwise_is_not_mixed_with_another(
     done = selfmodel(*arguments, "--controller", "cpg", cwd=folder)
 
     assert done.returncode == 2
-    assert "holds a study that was made otherwise" in done.stderr
+    assert "contains a study with other settings" in done.stderr
 
 
 @pytest.mark.parametrize("changed", ["biped.toml", "foot.obj"])
@@ -206,9 +206,9 @@ REFUSED = [
     ({"comparator": "no-such"}, "unknown comparator"),
     ({"controller": "brain"}, "unknown kind of controller"),
     ({"kinds": "brek"}, "unknown kind 'brek'"),
-    ({"gap": 0.7}, "a gap is a number from 0 to 0.5"),
+    ({"gap": 0.7}, "expected a gap from 0 to 0.5"),
     ({"controller": "cpg", "neurons": 4}, "--neurons 4 is of a network"),
-    ({"bodies": ["biped.xml", "other/biped.xml"]}, "would be called alike"),
+    ({"bodies": ["biped.xml", "other/biped.xml"]}, "would have the same file names"),
 ]
 
 
@@ -224,7 +224,7 @@ def test_what_cannot_be_run_is_refused_before_anything_is(
     check(study)
 
     with pytest.raises(InputError, match=reason):
-        run_study(replace(study, **changed), workers=1, on_event=lambda _: None)
+        run_study(replace(study, **changed), workers=1, on_progress=lambda _: None)
     assert not (tmp_path / "out").exists()
 
 
@@ -311,11 +311,11 @@ def test_a_gait_that_was_lost_is_told_of_and_not_passed_over(
     study = replace(STUDY, bodies=["quadruped"], cases=[2], folder=tmp_path)
     assert recovery_jobs(study) == []
     run_grid(
-        tmp_path / "gaits", gait_jobs(study), evolve_nothing, workers=1, on_event=lambda _: None
+        tmp_path / "gaits", gait_jobs(study), evolve_nothing, workers=1, on_progress=lambda _: None
     )
 
     with pytest.raises(InputError, match=r"quadruped-seed000\.npz is missing"):
-        run_study(study, workers=1, on_event=lambda _: None)
+        run_study(study, workers=1, on_progress=lambda _: None)
 
 
 def evolve_nothing(_job: Job, _part: str, _run: Path) -> None:
@@ -347,8 +347,8 @@ def test_domains_of_the_suite_need_no_prefix_where_we_have_no_robot_of_that_name
 
 
 def test_summaries_are_medians_and_leave_out_ratios_that_mean_nothing():
-    def row(seed: int, before: float, recovered: float, *, correct: bool) -> Row:
-        return Row(
+    def row(seed: int, before: float, recovered: float, *, correct: bool) -> SuiteRow:
+        return SuiteRow(
             "a", 1, "break:x", seed, "x", correct, "explained", 2, before, 0.0, recovered, 0, 3.0
         )
 

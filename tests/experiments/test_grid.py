@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from hypothesis import given, strategies as st
 
 from selfmodel.errors import InputError
 from selfmodel.experiments.grid import GridBegins, Job, PartEnds, difference, finished, run_grid
+from selfmodel.experiments.grid.worker_pool import MAX_TASKS_PER_WORKER, run_tasks
 
 ROOT = Path(__file__).parents[2]
 
@@ -49,6 +51,11 @@ def silent(_event: GridBegins | PartEnds) -> None:
     pass
 
 
+def process_id(_task: int) -> int:
+    """The process that does a task."""
+    return os.getpid()
+
+
 SCRIPT = """
 import sys
 from pathlib import Path
@@ -56,7 +63,7 @@ from selfmodel.experiments.grid import run_grid
 from tests.experiments.test_grid import jobs, silent, work
 
 if __name__ == "__main__":
-    run_grid(Path(sys.argv[1]), jobs(6, seconds=0.3), work, workers=2, on_event=print)
+    run_grid(Path(sys.argv[1]), jobs(6, seconds=0.3), work, workers=2, on_progress=print)
 """
 
 
@@ -88,8 +95,8 @@ def wait_for_a_result(folder: Path) -> None:
 
 def test_a_grid_does_every_part_once_and_not_again(tmp_path: Path):
     events: list = []
-    first = run_grid(tmp_path, jobs(3, ("a", "b")), work, workers=2, on_event=events.append)
-    again = run_grid(tmp_path, jobs(3, ("a", "b")), work, workers=2, on_event=events.append)
+    first = run_grid(tmp_path, jobs(3, ("a", "b")), work, workers=2, on_progress=events.append)
+    again = run_grid(tmp_path, jobs(3, ("a", "b")), work, workers=2, on_progress=events.append)
 
     assert (first, again) == ((), ())
     assert calls(tmp_path) == {f"run-{seed:02d}": ["a", "b"] for seed in range(3)}
@@ -102,7 +109,7 @@ def test_a_grid_does_every_part_once_and_not_again(tmp_path: Path):
 def test_the_results_do_not_depend_on_the_number_of_workers(tmp_path: Path):
     for workers in (1, 2):
         run_grid(
-            tmp_path / str(workers), jobs(4, ("a", "b")), work, workers=workers, on_event=silent
+            tmp_path / str(workers), jobs(4, ("a", "b")), work, workers=workers, on_progress=silent
         )
 
     one, two = ([*finished(tmp_path / folder)] for folder in ("1", "2"))
@@ -112,8 +119,8 @@ def test_the_results_do_not_depend_on_the_number_of_workers(tmp_path: Path):
 
 
 def test_a_run_is_extended_by_a_part_and_keeps_the_others(tmp_path: Path):
-    run_grid(tmp_path, jobs(2, ("a",)), work, workers=1, on_event=silent)
-    run_grid(tmp_path, jobs(2, ("a", "package.module:b/c")), work, workers=1, on_event=silent)
+    run_grid(tmp_path, jobs(2, ("a",)), work, workers=1, on_progress=silent)
+    run_grid(tmp_path, jobs(2, ("a", "package.module:b/c")), work, workers=1, on_progress=silent)
 
     assert calls(tmp_path)["run-01"] == ["a", "package.module:b/c"]
     assert {each.part for each in finished(tmp_path)} == {"a", "package.module:b/c"}
@@ -123,13 +130,13 @@ def test_a_run_is_extended_by_a_part_and_keeps_the_others(tmp_path: Path):
     ("fails", "sentence"),
     [
         ("foreseen", "the cause and the cure"),
-        ("bug", "its process ended with status 1; standard error may say more"),
-        ("crash", "its process ended with status 7; standard error may say more"),
+        ("bug", "its process ended with status 1; standard error may have the reason"),
+        ("crash", "its process ended with status 7; standard error may have the reason"),
     ],
 )
 def test_a_failure_is_kept_and_stops_no_other(tmp_path: Path, fails: str, sentence: str):
     bad = Job("bad", {"factor": 1, "fails": fails}, 0, ("a", "b"))
-    failed = run_grid(tmp_path, [bad, *jobs(2)], work, workers=1, on_event=silent)
+    failed = run_grid(tmp_path, [bad, *jobs(2)], work, workers=1, on_progress=silent)
 
     assert [(each.key, each.part, each.error) for each in failed] == [
         ("bad", "a", sentence),
@@ -142,27 +149,29 @@ def test_a_failure_is_kept_and_stops_no_other(tmp_path: Path, fails: str, senten
 
 @pytest.mark.process
 def test_what_failed_is_tried_again(tmp_path: Path):
-    assert run_grid(tmp_path, jobs(1, fails="foreseen"), work, workers=1, on_event=silent)
+    assert run_grid(tmp_path, jobs(1, fails="foreseen"), work, workers=1, on_progress=silent)
     (tmp_path / "run-00" / "mended").touch()
 
-    assert run_grid(tmp_path, jobs(1, fails="foreseen"), work, workers=1, on_event=silent) == ()
+    assert run_grid(tmp_path, jobs(1, fails="foreseen"), work, workers=1, on_progress=silent) == ()
 
 
 @pytest.mark.process
 def test_a_run_whose_results_were_deleted_is_made_again(tmp_path: Path):
-    run_grid(tmp_path, jobs(2), work, workers=1, on_event=silent)
+    run_grid(tmp_path, jobs(2), work, workers=1, on_progress=silent)
     shutil.rmtree(tmp_path / "run-01" / "parts")
 
-    assert run_grid(tmp_path, jobs(2), work, workers=1, on_event=silent) == ()
+    assert run_grid(tmp_path, jobs(2), work, workers=1, on_progress=silent) == ()
     assert calls(tmp_path) == {"run-00": ["result"], "run-01": ["result", "result"]}
 
 
 def test_a_run_made_of_something_else_is_refused_before_anything_is_done(tmp_path: Path):
-    run_grid(tmp_path, jobs(1), work, workers=1, on_event=silent)
+    run_grid(tmp_path, jobs(1), work, workers=1, on_progress=silent)
     other = [Job("new", {"factor": 1}, 0), Job("run-00", {"factor": 11}, 0)]
 
-    with pytest.raises(InputError, match=r"run-00 .*parameters.factor is 10 there, asked is 11"):
-        run_grid(tmp_path, other, work, workers=1, on_event=silent)
+    with pytest.raises(
+        InputError, match=r"run-00 .*parameters.factor is 10 there, requested is 11"
+    ):
+        run_grid(tmp_path, other, work, workers=1, on_progress=silent)
     assert not (tmp_path / "new").exists()
 
 
@@ -175,7 +184,7 @@ def test_a_grid_that_was_killed_goes_on_where_it_was(tmp_path: Path):
     done = {each.key for each in finished(tmp_path / "runs")}
     assert 0 < len(done) < 6
 
-    run_grid(tmp_path / "runs", jobs(6, seconds=0.3), work, workers=2, on_event=silent)
+    run_grid(tmp_path / "runs", jobs(6, seconds=0.3), work, workers=2, on_progress=silent)
 
     assert [each.seed for each in finished(tmp_path / "runs")] == list(range(6))
     assert all(calls(tmp_path / "runs")[key] == ["result"] for key in done)
@@ -195,25 +204,38 @@ def test_an_interrupt_ends_every_process_at_once_and_quietly(tmp_path: Path):
 
 
 def test_a_worker_never_sees_an_interrupt_not_even_while_it_starts(tmp_path: Path):
-    run_grid(tmp_path, jobs(2), work, workers=2, on_event=silent)
+    run_grid(tmp_path, jobs(2), work, workers=2, on_progress=silent)
 
     assert all(each.result["deaf"] for each in finished(tmp_path))
     assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
 
 @pytest.mark.process
-def test_two_processes_at_one_grid_do_nothing_twice(tmp_path: Path):
-    both = [start(tmp_path), start(tmp_path)]
+def test_a_second_process_at_one_grid_is_refused_and_nothing_is_done_twice(tmp_path: Path):
+    process = start(tmp_path)
+    wait_for_a_result(tmp_path)
 
-    told = [process.communicate(timeout=60) for process in both]
-    assert [process.returncode for process in both] == [0, 0]
+    with pytest.raises(InputError, match=r"another process runs a grid in .*runs: wait"):
+        run_grid(tmp_path / "runs", jobs(6, seconds=0.3), work, workers=2, on_progress=silent)
+    out, _ = process.communicate(timeout=60)
+    assert process.returncode == 0
     assert calls(tmp_path / "runs") == {f"run-{seed:02d}": ["result"] for seed in range(6)}
-    assert not any(b"a plug-in may print" in out for out, _ in told)
+    assert b"a plug-in may print" not in out
+
+
+@pytest.mark.process
+def test_a_worker_is_replaced_after_its_largest_number_of_tasks():
+    chains = [[number] for number in range(MAX_TASKS_PER_WORKER + 1)]
+    with closing(run_tasks(process_id, chains, 1)) as answers:
+        processes = [process for _, process in answers]
+
+    assert len(set(processes[:-1])) == 1
+    assert processes[-1] != processes[0]
 
 
 @pytest.mark.parametrize("key", ["", "..", "a/b", ".hidden", "a b"])
 def test_a_key_that_cannot_name_a_folder_is_refused(key: str):
-    with pytest.raises(ValueError, match="able to name a folder"):
+    with pytest.raises(ValueError, match="a key that is a valid folder name"):
         Job(key, {}, 0)
 
 

@@ -124,14 +124,14 @@ def run(
     )
     share = inputs.share("--only", only)
     failed = grid_display.run_shown(
-        lambda on_event: run_study(
-            study, workers=thread_count(workers), on_event=on_event, only=share
+        lambda on_progress: run_study(
+            study, workers=thread_count(workers), on_progress=on_progress, only=share
         ),
         out,
     )
     results = write_results(out)
     if as_json:
-        found = {**results.as_object(), "failures": grid_display.as_objects(failed)}
+        found = {**results.as_dict(), "failures": grid_display.as_objects(failed)}
         typer.echo(json.dumps(found, indent=1, allow_nan=False))
     else:
         _print(results.summaries)

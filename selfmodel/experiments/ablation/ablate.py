@@ -1,4 +1,4 @@
-"""Runs an ablation: first the gaits, then the runs that take them."""
+"""Execution of an ablation: a grid of gaits, then a grid of runs."""
 
 from collections.abc import Callable
 from functools import partial
@@ -7,32 +7,32 @@ from typing import Any
 
 from selfmodel.experiments.ablation import bank
 from selfmodel.experiments.ablation.plan import Ablation, cells, check, job, spec
-from selfmodel.experiments.ablation.rows import as_objects
 from selfmodel.experiments.ablation.run_one import run_one
 from selfmodel.experiments.grid import GridBegins, Job, PartEnds, run_grid
+from selfmodel.experiments.study_files import as_dicts
 
 
 def ablate(
     ablation: Ablation,
     *,
     workers: int,
-    on_event: Callable[[GridBegins | PartEnds], None],
+    on_progress: Callable[[GridBegins | PartEnds], None],
     only: tuple[int, int] = (1, 1),
 ) -> tuple[PartEnds, ...]:
-    """Runs what has not been run yet, and returns what failed.
+    """Runs the unfinished parts of an ablation and returns the failed ones.
 
     Args:
-        ablation: What to run.
-        workers: Processes at a time, each with one thread of physics.
-        on_event: Is told what happens, of the gaits' grid and then of the runs'.
-        only: ``(i, n)``: of every n runs the i-th, from 1, for a cluster of n machines.
+        ablation: The ablation.
+        workers: Number of worker processes, each with one thread of physics.
+        on_progress: Callback of the grid of gaits, then of the grid of runs.
+        only: ``(i, n)``: share i of n of the runs, from 1, for n machines with a folder each.
 
     Raises:
-        InputError: Something about it is wrong, or its folder holds another.
+        InputError: The ablation is invalid, or its folder contains another ablation.
     """
     check(ablation)
     chosen = cells(ablation, only)
-    no_gait = bank.fill(ablation, chosen, workers, on_event)
+    no_gait = bank.fill(ablation, chosen, workers, on_progress)
     gaits = bank.folder(ablation)
     jobs = [
         job(ablation, cell, digests)
@@ -40,10 +40,14 @@ def ablate(
         if (digests := bank.digests(gaits, cell, ablation.settings)) is not None
     ]
     failed = run_grid(
-        ablation.folder / "runs", jobs, partial(_rows, gaits), workers=workers, on_event=on_event
+        ablation.folder / "runs",
+        jobs,
+        partial(_rows, gaits),
+        workers=workers,
+        on_progress=on_progress,
     )
     return no_gait + failed
 
 
 def _rows(gaits: Path, of: Job, comparator: str, folder: Path) -> Any:  # noqa: ANN401  # JSON
-    return as_objects(run_one(spec(of), comparator, folder, gaits))
+    return as_dicts(run_one(spec(of), comparator, folder, gaits))

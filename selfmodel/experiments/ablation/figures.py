@@ -1,4 +1,4 @@
-"""The figures of an ablation: how the gap tells on each comparator, and on which cases."""
+"""Figures of an ablation: right diagnoses by reality gap, and by case."""
 
 import io
 import math
@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from selfmodel.experiments.ablation.rows import Row
-from selfmodel.experiments.ablation.scores import Score
+from selfmodel.experiments.ablation.rows import AblationRow
+from selfmodel.experiments.ablation.scores import ComparatorScore
 from selfmodel.experiments.confidence_intervals import Interval
-from selfmodel.experiments.keys import key_of
+from selfmodel.experiments.study_files import key_of
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -20,8 +20,10 @@ if TYPE_CHECKING:
 MARKERS = "osD^v<>pP*Xhd"
 
 
-def draw(rows: Sequence[Row], scores: Sequence[Score]) -> Iterator[tuple[str, bytes]]:
-    """Gives each figure's name and its PNG; none where there are no rows."""
+def draw(
+    rows: Sequence[AblationRow], scores: Sequence[ComparatorScore]
+) -> Iterator[tuple[str, bytes]]:
+    """Yields the name and the PNG of each figure; no figures without rows."""
     if not rows:
         return
     yield "gap.png", _png(by_gap(scores))
@@ -37,15 +39,15 @@ def _first_and_last(trials: Sequence[int]) -> list[int]:
     return sorted({trials[0], trials[-1]})
 
 
-def by_gap(scores: Sequence[Score]) -> Figure:
-    """A panel for each robot and number of trials, a line a comparator with interval bars."""
+def by_gap(scores: Sequence[ComparatorScore]) -> Figure:
+    """Returns right diagnoses by gap: a panel per robot and trial count, a line per comparator."""
     robots = sorted({score.robot for score in scores})
     shown = _first_and_last(sorted({score.trials for score in scores}))
     comparators = sorted({score.comparator for score in scores})
     gaps = sorted({score.gap for score in scores})
     figure = Figure(figsize=(1 + 4.2 * len(shown), 0.8 + 3.2 * len(robots)), layout="constrained")
     panels = figure.subplots(len(robots), len(shown), sharex=True, sharey=True, squeeze=False)
-    spread = 0.012 * (max(gaps) - min(gaps) or 1)  # beside one another, so that bars are seen
+    spread = 0.012 * (max(gaps) - min(gaps) or 1)  # error bars side by side
     for i, robot in enumerate(robots):
         for j, trials in enumerate(shown):
             axes = panels[i, j]
@@ -93,7 +95,7 @@ def _line(axes: Axes, line: dict[float, Interval], label: str, number: int, shif
         yerr=bars,
         label=label,
         marker=MARKERS[number % len(MARKERS)],
-        color=f"C{number}",  # a panel need not have all comparators
+        color=f"C{number}",  # the same in panels without all comparators
         markersize=5,
         capsize=2,
         linewidth=1.5,
@@ -101,8 +103,8 @@ def _line(axes: Axes, line: dict[float, Interval], label: str, number: int, shif
     )
 
 
-def _by_case(robot: str, trials: int, rows: Sequence[Row]) -> Figure:
-    """A panel a gap: how often each comparator is right about each case."""
+def _by_case(robot: str, trials: int, rows: Sequence[AblationRow]) -> Figure:
+    """Returns right diagnoses by case and comparator, a panel per gap."""
     gaps = sorted({row.gap for row in rows})
     cases = sorted({row.failure for row in rows})
     comparators = sorted({row.comparator for row in rows})

@@ -1,4 +1,4 @@
-"""What an ablation consists of, as the runs of a grid."""
+"""Definition of an ablation and its runs, as jobs of a grid."""
 
 import dataclasses
 import hashlib
@@ -12,7 +12,7 @@ from urllib.parse import quote
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.experiments import plugins, robots
 from selfmodel.experiments.grid import Job, check_shared
-from selfmodel.experiments.keys import check_keys, key_of
+from selfmodel.experiments.study_files import check_keys, key_of
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.notation import parse
@@ -22,34 +22,34 @@ from selfmodel.settings import Settings
 from selfmodel.version import __version__
 
 NEXT_TRIAL = ("bank", "repair", "disagreement")
-"""How the controllers of the trials are chosen: gaits from the bank, the same for every comparator;
-or, after the first trial, what the repair EA evolves for the diagnosis so far; or what the
-hypotheses of the diagnosis so far disagree on most."""
+"""Choices of the trials' controllers: gaits from the bank, the same for every comparator; or, after
+the first trial, the controller that the repair EA evolves for the diagnosis so far; or the
+controller with the largest disagreement of the diagnosis so far."""
 
 GAITS = 6
-"""Gaits of a robot in the bank."""
+"""Number of gaits per robot in the bank."""
 
 HEALTHY_TRIALS = 2
-"""Trials before the failure."""
+"""Number of trials before the failure."""
 
 
 @dataclass(frozen=True)
 class Ablation:
-    """What to compare, and on what.
+    """Definition of an ablation: comparators, robots, failures and reality gaps.
 
     Attributes:
         robots: Names of robots.
-        cases: Numbers of failures of Table I; None for all that each robot can have.
-        comparators: Names, or ``package.module:object``.
+        cases: Numbers of failures of Table I; None for all that apply to each robot.
+        comparators: Names of comparators, or ``package.module:object``.
         gaps: Levels of the reality gap.
-        seeds: A run for each.
-        folder: Where all of it is kept.
-        settings: The paper's numbers; ``trials`` is how many trials of the damaged robot there are.
+        seeds: Seeds, one run each.
+        folder: Folder of the gaits, runs and results.
+        settings: Parameters of the search; ``trials`` is the number of trials of the damaged robot.
         damages: Further failures, in notation.
-        kinds: What a diagnosis considers, as ``--kinds`` takes it.
-        structure: Whether the robots are built differently from their models.
+        kinds: Fault kinds to search, as in ``--kinds``.
+        structure: Whether the physical robots have structural mismatches.
         next_trial: One of ``NEXT_TRIAL``.
-        bank: A folder of gaits, ``ROBOT-K.npz``; without one they are evolved.
+        bank: Folder of gaits, ``ROBOT-K.npz``; None to evolve them.
     """
 
     robots: Sequence[str]
@@ -58,7 +58,7 @@ class Ablation:
     gaps: Sequence[float]
     seeds: Sequence[int]
     folder: Path
-    settings: Settings = Settings()  # noqa: RUF009  # it is frozen
+    settings: Settings = Settings()  # noqa: RUF009  # a frozen dataclass
     damages: Sequence[str] = ()
     kinds: str = ",".join(kind.name for kind in PAPER_KINDS)
     structure: bool = False
@@ -68,14 +68,14 @@ class Ablation:
 
 @dataclass(frozen=True)
 class Cell:
-    """One run of the grid, but for its comparators.
+    """One run of the grid, for all comparators.
 
     Attributes:
-        robot: The robot's name.
-        case: The failure's number in Table I, if it has one.
+        robot: Name of the robot.
+        case: Number of the failure in Table I; None for a failure that is not in it.
         truth: The failure, in notation.
-        gap: The level of the reality gap.
-        seed: Every random choice comes from it.
+        gap: Level of the reality gap.
+        seed: Seed of all random numbers.
     """
 
     robot: str
@@ -85,20 +85,20 @@ class Cell:
     seed: int
 
     def gaits(self, settings: Settings) -> list[int]:
-        """Returns the numbers in the bank of the gaits of its trials, in their order."""
+        """Returns the numbers of the gaits in the bank, one per trial."""
         return [(self.seed + k) % GAITS for k in range(max(HEALTHY_TRIALS, settings.trials))]
 
 
 @dataclass(frozen=True)
 class Spec:
-    """All that a run needs to know, as its folder says it.
+    """Complete specification of a run, as in its ``run.json``.
 
     Attributes:
-        cell: Which run it is.
-        settings: The paper's numbers.
-        kinds: What a diagnosis considers.
-        structure: Whether the robot is built differently from its model.
-        next_trial: How the trials' controllers are chosen.
+        cell: The run.
+        settings: Parameters of the search.
+        kinds: Fault kinds to search.
+        structure: Whether the physical robot has structural mismatches.
+        next_trial: Choice of the trials' controllers, one of ``NEXT_TRIAL``.
     """
 
     cell: Cell
@@ -109,22 +109,20 @@ class Spec:
 
 
 def check(ablation: Ablation) -> None:
-    """Checks all that can be wrong with an ablation, before anything is run.
+    """Checks the definition of an ablation, before anything is run.
 
     Raises:
-        InputError: Something is, and which.
+        InputError: The definition is invalid, or its folder contains another ablation.
     """
     for name in ("robots", "comparators", "gaps", "seeds"):
         if not getattr(ablation, name):
-            raise InputError(f"an ablation needs at least one of its {name}, got none")
+            raise InputError(f"expected at least one of the {name} of an ablation, got none")
     if not (ablation.cases is None or ablation.cases or ablation.damages):
-        raise InputError("an ablation needs at least one case or one damage, got neither")
+        raise InputError("expected at least one case or one damage of an ablation, got neither")
     _check_names(ablation)
     for gap in ablation.gaps:
         if not 0 <= gap <= MAX_GAP_LEVEL:
-            raise InputError(
-                f"a gap is a number from 0 to {MAX_GAP_LEVEL}, such as 0.05, got {gap}"
-            )
+            raise InputError(f"expected a gap from 0 to {MAX_GAP_LEVEL}, such as 0.05, got {gap}")
     _check_trials(ablation)
     check_shared(ablation.folder, _shared(ablation), "an ablation")
 
@@ -133,13 +131,13 @@ def _check_trials(ablation: Ablation) -> None:
     trials = ablation.settings.trials
     if ablation.next_trial != "bank" and trials < 2:
         raise InputError(
-            f"a trial is chosen by the first diagnosis: with --next-trial {ablation.next_trial} "
-            f"there are at least 2 trials, got 1"
+            f"expected at least 2 trials with --next-trial {ablation.next_trial}, got 1: the first "
+            f"diagnosis chooses the second trial"
         )
     if ablation.next_trial == "bank" and trials > GAITS and 0 in ablation.gaps:
         raise InputError(
-            f"without a gap, the same gait gives the same trial, and the bank has {GAITS}: give "
-            f"at most {GAITS} trials, got {trials}, or only gaps above 0"
+            f"without a gap, the same gait gives the same trial, and the bank has {GAITS} gaits: "
+            f"give at most {GAITS} trials, got {trials}, or only gaps above 0"
         )
 
 
@@ -147,8 +145,8 @@ def cells(ablation: Ablation, only: tuple[int, int] = (1, 1)) -> list[Cell]:
     """Returns the runs of an ablation, one seed after another.
 
     Args:
-        ablation: What to run.
-        only: ``(i, n)``: of every n runs the i-th, from 1.
+        ablation: The ablation.
+        only: ``(i, n)``: share i of n of the runs, from 1.
     """
     found = [
         Cell(robot, case, truth, gap, seed)
@@ -161,12 +159,12 @@ def cells(ablation: Ablation, only: tuple[int, int] = (1, 1)) -> list[Cell]:
 
 
 def job(ablation: Ablation, cell: Cell, gaits: Sequence[str]) -> Job:
-    """Returns a run as the grid knows it.
+    """Returns the job of a run.
 
     Args:
-        ablation: What it belongs to.
-        cell: Which one.
-        gaits: A digest of each gait that it takes from the bank.
+        ablation: The ablation.
+        cell: The run.
+        gaits: SHA-256 of each gait of the run.
     """
     failure = f"case{cell.case:02d}" if cell.case is not None else quote(cell.truth, safe="=")
     return Job(
@@ -186,14 +184,16 @@ def job(ablation: Ablation, cell: Cell, gaits: Sequence[str]) -> Job:
 
 
 def spec(of: Job) -> Spec:
-    """Returns what a run of the grid says of itself."""
-    said = of.parameters
+    """Returns the specification in the job of a run."""
+    parameters = of.parameters
     return Spec(
-        cell=Cell(said["robot"], said["case"], said["truth"], said["gap"], of.seed),
-        settings=Settings(**said["shared"]["settings"]),
-        kinds=said["shared"]["kinds"],
-        structure=said["shared"]["structure"],
-        next_trial=said["shared"]["next_trial"],
+        cell=Cell(
+            parameters["robot"], parameters["case"], parameters["truth"], parameters["gap"], of.seed
+        ),
+        settings=Settings(**parameters["shared"]["settings"]),
+        kinds=parameters["shared"]["kinds"],
+        structure=parameters["shared"]["structure"],
+        next_trial=parameters["shared"]["next_trial"],
     )
 
 
@@ -202,17 +202,19 @@ def _failures(ablation: Ablation, robot: str) -> list[tuple[int | None, str]]:
     anatomy = entry.robot().anatomy
     numbers = entry.cases if ablation.cases is None else ablation.cases
     cases: list[tuple[int | None, str]] = [(case, entry.cases[case]) for case in numbers]
-    damages = [str(parse(damage, anatomy, _named(ablation))) for damage in ablation.damages]
+    damages = [
+        str(parse(damage, anatomy, _notation_kinds(ablation))) for damage in ablation.damages
+    ]
     return cases + [(None, damage) for damage in dict.fromkeys(damages)]
 
 
-def _named(ablation: Ablation) -> tuple[FaultKind, ...]:
-    """What notation may name: also a third party's kinds, where they are considered."""
+def _notation_kinds(ablation: Ablation) -> tuple[FaultKind, ...]:
+    """The fault kinds that notation may name, with the plug-ins to search."""
     return notation_kinds(plugins.kinds(ablation.kinds))
 
 
 def model_digest(robot: str) -> str:
-    """Returns the digest of a robot's model, which its results depend on."""
+    """Returns the SHA-256 of a robot's MJCF."""
     return hashlib.sha256(robots.robot_entry(robot).robot().mjcf.encode()).hexdigest()
 
 
@@ -226,15 +228,15 @@ def _check_names(ablation: Ablation) -> None:
         anatomy = entry.robot().anatomy
         HypothesisSpace.of(plugins.kinds(ablation.kinds), anatomy)
         for damage in ablation.damages:
-            parse(damage, anatomy, _named(ablation))
+            parse(damage, anatomy, _notation_kinds(ablation))
     for comparator in ablation.comparators:
         plugins.comparator(comparator)
     if ablation.next_trial not in NEXT_TRIAL:
-        raise unknown_name("way to choose the next trial", ablation.next_trial, NEXT_TRIAL)
+        raise unknown_name("choice of the next trial", ablation.next_trial, NEXT_TRIAL)
 
 
 def _shared(ablation: Ablation) -> dict[str, Any]:
-    """What is the same for all runs, and must be for their rows to stand in one table."""
+    """Returns the parameters that all runs of one results table share."""
     return {
         "selfmodel": __version__,
         "settings": dataclasses.asdict(ablation.settings),

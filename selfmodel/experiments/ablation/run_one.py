@@ -1,4 +1,4 @@
-"""One run: physical trials, logged once, and what one comparator makes of them."""
+"""One part of an ablation: the trials of a run, and their diagnosis by one comparator."""
 
 import dataclasses
 import shutil
@@ -12,8 +12,8 @@ from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.experiments import plugins, robots
 from selfmodel.experiments.ablation import bank
 from selfmodel.experiments.ablation.plan import Spec
-from selfmodel.experiments.ablation.rows import Row
-from selfmodel.experiments.ablation.score_one import Clock, row_of
+from selfmodel.experiments.ablation.rows import AblationRow
+from selfmodel.experiments.ablation.score_one import DiagnosisCost, row_of
 from selfmodel.experiments.ablation.trials import (
     Setting,
     after_failure,
@@ -29,36 +29,36 @@ from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Trial
 
 
-def run_one(spec: Spec, comparator: str, folder: Path, gaits: Path) -> list[Row]:
-    """Returns a row for each diagnosis: after the first trial and the last, or after each repair.
+def run_one(spec: Spec, comparator: str, folder: Path, gaits: Path) -> list[AblationRow]:
+    """Returns a row per diagnosis: after the first and the last trial, or after each trial.
 
     Args:
-        spec: What to run.
-        comparator: A name, or ``package.module:object``.
-        folder: Where the run is kept; trials that are in it are not run again.
-        gaits: The bank.
+        spec: Specification of the run.
+        comparator: Name of a comparator, or ``package.module:object``.
+        folder: Folder of the run; its trials are not run again.
+        gaits: Folder of the bank.
 
     Raises:
-        InputError: The comparator cannot judge the trials.
+        InputError: The comparator cannot compare the trials.
         WorkError: A trial could not be run or read.
     """
     bank_gaits = (
         bank.gait(gaits, spec.cell.robot, number) for number in spec.cell.gaits(spec.settings)
     )
     setting = setting_of(spec, comparator, folder, tuple(bank_gaits))
-    return _WAYS[spec.next_trial](setting)
+    return _TRIAL_CHOICES[spec.next_trial](setting)
 
 
 def setting_of(
     spec: Spec, comparator: str, folder: Path, gaits: tuple[Controller, ...] = ()
 ) -> Setting:
-    """Returns the objects that a run's specification stands for.
+    """Returns the objects of a run's specification.
 
     Args:
-        spec: What to run.
-        comparator: A name, or ``package.module:object``.
-        folder: Where the run is kept.
-        gaits: Its gaits, where trials are still to be run.
+        spec: Specification of the run.
+        comparator: Name of a comparator, or ``package.module:object``.
+        folder: Folder of the run.
+        gaits: Gaits of the run; unused if all its trials are logged.
     """
     robot = robots.robot_entry(spec.cell.robot).robot()
     return Setting(
@@ -72,19 +72,19 @@ def setting_of(
     )
 
 
-def diagnosed(
+def diagnose_run(
     setting: Setting, robot: Robot, intact: Sequence[Trial], trials: Sequence[Trial]
-) -> list[Row]:
-    """Returns a row for the diagnosis after the first trial, and one for that after the last.
+) -> list[AblationRow]:
+    """Returns the rows of the diagnoses after the first and after the last trial.
 
     Args:
         setting: The run.
-        robot: The self-model, calibrated.
+        robot: The calibrated self-model.
         intact: Trials before the failure.
-        trials: Trials after it, at least one.
+        trials: Trials after the failure, at least one.
 
     Raises:
-        InputError: The comparator cannot judge the trials.
+        InputError: The comparator cannot compare the trials.
     """
     search = DiagnosticSearch(
         Simulator(robot, threads=1),
@@ -93,15 +93,15 @@ def diagnosed(
         plugins.kinds(setting.spec.kinds),
         intact=intact,
     )
-    rows: list[Row] = []
-    clock = Clock()
+    rows: list[AblationRow] = []
+    cost = DiagnosisCost()
 
     def on_event(event: Event) -> None:
-        clock(event)
+        cost(event)
         if isinstance(event, Diagnosis):
             rows.append(
                 dataclasses.replace(
-                    row_of(setting, event, trials[: event.trials], clock),
+                    row_of(setting, event, trials[: event.trials], cost),
                     evaluations=search.evaluations,
                     distinct_hypotheses=search.distinct_hypotheses,
                 )
@@ -111,37 +111,37 @@ def diagnosed(
     return rows
 
 
-def _from_the_bank(setting: Setting) -> list[Row]:
-    """The trials are the same for every comparator, and so are their logs."""
+def _from_the_bank(setting: Setting) -> list[AblationRow]:
+    """Returns the rows of trials with gaits of the bank, whose logs all comparators share."""
     intact = before_failure(setting)
     trials = [
         after_failure(setting, number, gait)
         for number, gait in enumerate(setting.gaits[: setting.spec.settings.trials])
     ]
-    return diagnosed(setting, calibrated_robot(setting, intact), intact, trials)
+    return diagnose_run(setting, calibrated_robot(setting, intact), intact, trials)
 
 
-def _in_a_recovery(setting: Setting) -> list[Row]:
-    """After the first, every comparator has trials of its own: what its diagnosis led to."""
+def _in_a_recovery(setting: Setting) -> list[AblationRow]:
+    """Returns the rows of a recovery, whose later trials depend on the comparator."""
     folder = setting.folder / quote(setting.name, safe="")
-    shutil.rmtree(folder, ignore_errors=True)  # what is left of a run that was killed
+    shutil.rmtree(folder, ignore_errors=True)  # files of a killed run
     settings, cell = setting.spec.settings, setting.spec.cell
-    rows: list[Row] = []
+    rows: list[AblationRow] = []
     trials: list[Trial] = []
-    clock = Clock()
+    cost = DiagnosisCost()
 
     def on_event(event: Event) -> None:
-        clock(event)
+        cost(event)
         if isinstance(event, Trial):
             trials.append(event)
         elif isinstance(event, Diagnosis):
-            ways = [trial.displacement for trial in trials]
+            displacements = [trial.displacement for trial in trials]
             rows.append(
                 dataclasses.replace(
-                    row_of(setting, event, trials[1:], clock),
-                    before=ways[0],
-                    after=ways[1],
-                    recovered=max(ways[2:], default=None),
+                    row_of(setting, event, trials[1:], cost),
+                    before=displacements[0],
+                    after=displacements[1],
+                    recovered=max(displacements[2:], default=None),
                 )
             )
 
@@ -150,7 +150,7 @@ def _in_a_recovery(setting: Setting) -> list[Row]:
         case=cell.case,
         truth=setting.truth,
         comparator=setting.comparator,
-        # The failing trial is the first of them.
+        # An experiment does not count the failing trial.
         settings=dataclasses.replace(settings, trials=settings.trials - 1),
         seed=cell.seed,
         threads=1,
@@ -168,7 +168,7 @@ def _in_a_recovery(setting: Setting) -> list[Row]:
     return rows
 
 
-_WAYS: Mapping[str, Callable[[Setting], list[Row]]] = {
+_TRIAL_CHOICES: Mapping[str, Callable[[Setting], list[AblationRow]]] = {
     "bank": _from_the_bank,
     "repair": _in_a_recovery,
     "disagreement": _in_a_recovery,

@@ -1,4 +1,4 @@
-"""A diagnosis as a row: whether it is right, and what it cost."""
+"""Row of a diagnosis: its correctness and its cost."""
 
 import math
 from collections.abc import Sequence
@@ -7,7 +7,7 @@ from time import perf_counter
 
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.evolution import Generation
-from selfmodel.experiments.ablation.rows import Row
+from selfmodel.experiments.ablation.rows import AblationRow
 from selfmodel.experiments.ablation.trials import Setting
 from selfmodel.experiments.scoring import is_correct
 from selfmodel.recovery.events import Event, SearchBegins
@@ -16,12 +16,12 @@ from selfmodel.trials.trial import Trial
 
 
 @dataclass(eq=False)
-class Clock:
-    """Counts what diagnoses cost, and nothing between them.
+class DiagnosisCost:
+    """Callback that accumulates the cost of diagnoses, without the time between them.
 
     Attributes:
-        evaluations: Hypotheses that the EA asked about.
-        seconds: Wall time.
+        evaluations: Number of hypotheses evaluated by the diagnostic EA.
+        seconds: Wall time of the diagnoses, s.
     """
 
     evaluations: int = 0
@@ -30,7 +30,7 @@ class Clock:
     _diagnosing: bool = False
 
     def __call__(self, event: Event) -> None:
-        """Takes note of an event as it happens."""
+        """Adds the cost of an event."""
         match event:
             case SearchBegins(kind):
                 self._diagnosing = kind == "diagnostic"
@@ -41,20 +41,22 @@ class Clock:
                 self.seconds += perf_counter() - self._start
 
 
-def row_of(setting: Setting, diagnosis: Diagnosis, trials: Sequence[Trial], clock: Clock) -> Row:
-    """Returns the row of a diagnosis, but for what only the one who made it knows.
+def row_of(
+    setting: Setting, diagnosis: Diagnosis, trials: Sequence[Trial], cost: DiagnosisCost
+) -> AblationRow:
+    """Returns the row of a diagnosis, without displacements and number of distinct hypotheses.
 
     Args:
         setting: The run.
-        diagnosis: Of all trials so far.
-        trials: These trials.
-        clock: What the diagnoses of the run have cost so far.
+        diagnosis: Diagnosis of all trials so far.
+        trials: Trials of the damaged robot so far.
+        cost: Cost of the diagnoses of the run so far.
     """
     cell = setting.spec.cell
     best = diagnosis.ranked[0]
-    # A simulator of its own: judging is no part of what the diagnosis cost.
-    judge = Simulator(setting.robot, threads=1)
-    return Row(
+    # A separate simulator: scoring does not count as cost of the diagnosis.
+    simulator = Simulator(setting.robot, threads=1)
+    return AblationRow(
         robot=cell.robot,
         case=cell.case,
         truth=str(setting.truth),
@@ -64,14 +66,14 @@ def row_of(setting: Setting, diagnosis: Diagnosis, trials: Sequence[Trial], cloc
         comparator=setting.name,
         trials=diagnosis.trials,
         best=str(best.hypothesis),
-        correct=is_correct(best.hypothesis, setting.truth, trials, judge),
+        correct=is_correct(best.hypothesis, setting.truth, trials, simulator),
         distance=_finite(best.distance),
         intact_distance=_finite(diagnosis.intact_distance),
         verdict=diagnosis.verdict,
         rivals=len(diagnosis.indistinguishable),
-        evaluations=clock.evaluations,
+        evaluations=cost.evaluations,
         distinct_hypotheses=None,
-        seconds=clock.seconds,
+        seconds=cost.seconds,
         before=None,
         after=None,
         recovered=None,

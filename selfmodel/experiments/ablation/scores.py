@@ -1,10 +1,10 @@
-"""How often each comparator is right, and at what cost, with 95 % intervals."""
+"""Scores of the comparators: proportion of right diagnoses and cost, with 95 % intervals."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT
-from selfmodel.experiments.ablation.rows import Row
+from selfmodel.experiments.ablation.rows import AblationRow
 from selfmodel.experiments.confidence_intervals import Interval, proportion, ratio
 
 REFERENCE = FORWARD_DISPLACEMENT.name
@@ -12,20 +12,20 @@ REFERENCE = FORWARD_DISPLACEMENT.name
 
 
 @dataclass(frozen=True)
-class Score:
-    """How well a comparator did on one robot, at one gap, after so many trials, over all cases.
+class ComparatorScore:
+    """Score of a comparator on one robot at one gap after a number of trials, over all cases.
 
     Attributes:
-        robot: The robot.
-        gap: The level of the reality gap.
-        comparator: The comparator.
-        trials: Trials that each diagnosis explains.
-        runs: How many diagnoses.
-        right: How many of them are right.
-        correct: The proportion, with Wilson's interval.
-        time: Seconds over those of ``REFERENCE`` on the same runs; None without those.
-        recovery: Displacement of the best recovery trial over that before the failure; None where
-            no run has both.
+        robot: Name of the robot.
+        gap: Level of the reality gap.
+        comparator: Name of the comparator.
+        trials: Number of trials that each diagnosis explains.
+        runs: Number of diagnoses.
+        right: Number of right diagnoses.
+        correct: Proportion of right diagnoses, with Wilson's interval.
+        time: Seconds over those of ``REFERENCE`` on the same runs; None without such runs.
+        recovery: Displacement of the best recovery trial over the displacement before the failure;
+            None if no run has both.
     """
 
     robot: str
@@ -39,9 +39,9 @@ class Score:
     recovery: Interval | None
 
 
-def summarise(rows: Sequence[Row]) -> tuple[Score, ...]:
-    """Returns the score of each comparator, for each robot, gap and number of trials."""
-    groups: dict[tuple[str, float, str, int], list[Row]] = {}
+def summarise(rows: Sequence[AblationRow]) -> tuple[ComparatorScore, ...]:
+    """Returns the score of each comparator per robot, gap and number of trials."""
+    groups: dict[tuple[str, float, str, int], list[AblationRow]] = {}
     for row in rows:
         groups.setdefault((row.robot, row.gap, row.comparator, row.trials), []).append(row)
     scores = []
@@ -50,7 +50,7 @@ def summarise(rows: Sequence[Row]) -> tuple[Score, ...]:
         paired = [(row, reference[row.run]) for row in same if row.run in reference]
         right = sum(row.correct for row in same)
         scores.append(
-            Score(
+            ComparatorScore(
                 robot=robot,
                 gap=gap,
                 comparator=comparator,
@@ -67,10 +67,12 @@ def summarise(rows: Sequence[Row]) -> tuple[Score, ...]:
     return tuple(scores)
 
 
-def _recovery(rows: Sequence[Row]) -> Interval | None:
-    ways = [
+def _recovery(rows: Sequence[AblationRow]) -> Interval | None:
+    displacements = [
         (row.recovered, row.before)
         for row in rows
         if row.recovered is not None and row.before is not None and row.before > 0
     ]
-    return ratio([after for after, _ in ways], [before for _, before in ways]) if ways else None
+    if not displacements:
+        return None
+    return ratio([after for after, _ in displacements], [before for _, before in displacements])

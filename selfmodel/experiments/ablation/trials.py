@@ -1,4 +1,4 @@
-"""The physical trials of a run: made once, and known from their logs."""
+"""Physical trials of a run: run once, then read from their logs."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -21,16 +21,16 @@ from selfmodel.trials.trial import Stage, Trial, TrialPlan
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """The objects that a run's specification stands for.
+    """Objects of a run's specification.
 
     Attributes:
-        spec: The specification.
-        comparator: Judges hypotheses.
-        name: What it was asked for by.
-        robot: The robot as its model describes it.
-        truth: What goes wrong with it.
-        gaits: Its gaits for this run, in the order of the trials.
-        folder: Where the run is kept.
+        spec: Specification of the run.
+        comparator: The comparator.
+        name: Name of the comparator, or ``package.module:object``.
+        robot: The nominal robot.
+        truth: The failure of the physical robot.
+        gaits: Gaits of the run, in the order of the trials.
+        folder: Folder of the run.
     """
 
     spec: Spec
@@ -43,7 +43,7 @@ class Setting:
 
 
 def before_failure(setting: Setting) -> list[Trial]:
-    """Returns the trials of the healthy robot, as their logs say; runs those missing."""
+    """Returns the logged trials of the healthy robot; runs the missing ones."""
     return [
         _trial(setting, number, "before", gait)
         for number, gait in enumerate(setting.gaits[:HEALTHY_TRIALS])
@@ -51,14 +51,14 @@ def before_failure(setting: Setting) -> list[Trial]:
 
 
 def after_failure(setting: Setting, number: int, controller: Controller) -> Trial:
-    """Returns the trial of that number, from 0, of the damaged robot; see ``before_failure``."""
+    """Returns a logged trial of the damaged robot, numbered from 0; runs it if missing."""
     return _trial(setting, HEALTHY_TRIALS + number, "after", controller)
 
 
 def calibrated_robot(setting: Setting, intact: Sequence[Trial]) -> Robot:
-    """Returns the self-model fitted to the trials before the failure, the same for all comparators.
+    """Returns the calibrated self-model, the same for all comparators.
 
-    It is kept beside the trials.
+    The first call fits it to the trials before the failure and writes it beside the trials.
     """
     path, robot = setting.folder / "calibrated.xml", setting.robot
     if not path.exists():
@@ -67,18 +67,18 @@ def calibrated_robot(setting: Setting, intact: Sequence[Trial]) -> Robot:
 
 
 def _trial(setting: Setting, number: int, stage: Stage, gait: Controller) -> Trial:
-    """The trial as its log says it; run if there is no log yet."""
+    """Returns a trial from its log; runs it if there is no log."""
     steps, seed = setting.spec.settings.steps, setting.spec.cell.seed
     plan = TrialPlan(f"{number:02d}-{stage}", stage, gait, steps, seed)
     path = setting.folder / "trials" / f"{plan.name}.mcap"
     if path.exists():
         return read_log(path).trial
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial_path(path).unlink(missing_ok=True)  # of a run that was killed
+    partial_path(path).unlink(missing_ok=True)  # of a killed run
     hidden = INTACT if stage == "before" else setting.truth
     cell, robot = setting.spec.cell, setting.robot
     reality = draw_reality(robot, cell.seed, cell.gap, structure=setting.spec.structure)
-    # Each trial has noise of its own, the same for every comparator.
+    # Noise differs between trials and is the same for every comparator.
     physical = reality.robot(robot, hidden, stream=number)
     header = TrialHeader(setting.spec.settings, hidden=str(hidden), gap=reality.text)
     return run_trial(physical, plan, path, robot, header)

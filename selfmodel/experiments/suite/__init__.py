@@ -1,1 +1,1 @@
-"""The study of dm_control's suite: every body, its failures, its recovery."""
+"""Study of recoveries of many bodies: dm_control's suite, the paper's robots, MJCF files."""

@@ -1,4 +1,4 @@
-"""Which bodies a study is of: domains and tasks of the suite, our robots, and anybody's MJCF."""
+"""Bodies of a study: domains and tasks of dm_control's suite, the paper's robots, MJCF files."""
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
@@ -11,19 +11,19 @@ DOMAINS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {name: tuple(entry.suite) for name, entry in ROBOTS.items()}
     | {f"{suite_bodies.PREFIX}{name}": tasks for name, tasks in suite_bodies.DOMAINS.items()}
 )
-"""Every domain with its tasks, the one that counts first where none is named."""
+"""Tasks of every domain, the default task first."""
 
 
 def bodies(domains: Sequence[str], tasks: Sequence[str] | None) -> tuple[str, ...]:
-    """Returns the names of the robots of some domains and tasks, each once.
+    """Returns the unique names of the robots of domains and tasks.
 
     Args:
-        domains: Of ``DOMAINS``, those of the suite also without their prefix where we have no
-            robot of that name; or paths of MJCF files.
-        tasks: Of each domain those of them that it has; None for its first.
+        domains: Names in ``DOMAINS``, or paths of MJCF files. The prefix of a domain of the suite
+            may be omitted unless another robot has the same name.
+        tasks: Names of tasks, of which each domain contributes its own; None for the default tasks.
 
     Raises:
-        InputError: There is no such domain, it has none of the tasks, or no domain has one of them.
+        InputError: A domain is unknown or has none of the tasks, or no domain has a task.
     """
     found: list[str] = []
     for given in domains:
@@ -47,7 +47,7 @@ def bodies(domains: Sequence[str], tasks: Sequence[str] | None) -> tuple[str, ..
 
 
 def tasks_of(domains: Sequence[str]) -> tuple[str, ...]:
-    """Returns the names of the tasks of some domains; see ``bodies``."""
+    """Returns the names of the tasks of domains; see ``bodies``."""
     own = [DOMAINS[_domain(given)] for given in domains if not is_model(given)]
     return tuple(sorted({task for tasks in own for task in tasks}))
 

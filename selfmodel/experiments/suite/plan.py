@@ -1,4 +1,4 @@
-"""What a study of many bodies consists of, as the runs of a grid."""
+"""Definition of a study of many bodies, as jobs of two grids."""
 
 import dataclasses
 import hashlib
@@ -9,8 +9,9 @@ from typing import Any
 
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.experiments import plugins, robots
+from selfmodel.experiments.gaits import gait_settings
 from selfmodel.experiments.grid import Job, check_shared, finished
-from selfmodel.experiments.keys import check_keys, key_of
+from selfmodel.experiments.study_files import check_keys, key_of
 from selfmodel.faults.neuron import silent_neurons
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
@@ -19,35 +20,32 @@ from selfmodel.settings import Settings
 from selfmodel.tasks import Entry
 from selfmodel.version import __version__
 
-OF_DIAGNOSIS = ("trials", "genes", "kept")
-"""Settings that no gait depends on."""
+GAIT_PARAMETERS = ("selfmodel", "score", "controller", "neurons")
+"""Names of the parameters that affect a gait."""
 
-OF_GAIT = ("selfmodel", "score", "controller", "neurons")
-"""Parameters that gaits depend on."""
-
-LATER = ("kinds", "gap", "structure", "neurons")
-"""Parameters that are kept only if they differ from their defaults, so that studies from before
-they existed are continued."""
+OPTIONAL_PARAMETERS = ("kinds", "gap", "structure", "neurons")
+"""Names of the parameters that ``run.json`` contains only if they differ from their defaults, so
+that folders of version 0.1, which has no such parameters, are resumable."""
 
 
 @dataclass(frozen=True)
 class Study:
-    """Which bodies fail in which ways, and how they are brought back.
+    """Definition of a study: bodies, failures and parameters of the recoveries.
 
     Attributes:
         bodies: Names of robots, and paths of MJCF files.
-        cases: Numbers of failures like those of Table I; a body that cannot have one is left out of
-            it, and so are silent neurons where there are none.
-        seeds: A run for each.
-        folder: Where all of it is kept.
-        settings: The paper's numbers.
-        score: What controllers are evolved for, and what is told of the trials.
-        controller: The kind of controller.
-        comparator: Its name, or ``package.module:object``.
-        kinds: Fault kinds that are searched, as ``--kinds`` has them.
+        cases: Numbers of failures like those of Table I; a case that does not apply to a body or
+            to its controllers is omitted.
+        seeds: Seeds, one run each.
+        folder: Folder of the gaits, runs and results.
+        settings: Parameters of the recoveries.
+        score: Fitness of the repair EA, also reported per trial.
+        controller: Name of the controller design.
+        comparator: Name of the comparator, or ``package.module:object``.
+        kinds: Fault kinds to search, as in ``--kinds``.
         gap: Level of the reality gap.
-        structure: Whether the physical robots have structural mismatch.
-        neurons: Hidden neurons of the network; the design's default for None.
+        structure: Whether the physical robots have structural mismatches.
+        neurons: Number of hidden neurons; None for the design's default.
     """
 
     bodies: Sequence[str]
@@ -65,15 +63,15 @@ class Study:
 
 
 def known_cases(bodies: Sequence[str]) -> tuple[int, ...]:
-    """Returns the numbers of the cases that at least one of some bodies has."""
+    """Returns the numbers of the cases that apply to at least one body."""
     return tuple(sorted({case for body in bodies for case in robots.robot_entry(body).cases}))
 
 
 def check(study: Study) -> None:
-    """Checks all that can be wrong with a study, before anything is run.
+    """Checks the definition of a study, before anything is run.
 
     Raises:
-        InputError: Something is, and which.
+        InputError: The definition is invalid, or its folder contains another study.
     """
     plugins.comparator(study.comparator)
     plugins.kinds(study.kinds)
@@ -83,9 +81,7 @@ def check(study: Study) -> None:
         plugins.design(study.controller, entry.robot(), study.neurons)
         plugins.score(study.score, body, entry)
     if not 0 <= study.gap <= MAX_GAP_LEVEL:
-        raise InputError(
-            f"a gap is a number from 0 to {MAX_GAP_LEVEL}, such as 0.05, got {study.gap}"
-        )
+        raise InputError(f"expected a gap from 0 to {MAX_GAP_LEVEL}, such as 0.05, got {study.gap}")
     known = known_cases(study.bodies)
     for case in study.cases:
         if case not in known:
@@ -94,24 +90,21 @@ def check(study: Study) -> None:
 
 
 def gait_jobs(study: Study, only: tuple[int, int] = (1, 1)) -> list[Job]:
-    """Returns the evolution of each body's gait before it fails, one a seed.
+    """Returns the jobs that evolve the gaits before the failure, one per body and seed.
 
     Args:
-        study: What to run.
-        only: ``(i, n)``: every n-th gait, from the i-th, counted from 1.
+        study: The study.
+        only: ``(i, n)``: share i of n of the gaits, from 1.
     """
     shared = _shared(study)
-    made_of = {name: shared["settings"][name] for name in shared["settings"]}
-    for name in OF_DIAGNOSIS:
-        del made_of[name]
     part, parts = only
     jobs = [
         Job(
             key=f"{key_of(body)}-seed{seed:03d}",
             parameters={
                 **_body(body),
-                "settings": made_of,
-                **{name: shared[name] for name in OF_GAIT if name in shared},
+                "settings": gait_settings(study.settings),
+                **{name: shared[name] for name in GAIT_PARAMETERS if name in shared},
             },
             seed=seed,
             parts=("gait",),
@@ -123,14 +116,14 @@ def gait_jobs(study: Study, only: tuple[int, int] = (1, 1)) -> list[Job]:
 
 
 def recovery_jobs(study: Study, only: tuple[int, int] = (1, 1)) -> list[Job]:
-    """Returns the recoveries whose gait has been evolved, one seed after another.
+    """Returns the jobs of the recoveries with an evolved gait, one seed after another.
 
     Args:
-        study: What to run.
-        only: Those of every n-th gait; see ``gait_jobs``.
+        study: The study.
+        only: ``(i, n)``: the recoveries of share i of n of the gaits, from 1.
 
     Raises:
-        InputError: A gait that was evolved is not there any more.
+        InputError: The file of an evolved gait is missing.
     """
     found = []
     for gait in gait_jobs(study, only):
@@ -138,8 +131,8 @@ def recovery_jobs(study: Study, only: tuple[int, int] = (1, 1)) -> list[Job]:
         if not path.exists():
             if any(part.key == gait.key for part in finished(study.folder / "gaits")):
                 raise InputError(
-                    f"{path} is missing, the gait that recoveries begin with: put it back, or "
-                    f"delete {study.folder / 'gaits' / gait.key} to evolve it again"
+                    f"{path} is missing, the first gait of recoveries: restore the file, or delete "
+                    f"{study.folder / 'gaits' / gait.key} to evolve the gait again"
                 )
             continue
         body = gait.parameters["body"]
@@ -159,12 +152,12 @@ def recovery_jobs(study: Study, only: tuple[int, int] = (1, 1)) -> list[Job]:
                 parts=("recovery",),
             )
             for case in study.cases
-            if case in entry.cases and _means_something(study, entry, case)
+            if case in entry.cases and _applies(study, entry, case)
         ]
     return found
 
 
-def _means_something(study: Study, entry: Entry, case: int) -> bool:
+def _applies(study: Study, entry: Entry, case: int) -> bool:
     """Returns whether the study's controllers have the hidden neurons that a failure silences."""
     robot = entry.robot()
     silent = silent_neurons(parse(entry.cases[case], robot.anatomy))
@@ -172,7 +165,7 @@ def _means_something(study: Study, entry: Entry, case: int) -> bool:
 
 
 def gait_path(folder: Path, key: str) -> Path:
-    """Returns where the gait of that key is, in the folder of a study."""
+    """Returns the file of a gait in the folder of a study."""
     return folder / "gaits" / f"{key}.npz"
 
 
@@ -180,7 +173,7 @@ def _body(body: str) -> dict[str, Any]:
     robot = robots.robot_entry(body).robot()
     assets = hashlib.sha256()
     for name, content in sorted(robot.assets.items()):
-        # Of one length each: what ends where is told apart.
+        # Digests have one length, so that the boundaries of names and contents count.
         for part in (name.encode(), content):
             assets.update(hashlib.sha256(part).digest())
     return {
@@ -193,7 +186,7 @@ def _body(body: str) -> dict[str, Any]:
 
 
 def _shared(study: Study) -> dict[str, Any]:
-    """What is the same for all runs, and must be for their rows to stand in one table."""
+    """Returns the parameters that all runs of one results table share."""
     return {
         "selfmodel": __version__,
         "settings": dataclasses.asdict(study.settings),
@@ -203,6 +196,6 @@ def _shared(study: Study) -> dict[str, Any]:
         **{
             field.name: getattr(study, field.name)
             for field in dataclasses.fields(study)
-            if field.name in LATER and getattr(study, field.name) != field.default
+            if field.name in OPTIONAL_PARAMETERS and getattr(study, field.name) != field.default
         },
     }

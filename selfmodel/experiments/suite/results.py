@@ -1,4 +1,4 @@
-"""What a study found, in files."""
+"""Results of a study of many bodies: rows and summaries, collected from its folder and written."""
 
 import json
 from dataclasses import dataclass
@@ -6,43 +6,46 @@ from pathlib import Path
 from typing import Any
 
 from selfmodel.experiments.grid import finished
-from selfmodel.experiments.suite.rows import Row, Summary, as_csv, as_objects, summarise
-from selfmodel.logs.atomic import lock_folder, write_atomic
+from selfmodel.experiments.study_files import as_csv, as_dicts, write_files
+from selfmodel.experiments.suite.rows import SuiteRow, Summary, summarise
 
 
 @dataclass(frozen=True)
-class Results:
-    """What was found, and where it was written.
+class SuiteResults:
+    """Results of a study and their files.
 
     Attributes:
-        rows: Every recovery in the folder.
-        summaries: What they come to.
-        files: The CSV and the JSON.
+        rows: All recoveries in the folder.
+        summaries: Summaries of the rows.
+        files: Paths of the CSV and the JSON.
     """
 
-    rows: tuple[Row, ...]
+    rows: tuple[SuiteRow, ...]
     summaries: tuple[Summary, ...]
     files: tuple[Path, ...]
 
-    def as_object(self) -> dict[str, Any]:
-        """Returns it as JSON has it."""
-        return {"rows": as_objects(self.rows), "summaries": as_objects(self.summaries)}
+    def as_dict(self) -> dict[str, Any]:
+        """Returns rows and summaries as JSON."""
+        return _as_dict(self.rows, self.summaries)
 
 
-def write_results(folder: Path) -> Results:
-    """Writes ``results.csv`` and ``results.json`` of all that is in the folder of a study.
+def write_results(folder: Path) -> SuiteResults:
+    """Writes ``results.csv`` and ``results.json`` of all runs in the folder of a study.
 
     Raises:
-        InputError: A file in it is damaged.
-        OSError: They cannot be written.
+        InputError: A file in the folder is damaged.
+        OSError: The results cannot be written.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    with lock_folder(folder):  # several may end at once
-        found = [Row(**row) for part in finished(folder / "runs") for row in part.result]
-        rows = tuple(sorted(found, key=lambda row: (row.robot, row.case, row.seed)))
-        files = (folder / "results.csv", folder / "results.json")
-        results = Results(rows, summarise(rows), files)
-        write_atomic(files[0], as_csv(rows).encode())
-        text = json.dumps(results.as_object(), indent=1, allow_nan=False)
-        write_atomic(files[1], f"{text}\n".encode())
-    return results
+    found = [SuiteRow(**row) for part in finished(folder / "runs") for row in part.result]
+    rows = tuple(sorted(found, key=lambda row: (row.robot, row.case, row.seed)))
+    summaries = summarise(rows)
+    text = json.dumps(_as_dict(rows, summaries), indent=1, allow_nan=False)
+    files = {
+        "results.csv": as_csv(SuiteRow, rows).encode(),
+        "results.json": f"{text}\n".encode(),
+    }
+    return SuiteResults(rows, summaries, write_files(folder, files))
+
+
+def _as_dict(rows: tuple[SuiteRow, ...], summaries: tuple[Summary, ...]) -> dict[str, Any]:
+    return {"rows": as_dicts(rows), "summaries": as_dicts(summaries)}

@@ -1,37 +1,33 @@
-"""The rows of a study, one a run, and what they amount to for each body and case."""
+"""Rows of a study of many bodies, one per recovery, and their summaries by body and case."""
 
-import csv
-import dataclasses
-import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import median
-from typing import Any
 
 from selfmodel.experiments.confidence_intervals import Interval, proportion
 
 SINGLE = (1, 2, 3, 5, 6)
-"""The cases that are one fault."""
+"""Numbers of the cases with a single fault."""
 
 
 @dataclass(frozen=True)
-class Row:
-    """One recovery.
+class SuiteRow:
+    """One recovery with its truth and its cost.
 
     Attributes:
-        robot: The body.
-        case: Which failure it is.
-        truth: What it is, in notation.
-        seed: The seed of the run.
-        best: The last diagnosis, in notation.
-        correct: Whether it is the truth, or cannot be told from it by the trials.
-        verdict: What the diagnosis says of itself.
-        trials: Physical trials since the failure.
+        robot: Name of the body.
+        case: Number of the failure.
+        truth: The failure, in notation.
+        seed: Seed of the run.
+        best: Best hypothesis of the last diagnosis, in notation.
+        correct: Whether the best hypothesis is the truth, or behaves like the truth in all trials.
+        verdict: Verdict of the last diagnosis.
+        trials: Number of physical trials since the failure.
         before: Score of the trial before the failure.
-        after: Score of the same controller after it.
+        after: Score of the same controller after the failure.
         recovered: Score of the best recovery trial.
-        diverged: Simulations that broke down.
-        seconds: Wall time of the recovery without the gait before it, on one thread.
+        diverged: Number of diverged simulations.
+        seconds: Wall time of the recovery without the evolution of its first gait, on one thread.
     """
 
     robot: str
@@ -51,20 +47,20 @@ class Row:
 
 @dataclass(frozen=True)
 class Summary:
-    """What the runs of a body come to, over the seeds of one case or over its single faults.
+    """Summary of the runs of a body, over the seeds of one case or over all single faults.
 
     Attributes:
-        robot: The body.
-        case: The case; None for all single faults.
-        truth: What it is, in notation; "" for all single faults.
-        runs: How many runs.
-        right: How many of their diagnoses are right.
-        correct: The proportion, with Wilson's interval.
+        robot: Name of the body.
+        case: Number of the case; None for all single faults.
+        truth: The failure, in notation; "" for all single faults.
+        runs: Number of runs.
+        right: Number of right diagnoses.
+        correct: Proportion of right diagnoses, with Wilson's interval.
         before: Median score before the failure.
-        after: Median score after it.
+        after: Median score after the failure.
         recovered: Median score of the best recovery trial.
-        recovery: Median of recovered over before, where that is above 0; None where it never is.
-        trials: Mean of the physical trials since the failure.
+        recovery: Median of recovered over before for runs with before above 0; None without any.
+        trials: Mean number of physical trials since the failure.
         seconds: Median wall time.
     """
 
@@ -82,8 +78,8 @@ class Summary:
     seconds: float
 
 
-def summarise(rows: Sequence[Row]) -> tuple[Summary, ...]:
-    """Returns a summary for each case of each body, and after them one of its single faults."""
+def summarise(rows: Sequence[SuiteRow]) -> tuple[Summary, ...]:
+    """Returns the summaries of each body: one per case, then one of all single faults."""
     found = []
     for robot in dict.fromkeys(row.robot for row in rows):
         own = [row for row in rows if row.robot == robot]
@@ -96,7 +92,7 @@ def summarise(rows: Sequence[Row]) -> tuple[Summary, ...]:
     return tuple(found)
 
 
-def _summary(robot: str, case: int | None, truth: str, rows: Sequence[Row]) -> Summary:
+def _summary(robot: str, case: int | None, truth: str, rows: Sequence[SuiteRow]) -> Summary:
     right = sum(row.correct for row in rows)
     ratios = [row.recovered / row.before for row in rows if row.before > 0]
     return Summary(
@@ -113,20 +109,3 @@ def _summary(robot: str, case: int | None, truth: str, rows: Sequence[Row]) -> S
         trials=sum(row.trials for row in rows) / len(rows),
         seconds=median(row.seconds for row in rows),
     )
-
-
-def as_csv(rows: Sequence[Row]) -> str:
-    """Returns rows as CSV (RFC 4180, but lines end in a newline)."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    columns = [field.name for field in dataclasses.fields(Row)]
-    writer.writerow(columns)
-    for row in rows:
-        values = (getattr(row, column) for column in columns)
-        writer.writerow(str(v).lower() if isinstance(v, bool) else v for v in values)
-    return text.getvalue()
-
-
-def as_objects(rows: Iterable[Row | Summary]) -> list[dict[str, Any]]:
-    """Returns rows as JSON has them."""
-    return [dataclasses.asdict(row) for row in rows]

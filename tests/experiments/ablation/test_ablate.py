@@ -16,7 +16,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from selfmodel.errors import InputError
-from selfmodel.experiments.ablation import Ablation, Row, ablate, collect, write_results
+from selfmodel.experiments.ablation import Ablation, AblationRow, ablate, collect, write_results
 from selfmodel.experiments.ablation.plan import cells
 from selfmodel.experiments.ablation.scores import summarise
 from selfmodel.experiments.grid import GridBegins, PartEnds
@@ -33,7 +33,7 @@ from selfmodel.errors import InputError
 
 @dataclass(frozen=True)
 class Picky(ForwardDisplacement):
-    def request(self, trial):
+    def prepare(self, trial):
         raise InputError("this trial does not please")
 
 SAME = ForwardDisplacement(name="same")
@@ -63,10 +63,10 @@ def small(folder: Path, **changes: object) -> Ablation:
 
 
 def run(ablation: Ablation, workers: int = 1, **more: object) -> tuple[PartEnds, ...]:
-    return ablate(ablation, workers=workers, on_event=lambda _event: None, **more)
+    return ablate(ablation, workers=workers, on_progress=lambda _event: None, **more)
 
 
-def timeless(rows: Sequence[Row]) -> list[Row]:
+def timeless(rows: Sequence[AblationRow]) -> list[AblationRow]:
     return [dataclasses.replace(row, seconds=0) for row in rows]
 
 
@@ -116,7 +116,7 @@ def test_one_more_comparator_diagnoses_from_the_same_logs_and_nothing_is_done_ag
     events: list[GridBegins | PartEnds] = []
     same = "their_comparators:SAME"
     both = small(extended, bank=done / "bank", comparators=[PAPERS, same])
-    ablate(both, workers=1, on_event=events.append)
+    ablate(both, workers=1, on_progress=events.append)
 
     assert events[0] == GridBegins(total=4, finished=2)
     assert [event.part for event in events[1:]] == [same, same]
@@ -230,7 +230,7 @@ def test_trials_that_are_chosen_are_a_comparators_own(tmp_path: Path, way: str):
 def test_a_way_to_choose_needs_a_trial_to_choose(tmp_path: Path, way: str):
     settings = Settings(steps=60, generations=2, trials=1).scaled(6)
 
-    with pytest.raises(InputError, match=f"with --next-trial {way} there are at least 2 trials"):
+    with pytest.raises(InputError, match=f"at least 2 trials with --next-trial {way}"):
         run(small(tmp_path / "out", next_trial=way, settings=settings))
 
 
@@ -264,7 +264,7 @@ def test_a_killed_ablation_goes_on_and_finds_what_an_unbroken_one_finds(done: Pa
 def test_a_folder_with_another_ablation_is_refused(done: Path):
     other = Settings(steps=60, generations=3, trials=2).scaled(6)
 
-    with pytest.raises(InputError, match=r"settings.generations is 2 there, asked is 3"):
+    with pytest.raises(InputError, match=r"settings.generations is 2 there, requested is 3"):
         run(small(done, cases=[2], settings=other))
     assert not list(done.glob("runs/*case02*"))
 
@@ -345,7 +345,7 @@ def test_every_trial_of_a_robot_built_differently_hides_how(otherwise: Path, don
     "changes", [{"structure": True}, {"kinds": "break,jam"}], ids=["structure", "kinds"]
 )
 def test_what_is_not_of_one_table_does_not_go_into_one_folder(done: Path, changes: dict):
-    with pytest.raises(InputError, match="holds an ablation that was made otherwise"):
+    with pytest.raises(InputError, match="contains an ablation with other settings"):
         run(small(done, cases=[2], **changes))
 
 
@@ -358,9 +358,9 @@ def test_the_shares_of_a_cluster_are_the_whole_and_nothing_twice(seeds: int, gap
     assert max(map(len, shares)) - min(map(len, shares)) <= 1
 
 
-def scored(comparator: str, case: int, seconds: float, *, correct: bool) -> Row:
-    return Row(
-        **dict.fromkeys(field.name for field in dataclasses.fields(Row))
+def scored(comparator: str, case: int, seconds: float, *, correct: bool) -> AblationRow:
+    return AblationRow(
+        **dict.fromkeys(field.name for field in dataclasses.fields(AblationRow))
         | {"robot": "quadruped", "gap": 0.05, "seed": 0, "trials": 1, "best": "intact"}
         | {"comparator": comparator, "case": case, "seconds": seconds, "correct": correct}
         | {"truth": f"the failure of case {case}"}

@@ -52,11 +52,11 @@ def test_a_robot_of_ones_own_is_ablated_by_the_name_of_its_file(
     Path("mine.xml").write_text(quadruped.mjcf, encoding="utf-8")
     ablation = small(tmp_path / "out", robots=["./mine.xml"])
 
-    assert ablate(ablation, workers=1, on_event=lambda _event: None) == ()
+    assert ablate(ablation, workers=1, on_progress=lambda _event: None) == ()
     assert {row.robot for row in collect(ablation.folder)} == {"./mine.xml"}
     assert {
         path.name for path in write_results(ablation.folder).files if path.suffix == ".png"
     } == {*("gap.png", "cases-mine-1.png", "cases-mine-2.png")}
     assert (ablation.folder / "runs" / "mine-case01-gap0.0-seed005").is_dir()
-    with pytest.raises(InputError, match=r"mine.xml and ./mine.xml would be called alike"):
+    with pytest.raises(InputError, match=r"mine.xml and ./mine.xml would have the same file names"):
         check(small(tmp_path, robots=["mine.xml", "./mine.xml"]))

@@ -86,7 +86,7 @@ def test_settings_are_options(ant: Path, tmp_path: Path):
         (("recover", "ant.xml", "--case", "11"), "unknown case"),
         (("recover", "ant.xml"), "a notation is like break:ankle_1"),
         (("recover", "ant.xml", "--damage", "break:hipp"), "did you mean hip_"),
-        (("recover", "quadruped", "--case", "1", "--set", "forward=y"), "has all that it needs"),
+        (("recover", "quadruped", "--case", "1", "--set", "forward=y"), "is the name of a robot"),
         (("robots", "ant.xml", "--set", "forwards=y"), "did you mean forward"),
         (("robots", "ant.xml", "--set", "neurons=4"), "give --neurons N to the command"),
         (("robots", "ant.xml", "--set", "y"), "a setting such as forward=-x, got 'y'"),

@@ -1,0 +1,53 @@
+"""Gaits of healthy robots for studies, evolved once and kept in files."""
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+from selfmodel.controllers.controller import Design
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.logs.atomic import write_atomic
+from selfmodel.logs.controllers import controller_bytes
+from selfmodel.recovery.fitness import DISPLACEMENT, Score
+from selfmodel.recovery.random_streams import repair_stream
+from selfmodel.recovery.repair import RepairSearch
+from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.simulation.simulator import Simulator
+
+DIAGNOSIS_SETTINGS = ("trials", "genes", "kept")
+"""Names of the settings that do not affect a gait."""
+
+
+def gait_settings(settings: Settings) -> dict[str, Any]:
+    """Returns the settings that affect a gait, as JSON."""
+    values = dataclasses.asdict(settings)
+    return {name: values[name] for name in values if name not in DIAGNOSIS_SETTINGS}
+
+
+def evolve_gait(
+    path: Path,
+    robot: Robot,
+    settings: Settings,
+    seed: int,
+    *,
+    design: Design | None = None,
+    score: Score = DISPLACEMENT,
+) -> dict[str, Any]:
+    """Evolves the first gait of a recovery with the same seed, and writes it.
+
+    Args:
+        path: The ``.npz`` file to write.
+        robot: The nominal robot.
+        settings: Parameters of the repair EA.
+        seed: Seed of all random numbers.
+        design: Controller design; None for the robot's network.
+        score: Fitness of the repair EA.
+
+    Returns:
+        Number of evaluations, as JSON.
+    """
+    repair = RepairSearch(Simulator(robot, threads=1), settings, design, score=score)
+    gait = repair(INTACT, (), repair_stream(seed, 0), lambda _generation: None)
+    write_atomic(path, controller_bytes(gait))
+    return {"evaluations": repair.evaluations}

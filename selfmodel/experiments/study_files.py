@@ -1,0 +1,75 @@
+"""Files of a study: their names per robot, tables as CSV and JSON, atomic writing."""
+
+import csv
+import dataclasses
+import io
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from selfmodel.errors import InputError
+from selfmodel.experiments import robots
+from selfmodel.logs.atomic import write_atomic
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+
+def key_of(robot: str) -> str:
+    """Returns the robot's part of a file name: its name, or the name of its MJCF file."""
+    name = Path(robot).stem if robots.is_model(robot) else robot
+    return re.sub(r"[^\w.-]", "_", name, flags=re.ASCII).lstrip(".-") or "robot"
+
+
+def check_keys(robots: Iterable[str]) -> None:
+    """Checks that the robots of a study have different file names.
+
+    Raises:
+        InputError: Two robots have one file name; the message names both.
+    """
+    taken: dict[str, str] = {}
+    for robot in robots:
+        other = taken.setdefault(key_of(robot), robot)
+        if other != robot:
+            raise InputError(
+                f"{other} and {robot} would have the same file names: rename one of the files"
+            )
+
+
+def as_csv(record: "type[DataclassInstance]", rows: Sequence["DataclassInstance"]) -> str:
+    """Returns rows as CSV (RFC 4180, with newlines as line ends); None is an empty cell.
+
+    Args:
+        record: Class of the rows; its fields are the columns.
+        rows: The rows.
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    columns = [field.name for field in dataclasses.fields(record)]
+    writer.writerow(columns)
+    for row in rows:
+        values = (getattr(row, column) for column in columns)
+        writer.writerow(str(v).lower() if isinstance(v, bool) else v for v in values)
+    return text.getvalue()
+
+
+def as_dicts(rows: Iterable["DataclassInstance"]) -> list[dict[str, Any]]:
+    """Returns rows as JSON."""
+    return [dataclasses.asdict(row) for row in rows]
+
+
+def write_files(folder: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
+    """Writes files into a folder, made if missing, and returns their paths.
+
+    Args:
+        folder: The folder.
+        files: Content by path relative to the folder.
+
+    Raises:
+        OSError: A file cannot be written.
+    """
+    for name, data in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        write_atomic(folder / name, data)
+    return tuple(folder / name for name in files)

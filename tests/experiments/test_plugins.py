@@ -1,0 +1,90 @@
+"""Plug-ins by name: entry points of installed packages, and ``package.module:object``."""
+
+from pathlib import Path
+
+import pytest
+
+from selfmodel.comparators import FORWARD_DISPLACEMENT
+from selfmodel.errors import InputError
+from selfmodel.experiments import plugins
+
+MODULE = """
+from dataclasses import replace
+from selfmodel.comparators import FORWARD_DISPLACEMENT
+from selfmodel.faults import KINDS
+
+MINE = replace(FORWARD_DISPLACEMENT, name="mine")
+LIMP = replace(KINDS["jam"], name="limp", keyword="limp")
+NUMBER = 7
+"""
+
+ENTRY_POINTS = """
+[selfmodel.comparators]
+displacement-of-theirs = entry_module:MINE
+forward-displacement = entry_module:MINE
+number = entry_module:NUMBER
+gone = entry_module:GONE
+
+[selfmodel.fault_kinds]
+limp = entry_module:LIMP
+"""
+
+
+def install(folder: Path, package: str, entry_points: str) -> None:
+    """Writes the metadata of an installed package."""
+    metadata = folder / f"{package}-1.0.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
+    (metadata / "entry_points.txt").write_text(entry_points)
+
+
+@pytest.fixture(autouse=True)
+def _installed_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "entry_module.py").write_text(MODULE)
+    install(tmp_path, "theirs", ENTRY_POINTS)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+
+
+def test_a_comparator_and_a_fault_kind_are_found_by_their_entry_points():
+    assert plugins.comparator("displacement-of-theirs").name == "mine"
+    assert [kind.name for kind in plugins.kinds("break,limp")] == ["break", "limp"]
+
+
+def test_an_entry_point_is_the_object_of_its_module():
+    by_path = plugins.comparator("entry_module:MINE")
+
+    assert plugins.comparator("displacement-of-theirs") == by_path
+
+
+def test_a_name_of_selfmodel_has_precedence_over_an_entry_point():
+    assert plugins.comparator("forward-displacement") is FORWARD_DISPLACEMENT
+
+
+def test_all_fault_kinds_are_those_of_selfmodel():
+    assert "limp" not in {kind.name for kind in plugins.kinds("all")}
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("displacement-of-their", "did you mean .*displacement-of-theirs"),
+        ("number", "'number' is no comparator"),
+        ("gone", "cannot find the comparator 'gone': .*GONE.*displacement-of-theirs"),
+    ],
+)
+def test_a_comparator_that_cannot_be_used_is_refused(name: str, reason: str):
+    with pytest.raises(InputError, match=reason):
+        plugins.comparator(name)
+
+
+def test_an_unknown_fault_kind_is_refused_with_the_installed_names():
+    with pytest.raises(InputError, match=r"unknown kind 'limb': did you mean .*limp"):
+        plugins.kinds("limb")
+
+
+def test_a_name_that_two_packages_define_is_refused(tmp_path: Path):
+    install(tmp_path, "others", "[selfmodel.comparators]\nnumber = entry_module:MINE\n")
+
+    with pytest.raises(InputError, match="two installed packages have the comparator 'number'"):
+        plugins.comparator("number")
