@@ -90,7 +90,7 @@ def test_a_hinge_without_a_motor_belongs_to_the_joint_of_its_body():
 
 
 def test_joints_of_the_same_name_are_refused():
-    """Two share their hinges' name, and one of them has for its body's name that of a third."""
+    """Two joints have the same prefix, and the body of one has the name of a third joint."""
     tails = "".join(
         f'<body name="{body}">{two_hinges(f"tail_{body}", f"tail{body}")}<geom size=".1"/></body>'
         for body in ("knee", "other")

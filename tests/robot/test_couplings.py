@@ -146,7 +146,7 @@ def test_a_constraint_of_welded_joints_only_is_disabled():
 
 
 def floating(equality: str) -> Robot:
-    """The robot with nothing but the constraint that acts on it."""
+    """Returns the robot with no forces but those of an equality constraint."""
     robot = made(equality)
     robot.model.opt.gravity[:] = 0
     robot.model.pair_margin[:] = 0

@@ -37,7 +37,7 @@ def text(values: np.ndarray) -> str:
 
 
 def made(seed: int, slides: int, *, turns: bool) -> Robot:
-    """A robot whose root slides along any axes and turns about any axis beside its origin."""
+    """Returns a robot whose base has random slide axes and a hinge beside its origin."""
     rng = np.random.default_rng(seed)
     joints = "".join(
         f'<joint name="s{k}" type="slide" axis="{text(rng.normal(size=3))}" ref="{rng.normal()}"/>'

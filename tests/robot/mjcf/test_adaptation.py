@@ -25,7 +25,7 @@ SPRUNG_LEGS = LEGS.replace("</body>", '<site name="a" pos="0 .02 -.2"/></body>',
 
 
 def theirs(path: Path) -> mujoco.MjModel:
-    """What MuJoCo makes of the user's own file."""
+    """Returns the compiled model of the user's file."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return mujoco.MjModel.from_xml_path(str(path))
@@ -38,7 +38,7 @@ def written(folder: Path, text: str) -> Path:
 
 
 def moved(model: mujoco.MjModel, qpos: np.ndarray, steps: int = 60) -> mujoco.MjData:
-    """Where a model goes from a pose, with motors that swing."""
+    """Returns the state after a run from a pose with sinusoidal commands."""
     data = mujoco.MjData(model)
     data.qpos = qpos
     for step in range(steps):
@@ -77,7 +77,7 @@ def test_an_adapted_mjcf_stays_the_same_when_adapted_again(name: str, tmp_path: 
 
 
 TINY = 1e-300
-"""Below it, MuJoCo calls a number too large to read."""
+"""Smallest number that MuJoCo reads from an XML text."""
 
 
 def angles(most: float) -> st.SearchStrategy[float]:
@@ -231,7 +231,7 @@ def test_a_touch_sensor_reads_1_while_its_limb_is_in_contact(name: str):
 
 
 def adapted_names(name: str) -> set[str]:
-    """The touch sensors that a file did not have itself."""
+    """Returns the names of the sensors that the adaptation has added."""
     model = theirs(SAMPLES[name])
     own = {model.sensor(s).name for s in range(model.nsensor)}
     return {s.name for s in load_mjcf(SAMPLES[name]).anatomy.sensors} - own

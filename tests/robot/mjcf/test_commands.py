@@ -13,7 +13,7 @@ from tests.robot.mjcf.samples import SAMPLES
 
 @pytest.fixture
 def ant(tmp_path: Path) -> Path:
-    """A copy of somebody's robot."""
+    """Returns the path of a copy of gymnasium's ant."""
     return Path(shutil.copy(SAMPLES["gymnasium ant"], tmp_path / "ant.xml"))
 
 
