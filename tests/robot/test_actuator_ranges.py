@@ -1,4 +1,4 @@
-"""Promises of command ranges: what a motor's own attributes say, or a sentence that asks."""
+"""Tests of command ranges: read from a motor's attributes, or required in an error message."""
 
 import numpy as np
 import pytest
@@ -35,7 +35,7 @@ def made_with(motor: str, joint: str = LIMITED) -> Robot:
     return Robot("one-legged", MJCF.format(motor=motor, joint=joint), 0.01)
 
 
-def test_our_own_robots_span_the_paper_s_range_to_the_bit(robot: Robot):
+def test_the_own_robots_have_the_range_of_the_paper_to_the_bit(robot: Robot):
     paper = ((0.0, TARGET_RANGE),) * len(robot.anatomy.motors)
 
     assert command_ranges(robot.model) == paper
@@ -66,13 +66,13 @@ def test_our_own_robots_span_the_paper_s_range_to_the_bit(robot: Robot):
         ('<velocity name="m" joint="hip" kv="2" forcerange="-8 6"/>', -4, 3),
     ],
 )
-def test_a_range_is_what_the_motor_says_of_itself(motor: str, low: float, high: float):
+def test_a_range_follows_from_the_attributes_of_the_motor(motor: str, low: float, high: float):
     ((centre, half),) = command_ranges(made_with(motor).model)
 
     assert (centre - half, centre + half) == pytest.approx((low, high))
 
 
-def test_a_joint_s_largest_torque_bounds_a_motor_by_its_gear():
+def test_the_torque_limit_of_a_joint_bounds_a_motor_by_its_gear():
     joint = f'{LIMITED} actuatorfrcrange="-30 60"'
     ((centre, half),) = command_ranges(
         made_with('<motor name="m" joint="hip" gear="-3"/>', joint).model
@@ -90,19 +90,19 @@ def test_a_joint_s_largest_torque_bounds_a_motor_by_its_gear():
         '<motor name="m" site="foot"/>',
     ],
 )
-def test_a_motor_that_says_nothing_is_asked_for_by_name(motor: str):
+def test_a_motor_without_a_range_is_refused_by_name(motor: str):
     with pytest.raises(InputError, match=r"got none for the motor m: give it a ctrlrange"):
         command_ranges(made_with(motor).model)
 
 
-def test_a_servo_whose_joint_has_no_end_is_asked_for():
+def test_a_servo_of_an_unlimited_joint_is_refused_by_name():
     model = made_with('<position name="m" joint="hip" kp="10"/>').model
     model.jnt_limited[:] = 0
     with pytest.raises(InputError, match=r"got none for the motor m: give it a ctrlrange"):
         command_ranges(model)
 
 
-def test_a_robot_is_known_where_only_its_controller_would_need_the_range():
+def test_a_robot_without_a_range_is_valid_until_a_controller_needs_it():
     made = made_with('<motor name="m" joint="hip"/>')
 
     assert made.anatomy.motors == ("m",)
@@ -138,6 +138,6 @@ def test_a_network_s_outputs_span_the_range_of_each_motor():
         (((0.0, np.nan), (0.0, 1.0)), "motor x needs a finite command range"),
     ],
 )
-def test_what_is_no_range_is_refused(ranges: tuple, match: str):
+def test_an_invalid_range_is_refused(ranges: tuple, match: str):
     with pytest.raises(ValueError, match=match):
         Network(("a",), ("x", "y"), 3, ranges)

@@ -1,4 +1,4 @@
-"""Promises of what is read off a model: parts told apart, ranges in full, and a sentence if not."""
+"""Tests of the anatomy that is read from a model: names, ranges, and refused models."""
 
 import math
 
@@ -71,7 +71,7 @@ def two_hinges(one: str, other: str) -> str:
         ('<joint name="first" axis="1 0 0"/>', "first", "first"),
     ],
 )
-def test_a_joint_is_called_by_what_its_hinges_share_or_by_its_body(
+def test_a_joint_has_the_common_prefix_of_its_hinges_or_the_name_of_its_body(
     upper: str, motor: str, name: str
 ):
     joints = made(upper=upper, motor=f'<motor name="m" joint="{motor}"/>').anatomy.joints
@@ -89,8 +89,8 @@ def test_a_hinge_without_a_motor_belongs_to_the_joint_of_its_body():
     assert loose.anatomy.hinges == ("first", "knee")
 
 
-def test_joints_that_would_be_called_alike_are_refused():
-    """Two share their hinges' name, and one of them has for its body's name that of a third."""
+def test_joints_of_the_same_name_are_refused():
+    """Two joints have the same prefix, and the body of one has the name of a third joint."""
     tails = "".join(
         f'<body name="{body}">{two_hinges(f"tail_{body}", f"tail{body}")}<geom size=".1"/></body>'
         for body in ("knee", "other")
@@ -112,7 +112,7 @@ def test_an_angle_reads_from_minus_one_to_one_over_its_hinge_s_range():
 
 
 @pytest.mark.parametrize("name", EVERY_BODY)
-def test_what_a_controller_receives_is_what_a_sensor_says_an_angle_reads_as(name: str):
+def test_a_controller_receives_the_reading_of_the_sensor_for_the_angle(name: str):
     robot = BODIES[name]()
     run = (
         Simulator(robot, 1)
@@ -127,7 +127,7 @@ def test_what_a_controller_receives_is_what_a_sensor_says_an_angle_reads_as(name
             )
 
 
-def test_a_joint_that_cannot_be_at_zero_jams_at_the_end_that_is_nearest():
+def test_a_joint_that_cannot_reach_zero_jams_at_the_nearest_end():
     robot = made()
     jammed = build(robot, parse("jam:first", robot.anatomy))
     column = robot.anatomy.names.sensors.index("upper_angle")
@@ -193,7 +193,9 @@ def test_every_level_of_every_kind_is_within_the_bounds_of_its_part():
         ({"upper": '<joint axis="1 0 0"/><joint name="first"/>'}, "hinge number 1 has no name"),
     ],
 )
-def test_what_no_robot_can_have_is_named_in_one_sentence(parts: dict[str, str], sentence: str):
+def test_an_unsupported_part_is_refused_by_name_in_one_sentence(
+    parts: dict[str, str], sentence: str
+):
     mujoco.MjModel.from_xml_string(MJCF.format(**(PARTS | parts)))  # MuJoCo has no objection
     with pytest.raises(ValueError, match=sentence) as raised:
         made(**parts)

@@ -1,4 +1,4 @@
-"""Promises of tendons and constraints: what couples a limb goes with it, and stays if it jams."""
+"""Tests of tendons and equality constraints under broken and jammed joints."""
 
 import mujoco
 import numpy as np
@@ -71,7 +71,7 @@ def built(robot: Robot, text: str) -> mujoco.MjModel:
     return build(robot, parse(text, robot.anatomy)).model
 
 
-def test_a_motor_moves_the_joints_that_its_tendon_turns_and_counts_to_the_first():
+def test_a_motor_moves_the_joints_of_its_tendon_and_belongs_to_the_first():
     joints = {joint.name: joint for joint in made().anatomy.joints}
 
     assert set(joints) == {"hip", "knee", "ankle", "tail"}
@@ -95,7 +95,9 @@ def test_a_motor_moves_the_joints_that_its_tendon_turns_and_counts_to_the_first(
         ("jam:ankle+jam:hip", {"string", "tail"}),
     ],
 )
-def test_a_motor_has_force_while_what_it_moves_is_there_and_not_all_held(text: str, left: set[str]):
+def test_a_motor_has_force_while_its_bodies_are_attached_and_a_joint_is_free(
+    text: str, left: set[str]
+):
     model = built(made(), text)
     forces = {model.actuator(m).name for m in range(model.nu) if model.actuator_gainprm[m].any()}
 
@@ -113,7 +115,7 @@ def test_a_motor_has_force_while_what_it_moves_is_there_and_not_all_held(text: s
         ("jam:ankle+jam:knee", {"lower", "string"}),
     ],
 )
-def test_a_tendon_slackens_that_needs_what_is_lost_or_moves_only_what_is_held(
+def test_a_tendon_is_slack_if_a_body_is_detached_or_all_its_joints_are_welded(
     text: str, slack: set[str]
 ):
     model, names = built(made(), text), ("lower", "string")
@@ -126,7 +128,7 @@ def test_a_tendon_slackens_that_needs_what_is_lost_or_moves_only_what_is_held(
 
 
 @pytest.mark.parametrize("text", ["break:ankle", "break:knee", "break:hip", "break:tail"])
-def test_a_constraint_ends_with_any_body_that_it_involves(text: str):
+def test_a_constraint_is_disabled_if_one_of_its_bodies_is_detached(text: str):
     robot = made(JOINTED, TENDONS, BODIES, SITES)
     lost = robot.anatomy.joint(text.removeprefix("break:")).bodies
     involved = ({"foot", "upper"}, {"lower", "foot"}, {"foot", "tail"}, {"lower", "upper"})
@@ -135,7 +137,7 @@ def test_a_constraint_ends_with_any_body_that_it_involves(text: str):
     assert robot.model.eq_active0.all()
 
 
-def test_a_constraint_of_held_joints_alone_ends():
+def test_a_constraint_of_welded_joints_only_is_disabled():
     robot = made(JOINTED, TENDONS)
 
     assert built(robot, "jam:ankle").eq_active0.tolist() == [1, 1]
@@ -144,7 +146,7 @@ def test_a_constraint_of_held_joints_alone_ends():
 
 
 def floating(equality: str) -> Robot:
-    """The robot with nothing but the constraint that acts on it."""
+    """Returns the robot with no forces but those of an equality constraint."""
     robot = made(equality)
     robot.model.opt.gravity[:] = 0
     robot.model.pair_margin[:] = 0
@@ -161,7 +163,7 @@ def settled(model: mujoco.MjModel) -> mujoco.MjData:
 
 @pytest.mark.parametrize("angle", [-0.09, 0.3])
 @pytest.mark.parametrize(("held", "other"), [("hip", "ankle"), ("ankle", "hip")])
-def test_joints_are_coupled_as_before_where_one_of_them_is_held(
+def test_the_coupling_of_joints_is_the_same_if_one_of_them_is_welded(
     held: str, other: str, angle: float
 ):
     robot = floating(JOINTED)
@@ -172,7 +174,7 @@ def test_joints_are_coupled_as_before_where_one_of_them_is_held(
     assert ankle == pytest.approx(0.1 + 0.5 * hip + 0.3 * hip**2, abs=1e-3), other
 
 
-def test_a_tendon_is_as_long_as_before_where_one_of_its_joints_is_held():
+def test_the_length_of_a_tendon_is_the_same_if_one_of_its_joints_is_welded():
     robot = floating(TENDONS)
     data = settled(built(robot, "jam:knee=0.3"))
 
@@ -182,7 +184,7 @@ def test_a_tendon_is_as_long_as_before_where_one_of_its_joints_is_held():
 @pytest.mark.parametrize(
     ("text", "contacts"), [("intact", 1), ("break:tail", 1), ("break:knee", 0)]
 )
-def test_a_lost_body_touches_nothing_even_in_a_named_pair(text: str, contacts: int):
+def test_a_detached_body_has_no_contacts_even_in_an_explicit_pair(text: str, contacts: int):
     model = built(made(), text)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -190,7 +192,7 @@ def test_a_lost_body_touches_nothing_even_in_a_named_pair(text: str, contacts: i
     assert np.count_nonzero(data.contact.efc_address >= 0) == contacts
 
 
-def test_faults_of_motors_that_move_nothing_any_more_are_absorbed():
+def test_faults_of_motors_that_move_nothing_are_absorbed():
     anatomy = made().anatomy
 
     def settled_text(text: str) -> Hypothesis:
@@ -203,7 +205,7 @@ def test_faults_of_motors_that_move_nothing_any_more_are_absorbed():
     assert str(settled_text("break:tail+motor:tail=0.5")) == "break:tail"
 
 
-def test_a_joint_without_a_motor_of_its_own_has_no_weak_one():
+def test_a_joint_without_its_own_motor_has_no_motor_fault():
     anatomy = made().anatomy
 
     with pytest.raises(ValueError, match="ankle"):

@@ -24,7 +24,7 @@ from tests.helpers.drivers import random_controllers, random_of
 
 
 def of_0_1(robot: Robot, hidden: str) -> Robot:
-    """The robot with the custom numeric of version 0.1."""
+    """Returns the robot with the custom numeric of version 0.1."""
     numeric = f'<custom><numeric name="selfmodel_hidden_neurons" data="{hidden}"/></custom>'
     return Robot(
         robot.name,

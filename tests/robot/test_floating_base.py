@@ -1,4 +1,4 @@
-"""Promises of a root that slides: it is told like one that floats, and put back where it was."""
+"""Tests of a sliding base: its signals are those of a free base, and can be written back."""
 
 import mujoco
 import numpy as np
@@ -37,7 +37,7 @@ def text(values: np.ndarray) -> str:
 
 
 def made(seed: int, slides: int, *, turns: bool) -> Robot:
-    """A robot whose root slides along any axes and turns about any axis beside its origin."""
+    """Returns a robot whose base has random slide axes and a hinge beside its origin."""
     rng = np.random.default_rng(seed)
     joints = "".join(
         f'<joint name="s{k}" type="slide" axis="{text(rng.normal(size=3))}" ref="{rng.normal()}"/>'
@@ -65,7 +65,7 @@ SLIDERS = {"seed": st.integers(0, 2**32), "slides": st.integers(1, 3), "turns": 
 
 
 @given(**SLIDERS)
-def test_it_is_told_where_the_physics_has_it(seed: int, slides: int, turns: bool):  # noqa: FBT001
+def test_a_sliding_base_has_the_signals_of_its_body(seed: int, slides: int, turns: bool):  # noqa: FBT001 - drawn by hypothesis
     robot = made(seed, slides, turns=turns)
     data = anywhere(robot, seed)
     told = {signal: current_value(signal_fields(robot)[signal], data) for signal in BASE}
@@ -83,7 +83,7 @@ def test_it_is_told_where_the_physics_has_it(seed: int, slides: int, turns: bool
 
 
 @given(**SLIDERS)
-def test_what_is_told_puts_it_back(seed: int, slides: int, turns: bool):  # noqa: FBT001
+def test_the_signals_of_a_sliding_base_restore_its_state(seed: int, slides: int, turns: bool):  # noqa: FBT001 - drawn by hypothesis
     robot = made(seed, slides, turns=turns)
     data, again = anywhere(robot, seed), mujoco.MjData(robot.model)
     told = {
@@ -106,7 +106,7 @@ def test_what_is_told_puts_it_back(seed: int, slides: int, turns: bool):  # noqa
 
 
 @given(seed=st.integers(0, 2**32))
-def test_where_it_is_stays_when_only_its_turn_is_told(seed: int):
+def test_position_and_velocity_stay_if_only_the_rotation_is_written(seed: int):
     robot = made(seed, 3, turns=True)
     data, other = anywhere(robot, seed), anywhere(robot, seed + 5)
     where = [signal_fields(robot)[signal] for signal in ("base_position", "base_linear_velocity")]
@@ -121,7 +121,7 @@ def test_where_it_is_stays_when_only_its_turn_is_told(seed: int):
     )
 
 
-def test_a_way_that_it_cannot_go_is_left_out():
+def test_motion_outside_the_degrees_of_freedom_is_dropped():
     joints = '<joint name="x" type="slide" axis="1 0 0"/><joint name="turn" axis="0 1 0"/>'
     robot = Robot("rail", MJCF.format(pos="0 0 1", quat="1 0 0 0", joints=joints), 0.002)
     data = mujoco.MjData(robot.model)
@@ -151,7 +151,7 @@ def test_a_row_has_the_same_bits_in_any_batch(rows: int):
         np.testing.assert_array_equal(part(), whole[17 - rows :])
 
 
-def test_a_free_root_is_read_in_place(quadruped: Robot):
+def test_the_signals_of_a_free_base_are_views_of_the_state(quadruped: Robot):
     data = mujoco.MjData(quadruped.model)
     for signal in BASE:
         assert np.shares_memory(

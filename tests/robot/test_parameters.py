@@ -1,4 +1,4 @@
-"""Promises of parameters: a robot's text says them, however its model says its masses."""
+"""Tests of parameters: the MJCF of a robot contains them, in whatever way it defines its masses."""
 
 import dataclasses
 
@@ -98,7 +98,7 @@ def test_friction_is_that_of_geoms_and_of_contact_pairs():
     np.testing.assert_allclose(model.pair_friction, [[0.72, 0.84, 0.01, 0.0001, 0.0001]])
 
 
-def test_a_robots_text_says_its_parameters(robot: Robot):
+def test_the_mjcf_of_a_robot_contains_its_parameters(robot: Robot):
     parameters = some(robot)
     said = with_parameters(robot, parameters)
 
@@ -116,7 +116,7 @@ def test_a_robots_text_says_its_parameters(robot: Robot):
 
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.filterwarnings("ignore:compiler attribute 'settotalmass' is deprecated")
-def test_masses_are_said_whatever_way_the_model_says_them(way: str):
+def test_masses_are_written_in_whatever_way_the_model_defines_them(way: str):
     text = LEGS.format(**{"compiler": "", "inertial": "", "damping": "0.7"} | NAMED | WAYS[way])
     robot = Robot("legs", text, 0.01)
     edited = edited_model(robot, some(robot))
@@ -127,7 +127,7 @@ def test_masses_are_said_whatever_way_the_model_says_them(way: str):
     assert_alike(edited, with_parameters(robot, some(robot)).model)
 
 
-def test_a_delay_that_is_said_takes_the_place_of_the_one_before(quadruped: Robot):
+def test_a_new_delay_replaces_the_old_one(quadruped: Robot):
     late = with_parameters(quadruped, some(quadruped, delay=3))
     again = with_parameters(late, dataclasses.replace(nominal(late), delay=1))
 
@@ -169,7 +169,7 @@ def test_the_robot_stays_as_it_was(quadruped: Robot):
 
 
 @pytest.mark.parametrize("said", ["-3", "nan", "1e300", "2.5", "6"])
-def test_a_delay_that_cannot_be_is_refused(quadruped: Robot, said: str):
+def test_an_invalid_delay_is_refused(quadruped: Robot, said: str):
     numeric = f'<custom><numeric name="{CONTROL_DELAY}" data="{said}"/></custom></mujoco>'
     mjcf = quadruped.mjcf.replace("</mujoco>", numeric)
 

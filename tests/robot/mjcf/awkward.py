@@ -30,12 +30,12 @@ def mjcf(
 
 @dataclass(frozen=True)
 class Awkward:
-    """A file and what is expected of it.
+    """An MJCF and the expected result of loading it.
 
     Attributes:
-        text: The file, or its bytes.
-        sentence: What its refusal says, or "" where a robot comes of it.
-        files: Others, by their paths from its folder.
+        text: Content of the MJCF.
+        sentence: Part of the error message; "" if the MJCF gives a robot.
+        files: Contents of other files, by their paths from the folder of the MJCF.
     """
 
     text: str | bytes
@@ -43,7 +43,7 @@ class Awkward:
     files: dict[str, str | bytes] = field(default_factory=dict)
 
     def write(self, folder: Path) -> Path:
-        """Writes it all into a folder, and returns the path of the MJCF."""
+        """Writes all files into a folder, and returns the path of the MJCF."""
         home = folder / "home"
         for name, content in {"robot.xml": self.text, **self.files}.items():
             path = home / name
@@ -263,4 +263,4 @@ AWKWARD: dict[str, Awkward] = {
     "a sensor of another kind": Awkward(mjcf(more='<sensor><clock name="time"/></sensor>')),
     "settotalmass": Awkward(mjcf(more='<compiler settotalmass="7" inertiafromgeom="true"/>')),
 }
-"""By what is awkward in it."""
+"""Cases by the awkward part of the MJCF."""

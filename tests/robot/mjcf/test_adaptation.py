@@ -1,4 +1,4 @@
-"""Promises of the copy that a robot is made of: it moves as the user's file says."""
+"""Tests of the adapted MJCF: it moves as the user's file, with names, ground and sensors."""
 
 import warnings
 from pathlib import Path
@@ -25,7 +25,7 @@ SPRUNG_LEGS = LEGS.replace("</body>", '<site name="a" pos="0 .02 -.2"/></body>',
 
 
 def theirs(path: Path) -> mujoco.MjModel:
-    """What MuJoCo makes of the user's own file."""
+    """Returns the compiled model of the user's file."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return mujoco.MjModel.from_xml_path(str(path))
@@ -38,7 +38,7 @@ def written(folder: Path, text: str) -> Path:
 
 
 def moved(model: mujoco.MjModel, qpos: np.ndarray, steps: int = 60) -> mujoco.MjData:
-    """Where a model goes from a pose, with motors that swing."""
+    """Returns the state after a run from a pose with sinusoidal commands."""
     data = mujoco.MjData(model)
     data.qpos = qpos
     for step in range(steps):
@@ -67,7 +67,7 @@ def test_a_robot_moves_as_its_file_says(name: str):
 
 
 @pytest.mark.parametrize("name", SAMPLES)
-def test_what_is_ready_is_left_as_it_is(name: str, tmp_path: Path):
+def test_an_adapted_mjcf_stays_the_same_when_adapted_again(name: str, tmp_path: Path):
     first = load_mjcf(SAMPLES[name])
     again = load_mjcf(written(tmp_path, first.mjcf))
 
@@ -77,7 +77,7 @@ def test_what_is_ready_is_left_as_it_is(name: str, tmp_path: Path):
 
 
 TINY = 1e-300
-"""Below it, MuJoCo calls a number too large to read."""
+"""Smallest number that MuJoCo reads from an XML text."""
 
 
 def angles(most: float) -> st.SearchStrategy[float]:
@@ -90,7 +90,7 @@ def angles(most: float) -> st.SearchStrategy[float]:
     hips=st.tuples(angles(0.6), angles(0.6)),
     unit=st.sampled_from(["", '<compiler angle="radian"/>']),
 )
-def test_a_robot_starts_and_goes_on_as_from_its_keyframe(
+def test_a_robot_starts_and_moves_as_from_its_keyframe(
     tmp_path_factory: pytest.TempPathFactory,
     height: float,
     turn: tuple[float, ...],
@@ -114,7 +114,7 @@ def test_a_robot_starts_and_goes_on_as_from_its_keyframe(
     assert np.allclose(before.xpos, after.xpos, atol=1e-5)
 
 
-def test_a_keyframe_is_chosen_by_name_or_not_at_all(tmp_path: Path):
+def test_a_keyframe_is_chosen_by_name_or_none(tmp_path: Path):
     keys = "".join(f'<key name="{n}" qpos="0 0 {z} 1 0 0 0 0 0"/>' for n, z in (("a", 1), ("b", 2)))
     path = written(tmp_path, mjcf(more=f"<keyframe>{keys}</keyframe>"))
 
@@ -138,7 +138,7 @@ def test_a_keyframe_that_breaks_an_equality_is_refused(tmp_path: Path):
 
 
 @pytest.mark.parametrize(("forward", "axis"), [("x", 0), ("y", 1), ("-x", 0), ("-y", 1)])
-def test_forward_is_the_way_that_was_said(forward: str, axis: int):
+def test_forward_is_the_direction_in_the_settings(forward: str, axis: int):
     path = SAMPLES["gymnasium ant"]
     went = moved(theirs(path), theirs(path).qpos0).qpos[axis] * (-1 if "-" in forward else 1)
     robot = load_mjcf(path, MjcfSettings(forward=forward))
@@ -161,7 +161,7 @@ def test_uneven_ground_is_not_turned_under_a_robot(steps: str, tmp_path: Path):
         load_mjcf(written(tmp_path, mjcf(world=GROUND + steps)), MjcfSettings(forward="y"))
 
 
-def test_ground_is_laid_where_the_robot_stands(tmp_path: Path):
+def test_ground_is_added_at_the_lowest_point_of_the_robot(tmp_path: Path):
     robot = load_mjcf(written(tmp_path, mjcf(world="")))
     data = mujoco.MjData(robot.model)
     mujoco.mj_kinematics(robot.model, data)
@@ -180,7 +180,7 @@ PAIRED = """<default><geom contype="0" conaffinity="0"/></default>
 <pair geom1="right_geom" geom2="floor"/></contact>"""
 
 
-def test_ground_may_be_met_by_pairs_alone(tmp_path: Path):
+def test_explicit_contact_pairs_with_the_ground_are_enough(tmp_path: Path):
     path = written(tmp_path, mjcf(more=PAIRED))
     robot = load_mjcf(path)
 
@@ -194,7 +194,7 @@ def test_ground_may_be_met_by_pairs_alone(tmp_path: Path):
 
 
 @pytest.mark.parametrize("swims", ['<flag contact="disable"/>', ""])
-def test_who_swims_gets_no_ground(swims: str, tmp_path: Path):
+def test_a_swimmer_gets_no_ground(swims: str, tmp_path: Path):
     option = f'<option density="1000" viscosity=".1">{swims}</option>'
     text = mjcf(world="", more=option)
 
@@ -211,7 +211,7 @@ def bodies_in_contact(model: mujoco.MjModel, data: mujoco.MjData) -> set[str]:
 
 
 @pytest.mark.parametrize("name", [name for name in SAMPLES if "humanoid" not in name])
-def test_a_touch_sensor_feels_its_limb_meet_the_ground(name: str):
+def test_a_touch_sensor_reads_1_while_its_limb_is_in_contact(name: str):
     robot = load_mjcf(SAMPLES[name])
     model, touched = robot.model, set()
     data = mujoco.MjData(model)
@@ -231,13 +231,13 @@ def test_a_touch_sensor_feels_its_limb_meet_the_ground(name: str):
 
 
 def adapted_names(name: str) -> set[str]:
-    """The touch sensors that a file did not have itself."""
+    """Returns the names of the sensors that the adaptation has added."""
     model = theirs(SAMPLES[name])
     own = {model.sensor(s).name for s in range(model.nsensor)}
     return {s.name for s in load_mjcf(SAMPLES[name]).anatomy.sensors} - own
 
 
-def test_names_are_those_of_neighbours_where_there_are_none(tmp_path: Path):
+def test_unnamed_parts_get_the_names_of_their_neighbours(tmp_path: Path):
     anatomy = load_mjcf(SAMPLES["gymnasium ant"]).anatomy
 
     assert [joint.name for joint in anatomy.joints][:2] == ["hip_1", "ankle_1"]
@@ -248,7 +248,7 @@ def test_names_are_those_of_neighbours_where_there_are_none(tmp_path: Path):
     assert load_mjcf(written(tmp_path, bare)).anatomy.hinges == ("left", "right_hip")
 
 
-def test_odd_names_are_replaced_wherever_they_stand(tmp_path: Path):
+def test_special_characters_are_replaced_in_names_and_references(tmp_path: Path):
     odd = mjcf(
         motors=MOTORS,
         more='<contact><exclude body1="torso" body2="left"/></contact>'
@@ -261,7 +261,7 @@ def test_odd_names_are_replaced_wherever_they_stand(tmp_path: Path):
     assert any("le+ft_hip" in note for note in adapt(tmp_path / "robot.xml", MjcfSettings()).notes)
 
 
-def test_the_user_says_which_sensors_there_are(tmp_path: Path):
+def test_the_settings_choose_the_sensors(tmp_path: Path):
     path = written(tmp_path, mjcf())
     robot = load_mjcf(path, MjcfSettings(touch=("left",), angle=()))
 
@@ -270,7 +270,7 @@ def test_the_user_says_which_sensors_there_are(tmp_path: Path):
         load_mjcf(path, MjcfSettings(touch=("lft",)))
 
 
-def test_sensors_of_what_no_motor_drives_are_left_out(tmp_path: Path):
+def test_sensors_of_joints_without_a_motor_are_removed(tmp_path: Path):
     text = mjcf(
         root='<joint name="x" type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>',
         more='<sensor><jointpos joint="x"/><jointpos joint="left_hip" name="own"/></sensor>',
@@ -299,7 +299,7 @@ def test_sensors_of_what_no_motor_drives_are_left_out(tmp_path: Path):
         ("forward", "in TOML"),
     ],
 )
-def test_a_setting_that_means_nothing_is_refused(text: str, said: str, tmp_path: Path):
+def test_an_invalid_setting_is_refused(text: str, said: str, tmp_path: Path):
     path = written(tmp_path, mjcf())
     path.with_suffix(".toml").write_text(text, encoding="utf-8")
 
@@ -309,12 +309,12 @@ def test_a_setting_that_means_nothing_is_refused(text: str, said: str, tmp_path:
     assert said in str(refusal.value)
 
 
-def test_brackets_without_end_are_no_list_of_names(tmp_path: Path):
+def test_endless_brackets_are_no_list_of_names(tmp_path: Path):
     with pytest.raises(InputError, match="needs a list of names"):
         read_settings(written(tmp_path, mjcf()), parse_setting(f"touch={'[' * 3000}"))
 
 
-def test_the_file_beside_is_read_and_options_count_before_it(tmp_path: Path):
+def test_the_settings_file_is_read_and_options_override_it(tmp_path: Path):
     path = written(tmp_path, mjcf(motors=MOTORS.replace('ctrlrange="-1 1"', "")))
     beside = 'forward = "y"\ncontrol_timestep = 0.02\nctrlrange = [-2, 2]\n'
     path.with_suffix(".toml").write_text(beside, encoding="utf-8")
@@ -329,7 +329,7 @@ def test_the_file_beside_is_read_and_options_count_before_it(tmp_path: Path):
     assert read_settings(path).forward == "y"
 
 
-def test_a_motor_that_says_its_range_in_another_way_keeps_it(tmp_path: Path):
+def test_a_motor_with_another_kind_of_range_keeps_it(tmp_path: Path):
     motors = '<motor joint="left_hip"/><position joint="right_hip" kp="5"/>'
     path = written(tmp_path, mjcf(motors=motors))
 
@@ -348,7 +348,7 @@ def test_a_control_step_is_a_multiple_of_the_physics_step(tmp_path: Path):
         load_mjcf(path, MjcfSettings(control_timestep=0.01))
 
 
-def test_copies_and_frames_are_written_out(tmp_path: Path):
+def test_copies_and_frames_are_expanded(tmp_path: Path):
     legs = (
         '<replicate count="3" euler="0 0 120" sep="-"><frame pos=".1 0 0"><body name="leg">'
         '<joint name="hip" axis="0 1 0" range="-40 40"/><geom size=".03" pos="0 0 -.2"/>'
@@ -362,7 +362,7 @@ def test_copies_and_frames_are_written_out(tmp_path: Path):
 
 
 @pytest.mark.parametrize("inertia", ["true", "false", "auto"])
-def test_masses_that_are_written_out_are_those_of_the_model(inertia: str, tmp_path: Path):
+def test_expanded_masses_are_those_of_the_model(inertia: str, tmp_path: Path):
     given = '<inertial pos="0 0 0" mass="2" diaginertia=".01 .01 .01"/>'
     limbs = LEGS.replace('<joint name="left', f'{given}<joint name="left')
     limbs = limbs.replace('<joint name="right', f'{given}<joint name="right')

@@ -1,4 +1,4 @@
-"""Promises of the command line about a robot's MJCF."""
+"""Tests of the command line with a user's MJCF."""
 
 import json
 import shutil
@@ -13,12 +13,12 @@ from tests.robot.mjcf.samples import SAMPLES
 
 @pytest.fixture
 def ant(tmp_path: Path) -> Path:
-    """A copy of somebody's robot."""
+    """Returns the path of a copy of gymnasium's ant."""
     return Path(shutil.copy(SAMPLES["gymnasium ant"], tmp_path / "ant.xml"))
 
 
 @pytest.mark.search
-def test_a_robot_of_ones_own_is_recovered_and_diagnosed_from_its_logs(ant: Path, tmp_path: Path):
+def test_a_users_robot_is_recovered_and_diagnosed_from_its_logs(ant: Path, tmp_path: Path):
     before = ant.read_bytes()
     damage = ("--damage", "break:ankle_1", "--trials", "1", *SMALL)
     done = selfmodel("recover", "ant.xml", *damage, "--out", "run", "--json", cwd=tmp_path)
@@ -37,7 +37,7 @@ def test_a_robot_of_ones_own_is_recovered_and_diagnosed_from_its_logs(ant: Path,
 
 
 @pytest.mark.process
-def test_the_file_of_a_logs_robot_is_made_ready_as_the_logs_was(tmp_path: Path):
+def test_the_file_of_a_logged_robot_is_adapted_as_for_the_log(tmp_path: Path):
     key = '<keyframe><key qpos="0 0 .6 1 0 0 0 .3 -.3"/></keyframe>'
     felt = "".join(
         f'<touch name="{leg}_touch" site="{leg}"/><jointpos name="{leg}" joint="{leg}_hip"/>'
@@ -59,7 +59,7 @@ def test_the_file_of_a_logs_robot_is_made_ready_as_the_logs_was(tmp_path: Path):
     assert json.loads(with_file.stdout)["rms"] == json.loads(alone.stdout)["rms"]
 
 
-def test_what_was_found_is_shown(ant: Path, tmp_path: Path):
+def test_the_parts_of_a_robot_are_shown(ant: Path, tmp_path: Path):
     told = json.loads(selfmodel("robots", str(ant), "--json", cwd=tmp_path).stdout)
     shown = selfmodel("robots", str(ant), cwd=tmp_path, COLUMNS="60").stdout
 
@@ -72,7 +72,7 @@ def test_what_was_found_is_shown(ant: Path, tmp_path: Path):
     assert max(map(len, shown.splitlines()[:-2])) <= 60
 
 
-def test_settings_are_options_too(ant: Path, tmp_path: Path):
+def test_settings_are_options(ant: Path, tmp_path: Path):
     options = ("--set", "control_timestep=0.02", "--set", "touch=[]")
     told = json.loads(selfmodel("robots", str(ant), *options, "--json", cwd=tmp_path).stdout)
 
@@ -95,7 +95,7 @@ def test_settings_are_options_too(ant: Path, tmp_path: Path):
         (("trial", "bad.xml", "--out", "t.mcap"), "ctrlrange=[-1, 1]"),
     ],
 )
-def test_what_cannot_be_done_is_said_before_anything_is_run(
+def test_invalid_arguments_are_refused_before_a_run(
     ant: Path, tmp_path: Path, arguments: tuple[str, ...], said: str
 ):
     bad = mjcf(motors='<motor name="m" joint="left_hip"/>')

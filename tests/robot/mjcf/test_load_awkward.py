@@ -1,4 +1,4 @@
-"""Promises about awkward files: each gives a robot that moves, or is refused in one sentence."""
+"""Tests of awkward files: each gives a robot that moves, or is refused in one sentence."""
 
 import subprocess
 import sys
@@ -19,7 +19,7 @@ SECONDS_EACH = 5
 
 
 @pytest.mark.parametrize("what", [what for what, case in AWKWARD.items() if not case.sentence])
-def test_what_is_awkward_but_sound_gives_a_robot_that_moves(what: str, tmp_path: Path):
+def test_an_awkward_but_valid_file_gives_a_robot_that_moves(what: str, tmp_path: Path):
     path = AWKWARD[what].write(tmp_path)
     before = {file: file.read_bytes() for file in tmp_path.rglob("*") if file.is_file()}
 
@@ -33,7 +33,7 @@ def test_what_is_awkward_but_sound_gives_a_robot_that_moves(what: str, tmp_path:
 
 
 @pytest.mark.parametrize("what", [what for what, case in AWKWARD.items() if case.sentence])
-def test_what_cannot_be_used_is_refused_in_one_sentence(what: str, tmp_path: Path):
+def test_an_invalid_file_is_refused_in_one_sentence(what: str, tmp_path: Path):
     path = AWKWARD[what].write(tmp_path)
 
     with pytest.raises(InputError) as refusal:
@@ -46,11 +46,11 @@ def test_what_cannot_be_used_is_refused_in_one_sentence(what: str, tmp_path: Pat
     assert len(said) < 500
 
 
-def test_there_are_enough_of_them():
+def test_there_are_enough_awkward_files():
     assert len(AWKWARD) >= 30
 
 
-def test_none_takes_long_or_ends_the_process(tmp_path: Path):
+def test_no_file_takes_long_or_ends_the_process(tmp_path: Path):
     code = (
         "import sys\nfrom pathlib import Path\n"
         "from selfmodel.errors import InputError\nfrom selfmodel.robot.mjcf.load import load_mjcf\n"

@@ -1,4 +1,4 @@
-"""Promises about models in memory: dm_control's domains, and meshes that are only seen."""
+"""Tests of models in memory: dm_control's domains, and visual meshes."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -30,7 +30,7 @@ def test_domains_of_the_suite_are_robots():
     assert sum(sensor.kind == "touch" for sensor in four_legs.anatomy.sensors) == 4
 
 
-def test_bones_that_are_only_seen_are_left_out_and_still_weigh():
+def test_visual_meshes_are_removed_and_the_masses_stay():
     mjcf_text, files = dog.get_model_and_assets(floor_size=10, remove_ball=True)
     theirs = mujoco.MjModel.from_xml_string(mjcf_text, files)
     robot = made("dog", mjcf_text, files)
@@ -43,7 +43,7 @@ def test_bones_that_are_only_seen_are_left_out_and_still_weigh():
         assert np.allclose(mine.ipos, other.ipos, atol=1e-9)
 
 
-def test_meshes_that_touch_and_are_too_large_are_refused():
+def test_too_large_colliding_meshes_are_refused():
     text = mjcf(more=MESH.format("m", "m.obj"), torso=TORSO + '<geom type="mesh" mesh="m"/>')
     large = CUBE + "# a comment of many bytes\n" * (MAX_ASSET_BYTES // 20)
 
@@ -52,6 +52,6 @@ def test_meshes_that_touch_and_are_too_large_are_refused():
     assert made("cube", text, {"m.obj": CUBE}).assets.keys() == {"m.obj"}
 
 
-def test_a_file_that_was_not_given_is_named():
+def test_a_missing_file_is_refused_by_name():
     with pytest.raises(InputError, match=r"cube: it names .*'m\.obj'.* not given with it"):
         made("cube", mjcf(more=MESH.format("m", "m.obj")), {})

@@ -1,4 +1,4 @@
-"""Promises about robots that feel nothing: their controllers are rhythms, and they move."""
+"""Tests of robots without sensors: with a CPG they move and are logged."""
 
 from pathlib import Path
 
