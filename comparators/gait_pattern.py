@@ -16,7 +16,8 @@ from selfmodel.comparators.gait_features import (
 from selfmodel.comparators.observed import observed_signals
 from selfmodel.comparators.windows import masked_mean
 from selfmodel.simulation.requests import ClosedLoop
-from selfmodel.trials.behaviour import Behaviour, Signal
+from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.signals import Signal
 from selfmodel.trials.trial import Trial
 
 SIGNALS: tuple[Signal, ...] = ("sensors", "joint_positions")

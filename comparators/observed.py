@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from selfmodel.errors import InputError
-from selfmodel.trials.behaviour import Signal
+from selfmodel.trials.signals import Signal
 from selfmodel.trials.trial import Trial
 
 

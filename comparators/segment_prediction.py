@@ -11,9 +11,10 @@ from selfmodel.comparators.command_errors import command_errors, command_spans
 from selfmodel.comparators.sensor_noise_level import noise_level_loss
 from selfmodel.errors import InputError
 from selfmodel.simulation.requests import Segments, command_steps, cut_segments
-from selfmodel.trials.behaviour import Behaviour, Signal
+from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signal_difference import difference
 from selfmodel.trials.signal_scales import PREDICTION_ERROR_SCALES
+from selfmodel.trials.signals import Signal
 from selfmodel.trials.state_estimation import ONBOARD, STATE, estimated_states
 from selfmodel.trials.trial import Trial
 

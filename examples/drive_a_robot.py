@@ -23,7 +23,7 @@ from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.tasks import ROBOTS
-from selfmodel.trials.behaviour import Signal
+from selfmodel.trials.signals import Signal
 from selfmodel.trials.trial import TrialPlan
 
 OBSERVED: tuple[Signal, ...] = (

@@ -17,7 +17,8 @@ from selfmodel.logs.kinematics import (
 )
 from selfmodel.logs.topics import TIMING, Part, frames_stride, topics, transforms
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.behaviour import SIGNALS, Names, Sample
+from selfmodel.trials.behaviour import Sample
+from selfmodel.trials.signals import SIGNALS, Names
 
 
 def empty_rows(names: Names, steps: int, *, timed: bool) -> dict[Part, FloatArray]:

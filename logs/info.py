@@ -9,7 +9,7 @@ import numpy as np
 from selfmodel.logs.contents import Contents, read_contents
 from selfmodel.logs.reader import TrialLog, interpret
 from selfmodel.logs.records import HIDDEN, IMPORT, SALVAGE
-from selfmodel.trials.behaviour import SIGNALS, Signal
+from selfmodel.trials.signals import SIGNALS, Signal
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from selfmodel.logs.reader import TrialLog
 from selfmodel.robot.mjcf.adaptation import MAX_SUBSTEPS
 from selfmodel.robot.mjcf.untrusted import checked_model
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.behaviour import Names
+from selfmodel.trials.signals import Names
 
 GOOD = "its observations are intact"
 

@@ -11,7 +11,8 @@ from selfmodel.logs.contents import Contents, Messages
 from selfmodel.logs.errors import CorruptError, SchemaMismatchError
 from selfmodel.logs.records import TrialRecord
 from selfmodel.logs.topics import Part, Topic, topics
-from selfmodel.trials.behaviour import SIGNALS, Behaviour, Names, Signal
+from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.signals import SIGNALS, Names, Signal
 
 
 def read_behaviour(

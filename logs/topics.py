@@ -8,7 +8,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.logs.cdr import Layout, Template
-from selfmodel.trials.behaviour import Names, Signal
+from selfmodel.trials.signals import Names, Signal
 
 WORLD = "world"
 

@@ -19,7 +19,8 @@ from selfmodel.logs.preamble import write_preamble
 from selfmodel.logs.records import FINISHED, RESULT, STOPPED, Result, TrialHeader, checked_name
 from selfmodel.physical.cleanup import Cleanup
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.behaviour import Names, Sample
+from selfmodel.trials.behaviour import Sample
+from selfmodel.trials.signals import Names
 from selfmodel.trials.trial import TrialPlan
 
 FLUSH_STEPS = 50

@@ -22,7 +22,8 @@ from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
 from selfmodel.robot.state_access import current_value, signal_fields, state_writer
 from selfmodel.simulation.activations import activations_since_rest
-from selfmodel.trials.behaviour import SIGNALS, Behaviour, Sample, Signal
+from selfmodel.trials.behaviour import Behaviour, Sample
+from selfmodel.trials.signals import SIGNALS, Signal
 
 STATE: tuple[Signal, ...] = (
     "joint_positions",

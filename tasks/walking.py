@@ -18,7 +18,7 @@ from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
 from selfmodel.robot.state_access import current_value, signal_fields
-from selfmodel.trials.behaviour import Signal
+from selfmodel.trials.signals import Signal
 
 
 def environment(

@@ -7,10 +7,10 @@ import numpy as np
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.logs.rosbag.series import Column, IntArray, Series
 
-APART = 60.0
+MAX_LATENCY = 60.0
 """Maximum median difference of stamps and log times of one clock, s."""
 
-BEYOND = 1e12
+MAX_MEASUREMENT = 1e12
 """Magnitude above which a value is no measurement, in any unit; its square is finite."""
 
 
@@ -57,34 +57,34 @@ def clocked(series: Series, clock: str) -> Clocked:
             times.
 
     Raises:
-        ClocksApartError: Stamps and log times differ by more than ``APART``.
+        ClocksApartError: Stamps and log times differ by more than ``MAX_LATENCY``.
     """
     stamped = series.stamps > 0
     latency = (series.logged - series.stamps)[stamped] / 1e9
     everything = np.ones(len(stamped), dtype=bool)
     apart = float(np.median(latency)) if len(latency) else 0.0
     if clock == "log":
-        usable_latency = latency if abs(apart) <= APART else latency[:0]
+        usable_latency = latency if abs(apart) <= MAX_LATENCY else latency[:0]
         return Clocked(series.logged, everything, 0, usable_latency)
-    if abs(apart) > APART:
+    if abs(apart) > MAX_LATENCY:
         raise ClocksApartError(
             f"the stamps on {series.topic.name} and the times at which it was recorded are "
             f"{abs(apart):.0f} s apart (median), so they are of different clocks"
         )
     usable = everything.copy()
-    usable[stamped] = np.abs(latency) <= APART
+    usable[stamped] = np.abs(latency) <= MAX_LATENCY
     return Clocked(
         times=np.where(stamped, series.stamps, series.logged),
         usable=usable,
         fallbacks=int(np.sum(~stamped)),
-        latency=latency[np.abs(latency) <= APART],
+        latency=latency[np.abs(latency) <= MAX_LATENCY],
     )
 
 
 def track(clock: Clocked, column: Column, wanted: slice) -> Track:
     """Returns the time series of some of a column's numbers, sorted, with distinct times.
 
-    Rows with a value that is NaN, infinite or above ``BEYOND`` are left out.
+    Rows with a value that is NaN, infinite or above ``MAX_MEASUREMENT`` are left out.
 
     Args:
         clock: Times of the topic.
@@ -92,7 +92,7 @@ def track(clock: Clocked, column: Column, wanted: slice) -> Track:
         wanted: Slice of the numbers.
     """
     times, values = clock.times[column.index], column.values[:, wanted]
-    known = clock.usable[column.index] & (np.abs(values) <= BEYOND).all(axis=1)
+    known = clock.usable[column.index] & (np.abs(values) <= MAX_MEASUREMENT).all(axis=1)
     # unique() keeps the first of equal times, in the order of the recording.
     times, first = np.unique(times[known], return_index=True)
     return Track(times, values[known][first])

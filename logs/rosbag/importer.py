@@ -29,10 +29,11 @@ from selfmodel.logs.rosbag.tracks import Tracks, read_tracks, required
 from selfmodel.logs.writer import write_trial
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trials.behaviour import SIGNALS, Behaviour, Sample, Signal
+from selfmodel.trials.behaviour import Behaviour, Sample
+from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.trial import TrialPlan
 
-LONGEST = 1_000_000
+MAX_STEPS = 1_000_000
 """Maximum control steps of an import: a wrong stamp must not fill the memory."""
 
 
@@ -169,20 +170,20 @@ def _steps(mapping: BagMapping, tracks: Tracks, timestep: float) -> Steps:
     last = min(int(track.times[-1]) for role, _, track in needed if role.kind != "commands")
     origin = first + round(mapping.start * 1e9)
     period = timestep * 1e9
-    there = int((last - origin + 0.5) // period) + 1
-    asked = there if mapping.duration is None else round(mapping.duration / timestep)
-    if there < 2 or asked > there:
+    available = int((last - origin + 0.5) // period) + 1
+    steps = available if mapping.duration is None else round(mapping.duration / timestep)
+    if available < 2 or steps > available:
         raise mapping.document.error(
             ("duration" if mapping.duration is not None else "start",),
             f"every role has data for {max(0, last - first) / 1e9:.3f} s in all, got a start "
-            f"{mapping.start:g} s after that begins and {max(asked, 2)} steps of {timestep:g} s: "
+            f"{mapping.start:g} s after that begins and {max(steps, 2)} steps of {timestep:g} s: "
             f"ask for less, or leave out the role that has the least data",
         )
-    if not 2 <= asked <= LONGEST:
+    if not 2 <= steps <= MAX_STEPS:
         raise mapping.document.error(
-            ("duration",), f"a trial has 2 to {LONGEST} steps, got {asked}: set another duration"
+            ("duration",), f"a trial has 2 to {MAX_STEPS} steps, got {steps}: set another duration"
         )
-    return Steps(origin, np.rint(np.arange(asked) * period).astype(np.int64))
+    return Steps(origin, np.rint(np.arange(steps) * period).astype(np.int64))
 
 
 def _behaviour(mapping: BagMapping, tracks: Tracks, robot: Robot, steps: Steps) -> Behaviour:

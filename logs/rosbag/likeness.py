@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from difflib import SequenceMatcher
 from types import MappingProxyType
 
-SURE = 0.75
-"""Minimum similarity of a certain match, of at most 1, if no other name is ``NEAR``."""
+CERTAIN_SIMILARITY = 0.75
+"""Minimum similarity of a certain match, of at most 1, if no other name is ``CERTAIN_LEAD``."""
 
-ALIKE = 0.3
+MIN_SIMILARITY = 0.3
 """Minimum similarity of a match."""
 
-NEAR = 0.1
+CERTAIN_LEAD = 0.1
 """Minimum lead over the second most similar name of a certain match."""
 
 _WORDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
@@ -43,7 +43,7 @@ _SIDES = (frozenset({"front", "middle", "back"}), frozenset({"left", "right"}))
 
 
 @dataclass(frozen=True)
-class Guess:
+class NameMatch:
     """Name in the bag that matches a name of the model.
 
     Attributes:
@@ -55,7 +55,7 @@ class Guess:
     sure: bool
 
 
-def matched(wanted: Sequence[str], offered: Sequence[str]) -> dict[str, Guess]:
+def matched(wanted: Sequence[str], offered: Sequence[str]) -> dict[str, NameMatch]:
     """Returns the most similar offered name for each wanted name, each used once.
 
     Order, case and the usual abbreviations do not matter: ``FL_calf_joint`` is similar to
@@ -69,15 +69,17 @@ def matched(wanted: Sequence[str], offered: Sequence[str]) -> dict[str, Guess]:
         Matches by wanted name; names without a match are left out.
     """
     scores = {(ours, theirs): likeness(ours, theirs) for ours in wanted for theirs in offered}
-    found: dict[str, Guess] = {}
+    found: dict[str, NameMatch] = {}
     used: set[str] = set()
     for (ours, theirs), score in sorted(scores.items(), key=lambda item: -item[1]):
-        if score < ALIKE or ours in found or theirs in used:
+        if score < MIN_SIMILARITY or ours in found or theirs in used:
             continue
         rivals = [
             other for pair, other in scores.items() if (pair[0] == ours) != (pair[1] == theirs)
         ]
-        found[ours] = Guess(theirs, score >= SURE and score - max(rivals, default=0.0) >= NEAR)
+        found[ours] = NameMatch(
+            theirs, score >= CERTAIN_SIMILARITY and score - max(rivals, default=0.0) >= CERTAIN_LEAD
+        )
         used.add(theirs)
     return found
 

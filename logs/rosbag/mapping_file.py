@@ -21,7 +21,7 @@ from selfmodel.logs.rosbag.mapping import (
 from selfmodel.logs.rosbag.tables import Table, parse_document
 from selfmodel.trials.trial import STAGES
 
-LARGEST = 2**20
+MAX_MAPPING_BYTES = 2**20
 """Maximum size of a mapping, bytes."""
 
 
@@ -32,7 +32,7 @@ def read_mapping(path: Path) -> BagMapping:
         InputError: The file cannot be read, or is invalid; the message names the line.
     """
     try:
-        text = read_file(path, "a mapping", LARGEST).decode()
+        text = read_file(path, "a mapping", MAX_MAPPING_BYTES).decode()
     except UnicodeDecodeError as failure:
         raise InputError(f"{path}: expected TOML in UTF-8, got: {failure.reason}") from failure
     return parse_mapping(text, path.name)

@@ -29,7 +29,7 @@ Rows = tuple[tuple[str, ...], FloatArray]
 
 
 @dataclass(frozen=True)
-class FaultKind:
+class MessageType:
     """Supported message type.
 
     Attributes:
@@ -153,16 +153,16 @@ def _wxyz(quaternion: "ros.geometry_msgs__msg__Quaternion") -> list[float]:
     return [quaternion.w, quaternion.x, quaternion.y, quaternion.z]
 
 
-KINDS: Mapping[str, FaultKind] = MappingProxyType(
+KINDS: Mapping[str, MessageType] = MappingProxyType(
     {
-        JOINT_STATE: FaultKind(stamped=True, rows=_joint_state),
-        TRAJECTORY: FaultKind(stamped=True, rows=_trajectory),
-        ARRAY: FaultKind(stamped=False, rows=_array),
-        ODOMETRY: FaultKind(stamped=True, rows=_odometry),
-        POSE: FaultKind(stamped=True, rows=_pose_stamped),
-        IMU: FaultKind(stamped=True, rows=_imu),
-        WRENCH: FaultKind(stamped=True, rows=_wrench),
-        **dict.fromkeys(NUMBERS, FaultKind(stamped=False, rows=_number)),
+        JOINT_STATE: MessageType(stamped=True, rows=_joint_state),
+        TRAJECTORY: MessageType(stamped=True, rows=_trajectory),
+        ARRAY: MessageType(stamped=False, rows=_array),
+        ODOMETRY: MessageType(stamped=True, rows=_odometry),
+        POSE: MessageType(stamped=True, rows=_pose_stamped),
+        IMU: MessageType(stamped=True, rows=_imu),
+        WRENCH: MessageType(stamped=True, rows=_wrench),
+        **dict.fromkeys(NUMBERS, MessageType(stamped=False, rows=_number)),
     }
 )
 """Supported message types by name.

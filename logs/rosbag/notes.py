@@ -9,10 +9,10 @@ from selfmodel.logs.rosbag.quality import Quality
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Behaviour
 
-APART = 0.1
+MAX_INITIAL_DIFFERENCE = 0.1
 """Difference from the model's initial pose above which a joint is listed, rad."""
 
-LISTED = 5
+MAX_LISTED_GAPS = 5
 """Maximum listed gaps of a topic."""
 
 
@@ -36,7 +36,7 @@ def _pose(behaviour: Behaviour, robot: Robot) -> Iterator[str]:
     far = [
         f"{name} {difference:.2f}"
         for name, difference in zip(behaviour.names.hinges, apart, strict=True)
-        if difference > APART
+        if difference > MAX_INITIAL_DIFFERENCE
     ]
     if far:
         yield (
@@ -74,9 +74,11 @@ def _gaps(behaviour: Behaviour, qualities: Mapping[str, Quality]) -> Iterator[st
         within = [gap for gap in found.gaps if gap.start < end and gap.start + gap.length > 0]
         if not within or found.roles == ("commands",):  # a command is held until the next
             continue
-        listed = [f"{gap.length * 1e3:.0f} ms at {gap.start:.3f} s" for gap in within[:LISTED]]
-        if len(within) > LISTED:
-            listed.append(f"{len(within) - LISTED} more")
+        listed = [
+            f"{gap.length * 1e3:.0f} ms at {gap.start:.3f} s" for gap in within[:MAX_LISTED_GAPS]
+        ]
+        if len(within) > MAX_LISTED_GAPS:
+            listed.append(f"{len(within) - MAX_LISTED_GAPS} more")
         rows = sum(
             int(np.sum((behaviour.time > gap.start) & (behaviour.time < gap.start + gap.length)))
             for gap in within

@@ -7,16 +7,16 @@ from typing import Any
 import numpy as np
 
 from selfmodel.logs.rosbag.clock import Clocked
-from selfmodel.logs.rosbag.resample import REACH
+from selfmodel.logs.rosbag.resample import MAX_PERIOD_RATIO
 from selfmodel.logs.rosbag.series import Series
 
-LISTED = 100
+MAX_LISTED_GAPS = 100
 """Maximum listed gaps of a topic."""
 
 
 @dataclass(frozen=True)
 class Gap:
-    """Interval between two messages longer than ``REACH`` usual periods.
+    """Interval between two messages longer than ``MAX_PERIOD_RATIO`` usual periods.
 
     Attributes:
         start: Time of the message before the gap, from the start of the trial, s; may be negative.
@@ -64,9 +64,9 @@ class Quality:
     refused: Mapping[str, int]
 
     def facts(self) -> dict[str, Any]:
-        """Returns the quality as JSON values, with the first ``LISTED`` gaps."""
+        """Returns the quality as JSON values, with the first ``MAX_LISTED_GAPS`` gaps."""
         longest = max((gap.length for gap in self.gaps), default=0.0)
-        where = [[gap.start, gap.length] for gap in self.gaps[:LISTED]]
+        where = [[gap.start, gap.length] for gap in self.gaps[:MAX_LISTED_GAPS]]
         gaps = {"count": len(self.gaps), "longest": longest, "where": where}
         return asdict(self) | {"gaps": gaps}
 
@@ -84,7 +84,7 @@ def quality(series: Series, clock: Clocked, origin: int, roles: tuple[str, ...])
     times = np.unique(usable)
     periods = np.diff(times) / 1e9
     usual = float(np.median(periods)) if len(periods) else None
-    silent = periods > REACH * usual if usual is not None else np.zeros(0, dtype=bool)
+    silent = periods > MAX_PERIOD_RATIO * usual if usual is not None else np.zeros(0, dtype=bool)
     return Quality(
         roles=roles,
         type=series.topic.type,

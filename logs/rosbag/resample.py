@@ -7,7 +7,7 @@ import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 
-REACH = 1.5
+MAX_PERIOD_RATIO = 1.5
 """Minimum gap between two samples, in usual (median) periods."""
 
 
@@ -17,7 +17,7 @@ def reach(times: FloatArray) -> float:
     Args:
         times: Times of the samples, ``(m,)``, increasing.
     """
-    return REACH * float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+    return MAX_PERIOD_RATIO * float(np.median(np.diff(times))) if len(times) > 1 else 0.0
 
 
 def linear(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -> FloatArray:

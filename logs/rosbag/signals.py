@@ -9,11 +9,12 @@ from selfmodel.arrays import FloatArray
 from selfmodel.logs.rosbag.clock import Track
 from selfmodel.logs.rosbag.resample import angles, hold, linear, reach, slerp
 from selfmodel.logs.rosbag.series import IntArray
+from selfmodel.logs.rosbag.start_frame import heading_removal, rotate_world
 from selfmodel.logs.rosbag.tracks import Tracks
-from selfmodel.logs.rosbag.turning import rotated, turned, unyaw
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.behaviour import Signal
+from selfmodel.trials.rotation import rotated
+from selfmodel.trials.signals import Signal
 
 Interpolation = Callable[[FloatArray, FloatArray, FloatArray, float], FloatArray]
 
@@ -93,9 +94,9 @@ def base_signals(tracks: Tracks, steps: Steps, *, from_start: bool) -> dict[Sign
         if any(len(track.times) and np.isnan(rows[0]).any() for track, rows in required):
             raise ValueError("where the base is at the start of the trial is not known")
         if len(tracks.base_orientation.times):
-            by = unyaw(orientation[0])
-            orientation = turned(orientation, by)
-            position = rotated(position - position[0] * [1, 1, 0], by[np.newaxis])
+            rotation = heading_removal(orientation[0])
+            orientation = rotate_world(orientation, rotation)
+            position = rotated(position - position[0] * [1, 1, 0], rotation[np.newaxis])
         else:
             position = position - position[0] * [1, 1, 0]
     return {

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-LATEST = 2**62
+MAX_LOG_TIME = 2**62
 """Maximum log time of a bag, ns: the year 2116; sums still fit 64 bits."""
 
 
@@ -46,6 +46,6 @@ def checked_time(time: object) -> int:
     Raises:
         DamageError: The time is invalid.
     """
-    if not isinstance(time, int) or not 0 <= time < LATEST:
+    if not isinstance(time, int) or not 0 <= time < MAX_LOG_TIME:
         raise DamageError(f"a message has the log time {time!r} ns")
     return time

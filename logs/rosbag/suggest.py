@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from selfmodel.logs.rosbag.bag import Bag, Topic
 from selfmodel.logs.rosbag.checks import TYPES
-from selfmodel.logs.rosbag.likeness import Guess, matched
+from selfmodel.logs.rosbag.likeness import NameMatch, matched
 from selfmodel.logs.rosbag.mapping import UNKNOWN, RoleKind
 from selfmodel.logs.rosbag.messages import ARRAY, JOINT_STATE, NUMBERS, ODOMETRY, WRENCH
 from selfmodel.logs.rosbag.series import Series, read_series
@@ -122,7 +122,7 @@ def _order(width: int, order: tuple[str, ...]) -> tuple[str, ...]:
     return order if len(order) == width else tuple(f"column_{k}" for k in range(width))
 
 
-def _link(guess: Guess | None, offered: Sequence[str]) -> str:
+def _link(guess: NameMatch | None, offered: Sequence[str]) -> str:
     if guess is None:
         known = ", ".join("".join(map(_escaped, name)) for name in offered) or "nothing"
         return f'"{UNKNOWN}"  # CHANGE: the bag has {known}'

@@ -18,7 +18,7 @@ from selfmodel.logs import TrialLog
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.threads import thread_count
 from selfmodel.simulation.trial_replay import Replay, replay as simulate
-from selfmodel.trials.behaviour import SIGNALS, Signal
+from selfmodel.trials.signals import SIGNALS, Signal
 
 TOLERANCE = 1e-6
 """Largest difference that counts as equal between versions of MuJoCo or after an import, SI

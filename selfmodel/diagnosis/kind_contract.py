@@ -13,7 +13,7 @@ from selfmodel.robot.designs import network_for
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import SIGNALS
+from selfmodel.trials.signals import SIGNALS
 
 STEPS = 20
 """Control steps of the check that robots with the fault share a batch with others."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import SIGNALS
+from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trial import Trial
 
 

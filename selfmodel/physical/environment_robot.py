@@ -18,7 +18,8 @@ from selfmodel.physical.safety_limits import Limit
 from selfmodel.physical.step_timing import TIMESTAMP, StepTimer
 from selfmodel.robot.actuator_ranges import command_ranges
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.behaviour import SIGNALS, Names, Sample, Signal
+from selfmodel.trials.behaviour import Sample
+from selfmodel.trials.signals import SIGNALS, Names, Signal
 
 Observe = Callable[[Any], Mapping[str, Any] | None]
 """Function from an observation of the environment to signals by name, each ``(width,)``, with an

@@ -8,8 +8,8 @@ import numpy as np
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.embodiment import WELD_ARMATURE, Embodiment
-from selfmodel.trials.behaviour import Signal
 from selfmodel.trials.signal_scales import MEASUREMENT_FULL_SCALES
+from selfmodel.trials.signals import Signal
 
 
 class Measurement(Protocol):

@@ -7,7 +7,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.behaviour import Signal
+from selfmodel.trials.signals import Signal
 
 NORM_TOLERANCE = 0.01
 """Largest deviation of a measured quaternion's norm from 1."""

@@ -21,7 +21,8 @@ from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
 from selfmodel.robot.state_access import bind_data, signal_fields
-from selfmodel.trials.behaviour import SIGNALS, Sample
+from selfmodel.trials.behaviour import Sample
+from selfmodel.trials.signals import SIGNALS
 
 OWN_SEED = 1
 """Seed of the randomness of a fault, such as terrain, in a physical robot without a gap; the

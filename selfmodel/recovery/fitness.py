@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from selfmodel.arrays import FloatArray
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.behaviour import Behaviour, Signal, forward_displacement
+from selfmodel.trials.behaviour import Behaviour, forward_displacement
+from selfmodel.trials.signals import Signal
 
 
 @dataclass(frozen=True)

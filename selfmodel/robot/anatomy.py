@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from selfmodel.trials.behaviour import Names
+from selfmodel.trials.signals import Names
 
 
 @dataclass(frozen=True)

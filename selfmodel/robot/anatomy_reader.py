@@ -103,7 +103,7 @@ def _joint_names(model: mujoco.MjModel, groups: dict[int, list[int]]) -> dict[in
     repeated = {name for name in names.values() if list(names.values()).count(name) > 1}
     if repeated:
         raise ValueError(
-            f"expected a different name for each joint, got two joints that would both be called "
+            f"expected a different name for each joint, got two joints with the name "
             f"{min(repeated)!r}, by the common prefix of their hinges or by their bodies: rename "
             f"their hinges"
         )

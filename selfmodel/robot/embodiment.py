@@ -88,7 +88,7 @@ class Embodiment:
         model.dof_frictionloss[dofs] = 0.0
         model.jnt_stiffness[model.jnt_bodyid == body] = 0.0
         model.jnt_stiffnesspoly[model.jnt_bodyid == body] = 0.0
-        # A limit has a force where the initial pose or an encoder error is beyond the range.
+        # A limit has a force if the initial pose, or an encoder error, is beyond the range.
         model.jnt_limited[model.jnt_bodyid == body] = 0
         for motor in range(model.nu):
             if body in motor_bodies(model, motor):

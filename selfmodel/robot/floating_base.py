@@ -13,7 +13,7 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.robot.sliding_base import ScalarJoint, SlidingBase
 from selfmodel.robot.state_fields import DerivedSignal, StateField
-from selfmodel.trials.behaviour import Signal
+from selfmodel.trials.signals import Signal
 
 _FREE, _SLIDE, _HINGE = (
     int(mujoco.mjtJoint.mjJNT_FREE),

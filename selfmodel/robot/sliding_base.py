@@ -7,8 +7,8 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.robot.state_fields import DerivedSignal, StateField
-from selfmodel.trials.behaviour import Signal
 from selfmodel.trials.rotation import product, rotated
+from selfmodel.trials.signals import Signal
 
 
 @dataclass(frozen=True)

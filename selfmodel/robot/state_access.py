@@ -9,7 +9,7 @@ from selfmodel.arrays import FloatArray, columns
 from selfmodel.robot.floating_base import read_floating_base
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state_fields import Bind, DerivedSignal, StateField
-from selfmodel.trials.behaviour import Signal
+from selfmodel.trials.signals import Signal
 
 StateWriter = Callable[[Mapping[Signal, FloatArray]], None]
 """Writes signals, ``(n, width)`` each, into the state; absent signals keep their values."""

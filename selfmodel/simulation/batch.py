@@ -12,7 +12,7 @@ from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state_access import signal_fields
 from selfmodel.robot.state_fields import Reader
-from selfmodel.trials.behaviour import Signal
+from selfmodel.trials.signals import Signal
 
 
 def new_batch(model: mujoco.MjModel, embodiments: Sequence[Embodiment], threads: int) -> Batch:

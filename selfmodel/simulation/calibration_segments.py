@@ -8,7 +8,8 @@ import numpy as np
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.errors import InputError
 from selfmodel.simulation.requests import LEAD, Segments, command_steps, cut_segments
-from selfmodel.trials.behaviour import Behaviour, Signal
+from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.signals import Signal
 from selfmodel.trials.state_estimation import ONBOARD, STATE, estimated_states
 from selfmodel.trials.trial import Trial
 

@@ -7,7 +7,8 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.robot.control_delay import MAX_CONTROL_DELAY
-from selfmodel.trials.behaviour import SIGNALS, Behaviour, Signal
+from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.signals import SIGNALS, Signal
 
 LEAD = MAX_CONTROL_DELAY
 """Commands before a segment that ``cut_segments`` includes: enough for every control delay."""

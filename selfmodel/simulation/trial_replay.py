@@ -8,7 +8,8 @@ import numpy as np
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import SIGNALS, Behaviour, Signal
+from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.trial import Trial
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.trials.behaviour import Signal
 from selfmodel.trials.rotation import directions, rotation_between
+from selfmodel.trials.signals import Signal
 
 
 def difference(signal: Signal, one: FloatArray, other: FloatArray) -> FloatArray:

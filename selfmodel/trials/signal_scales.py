@@ -1,13 +1,13 @@
 """Scales of signals, side by side: one table per purpose, in each signal's unit.
 
 The tables differ on purpose; the comment before each gives the reason. The units are those of
-``behaviour.SIGNALS``; an orientation is compared as a rotation angle, rad, or as directions.
+``signals.SIGNALS``; an orientation is compared as a rotation angle, rad, or as directions.
 """
 
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from selfmodel.trials.behaviour import Signal
+from selfmodel.trials.signals import Signal
 
 # About three times the scales of calibration: the model of a damaged robot is judged, and a
 # hypothesis that is right but for the reality gap must not count as wrong.

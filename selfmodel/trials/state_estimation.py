@@ -10,7 +10,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.trials.behaviour import Behaviour, Signal
+from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.signals import Signal
 
 JOINTS: tuple[Signal, ...] = ("joint_positions", "joint_velocities")
 IMU: tuple[Signal, ...] = ("base_orientation", "base_angular_velocity")

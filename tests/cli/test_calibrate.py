@@ -15,7 +15,8 @@ from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.tasks import ROBOTS
-from selfmodel.trials.behaviour import Sample, Signal
+from selfmodel.trials.behaviour import Sample
+from selfmodel.trials.signals import Signal
 from selfmodel.trials.trial import Stage, TrialPlan
 from tests.helpers.command import selfmodel
 from tests.helpers.drivers import random_motion

@@ -12,7 +12,8 @@ from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.behaviour import SIGNALS, Behaviour
+from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_controllers, random_cpgs
 from tests.helpers.memory import in_memory

@@ -22,7 +22,7 @@ from selfmodel.faults.notation import parse
 from selfmodel.robot.designs import cpg_for
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import SIGNALS
+from selfmodel.trials.signals import SIGNALS
 from tests.helpers.drivers import random_controllers, random_cpgs
 
 RANGES = ((0.5, 0.25), (0.0, 1.0), (-2.0, 1.0))

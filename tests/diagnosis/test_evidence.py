@@ -23,7 +23,8 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
 from selfmodel.simulation.simulator import Run, Simulator
-from selfmodel.trials.behaviour import Behaviour, Signal
+from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.signals import Signal
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.comparators import Prepared, PreparedPieces
 from tests.helpers.drivers import random_controllers

@@ -31,8 +31,9 @@ from selfmodel.simulation.calibration import prediction_error
 from selfmodel.simulation.requests import Past, Segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import suite_bodies, walking
-from selfmodel.trials.behaviour import SIGNALS, Behaviour, collect
+from selfmodel.trials.behaviour import Behaviour, collect
 from selfmodel.trials.rotation import rotation_between
+from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.state_estimation import BASE, STATE
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.bodies import BODIES, EVERY_BODY, swinging, swung

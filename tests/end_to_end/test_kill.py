@@ -13,7 +13,7 @@ import pytest
 from selfmodel.logs import LogError, TrialLog, read_log
 from selfmodel.logs.salvage import salvage
 from selfmodel.logs.writer import FLUSH_STEPS
-from selfmodel.trials.behaviour import SIGNALS
+from selfmodel.trials.signals import SIGNALS
 
 ROOT = Path(__file__).parents[2]
 STEPS = 1000

@@ -10,7 +10,8 @@ from selfmodel.logs.writer import write_trial
 from selfmodel.physical.environment_robot import EnvironmentRobot
 from selfmodel.settings import Settings
 from selfmodel.tasks import ROBOTS
-from selfmodel.trials.behaviour import SIGNALS, Behaviour, collect
+from selfmodel.trials.behaviour import Behaviour, collect
+from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trial import TrialPlan
 from tests.helpers.drivers import random_controllers
 

@@ -3,7 +3,8 @@
 import numpy as np
 
 from selfmodel.controllers.playback import Playback
-from selfmodel.trials.behaviour import SIGNALS, Behaviour, Names, Signal
+from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.signals import SIGNALS, Names, Signal
 from selfmodel.trials.trial import Trial, TrialPlan
 
 LEGS = 4

@@ -7,7 +7,7 @@ import numpy as np
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import Signal
+from selfmodel.trials.signals import Signal
 from selfmodel.trials.trial import Trial
 
 

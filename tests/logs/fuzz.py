@@ -32,7 +32,8 @@ from selfmodel.logs.salvage import salvage
 from selfmodel.logs.writer import write_trial
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trials.behaviour import SIGNALS, Sample
+from selfmodel.trials.behaviour import Sample
+from selfmodel.trials.signals import SIGNALS
 from tests.logs.conftest import MJCF, made_up, plan_of, timed
 
 STEPS = 120

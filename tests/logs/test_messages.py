@@ -21,7 +21,7 @@ from selfmodel.logs.writer import write_trial
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trials.behaviour import Names
+from selfmodel.trials.signals import Names
 from tests.logs.conftest import plan_of
 
 OURS = "selfmodel_msgs/msg/SensorReadings"

@@ -12,7 +12,8 @@ from selfmodel.logs.physical_trial import TrialRunner, run_trial
 from selfmodel.logs.records import TrialHeader
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trials.behaviour import SIGNALS, Sample
+from selfmodel.trials.behaviour import Sample
+from selfmodel.trials.signals import SIGNALS
 from tests.logs.conftest import made_up, plan_of, timed
 
 STEPS = 20

@@ -14,7 +14,8 @@ from selfmodel.logs.writer import TrialWriter, write_trial
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trials.behaviour import SIGNALS, Behaviour, Sample, collect
+from selfmodel.trials.behaviour import Behaviour, Sample, collect
+from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trial import TrialPlan
 from tests.logs.conftest import STEPS, made_up, plan_of
 

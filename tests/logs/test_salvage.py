@@ -22,7 +22,7 @@ from selfmodel.logs.salvage import salvage, salvageable_steps
 from selfmodel.logs.writer import write_trial
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trials.behaviour import SIGNALS
+from selfmodel.trials.signals import SIGNALS
 from tests.logs.conftest import STEPS, made_up, plan_of
 
 

@@ -18,7 +18,8 @@ from selfmodel.logs.topics import TIMING
 from selfmodel.logs.writer import write_trial
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trials.behaviour import SIGNALS, Sample, collect
+from selfmodel.trials.behaviour import Sample, collect
+from selfmodel.trials.signals import SIGNALS
 from tests.logs.conftest import STEPS, made_up, plan_of, timed
 from tests.logs.test_damage import metadata, rewritten
 from tests.logs.test_salvage import spoiled

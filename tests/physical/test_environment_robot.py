@@ -28,7 +28,8 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import load
 from selfmodel.tasks.walking import motion_capture
-from selfmodel.trials.behaviour import SIGNALS, collect
+from selfmodel.trials.behaviour import collect
+from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trial import TrialPlan
 from tests.helpers.bench import (
     CONTROLLER,

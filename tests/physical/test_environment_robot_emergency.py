@@ -18,7 +18,8 @@ from selfmodel.physical.environment_robot import EnvironmentRobot
 from selfmodel.physical.safety_limits import Limit, joint_limits, tilt_limit
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trials.behaviour import Sample, Signal
+from selfmodel.trials.behaviour import Sample
+from selfmodel.trials.signals import Signal
 from selfmodel.trials.trial import TrialPlan
 from tests.helpers.bench import (
     CONTROLLER,

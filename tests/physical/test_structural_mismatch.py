@@ -22,7 +22,8 @@ from selfmodel.physical.structural_mismatch import (
 )
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import ROBOTS
-from selfmodel.trials.behaviour import SIGNALS, collect
+from selfmodel.trials.behaviour import collect
+from selfmodel.trials.signals import SIGNALS
 from tests.helpers.drivers import random_controllers
 
 QUADRUPED = ROBOTS["quadruped"].robot()

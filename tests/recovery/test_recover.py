@@ -30,7 +30,8 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.simulator import Run, Simulator
-from selfmodel.trials.behaviour import Sample, Signal
+from selfmodel.trials.behaviour import Sample
+from selfmodel.trials.signals import Signal
 from selfmodel.trials.trial import Stage, Trial
 from tests.helpers.drivers import random_controllers
 from tests.helpers.memory import MemoryJournal, in_memory

@@ -59,6 +59,7 @@ def asymmetric(quadruped: Robot) -> Robot:
     return dataclasses.replace(quadruped, mjcf=mjcf)
 
 
+@pytest.mark.search
 @pytest.mark.parametrize("kind", ["network", "cpg"])
 @pytest.mark.parametrize("next_trial", ["repair", "disagreement"])
 def test_a_recovery_has_one_design_though_a_fitted_model_is_rounded(

@@ -11,7 +11,7 @@ from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import KINDS
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import SIGNALS
+from selfmodel.trials.signals import SIGNALS
 from tests.helpers.bodies import BODIES, EVERY_BODY, swung
 
 MJCF = """
@@ -98,7 +98,7 @@ def test_joints_that_would_be_called_alike_are_refused():
     motors = "".join(f'<motor name="m{b}" joint="tail_{b}"/>' for b in ("knee", "other"))
     mjcf = MJCF.format(**(PARTS | {"motor": motors}))
 
-    with pytest.raises(ValueError, match="both be called 'knee'"):
+    with pytest.raises(ValueError, match="two joints with the name 'knee'"):
         Robot("made", mjcf.replace('<body name="upper">', f'{tails}<body name="upper">'), 0.002)
 
 

@@ -20,7 +20,8 @@ from selfmodel.simulation.calibration import (
     prediction_error,
 )
 from selfmodel.tasks import ROBOTS
-from selfmodel.trials.behaviour import SIGNALS, Signal, collect
+from selfmodel.trials.behaviour import collect
+from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.state_estimation import BASE
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_motion

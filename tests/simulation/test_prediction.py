@@ -22,8 +22,9 @@ from selfmodel.simulation.outcome import SimulationStats
 from selfmodel.simulation.prediction import predict
 from selfmodel.simulation.requests import Segments
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import SIGNALS, Behaviour, Signal, collect
+from selfmodel.trials.behaviour import Behaviour, collect
 from selfmodel.trials.rotation import rotation_between
+from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.state_estimation import ONBOARD, STATE
 from tests.helpers.drivers import random_motion
 from tests.helpers.hostile import exploding

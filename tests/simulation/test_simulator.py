@@ -10,7 +10,8 @@ from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
 from selfmodel.simulation.simulator import Run, Simulator
-from selfmodel.trials.behaviour import SIGNALS, collect
+from selfmodel.trials.behaviour import collect
+from selfmodel.trials.signals import SIGNALS
 from tests.helpers.drivers import random_controllers
 from tests.helpers.hostile import exploding
 

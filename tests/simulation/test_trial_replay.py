@@ -20,7 +20,8 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.trial_replay import replay
 from selfmodel.tasks import ROBOTS
-from selfmodel.trials.behaviour import SIGNALS, Behaviour
+from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_controllers, random_cpgs, random_of
 

@@ -13,7 +13,8 @@ from selfmodel.recovery.repair import RepairSearch
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS, entry, load, suite_bodies
-from selfmodel.trials.behaviour import SIGNALS, Behaviour, collect
+from selfmodel.trials.behaviour import Behaviour, collect
+from selfmodel.trials.signals import SIGNALS
 from tests.helpers.drivers import random_controllers
 
 STEPS = 60

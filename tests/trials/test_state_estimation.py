@@ -12,7 +12,8 @@ from selfmodel.faults.notation import parse
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS, entry
-from selfmodel.trials.behaviour import SIGNALS, Behaviour, Signal
+from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.state_estimation import IMU, JOINTS, STATE, estimated_states
 from tests.helpers.drivers import random_controllers, random_motion
 

@@ -12,7 +12,7 @@ from selfmodel.logs.errors import LogWriteError
 from selfmodel.logs.files import refuse_existing, replace_file
 from selfmodel.logs.reader import TrialLog
 from selfmodel.simulation.trial_replay import Replay
-from selfmodel.trials.behaviour import Signal
+from selfmodel.trials.signals import Signal
 
 FORMATS = ("png", "svg", "pdf")
 

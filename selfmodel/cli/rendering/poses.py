@@ -8,7 +8,8 @@ import numpy as np
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state_access import state_writer
-from selfmodel.trials.behaviour import Behaviour, Signal
+from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.signals import Signal
 
 POSE: tuple[Signal, ...] = ("joint_positions", "base_position", "base_orientation")
 """Signals that determine a pose."""

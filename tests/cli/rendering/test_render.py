@@ -29,7 +29,8 @@ from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import SIGNALS, Behaviour
+from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trial import TrialPlan
 from tests.helpers.command import selfmodel, selfmodel_process
 from tests.helpers.drivers import random_controllers

@@ -157,7 +157,7 @@ def test_the_command_suggests_imports_and_reports(driven: Path, tmp_path: Path):
             'robot = "quadruped"\ncontrol_timestep = 0.01',
             "map.toml:2: quadruped has a control time step of its own",
         ),
-        ('robot = "r.xml"', "map.toml:1: r.xml does not say how often it is controlled"),
+        ('robot = "r.xml"', "map.toml:1: r.xml has no control time step"),
         (
             'robot = "r.xml"\ncontrol_timestep = 0.01',
             "expected an MJCF file of a robot that needs no other file",
@@ -180,6 +180,7 @@ def test_what_a_mapping_names_must_be_there(
     assert second in done.stderr
 
 
+@pytest.mark.process
 def test_options_that_do_not_go_together_are_told(driven: Path):
     for arguments, message in (
         ((), "an import needs --out TRIAL.mcap and --mapping MAP.toml"),

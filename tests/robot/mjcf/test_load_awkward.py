@@ -11,7 +11,7 @@ from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import SIGNALS
+from selfmodel.trials.signals import SIGNALS
 from tests.helpers.drivers import random_controllers
 from tests.robot.mjcf.awkward import AWKWARD
 
