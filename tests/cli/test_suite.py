@@ -207,7 +207,7 @@ REFUSED = [
     ({"controller": "brain"}, "unknown kind of controller"),
     ({"kinds": "brek"}, "unknown kind 'brek'"),
     ({"gap": 0.7}, "expected a gap from 0 to 0.5"),
-    ({"controller": "cpg", "neurons": 4}, "--neurons 4 is of a network"),
+    ({"controller": "cpg", "neurons": 4}, "a CPG has no hidden neurons, got --neurons 4"),
     ({"bodies": ["biped.xml", "other/biped.xml"]}, "would have the same file names"),
 ]
 
