@@ -169,7 +169,6 @@ BY_THEME = {
     "cli/rendering/test_render": "the command of cli/render with all that it draws",
     "cli/test_controllers": "one option of many commands",
     "cli/test_kinds": "one option of many commands",
-    "diagnosis/test_verdict": "a verdict is of the search and of the significance together",
     "faults/test_graded": "all kinds with a severity, each a file of its own",
     "faults/test_kinds": "the contract of every kind, each a file of its own",
     "logs/rosbag/test_bags": "a reader of recordings that are made here",
