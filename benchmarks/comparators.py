@@ -59,7 +59,7 @@ class Known(NamedTuple):
     """A robot's calibrated model, its healthy trials, and one trial per failure."""
 
     model: Robot
-    intact: list[Trial]
+    healthy: list[Trial]
     failed: dict[int, Trial]
 
 
@@ -130,9 +130,9 @@ def _known(name: str, threads: int, settings: Settings) -> Known:
         behaviour = collect(robot.anatomy.names, physical.run(controller, plan.steps))
         return Trial(plan, name, behaviour, f"{plan.name}.mcap")
 
-    intact = [trial("before", "intact", k, controller) for k, controller in enumerate(gaits)]
+    healthy = [trial("before", "intact", k, controller) for k, controller in enumerate(gaits)]
     failed = {case: trial("after", entry.cases[case], HEALTHY_TRIALS, gaits[0]) for case in CASES}
-    return Known(calibrate(robot, intact, threads).robot, intact, failed)
+    return Known(calibrate(robot, healthy, threads).robot, healthy, failed)
 
 
 def _share(known: Known, comparator: Comparator, threads: int, settings: Settings) -> Facts:
@@ -170,7 +170,7 @@ def _diagnosis(
 ) -> Facts:
     """Returns seconds of a diagnosis and of its search, and the number of evaluated hypotheses."""
     simulator = Simulator(known.model, threads)
-    diagnose = DiagnosticSearch(simulator, comparator, settings, intact=known.intact)
+    diagnose = DiagnosticSearch(simulator, comparator, settings, intact=known.healthy)
     generations: list[Generation] = []
     start = perf_counter()
     diagnose([trial], [], np.random.default_rng(0), generations.append)

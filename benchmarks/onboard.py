@@ -96,10 +96,10 @@ def _diagnoses(runs: Path, of: Job, comparator: str, _folder: Path) -> list[dict
     trials = [
         without_base(read_log(path).trial) for path in sorted((folder / "trials").glob("*.mcap"))
     ]
-    intact = [trial for trial in trials if trial.plan.stage == "before"]
+    healthy = [trial for trial in trials if trial.plan.stage == "before"]
     failed = [trial for trial in trials if trial.plan.stage == "after"]
-    fitted = calibrate(setting.robot, intact, threads=1).robot
-    return as_dicts(diagnose_run(setting, fitted, intact, failed))
+    fitted = calibrate(setting.robot, healthy, threads=1).robot
+    return as_dicts(diagnose_run(setting, fitted, healthy, failed))
 
 
 if __name__ == "__main__":

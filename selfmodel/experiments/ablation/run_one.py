@@ -73,14 +73,14 @@ def setting_of(
 
 
 def diagnose_run(
-    setting: Setting, robot: Robot, intact: Sequence[Trial], trials: Sequence[Trial]
+    setting: Setting, robot: Robot, healthy: Sequence[Trial], trials: Sequence[Trial]
 ) -> list[AblationRow]:
     """Returns the rows of the diagnoses after the first and after the last trial.
 
     Args:
         setting: The run.
         robot: The calibrated self-model.
-        intact: Trials before the failure.
+        healthy: Trials before the failure.
         trials: Trials after the failure, at least one.
 
     Raises:
@@ -91,7 +91,7 @@ def diagnose_run(
         setting.comparator,
         setting.spec.settings,
         plugins.kinds(setting.spec.kinds),
-        intact=intact,
+        intact=healthy,
     )
     rows: list[AblationRow] = []
     cost = DiagnosisCost()
@@ -113,12 +113,12 @@ def diagnose_run(
 
 def _from_the_bank(setting: Setting) -> list[AblationRow]:
     """Returns the rows of trials with gaits of the bank, whose logs all comparators share."""
-    intact = before_failure(setting)
+    healthy = before_failure(setting)
     trials = [
         after_failure(setting, number, gait)
         for number, gait in enumerate(setting.gaits[: setting.spec.settings.trials])
     ]
-    return diagnose_run(setting, calibrated_robot(setting, intact), intact, trials)
+    return diagnose_run(setting, calibrated_robot(setting, healthy), healthy, trials)
 
 
 def _in_a_recovery(setting: Setting) -> list[AblationRow]:

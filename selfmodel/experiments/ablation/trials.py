@@ -55,14 +55,14 @@ def after_failure(setting: Setting, number: int, controller: Controller) -> Tria
     return _trial(setting, HEALTHY_TRIALS + number, "after", controller)
 
 
-def calibrated_robot(setting: Setting, intact: Sequence[Trial]) -> Robot:
+def calibrated_robot(setting: Setting, healthy: Sequence[Trial]) -> Robot:
     """Returns the calibrated self-model, the same for all comparators.
 
     The first call fits it to the trials before the failure and writes it beside the trials.
     """
     path, robot = setting.folder / "calibrated.xml", setting.robot
     if not path.exists():
-        write_atomic(path, calibrate(robot, intact, threads=1).robot.mjcf.encode())
+        write_atomic(path, calibrate(robot, healthy, threads=1).robot.mjcf.encode())
     return dataclasses.replace(robot, mjcf=path.read_text(encoding="utf-8"))
 
 

@@ -20,7 +20,8 @@ def bodies(domains: Sequence[str], tasks: Sequence[str] | None) -> tuple[str, ..
     Args:
         domains: Names in ``DOMAINS``, or paths of MJCF files. The prefix of a domain of the suite
             may be omitted unless another robot has the same name.
-        tasks: Names of tasks; a domain contributes those that it has. None for the default tasks.
+        tasks: Names of tasks; a domain contributes the tasks that it has. None for the default
+            task of each domain.
 
     Raises:
         InputError: A domain is unknown or has none of the tasks, or no domain has a task.
