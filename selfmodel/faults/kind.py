@@ -126,8 +126,8 @@ class FaultKind:
     @property
     def degenerate_kinds(self) -> tuple["FaultKind", ...]:
         """Kinds that a fault of this kind degenerates to."""
-        found = (*self.degenerates_to.values(), *self.degenerates_alone_to.values())
-        return tuple(dict.fromkeys(kind for kind in found if kind is not None))
+        kinds = (*self.degenerates_to.values(), *self.degenerates_alone_to.values())
+        return tuple(dict.fromkeys(kind for kind in kinds if kind is not None))
 
     @property
     def without_severity(self) -> "FaultKind":
