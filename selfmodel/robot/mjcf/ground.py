@@ -36,7 +36,7 @@ def add_ground(document: Document, model: mujoco.MjModel) -> None:
     )
     if not contype | conaffinity:
         raise InputError(
-            "no geom of the robot can have a contact: give the geoms of its limbs a contype of 1, "
+            "no geom of the robot can touch anything: give the geoms of its limbs a contype of 1, "
             "or <option> a density or viscosity if the robot swims or flies"
         )
     plane = {
