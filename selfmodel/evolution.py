@@ -106,7 +106,7 @@ class Evolution:
     def _children(self) -> FloatArray:
         settings, rng = self._settings, self._rng
         count = settings.population - settings.survivors
-        # Survivors are sorted, so the winner of a tournament is its lowest index.
+        # Survivors are sorted, so the entrant with the lowest index wins a tournament.
         entrants = rng.integers(len(self._genomes), size=(count, settings.tournament))
         return reproduce(self._genomes[entrants.min(axis=1)], self._draw, settings, rng)
 

@@ -108,7 +108,7 @@ class NetworkBatch:
         self._scaler = CommandScaler(network.ranges)
         self._working = _working_neurons(silent, network.hidden)
         sensors = len(network.sensors)
-        # Sensors, hidden neurons and the bias in one row: the input of either layer is a slice.
+        # Sensors, hidden neurons and the bias in one row: the input of each layer is a slice.
         self._inputs = np.zeros((len(genomes), sensors + network.hidden + 1))
         self._inputs[:, -1] = 1.0
         self.readings = self._inputs[:, :sensors]

@@ -83,7 +83,7 @@ def apply_faults(
         return embodiment
     for fault in hypothesis.faults:
         fault.kind.apply(embodiment, anatomy, fault)
-    # One MjData for both models, whose layouts are the same: its allocation costs the most here.
+    # One MjData for both models, which have one layout: its allocation takes the most time here.
     data = mujoco.MjData(model)
     nominal = _mean_inertia(model, data)
     mujoco.mj_setConst(embodiment.model, data)

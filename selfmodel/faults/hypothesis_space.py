@@ -53,9 +53,9 @@ class HypothesisSpace:
             InputError: No kind applies to the robot, or a kind is not searchable.
         """
         requested = tuple(kinds)
-        hidden = [kind.name for kind in requested if not kind.searchable]
-        if hidden:
-            raise InputError(f"no diagnosis may propose {', '.join(hidden)}: leave it out")
+        names = ", ".join(kind.name for kind in requested if not kind.searchable)
+        if names:
+            raise InputError(f"no diagnosis may propose {names}: leave {names} out")
         implied = [other for kind in requested for other in kind.degenerate_kinds]
         candidates = dict.fromkeys((*requested, *implied))
         applicable = tuple(kind for kind in candidates if kind.candidates(anatomy))

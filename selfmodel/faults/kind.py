@@ -145,7 +145,7 @@ class FaultKind:
 
 @dataclass(frozen=True, order=True)
 class Fault:
-    """One difference of the robot or of the world from the nominal model.
+    """A fault: one difference of the robot or of the world from the nominal model.
 
     Attributes:
         kind: Kind of the fault.

@@ -88,7 +88,7 @@ def _edit_spec(spec: "MjSpec", fault: Fault, seed: int) -> None:
     for plane in planes:
         plane.type = mujoco.mjtGeom.mjGEOM_HFIELD
         plane.hfieldname = TERRAIN_NAME
-        # A plane is infinite wherever its centre is; the field is centred on the initial position.
+        # The centre of an infinite plane is arbitrary; that of the field is the initial position.
         plane.pos = [0.0, 0.0, plane.pos[2] + low]
 
 

@@ -130,7 +130,7 @@ def add_structural_mismatch(spec: mujoco.MjSpec, structure: StructuralMismatch) 
         growth = max(geom.size[0] for geom in geoms) * (structure.foot_factor - 1)
         for geom in geoms:
             geom.size[0] *= structure.foot_factor
-        # The site of a touch sensor encloses the foot, so it grows with the foot.
+        # The site of a touch sensor encloses the foot, so the site grows with the foot.
         touch_sites = {sensor.objname for sensor in spec.sensors if sensor.type == TOUCH_SENSOR}
         for site in body.sites:
             if site.name in touch_sites:

@@ -51,11 +51,11 @@ def calibration_segments_of(trial: Trial) -> CalibrationSegments:
         InputError: Too few states and commands are known for any segments.
     """
     if trial.behaviour.steps <= LEAD + HORIZON:
-        raise _useless(trial, f"the trial has {trial.behaviour.steps}")
+        raise _unusable(trial, f"the trial has {trial.behaviour.steps}")
     segments = _spread(trial.behaviour) or _sequential(trial.behaviour)
     if segments is None:
         never = _never_known(trial.behaviour)
-        raise _useless(
+        raise _unusable(
             trial, f"the log never has {never}" if never else "the log has no such segment"
         )
     return segments
@@ -129,8 +129,8 @@ def _never_known(behaviour: Behaviour) -> str:
     return ", ".join(never)
 
 
-def _useless(trial: Trial, has: str) -> InputError:
+def _unusable(trial: Trial, reason: str) -> InputError:
     return InputError(
         f"{trial.path}: calibration needs segments of {LEAD + HORIZON + 1} steps or more, without "
-        f"late steps, with {', '.join(ONBOARD)} and the commands, and {has}: leave this log out"
+        f"late steps, with {', '.join(ONBOARD)} and the commands, and {reason}: leave this log out"
     )

@@ -51,7 +51,7 @@ def expand(document: Document) -> None:
             spec.compile()
             document.root = ET.fromstring(spec.to_xml())  # noqa: S314  # the text is from MuJoCo
         document.notes.append(
-            f"MuJoCo wrote out its <{'>, <'.join(used)}>, with numbers of six digits"
+            f"MuJoCo wrote out the <{'>, <'.join(used)}> elements, with numbers of six digits"
         )
         if any(element.tag in REFUSED_ELEMENTS for element in document.root.iter()):
             raise InputError(
@@ -61,7 +61,7 @@ def expand(document: Document) -> None:
     compilers = list(document.root.iter("compiler"))
     if any(compiler.get("settotalmass") for compiler in compilers):
         write_masses(document, compile_model(document.text, document.assets))
-        document.notes.append("its masses are written out, as settotalmass scales them")
+        document.notes.append("the masses are written out, as scaled by settotalmass")
 
 
 def _keep_all_elements(document: Document) -> None:

@@ -93,7 +93,7 @@ def _frames_at(model: mujoco.MjModel, qpos: FloatArray) -> BodyFrames:
 
 
 def _check_equalities(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Checks that equality constraints do not depend on the reference pose."""
+    """Checks that the new reference pose does not change the equality constraints."""
     if not model.neq:
         return
     rows = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_EQUALITY

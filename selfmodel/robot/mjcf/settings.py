@@ -94,8 +94,8 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
     for key in given:
         if key == "neurons":
             raise InputError(
-                "neurons is not a setting of a robot, but of its controller: leave it out, and "
-                "give --neurons N to the command"
+                "neurons is a setting of a controller, not of a robot: leave neurons out, and give "
+                "--neurons N to the command"
             )
         if key not in {field.name for field in fields(MjcfSettings)}:
             raise unknown_name("setting", key, [field.name for field in fields(MjcfSettings)])

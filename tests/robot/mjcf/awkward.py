@@ -244,7 +244,7 @@ AWKWARD: dict[str, Awkward] = {
             more='<option timestep="0.05" integrator="Euler"/>'
             '<default><joint stiffness="1e7" springref="30"/></default>'
         ),
-        "its simulation diverges",
+        "the simulation diverges",
     ),
     "a huge memory": Awkward(mjcf(more='<size memory="900G"/>'), "memory"),
     # Keyframes and names.
