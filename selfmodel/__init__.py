@@ -1,4 +1,4 @@
-"""Finds what changed in a legged robot from a few logged trials, and gets the robot walking again.
+"""Damage diagnosis and recovery of legged robots from a few logged trials.
 
 An implementation of Bongard & Lipson, *Automated Damage Diagnosis and Recovery for Remote
 Robotics* (ICRA 2004), on MuJoCo and dm_control. "The paper" in every docstring is that article.

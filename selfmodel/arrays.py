@@ -1,4 +1,4 @@
-"""The array types that signatures name."""
+"""Array types for signatures, and functions on arrays."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -13,7 +13,7 @@ class InputError(ValueError):
 
 
 class WorkError(RuntimeError):
-    """Failed work, although the input was valid."""
+    """Failure of an operation on valid input."""
 
 
 class TrialError(WorkError):
@@ -21,7 +21,7 @@ class TrialError(WorkError):
 
 
 def describe(error: BaseException) -> str:
-    """Returns the message of an error with its notes, such as that a robot was not stopped."""
+    """Returns the message of an error with its notes, such as a failed stop of a robot."""
     return "; ".join(filter(None, (str(error), *getattr(error, "__notes__", ()))))
 
 

@@ -10,7 +10,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.settings import Settings
 
 Draw = Callable[[np.random.Generator, tuple[int, ...]], FloatArray]
-"""Draws values of a genome: ``(generator, shape) -> array of that shape``."""
+"""Function that draws values of genomes: ``(generator, shape) -> array of that shape``."""
 
 
 @dataclass(frozen=True)
@@ -48,8 +48,8 @@ class Evolution:
         draw: Draws the values of random genomes and of mutations.
         settings: Parameters of the search.
         rng: Source of all random numbers.
-        seeds: Genomes of the first generation beside random genomes; at most a population of seeds
-            is used.
+        seeds: Genomes of the first generation beside random genomes; the first
+            ``settings.population`` seeds are used.
     """
 
     def __init__(
@@ -77,15 +77,15 @@ class Evolution:
         return self._asked
 
     def tell(self, fitness: FloatArray) -> None:
-        """Takes the fitness of the genomes last asked for, ``(n,)``, and generates children.
+        """Sets the fitness of the genomes that ``ask`` returned, ``(n,)``, and generates children.
 
         Raises:
             ValueError: ``fitness`` has another shape, or a NaN.
         """
         if fitness.shape != (len(self._asked),) or np.isnan(fitness).any():
             raise ValueError(
-                f"expected a fitness for each of the {len(self._asked)} genomes asked for, "
-                f"none of them NaN, got shape {fitness.shape}"
+                f"expected a fitness other than NaN for each of the {len(self._asked)} genomes "
+                f"asked for, got shape {fitness.shape}"
             )
         genomes = np.concatenate([self._genomes, self._asked])
         scores = np.concatenate([self._fitness, fitness])
@@ -106,7 +106,7 @@ class Evolution:
     def _children(self) -> FloatArray:
         settings, rng = self._settings, self._rng
         count = settings.population - settings.survivors
-        # Survivors are sorted, so the winner of a tournament is its lowest index.
+        # Survivors are sorted, so the entrant with the lowest index wins a tournament.
         entrants = rng.integers(len(self._genomes), size=(count, settings.tournament))
         return reproduce(self._genomes[entrants.min(axis=1)], self._draw, settings, rng)
 

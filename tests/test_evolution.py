@@ -154,7 +154,9 @@ def test_of_equals_the_earlier_survive():
 
 @pytest.mark.parametrize("fitness", [np.zeros(99), np.full(100, np.nan)])
 def test_a_fitness_that_does_not_fit_is_refused(fitness: np.ndarray):
-    with pytest.raises(ValueError, match="expected a fitness for each of the 100 genomes"):
+    with pytest.raises(
+        ValueError, match="expected a fitness other than NaN for each of the 100 genomes"
+    ):
         search().tell(fitness)
 
 

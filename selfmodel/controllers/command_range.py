@@ -16,10 +16,11 @@ servo, rad/s for a velocity servo, a fraction of the largest torque for many tor
 
 
 def checked_ranges(motors: tuple[str, ...], ranges: Ranges) -> Ranges:
-    """Returns the command ranges of some motors, by default the paper's for all.
+    """Returns checked command ranges; the paper's range for every motor if ``ranges`` is empty.
 
     Raises:
-        ValueError: The ranges do not fit the motors, or one is not finite or has no width.
+        ValueError: The number of ranges is not the number of motors, or a range is not finite or
+            has no positive width.
     """
     if not ranges:
         return ((0.0, TARGET_RANGE),) * len(motors)
@@ -28,7 +29,7 @@ def checked_ranges(motors: tuple[str, ...], ranges: Ranges) -> Ranges:
     for motor, (centre, half) in zip(motors, ranges, strict=True):
         if not (math.isfinite(centre) and math.isfinite(half) and half > 0):
             raise ValueError(
-                f"the motor {motor} needs a finite command range of some width, got "
+                f"the motor {motor} needs a finite command range of positive width, got "
                 f"{centre} plus and minus {half}"
             )
     return ranges
@@ -47,7 +48,7 @@ class CommandScaler:
         self._centre = centre if centre.any() else None
 
     def write(self, outputs: FloatArray, commands: FloatArray) -> None:
-        """Writes the commands of outputs in [-1, 1]; both are ``(n, motors)``."""
+        """Writes the commands for outputs in [-1, 1]; both arrays are ``(n, motors)``."""
         np.multiply(outputs, self._half, out=commands)
         if self._centre is not None:
             commands += self._centre

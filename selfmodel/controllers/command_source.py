@@ -9,7 +9,7 @@ from selfmodel.controllers.controller import Controller, ControllerBatch, check_
 from selfmodel.controllers.playback import Playback, PlaybackBatch
 
 CommandSource = Controller | Playback
-"""Source of a robot's commands. A trial of a robot that other software drove has a playback."""
+"""Source of a robot's commands: a playback if other software controlled the robot."""
 
 
 def make_batch(
@@ -18,7 +18,7 @@ def make_batch(
     """Returns the batch of the command sources of many robots, in their initial state.
 
     Args:
-        sources: One per robot: controllers of one design, or playbacks.
+        sources: Command sources, one per robot: controllers of one design, or playbacks.
         silent: Indices of the silent hidden neurons per robot; they do not affect a playback.
         sensors: Number of sensors of a robot.
 
@@ -30,10 +30,10 @@ def make_batch(
     playbacks = [source for source in sources if isinstance(source, Playback)]
     designs = Counter(controller.design for controller in controllers)
     if len(designs) + bool(playbacks) != 1:
-        found = [f"{count} x {design.description}" for design, count in designs.items()]
-        found.append(f"{len(playbacks)} playbacks")
+        counts = [f"{count} x {design.description}" for design, count in designs.items()]
+        counts.append(f"{len(playbacks)} playbacks")
         raise ValueError(
-            f"the command sources of one batch must have one design, got {'; '.join(found)}"
+            f"the command sources of one batch must have one design, got {'; '.join(counts)}"
         )
     if playbacks:
         return PlaybackBatch(playbacks, sensors)

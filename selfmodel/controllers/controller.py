@@ -14,8 +14,8 @@ from selfmodel.errors import InputError
 class ControllerBatch(Protocol):
     """The controllers of many robots, stepped together.
 
-    The arithmetic of a robot is the same to the bit whatever the number of rows and its place among
-    them: contact is chaotic, and a difference in the last bit grows to half a metre.
+    The commands of a robot are bit-identical for every number of rows and at every row: contact is
+    chaotic, and a difference in the last bit grows to half a metre.
 
     Attributes:
         readings: Sensor readings, ``(n, sensors)``; the caller writes them before each step.
@@ -96,7 +96,7 @@ class Controller:
         genome: ``(weights,)``, each value in [-1, 1].
 
     Raises:
-        ValueError: The genome does not fit the design.
+        ValueError: The genome has another length than the design's, or a value outside [-1, 1].
     """
 
     design: Design
@@ -139,7 +139,7 @@ def check_silent_neurons(design: Design, silent: AbstractSet[int]) -> None:
         silent: Indices of the silent hidden neurons.
 
     Raises:
-        InputError: The design lacks one of them; the message names the neuron.
+        InputError: A neuron does not exist in the design; the message contains its index.
     """
     missing = [neuron for neuron in sorted(silent) if neuron >= design.hidden]
     if not missing:

@@ -3,10 +3,10 @@
 The CPG has one oscillator per motor. All oscillators share one frequency; each has an amplitude, an
 offset and a phase. The amplitudes grow from 0 at the start, and sensor readings speed up or slow
 down the shared phase. Source: Ijspeert, Crespi, Ryczko and Cabelguen, *From swimming to walking
-with a salamander robot driven by a spinal cord model* (Science 315:1416, 2007); these are its
-oscillators after their phases have locked. The feedback of readings on the speed of the phase is
-from Righetti and Ijspeert, *Pattern generators with sensory feedback for the control of quadruped
-locomotion* (ICRA 2008).
+with a salamander robot driven by a spinal cord model* (Science 315:1416, 2007); the equations
+here are those of its oscillators after phase locking. The feedback of readings on the speed of the
+phase is from Righetti and Ijspeert, *Pattern generators with sensory feedback for the control of
+quadruped locomotion* (ICRA 2008).
 """
 
 import math
@@ -21,14 +21,15 @@ from selfmodel.controllers.command_range import CommandScaler, Ranges, checked_r
 
 MIN_FREQUENCY, MAX_FREQUENCY = 0.5, 4.0
 """Bounds of the stride frequency, Hz. A leg of 0.1 to 1 m has a natural pendulum frequency of 0.5
-to 1.6 Hz; animals and robots of that size run at two to three times that."""
+to 1.6 Hz; animals and robots of that size run at two to three times that frequency."""
 
 AMPLITUDE_RATE = 20.0
-"""Rate at which the amplitudes grow from 0, 1/s: 96 % after half a second. From the source."""
+"""Rate at which the amplitudes grow from 0, 1/s: 96 % after half a second. Source: Ijspeert et
+al."""
 
 MAX_FEEDBACK = 0.5
-"""Largest relative change of the phase speed by all sensors together, each reading 1. Below 1, so
-the phase always advances."""
+"""Largest relative change of the phase speed by all sensors together, each reading 1. The value
+is below 1, so the phase always advances."""
 
 
 @dataclass(frozen=True)
@@ -126,7 +127,7 @@ class CpgBatch:
     Readings are constant between two commands, so the advance of the phase is exact.
 
     Args:
-        cpg: The design of all.
+        cpg: Design of all controllers.
         genomes: ``(n, weights)``.
     """
 
@@ -134,11 +135,11 @@ class CpgBatch:
         decoded = [cpg.decode(genome) for genome in genomes]
         self._timestep = cpg.timestep
         self._scaler = CommandScaler(cpg.ranges)
-        self._stride = np.array([one.frequency * cpg.timestep for one in decoded])
-        self._amplitudes = np.array([one.amplitudes for one in decoded])
-        self._offsets = np.array([one.offsets for one in decoded])
-        self._phases = np.array([one.phases for one in decoded])
-        self._feedback = np.array([one.feedback for one in decoded])
+        self._stride = np.array([parameters.frequency * cpg.timestep for parameters in decoded])
+        self._amplitudes = np.array([parameters.amplitudes for parameters in decoded])
+        self._offsets = np.array([parameters.offsets for parameters in decoded])
+        self._phases = np.array([parameters.phases for parameters in decoded])
+        self._feedback = np.array([parameters.feedback for parameters in decoded])
         self._phase = np.zeros(len(decoded))
         self._step = 0
         self.readings = np.zeros((len(decoded), len(cpg.sensors)))
@@ -169,5 +170,5 @@ def amplitude_rise(time: float) -> float:
     The fraction r solves r'' = a (a (1 - r) / 4 - r') from rest, with a = ``AMPLITUDE_RATE``. The
     equation is critically damped, so the first commands do not jump.
     """
-    turned = AMPLITUDE_RATE * time / 2
-    return 1 - (1 + turned) * math.exp(-turned)
+    exponent = AMPLITUDE_RATE * time / 2
+    return 1 - (1 + exponent) * math.exp(-exponent)

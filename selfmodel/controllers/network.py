@@ -13,7 +13,7 @@ HIDDEN_NEURONS = 3
 """Hidden neurons of the paper's network."""
 
 MAX_HIDDEN_NEURONS = 100
-"""Largest number of hidden neurons that a network may be given."""
+"""Largest number of hidden neurons of a network."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,8 @@ class Network:
         ranges: Command range of each motor; the paper's for all by default.
 
     Raises:
-        ValueError: The ranges do not fit the motors, or one is not finite or has no width.
+        ValueError: The number of ranges is not the number of motors, or a range is not finite or
+            has no positive width.
     """
 
     name: ClassVar[str] = "network"
@@ -95,7 +96,7 @@ class NetworkBatch:
     """The networks of many robots; a ``ControllerBatch``.
 
     Args:
-        network: The design of all.
+        network: Design of all controllers.
         genomes: ``(n, weights)``.
         silent: Indices of the silent hidden neurons per robot; their activation is 0.
     """
@@ -107,7 +108,7 @@ class NetworkBatch:
         self._scaler = CommandScaler(network.ranges)
         self._working = _working_neurons(silent, network.hidden)
         sensors = len(network.sensors)
-        # Sensors, hidden neurons and the bias in one row: the input of either layer is a slice.
+        # Sensors, hidden neurons and the bias in one row: the input of each layer is a slice.
         self._inputs = np.zeros((len(genomes), sensors + network.hidden + 1))
         self._inputs[:, -1] = 1.0
         self.readings = self._inputs[:, :sensors]

@@ -18,7 +18,7 @@ class Playback:
             end of the recording.
 
     Raises:
-        ValueError: There are no commands, they do not fit the motors, or one is not finite.
+        ValueError: The commands have another shape or no rows, or a command is not finite.
     """
 
     motors: tuple[str, ...]
@@ -30,9 +30,9 @@ class Playback:
                 f"commands must have shape (steps, motors) = (1 or more, {len(self.motors)}), "
                 f"got {self.commands.shape}"
             )
-        unknown = np.flatnonzero(~np.isfinite(self.commands).all(axis=1))
-        if len(unknown):
-            raise ValueError(f"the commands of step {unknown[0]} are not all known")
+        incomplete = np.flatnonzero(~np.isfinite(self.commands).all(axis=1))
+        if len(incomplete):
+            raise ValueError(f"the commands of step {incomplete[0]} are not all finite")
         object.__setattr__(self, "commands", frozen(self.commands))
 
     def __eq__(self, other: object) -> bool:
@@ -73,7 +73,7 @@ class PlaybackBatch:
     """The recorded commands of many robots; a ``ControllerBatch``.
 
     Args:
-        playbacks: One per robot.
+        playbacks: Playbacks, one per robot.
         sensors: Number of sensors of a robot; the readings do not affect the commands.
     """
 

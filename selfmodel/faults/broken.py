@@ -1,4 +1,4 @@
-"""A broken joint: the limb beyond it falls off."""
+"""Broken joint: the bodies beyond the joint are detached."""
 
 from typing import TYPE_CHECKING
 
@@ -21,7 +21,7 @@ def _apply(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
 
 
 def _absorbs(fault: Fault, other: Fault, anatomy: Anatomy) -> bool:
-    """Returns whether the other fault is at a lost part, or of a motor without a load."""
+    """Returns whether the other fault is at a detached part, or of a motor without a load."""
     if other.part == fault.part:
         return other.kind != fault.kind
     broken = anatomy.joint(fault.part)
@@ -33,7 +33,7 @@ def _absorbs(fault: Fault, other: Fault, anatomy: Anatomy) -> bool:
 
 
 def _joints_with_limbs(anatomy: Anatomy) -> tuple[str, ...]:
-    """Joints whose limb has only named bodies: faults refer to bodies by name."""
+    """Returns the joints whose bodies all have names: faults refer to bodies by name."""
     return tuple(joint.name for joint in anatomy.joints if "" not in joint.bodies)
 
 

@@ -11,7 +11,7 @@ from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 
 SpecEdit = Callable[[MjSpec], None]
-"""Edits a specification before it is compiled."""
+"""Function that edits a specification, in place, before its compilation."""
 
 
 def build(
@@ -26,7 +26,7 @@ def build(
 
     Args:
         robot: The nominal robot.
-        hypothesis: In canonical form.
+        hypothesis: Hypothesis in canonical form.
         seed: Seed of the random parts of the faults, such as the shape of rough terrain. The
             self-model's seed is 0; a simulated physical robot has another seed.
         edits: Further edits of the specification, after those of the hypothesis.
@@ -47,11 +47,11 @@ def compile_model(
 ) -> MjModel:
     """Returns the compiled model with the faults that edit the specification.
 
-    The result is the robot's own model, not a copy, where nothing edits the specification.
+    The result is the robot's own model, not a copy, if the specification is not edited.
 
     Args:
         robot: The nominal robot.
-        hypothesis: In canonical form.
+        hypothesis: Hypothesis in canonical form.
         seed: As for ``build``.
         edits: As for ``build``.
     """
@@ -75,7 +75,7 @@ def apply_faults(
     Args:
         model: The model as ``compile_model`` returns it; it is not changed.
         anatomy: The robot's parts.
-        hypothesis: In canonical form.
+        hypothesis: Hypothesis in canonical form.
         seed: As for ``build``.
     """
     embodiment = Embodiment.of(model, anatomy, seed)
@@ -83,7 +83,7 @@ def apply_faults(
         return embodiment
     for fault in hypothesis.faults:
         fault.kind.apply(embodiment, anatomy, fault)
-    # One MjData for both models, whose layouts are the same: its allocation costs the most here.
+    # One MjData for both models, which have one layout: its allocation takes the most time here.
     data = mujoco.MjData(model)
     nominal = _mean_inertia(model, data)
     mujoco.mj_setConst(embodiment.model, data)
@@ -96,7 +96,7 @@ def apply_faults(
 
 
 def _mean_inertia(model: MjModel, data: mujoco.MjData) -> float:
-    """Mean of the diagonal of the mass matrix in the reference configuration."""
+    """Returns the mean of the mass matrix's diagonal in the reference configuration."""
     mujoco.mj_resetData(model, data)
     mujoco.mj_fwdPosition(model, data)
     return float(data.M[model.M_rowadr + model.M_rownnz - 1].mean())

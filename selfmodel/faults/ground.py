@@ -1,4 +1,4 @@
-"""The ground: sliding friction and slope."""
+"""Environment kinds of the ground: sliding friction and slope."""
 
 from typing import TYPE_CHECKING
 

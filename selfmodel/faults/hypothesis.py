@@ -1,4 +1,4 @@
-"""A hypothesis: a set of faults and environments in canonical form."""
+"""Hypothesis: a set of faults and environments in canonical form."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -12,10 +12,11 @@ class Hypothesis:
     """A set of faults; the empty set is the nominal robot.
 
     ``canonical``, ``notation.parse`` and ``HypothesisSpace`` make hypotheses in canonical form, in
-    which equal hypotheses have equal effects on a robot. The constructor checks nothing.
+    which equal hypotheses have equal effects on a robot. The constructor does not check its
+    argument.
 
     Attributes:
-        faults: Sorted, without faults that another fault absorbs.
+        faults: Faults, sorted, without faults that another fault absorbs.
     """
 
     faults: tuple[Fault, ...] = ()
@@ -45,7 +46,7 @@ def canonical(faults: Iterable[Fault], anatomy: Anatomy) -> Hypothesis:
     """Returns the hypothesis with the fewest faults that has the same effects on a robot.
 
     Order and repetition do not matter. Faults with a nominal severity and faults that another
-    fault absorbs are dropped: a joint beyond a broken joint is lost, whatever its own fault. Of
+    fault absorbs are dropped: a joint beyond a broken joint is detached, whatever its fault. Of
     several severities of one kind at one part the first is kept.
     """
     distinct: dict[tuple[FaultKind, str], Fault] = {}

@@ -1,4 +1,4 @@
-"""The hypotheses about one robot: notation, canonical form, genomes, candidates and neighbours."""
+"""Search space: hypotheses about one robot, their genomes, candidates and neighbours."""
 
 import dataclasses
 from collections.abc import Iterable, Sequence
@@ -53,9 +53,9 @@ class HypothesisSpace:
             InputError: No kind applies to the robot, or a kind is not searchable.
         """
         requested = tuple(kinds)
-        hidden = [kind.name for kind in requested if not kind.searchable]
-        if hidden:
-            raise InputError(f"no diagnosis may propose {', '.join(hidden)}: leave it out")
+        names = ", ".join(kind.name for kind in requested if not kind.searchable)
+        if names:
+            raise InputError(f"no diagnosis may propose {names}: leave {names} out")
         implied = [other for kind in requested for other in kind.degenerate_kinds]
         candidates = dict.fromkeys((*requested, *implied))
         applicable = tuple(kind for kind in candidates if kind.candidates(anatomy))
@@ -193,17 +193,17 @@ class HypothesisSpace:
     def _others(
         self, hypothesis: Hypothesis, changed: Iterable[Sequence[Fault]]
     ) -> list[Hypothesis]:
-        """The distinct canonical forms, without the hypothesis itself."""
+        """Returns the distinct canonical forms, without the hypothesis itself."""
         distinct = dict.fromkeys(self.canonical(faults) for faults in changed)
         return [other for other in distinct if other != hypothesis]
 
 
 def _evenly_spaced(count: int) -> Iterable[int]:
-    """Indices of at most ``COARSE_LEVELS`` of some levels, with the first and the last."""
+    """Returns at most ``COARSE_LEVELS`` indices below ``count``, with the first and the last."""
     indices = np.linspace(0, count - 1, COARSE_LEVELS).round().astype(int).tolist()
     return dict.fromkeys(indices)
 
 
 def _interval_middle(index: int, count: int) -> float:
-    """The middle of an index's interval of [0, 1), exact under ``int(value * count)``."""
+    """Returns the middle of an index's interval of [0, 1), exact under ``int(value * count)``."""
     return (index + 0.5) / count

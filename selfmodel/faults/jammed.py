@@ -1,4 +1,4 @@
-"""A jammed joint: its hinges are welded, at 0 or at an angle.
+"""Jammed joint: the hinges of the joint are welded, at 0 or at an angle.
 
 A hinge whose range excludes 0 is welded at the limit nearest to 0.
 """
@@ -66,7 +66,7 @@ def _absorbs_motor(fault: Fault, other: Fault, anatomy: Anatomy) -> bool:
 
 
 def _joints_with_angles(anatomy: Anatomy) -> tuple[str, ...]:
-    """Joints with a common angle of all hinges that differs from that of ``JAMMED``."""
+    """Returns the joints with a common angle of all hinges other than that of ``JAMMED``."""
     return tuple(joint.name for joint in anatomy.joints if _levels(anatomy, joint.name))
 
 

@@ -126,8 +126,8 @@ class FaultKind:
     @property
     def degenerate_kinds(self) -> tuple["FaultKind", ...]:
         """Kinds that a fault of this kind degenerates to."""
-        found = (*self.degenerates_to.values(), *self.degenerates_alone_to.values())
-        return tuple(dict.fromkeys(kind for kind in found if kind is not None))
+        kinds = (*self.degenerates_to.values(), *self.degenerates_alone_to.values())
+        return tuple(dict.fromkeys(kind for kind in kinds if kind is not None))
 
     @property
     def without_severity(self) -> "FaultKind":
@@ -145,7 +145,7 @@ class FaultKind:
 
 @dataclass(frozen=True, order=True)
 class Fault:
-    """One difference of the robot or of the world from the nominal model.
+    """A fault: one difference of the robot or of the world from the nominal model.
 
     Attributes:
         kind: Kind of the fault.

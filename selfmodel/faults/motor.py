@@ -1,4 +1,4 @@
-"""A weak motor: its torque is scaled down."""
+"""Weak motor: the torque of the motor is scaled by a factor below 1."""
 
 from typing import TYPE_CHECKING
 
@@ -15,7 +15,7 @@ def _apply(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
 
 
 def _joints_with_motors(anatomy: Anatomy) -> tuple[str, ...]:
-    """Joints with motors; a motor of several joints through a tendon belongs to the first."""
+    """Returns the joints with motors; a motor of several joints belongs to the first joint."""
     return tuple(joint.name for joint in anatomy.joints if joint.motors)
 
 

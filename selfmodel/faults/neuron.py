@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def _parts(_anatomy: Anatomy) -> tuple[str, ...]:
-    # Of any network; the number of neurons is known where a controller is.
+    # Neurons of the largest network: the controller, and so its number of neurons, is unknown.
     return tuple(str(neuron) for neuron in range(MAX_HIDDEN_NEURONS))
 
 

@@ -44,7 +44,7 @@ def parse(
 
 
 def _key(fault: Fault) -> tuple[str, str, str]:
-    """The key of a fault; a hypothesis has at most one severity per key."""
+    """Returns the key of a fault; a hypothesis has at most one severity per key."""
     return fault.kind.keyword, fault.part, fault.kind.prefix
 
 
@@ -81,12 +81,12 @@ def _unreadable(term: str, text: str, kinds: tuple[FaultKind, ...]) -> InputErro
 
 
 def _plain(named: list[FaultKind]) -> FaultKind:
-    """The kind of a term without a severity; a kind that needs a severity if there is no other."""
+    """Returns the kind of a term without a severity, if any; otherwise the first kind."""
     return next((kind for kind in named if kind.severity_bounds is None), named[0])
 
 
 def _graded(term: str, named: list[FaultKind], value: str) -> FaultKind:
-    """The kind of a term with a severity, by the prefix of the severity."""
+    """Returns the kind of a term with a severity, by the prefix of the severity."""
     graded = sorted(
         (kind for kind in named if kind.severity_bounds),
         key=lambda kind: len(kind.prefix),

@@ -35,5 +35,5 @@ def notation_kinds(kinds: Iterable[FaultKind]) -> tuple[FaultKind, ...]:
     Args:
         kinds: Kinds of the search, built-in or third-party; their degenerate kinds are included.
     """
-    named = [kind for one in kinds for kind in (one, *one.degenerate_kinds)]
+    named = [kind for each in kinds for kind in (each, *each.degenerate_kinds)]
     return tuple(dict.fromkeys((*KINDS.values(), *named)))

@@ -18,7 +18,7 @@ def _sensors(anatomy: Anatomy) -> tuple[str, ...]:
 
 
 def _angle_sensors(anatomy: Anatomy) -> tuple[str, ...]:
-    """Angle sensors; additive noise has no meaning for a binary touch sensor."""
+    """Returns the angle sensors; additive noise has no meaning for a binary touch sensor."""
     return tuple(sensor.name for sensor in anatomy.sensors if sensor.kind == "angle")
 
 

@@ -12,8 +12,8 @@ class _Limb:
 
     Attributes:
         joints: Joints, the one nearest to the root body first.
-        touch: Names of its touch sensors, the outermost first.
-        angle: Names of its joints' angle sensors.
+        touch: Names of the touch sensors, the outermost first.
+        angle: Names of the angle sensors of the joints.
     """
 
     joints: tuple[Joint, ...]
@@ -31,22 +31,26 @@ def cases_of(anatomy: Anatomy) -> Mapping[int, str]:
     Source: the paper, Table I; for the paper's two robots the cases equal the paper's.
     """
     limbs = _limbs(anatomy)
-    found: dict[int, str | None] = dict.fromkeys(range(1, 9))
+    by_number: dict[int, str | None] = dict.fromkeys(range(1, 9))
     if limbs:
         first, others = limbs[0], limbs[1:]
-        lost_limb = f"break:{first.joints[0].name}"
-        found[1] = f"break:{first.joints[-1].name}" if len(first.joints) > 1 else None
-        found[2] = lost_limb
-        found[3] = _failed(first.touch)
-        found[4] = _compound(lost_limb, _failed(name for limb in others for name in limb.touch))
-        found[5] = _failed(first.angle)
-        found[6] = f"jam:{first.joints[0].name}"
-        # The paper jams the leg behind the lost leg, not the opposite leg.
+        detached_limb = f"break:{first.joints[0].name}"
+        by_number[1] = f"break:{first.joints[-1].name}" if len(first.joints) > 1 else None
+        by_number[2] = detached_limb
+        by_number[3] = _failed(first.touch)
+        by_number[4] = _compound(
+            detached_limb, _failed(name for limb in others for name in limb.touch)
+        )
+        by_number[5] = _failed(first.angle)
+        by_number[6] = f"jam:{first.joints[0].name}"
+        # The paper jams the leg behind the detached leg, not the opposite leg.
         jammed = next(iter(others[1:] or others), None)
-        found[7] = _compound(lost_limb, f"jam:{jammed.joints[0].name}" if jammed else None)
+        by_number[7] = _compound(detached_limb, f"jam:{jammed.joints[0].name}" if jammed else None)
         rest = [limb for limb in others if limb is not jammed and limb.angle]
-        found[8] = found[7] and _compound(found[7], _failed(rest[-1].angle if rest else ()))
-    cases = {number: notation for number, notation in found.items() if notation}
+        by_number[8] = by_number[7] and _compound(
+            by_number[7], _failed(rest[-1].angle if rest else ())
+        )
+    cases = {number: notation for number, notation in by_number.items() if notation}
     return cases | {9: "intact", 10: "neuron:0"}
 
 
@@ -83,5 +87,5 @@ def _failed(sensors: Iterable[str]) -> str | None:
     return first and f"sensor:{first}"
 
 
-def _compound(one: str, other: str | None) -> str | None:
-    return other and f"{one}+{other}"
+def _compound(first: str, second: str | None) -> str | None:
+    return second and f"{first}+{second}"

@@ -33,8 +33,8 @@ FLAT_RADIUS, TRANSITION_WIDTH = 0.8, 0.4
 roughness, m: no robot starts inside the terrain."""
 
 MIN_CELL_CONTACTS, MIN_CELLS = 3, 10
-"""Minimum contacts per cell for an estimate of its height, because touch sensors err, and minimum
-estimated cells for an estimate of the terrain."""
+"""Minimum contacts per cell for an estimate of its height, because touch readings may be wrong, and
+minimum estimated cells for an estimate of the terrain."""
 
 UNIT_DEVIATION = 2 / 3 / math.sqrt(3)
 """Standard deviation of a terrain of roughness 1: that of the uniform distribution on [-1, 1],
@@ -61,7 +61,7 @@ def unit_heights(seed: int) -> FloatArray:
 
 
 def _interpolate(drawn: FloatArray, count: int) -> FloatArray:
-    """``count`` rows, interpolated between the drawn rows."""
+    """Returns ``count`` rows, interpolated between the drawn rows."""
     whole, part = np.divmod(np.arange(count), CELLS_PER_BUMP)
     weight = (part / CELLS_PER_BUMP)[:, np.newaxis]
     rows: FloatArray = drawn[whole] * (1 - weight) + drawn[whole + 1] * weight
@@ -88,7 +88,7 @@ def _edit_spec(spec: "MjSpec", fault: Fault, seed: int) -> None:
     for plane in planes:
         plane.type = mujoco.mjtGeom.mjGEOM_HFIELD
         plane.hfieldname = TERRAIN_NAME
-        # A plane is infinite wherever its centre is; the field is centred on the initial position.
+        # The centre of an infinite plane is arbitrary; that of the field is the initial position.
         plane.pos = [0.0, 0.0, plane.pos[2] + low]
 
 
@@ -143,11 +143,11 @@ def _adapt_to_contacts(embodiment: "Embodiment", fault: Fault, points: FloatArra
     field = model.hfield(TERRAIN_NAME)
     fields = model.geom_type == mujoco.mjtGeom.mjGEOM_HFIELD
     (geom, *_) = np.flatnonzero(fields & (model.geom_dataid == field.id))
-    back = model.geom_quat[geom] * (1.0, -1.0, -1.0, -1.0)
-    in_its_frame = rotated(points - model.geom_pos[geom], back)
+    inverse = model.geom_quat[geom] * (1.0, -1.0, -1.0, -1.0)
+    in_field_frame = rotated(points - model.geom_pos[geom], inverse)
     # The data is a fraction of the field's height above the lowest drawn height.
     lowest = fault.severity * float(unit_heights(embodiment.seed).min())
-    parts = (fault.severity * estimated_heights(in_its_frame) - lowest) / field.size[2]
+    parts = (fault.severity * estimated_heights(in_field_frame) - lowest) / field.size[2]
     field.data[:] = np.clip(parts, 0, 1)
 
 

@@ -1,4 +1,4 @@
-"""Wind: the medium moves along forward, or across; it is air if the model has no medium."""
+"""Wind along or across the forward direction; the medium is air if the model has none."""
 
 from typing import TYPE_CHECKING
 

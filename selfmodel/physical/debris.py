@@ -1,4 +1,4 @@
-"""Debris of a physical robot: free bodies in the places of its detached limbs."""
+"""Debris of a physical robot: free copies of its detached limbs."""
 
 import mujoco
 import numpy as np
@@ -13,7 +13,7 @@ CONTACT_MEMORY = 4 * 2**20
 
 
 def detached_limbs(robot: Robot, hidden: Hypothesis) -> tuple[str, ...]:
-    """Returns the root body of each limb that a hypothesis detaches, in its order of faults."""
+    """Returns the root body of each limb that a hypothesis detaches, in the order of its faults."""
     limbs = []
     for fault in hidden.faults:
         if fault.kind is BROKEN:
@@ -26,9 +26,9 @@ def add_debris(spec: mujoco.MjSpec, limbs: tuple[str, ...]) -> None:
     """Adds a free copy of each limb to a physical robot's model, after all other bodies.
 
     The robot's own limb remains as a detached body, so that the layout of the logged signals is
-    unchanged. The copy has no motors, tendons and sensors, and its joints are free. It collides
-    with the ground, the robot and other debris, but not with a body that it overlaps when it is
-    detached: the contact force would throw it away.
+    unchanged. The copy has no motors, tendons and sensors, and its joints are free. The copy
+    collides with the ground, the robot and other debris, but not with a body that it overlaps at
+    the start: the contact force would throw the copy away.
 
     Args:
         spec: The model; it is changed.
@@ -45,8 +45,8 @@ def add_debris(spec: mujoco.MjSpec, limbs: tuple[str, ...]) -> None:
     for k, limb in enumerate(limbs):
         _add_limb(spec, bare, limb, k)
     spec.memory = max(spec.memory, CONTACT_MEMORY)
-    for one, other in _overlapping_pairs(spec, limbs):
-        spec.add_exclude(bodyname1=one, bodyname2=other)
+    for first, second in _overlapping_pairs(spec, limbs):
+        spec.add_exclude(bodyname1=first, bodyname2=second)
 
 
 def _add_limb(spec: mujoco.MjSpec, bare: mujoco.MjSpec, limb: str, number: int) -> None:
@@ -82,14 +82,14 @@ def _overlapping_pairs(spec: mujoco.MjSpec, limbs: tuple[str, ...]) -> list[tupl
     pairs = np.unique(np.sort(model.geom_bodyid[geoms], axis=1), axis=0)
     # Debris has the highest body numbers, so the second of a pair; the world is body 0.
     return [
-        (model.body(one).name, model.body(other).name)
-        for one, other in pairs
-        if one != 0 and model.body(other).name.startswith(DEBRIS_PREFIX)
+        (model.body(first).name, model.body(second).name)
+        for first, second in pairs
+        if first != 0 and model.body(second).name.startswith(DEBRIS_PREFIX)
     ]
 
 
 def place_debris(model: mujoco.MjModel, data: mujoco.MjData, limbs: tuple[str, ...]) -> None:
-    """Sets the pose of each debris body to the pose of the limb that it is a copy of.
+    """Sets the pose of each debris body to the pose of the limb that the body is a copy of.
 
     Args:
         model: Model of a physical robot with debris.

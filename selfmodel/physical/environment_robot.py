@@ -23,7 +23,7 @@ from selfmodel.trials.signals import SIGNALS, Names, Signal
 
 Observe = Callable[[Any], Mapping[str, Any] | None]
 """Function from an observation of the environment to signals by name, each ``(width,)``, with an
-optional ``time``. Absent signals and NaN were not observed; None if nothing was observed."""
+optional ``time``. Absent signals and NaN count as not observed; None if there is no observation."""
 
 
 def signals_by_name(
@@ -56,9 +56,9 @@ class EnvironmentRobot:
 
     ``reset`` must move the robot to its initial pose, at rest. ``step`` must send the targets to
     the motors at once, return after one control time step, and return the observation of that time.
-    The environment sets the pace; ``EnvironmentRobot`` measures it.
+    The environment sets the duration of a step; ``EnvironmentRobot`` measures the duration.
 
-    If nothing is observed in time, ``step`` returns the observation None or raises
+    If no observation arrives in time, ``step`` returns the observation None or raises
     ``TimeoutError``. The controller then runs on its previous readings.
 
     The safe command is sent before ``reset`` and at the end. It is the first action after an early
@@ -188,7 +188,7 @@ class EnvironmentRobot:
             yield Sample(k * timestep, values, timing)
 
     def _step_environment(self, targets: FloatArray | None) -> dm_env.TimeStep | None:
-        """Steps the environment, or resets it if there are no targets; None after a timeout."""
+        """Returns the result of a step, or of a reset without targets; None after a timeout."""
         try:
             return self._env.reset() if targets is None else self._env.step(targets.copy())
         except TimeoutError:
@@ -210,7 +210,7 @@ class EnvironmentRobot:
             k: The step.
             values: Row of each signal, ``(width,)``, NaN where not observed.
             missing_steps: Consecutive steps without a value, ``(width,)``, of each required signal.
-            missing: Whether nothing was observed at this step.
+            missing: Whether the step has no observation.
 
         Raises:
             TrialError: A required signal is missing for too long, a number is invalid, or a limit

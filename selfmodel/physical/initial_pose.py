@@ -37,8 +37,10 @@ def randomize_initial_pose(
         hinge = model.joint(name)
         if model.dof_armature[hinge.dofadr[0]] == WELD_ARMATURE:
             continue
-        moved = data.qpos[hinge.qposadr[0]] + angle
-        data.qpos[hinge.qposadr[0]] = np.clip(moved, *hinge.range) if hinge.limited[0] else moved
+        shifted = data.qpos[hinge.qposadr[0]] + angle
+        data.qpos[hinge.qposadr[0]] = (
+            np.clip(shifted, *hinge.range) if hinge.limited[0] else shifted
+        )
     tilt = np.append(level * TILT_DEVIATION * rng.standard_normal(2), 0.0)
     base = rotated_by_vector(current_value(fields["base_orientation"], data), tilt)
     write({"base_orientation": base[np.newaxis]})

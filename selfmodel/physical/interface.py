@@ -34,8 +34,8 @@ class PhysicalRobot(Protocol):
 class TimedRobot(PhysicalRobot, Protocol):
     """Physical robot with a clock of its own: each of its samples has a ``moment``.
 
-    Its trials are not reproducible. So the log of a trial that was stopped early is finished and
-    marked as stopped; the log of a simulated robot remains an unfinished file.
+    The trials of such a robot are not reproducible, so the log of a trial that was stopped early is
+    finished and marked as stopped; the log of a simulated robot remains an unfinished file.
     """
 
     @property

@@ -19,7 +19,7 @@ class Limit:
 
     Attributes:
         signals: Required signals; a robot that does not observe them is stopped too.
-        reason: Returns why the robot must be stopped, or "" if no limit is exceeded. Its argument
+        reason: Returns the reason to stop the robot, or "" if no limit is exceeded. The argument
             is the row of each signal, ``(width,)``, NaN where not observed.
     """
 

@@ -34,7 +34,7 @@ class SimulatedRobot:
 
     Args:
         robot: The robot as its model describes it.
-        hidden: Hypothesis that is true of the physical robot.
+        hidden: Hidden faults of the physical robot, as a hypothesis.
         gap: Reality gap; None or a level of 0 for no gap.
         structure: Structural mismatch; None for the structure of the model.
         stream: Number of the robot's random number stream among those of the gap's seed. Robots

@@ -35,7 +35,7 @@ class StepTimer:
 
         Args:
             now: Reading of the clock, s.
-            observation: The observation; None if nothing was observed.
+            observation: The observation; None if there is no observation.
         """
         timestamp = float("nan" if observation is None else observation.get(TIMESTAMP, "nan"))
         if math.isinf(timestamp):  # a log cannot contain an infinite time

@@ -17,7 +17,7 @@ BEND_RANGE = (0.02, 0.06)
 """Range of the deflection of a soft limb under ``BENDING_TORQUE``, rad."""
 
 BENDING_TORQUE = 5.0
-"""Torque of the size that walking takes, N m."""
+"""Typical torque of a hinge of a walking robot, N m."""
 
 FOOT_RADIUS_FACTORS = (0.7, 1.4)
 """Range of the factor of a foot's radius."""
@@ -89,8 +89,8 @@ def draw_structural_mismatch(robot: Robot, rng: np.random.Generator) -> Structur
     ]
 
     def chosen(names: list[str]) -> str:
-        pick = rng.random()
-        return names[int(pick * len(names))] if names else ""
+        draw = rng.random()
+        return names[int(draw * len(names))] if names else ""
 
     return StructuralMismatch(
         play=dict(zip(hinges, play, strict=True)),
@@ -130,7 +130,7 @@ def add_structural_mismatch(spec: mujoco.MjSpec, structure: StructuralMismatch) 
         growth = max(geom.size[0] for geom in geoms) * (structure.foot_factor - 1)
         for geom in geoms:
             geom.size[0] *= structure.foot_factor
-        # The site of a touch sensor encloses the foot, so it grows with the foot.
+        # The site of a touch sensor encloses the foot, so the site grows with the foot.
         touch_sites = {sensor.objname for sensor in spec.sensors if sensor.type == TOUCH_SENSOR}
         for site in body.sites:
             if site.name in touch_sites:

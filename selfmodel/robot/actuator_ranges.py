@@ -8,7 +8,7 @@ from selfmodel.controllers.command_range import Ranges
 from selfmodel.errors import InputError
 
 Range = tuple[float, float]
-"""Lower and upper end."""
+"""Lower and upper end of a range, in the unit of the commands, the joint or the tendon."""
 
 
 def command_ranges(model: mujoco.MjModel) -> Ranges:
@@ -20,7 +20,7 @@ def command_ranges(model: mujoco.MjModel) -> Ranges:
     ``forcerange``, or the torque of the joint reaches the joint's ``actuatorfrcrange``.
 
     Raises:
-        InputError: A motor has none of these ranges; the sentence contains its name.
+        InputError: A motor has none of these ranges; the message contains the name of the motor.
     """
     return tuple(_centre_and_half(_range(model, motor)) for motor in range(model.nu))
 
@@ -38,14 +38,14 @@ def _range_or_none(model: mujoco.MjModel, motor: int) -> Range | None:
 
 
 def _range(model: mujoco.MjModel, motor: int) -> Range:
-    found = _range_or_none(model, motor)
-    if found is None:
+    ends = _range_or_none(model, motor)
+    if ends is None:
         raise InputError(
             f"expected a command range for each motor, got none for the motor "
             f"{model.actuator(motor).name or motor}: give it a ctrlrange in the MJCF, such as "
             f'ctrlrange="-1 1"'
         )
-    return found
+    return ends
 
 
 def _servo_range(model: mujoco.MjModel, motor: int) -> Range | None:

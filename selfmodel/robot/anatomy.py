@@ -15,12 +15,12 @@ class Joint:
         hinges: Hinge joints of the model that form the joint.
         motors: Actuators that drive the joint; an actuator that moves several joints through a
             tendon belongs to the first of them.
-        bodies: Bodies that are lost when the joint breaks: the body that the joint moves, and all
-            its descendants.
+        bodies: Bodies that are detached when the joint breaks: the body that the joint moves, and
+            all its descendants.
         descendants: Joints and sensors on ``bodies``, without the joint itself.
         limits: Lower and upper angle per hinge, rad; -pi and pi for an unlimited hinge.
-        motors_lost_if_broken: Actuators that act on nothing once the joint is broken.
-        motors_lost_if_jammed: Actuators that move nothing once the joint is welded.
+        motors_lost_if_broken: Actuators without effect once the joint is broken.
+        motors_lost_if_jammed: Actuators without effect once the joint is welded.
     """
 
     name: str

@@ -19,7 +19,7 @@ def driven_joints(model: mujoco.MjModel) -> frozenset[int]:
 
 
 def read_anatomy(model: mujoco.MjModel, root: int) -> Anatomy:
-    """Returns the named parts of a robot.
+    """Returns the anatomy of a robot: its named parts.
 
     The hinges of one body form one joint if a motor moves at least one of them. The joint has the
     common prefix of their names, or else the name of the body. Touch sensors and joint position
@@ -95,9 +95,9 @@ def _joint_names(model: mujoco.MjModel, groups: dict[int, list[int]]) -> dict[in
         body: _common_prefix([model.joint(j).name for j in group]) or str(model.body(body).name)
         for body, group in groups.items()
     }
-    found = list(prefixes.values())
+    all_prefixes = list(prefixes.values())
     names = {
-        body: name if found.count(name) == 1 else str(model.body(body).name)
+        body: name if all_prefixes.count(name) == 1 else str(model.body(body).name)
         for body, name in prefixes.items()
     }
     repeated = {name for name in names.values() if list(names.values()).count(name) > 1}

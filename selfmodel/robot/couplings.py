@@ -49,7 +49,7 @@ def disable_welded(model: mujoco.MjModel, welded: frozenset[int]) -> None:
 
 
 def rebase_equality(model: mujoco.MjModel, joint: int, shift: float) -> None:
-    """Rewrites joint equality constraints for a new reference angle, so that they stay the same.
+    """Rewrites joint equality constraints for a new reference angle; their effect is unchanged.
 
     A joint equality constraint relates the angles from the references of both joints, by a
     polynomial of the second joint's angle.
@@ -61,9 +61,9 @@ def rebase_equality(model: mujoco.MjModel, joint: int, shift: float) -> None:
     """
     for constraint in np.flatnonzero(model.eq_type == _EQ_JOINT):
         if model.eq_obj2id[constraint] == joint:
-            moved = Polynomial(model.eq_data[constraint, :5])(Polynomial([shift, 1.0]))
+            shifted = Polynomial(model.eq_data[constraint, :5])(Polynomial([shift, 1.0]))
             model.eq_data[constraint, :5] = 0.0
-            model.eq_data[constraint, : len(moved.coef)] = moved.coef
+            model.eq_data[constraint, : len(shifted.coef)] = shifted.coef
         if model.eq_obj1id[constraint] == joint:
             model.eq_data[constraint, 0] -= shift
 
@@ -86,7 +86,7 @@ def _disable_pairs(model: mujoco.MjModel, body: int) -> None:
 
 
 def _constrained_joints(model: mujoco.MjModel, constraint: int) -> frozenset[int]:
-    """Returns the ids of the joints of a joint or tendon equality constraint; else none."""
+    """Returns the ids of the joints of a joint or tendon equality constraint, or none."""
     kind = int(model.eq_type[constraint])
     objects = [int(o) for o in (model.eq_obj1id[constraint], model.eq_obj2id[constraint]) if o >= 0]
     if kind == _EQ_JOINT:

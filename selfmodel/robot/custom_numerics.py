@@ -18,8 +18,8 @@ def control_delay(model: mujoco.MjModel) -> int:
     Raises:
         ValueError: The custom numeric is not a whole number from 0 to ``MAX_CONTROL_DELAY``.
     """
-    found = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, CONTROL_DELAY)
-    delay = float(model.numeric(found).data[0]) if found >= 0 else 0.0
+    index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, CONTROL_DELAY)
+    delay = float(model.numeric(index).data[0]) if index >= 0 else 0.0
     if not (delay.is_integer() and 0 <= delay <= MAX_CONTROL_DELAY):
         raise ValueError(
             f"{CONTROL_DELAY} must be a whole number from 0 to {MAX_CONTROL_DELAY}, got {delay:g}"

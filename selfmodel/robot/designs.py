@@ -39,7 +39,9 @@ def cpg_for(robot: Robot, hidden: int | None = None) -> Cpg:
         InputError: A number of hidden neurons is given, or a motor has no command range.
     """
     if hidden is not None:
-        raise InputError(f"a CPG has no hidden neurons, got --neurons {hidden}: leave it out")
+        raise InputError(
+            f"a CPG has no hidden neurons, got --neurons {hidden}: leave --neurons out"
+        )
     names = robot.anatomy.names
     ranges = command_ranges(robot.model)
     return Cpg(names.sensors, names.motors, robot.control_timestep, ranges)

@@ -28,13 +28,13 @@ def turned_by_hinge(
     Returns:
         The new position, ``(3,)``, and the new orientation, ``(4,)``.
     """
-    rotation, turned = np.empty(4), np.empty(4)
+    rotation, rotated = np.empty(4), np.empty(4)
     mujoco.mju_axisAngle2Quat(rotation, axis, angle)
-    mujoco.mju_mulQuat(turned, orientation, rotation)
+    mujoco.mju_mulQuat(rotated, orientation, rotation)
     before, after = np.empty(3), np.empty(3)
     mujoco.mju_rotVecQuat(before, anchor, orientation)
-    mujoco.mju_rotVecQuat(after, anchor, turned)
-    return position + (before - after), turned
+    mujoco.mju_rotVecQuat(after, anchor, rotated)
+    return position + (before - after), rotated
 
 
 def turn_about_origin(position: FloatArray, orientation: FloatArray, rotation: FloatArray) -> None:

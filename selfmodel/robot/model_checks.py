@@ -31,7 +31,7 @@ def check_model(model: mujoco.MjModel, root: int) -> None:
         root: Id of the root body.
 
     Raises:
-        ValueError: The model has an unsupported part; the sentence contains its name.
+        ValueError: The model has an unsupported part; the message contains the name of the part.
     """
     base_joints = joints_of_body(model, root)
     for j in range(model.njnt):

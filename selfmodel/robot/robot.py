@@ -22,12 +22,12 @@ class Robot:
 
     Attributes:
         name: Name of the robot.
-        mjcf: The MJCF as one XML text without includes; ``assets`` has its files.
+        mjcf: The MJCF as one XML text without includes; ``assets`` contains its files.
         control_timestep: Time between two commands, s.
         assets: Contents of the files that the MJCF names, such as meshes, by file name.
         model: The compiled model.
         anatomy: Joints, sensors and motors.
-        root: Name of the root body, whose displacement is the robot's.
+        root: Name of the root body, whose displacement is the displacement of the robot.
     """
 
     name: str
@@ -66,9 +66,9 @@ class Robot:
 
     @property
     def is_calibrated(self) -> bool:
-        """Whether the model is the result of a calibration: it then has a ``CONTROL_DELAY``."""
-        found: int = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_NUMERIC, CONTROL_DELAY)
-        return found >= 0
+        """Whether the model is the result of a calibration, which adds a ``CONTROL_DELAY``."""
+        index: int = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_NUMERIC, CONTROL_DELAY)
+        return index >= 0
 
     @property
     def standing_height(self) -> float:

@@ -34,7 +34,7 @@ def scale_model(
     model.pair_friction[:, :2] *= friction
     model.dof_damping *= damping
     model.dof_dampingpoly *= damping
-    # A position servo's stiffness is in both: one factor scales its torque at the same target.
+    # Both contain the stiffness of a position servo: one factor scales the torque at each target.
     model.actuator_gainprm *= motor_gains[:, np.newaxis]
     model.actuator_biasprm *= motor_gains[:, np.newaxis]
     mujoco.mj_setConst(model, mujoco.MjData(model))

@@ -24,7 +24,7 @@ def signal_fields(
 
     Args:
         robot: The robot, whose parts name the columns of the signals.
-        models: Models of the states: none for the robot's own, one for all states, or one per
+        models: Models of the states: no model for the robot's own, one for all states, or one per
             state, of one layout. A model has all parts of the robot, and may have more.
     """
     models = models or (robot.model,)

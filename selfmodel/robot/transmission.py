@@ -24,7 +24,7 @@ def motor_joints(model: mujoco.MjModel, motor: int) -> frozenset[int]:
 
 
 def motor_bodies(model: mujoco.MjModel, motor: int) -> frozenset[int]:
-    """Returns the ids of the bodies that a motor needs: without one of them it moves nothing."""
+    """Returns the ids of the bodies that a motor requires to have an effect."""
     kind, target = int(model.actuator_trntype[motor]), int(model.actuator_trnid[motor, 0])
     if kind in _JOINT:
         return frozenset({int(model.jnt_bodyid[target])})
@@ -36,8 +36,8 @@ def motor_bodies(model: mujoco.MjModel, motor: int) -> frozenset[int]:
 def tendon_joints(model: mujoco.MjModel, tendon: int) -> frozenset[int]:
     """Returns the ids of the joints that change the length of a tendon.
 
-    A fixed tendon names its joints. For a spatial tendon, the result has each hinge that moves
-    some, but not all, of the bodies on the path of the tendon.
+    The model lists the joints of a fixed tendon. For a spatial tendon, the result has each hinge
+    that moves some, but not all, of the bodies on the path of the tendon.
     """
     joints = _wrapped(model, tendon, (_WRAPPED_JOINT,))
     if joints:
@@ -52,7 +52,7 @@ def tendon_joints(model: mujoco.MjModel, tendon: int) -> frozenset[int]:
 
 
 def tendon_bodies(model: mujoco.MjModel, tendon: int) -> frozenset[int]:
-    """Returns the ids of the bodies on the path of a tendon, all of which the tendon needs."""
+    """Returns the ids of the bodies on the path of a tendon, all required for its effect."""
     joints = _wrapped(model, tendon, (_WRAPPED_JOINT,))
     sites = _wrapped(model, tendon, (_WRAPPED_SITE,))
     geoms = _wrapped(model, tendon, _WRAPPED_GEOM)

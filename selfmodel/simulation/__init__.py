@@ -1,4 +1,4 @@
-"""The self-model in motion: rollouts, short predictions, calibration, replay."""
+"""Simulation of the self-model: rollouts, short predictions, calibration, replay."""
 
 from typing import TYPE_CHECKING
 

@@ -34,17 +34,17 @@ def initial_activations(robot: Robot, segments: Segments, delay: int) -> FloatAr
     """
     model = robot.model
     motors: IndexArray = np.flatnonzero(model.actuator_dyntype != mujoco.mjtDyn.mjDYN_NONE)
-    found = np.zeros((len(segments.commands), model.na))
+    activations = np.zeros((len(segments.commands), model.na))
     if not len(motors):
-        return found
+        return activations
     dynamics = _ActivationDynamics(robot, motors)
     if segments.past is None:
         effective = segments.commands[:, : max(segments.lead - delay, 0), motors]
         state = dynamics.settled(segments.commands[:, 0, motors])
         for k in range(effective.shape[1]):
             state = dynamics.next(state, effective[:, k])
-        found[:, model.actuator_actadr[motors]] = state
-        return found
+        activations[:, model.actuator_actadr[motors]] = state
+        return activations
     commands, starts = segments.past.commands[:, motors], segments.past.starts
     # An unknown command is assumed to be the last known command before it; 0 at first.
     last_known = np.maximum.accumulate(
@@ -56,8 +56,8 @@ def initial_activations(robot: Robot, segments: Segments, delay: int) -> FloatAr
     for k in range(len(states) - 1):
         command = filled[k - delay] if k >= delay else np.zeros(len(motors))
         states[k + 1] = dynamics.next(states[k], command)
-    found[:, model.actuator_actadr[motors]] = states[starts]
-    return found
+    activations[:, model.actuator_actadr[motors]] = states[starts]
+    return activations
 
 
 def activations_since_rest(robot: Robot, commands: FloatArray) -> FloatArray:
@@ -72,15 +72,15 @@ def activations_since_rest(robot: Robot, commands: FloatArray) -> FloatArray:
     """
     model = robot.model
     motors: IndexArray = np.flatnonzero(model.actuator_dyntype != mujoco.mjtDyn.mjDYN_NONE)
-    found = np.zeros((len(commands), model.na))
+    activations = np.zeros((len(commands), model.na))
     if not len(motors):
-        return found
+        return activations
     dynamics, state = _ActivationDynamics(robot, motors), np.zeros(len(motors))
     # The last command has no row after it.
-    for row, command in zip(found[1:], commands[:, motors], strict=False):
+    for row, command in zip(activations[1:], commands[:, motors], strict=False):
         state = dynamics.next(state, command)
         row[model.actuator_actadr[motors]] = state
-    return found
+    return activations
 
 
 class _ActivationDynamics:

@@ -57,9 +57,10 @@ CANDIDATE_DELAYS = range(MAX_CONTROL_DELAY + 1)
 """Control delays of the exhaustive search, control steps."""
 
 MAX_ITERATIONS = 3
+"""Largest number of iterations of the least-squares solver."""
 
 EXACT_ERROR = 0.01
-"""Root mean square error, in ``CALIBRATION_ERROR_SCALES``, below which the model is taken to be
+"""Root mean square error, in ``CALIBRATION_ERROR_SCALES``, below which the model counts as
 exact."""
 
 
@@ -115,8 +116,8 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
         return Calibration(robot, start, deviations, before, before)
     zero = np.zeros((len(start.factors), 1))
 
-    def residuals_at(delay: int, of: Sequence[CalibrationSegments]) -> Residual:
-        return partial(_residuals, robot, of, delay, threads)
+    def residuals_at(delay: int, cut: Sequence[CalibrationSegments]) -> Residual:
+        return partial(_residuals, robot, cut, delay, threads)
 
     delay = min(
         CANDIDATE_DELAYS, key=lambda steps: float(np.sum(residuals_at(steps, data)(zero) ** 2))
@@ -131,18 +132,18 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
         xtol=1e-3,
         verbose=mujoco.minimize.Verbosity.SILENT,
     )
-    found = from_factors(np.exp(fitted.ravel()), delay)
+    fitted_parameters = from_factors(np.exp(fitted.ravel()), delay)
     # Independent segments: long simulations are chaotic, so their derivatives are meaningless.
-    independent = _with_estimated_base(robot, found, data, threads)
+    independent = _with_estimated_base(robot, fitted_parameters, data, threads)
     slopes = _slopes(residuals_at(delay, independent), fitted)
     count = len(slopes) - len(zero)  # number of errors; the other rows are the prior
     spread = np.linalg.inv(slopes.T @ slopes) * count * PRIOR_WEIGHT**2
     return Calibration(
-        robot=with_parameters(robot, found),
-        parameters=found,
+        robot=with_parameters(robot, fitted_parameters),
+        parameters=fitted_parameters,
         deviations=np.sqrt(np.diag(spread)),
         error_before=before,
-        error=_error(robot, found, data, threads),
+        error=_error(robot, fitted_parameters, data, threads),
     )
 
 
@@ -198,10 +199,10 @@ def _error(
 
 
 def _with_estimated_base(
-    robot: Robot, found: Parameters, data: Sequence[CalibrationSegments], threads: int
+    robot: Robot, fitted_parameters: Parameters, data: Sequence[CalibrationSegments], threads: int
 ) -> list[CalibrationSegments]:
     """Returns independent segments; an unobserved base begins in its predicted state."""
-    predict_with = _predictor(robot, [found], threads)
+    predict_with = _predictor(robot, [fitted_parameters], threads)
 
     def independent(own: CalibrationSegments) -> CalibrationSegments:
         segments = own.segments

@@ -14,13 +14,13 @@ from selfmodel.trials.state_estimation import ONBOARD, STATE, estimated_states
 from selfmodel.trials.trial import Trial
 
 MAX_SEGMENTS = 40
-"""Segments of a trial in which the base was observed, at most."""
+"""Largest number of segments of a trial in which the base was observed."""
 
 HORIZON = 10
-"""Control steps of a segment."""
+"""Length of a segment, control steps."""
 
 MIN_BASE_SHARE = 0.25
-"""Share of the usable segments in which the base must have been observed to be used."""
+"""Smallest share of usable segments with an observed base at which the base is used."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,15 +48,17 @@ def calibration_segments_of(trial: Trial) -> CalibrationSegments:
     pose: each begins with the base in the predicted state at the end of the segment before.
 
     Raises:
-        InputError: Too little is known for either.
+        InputError: Too few states and commands are known for any segments.
     """
     if trial.behaviour.steps <= LEAD + HORIZON:
-        raise _useless(trial, f"the trial has {trial.behaviour.steps}")
-    found = _spread(trial.behaviour) or _sequential(trial.behaviour)
-    if found is None:
+        raise _unusable(trial, f"the trial has {trial.behaviour.steps}")
+    segments = _spread(trial.behaviour) or _sequential(trial.behaviour)
+    if segments is None:
         never = _never_known(trial.behaviour)
-        raise _useless(trial, f"the log never has {never}" if never else "the log has none of use")
-    return found
+        raise _unusable(
+            trial, f"the log never has {never}" if never else "the log has no such segment"
+        )
+    return segments
 
 
 def _spread(behaviour: Behaviour) -> CalibrationSegments | None:
@@ -82,8 +84,8 @@ def _sequential(behaviour: Behaviour) -> CalibrationSegments | None:
     states = estimated_states(behaviour, ONBOARD)
     commanded = np.asarray(np.isfinite(behaviour["commands"]).all(axis=1))
     starts = begins[_known(states)[begins] & _all_known(commanded, begins)]
-    found = _with_observed(behaviour, states, starts)
-    return found if found.judged.sum() >= HORIZON else None
+    segments = _with_observed(behaviour, states, starts)
+    return segments if segments.judged.sum() >= HORIZON else None
 
 
 def _known(signals: Mapping[Signal, FloatArray]) -> BoolArray:
@@ -116,19 +118,19 @@ def _with_observed(
 
 def _never_known(behaviour: Behaviour) -> str:
     """Returns the required signals that were never observed, with columns if only some are."""
-    found = []
+    never = []
     signals: tuple[Signal, ...] = (*ONBOARD, "commands")
     for signal in signals:
         names = np.array(behaviour.names.columns(signal))
         lacking = ~np.isfinite(behaviour[signal]).any(axis=0)
         if lacking.any():
             some = "" if lacking.all() else f" of {', '.join(names[lacking])}"
-            found.append(signal + some)
-    return ", ".join(found)
+            never.append(signal + some)
+    return ", ".join(never)
 
 
-def _useless(trial: Trial, has: str) -> InputError:
+def _unusable(trial: Trial, reason: str) -> InputError:
     return InputError(
-        f"{trial.path}: calibration needs segments of {LEAD + HORIZON + 1} steps or more, none of "
-        f"them late, with {', '.join(ONBOARD)} and the commands, and {has}: leave this log out"
+        f"{trial.path}: calibration needs segments of {LEAD + HORIZON + 1} steps or more, without "
+        f"late steps, with {', '.join(ONBOARD)} and the commands, and {reason}: leave this log out"
     )

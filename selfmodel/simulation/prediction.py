@@ -57,11 +57,11 @@ def predict(
     Raises:
         InputError: The segments do not include all commands that are in the delay line.
     """
-    late = robot.control_delay if delay is None else delay
-    if segments.lead < late:
+    delay_steps = robot.control_delay if delay is None else delay
+    if segments.lead < delay_steps:
         raise InputError(
-            f"the robot's commands take effect {late} steps late, and segments have a lead of "
-            f"{segments.lead}: a comparator needs a lead of {MAX_CONTROL_DELAY}"
+            f"the robot's commands take effect {delay_steps} steps late, and segments have a lead "
+            f"of {segments.lead}: a comparator needs a lead of {MAX_CONTROL_DELAY}"
         )
     n, count, horizon = len(embodiments), len(segments.commands), segments.horizon
     simulated, source_of = np.unique(
@@ -88,10 +88,10 @@ def predict(
         for signal in segments.record
     }
     inputs = _BatchInputs(robot, batch, moving, segments)
-    activations = initial_activations(robot, segments, late)
+    activations = initial_activations(robot, segments, delay_steps)
     batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE)
     alive = LiveBatch(batch)
-    first = segments.lead - late
+    first = segments.lead - delay_steps
     with silence_mujoco_warnings():
         for stage in stages:
             inputs.write_states(activations, stage)

@@ -1,4 +1,4 @@
-"""Replay: a logged trial is simulated again and compared with its log."""
+"""Replay: a new simulation of a logged trial, compared with the log."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ class Replay:
         first_divergence_step: First step at which a signal differs by more than the tolerance;
             None without such a step.
         errors: Root mean square error of each signal over its columns, ``(steps,)`` in the signal's
-            unit; NaN where nothing was observed.
+            unit; NaN at a step without an observation.
         diverged: Whether the simulation diverged; its signals are then invalid.
     """
 
@@ -62,7 +62,7 @@ def replay(
     for signal in SIGNALS:
         recorded, predicted = logged[signal], simulated[signal]
         observed = ~np.isnan(recorded)
-        with np.errstate(invalid="ignore", over="ignore"):  # of a simulation that diverged
+        with np.errstate(invalid="ignore", over="ignore"):  # values of a diverged simulation
             difference = np.where(observed, predicted - recorded, 0.0)
             differs |= (~(np.abs(difference) <= tolerance) & observed).any(axis=1)
             errors[signal] = _rms_of_rows(difference, observed)

@@ -19,7 +19,7 @@ class StepTiming:
             unknown.
         late: Whether the time since the previous step differs from the control time step by more
             than a tolerance, in either direction.
-        missing: Whether nothing was observed.
+        missing: Whether the step has no observation.
     """
 
     elapsed: float
@@ -34,7 +34,7 @@ class Sample:
     Attributes:
         time: Scheduled time of the step, s since the start of the run: a multiple of the control
             time step.
-        values: The row of each signal, ``(width,)``.
+        values: Row of each signal, ``(width,)``, in the signal's unit.
         moment: Measured time of the step, for a robot with its own clock.
     """
 
@@ -54,7 +54,7 @@ class Behaviour:
         names: Column names of the signals.
         time: Seconds since the start of the run, ``(steps,)``, strictly increasing.
         signals: Recorded signals, each ``(..., steps, width)``.
-        late: Late steps, ``(steps,)``: whether the time since the previous row differs from the
+        late: Mask of the late steps, ``(steps,)``: the time since the previous row differs from the
             control time step; None for a robot without its own clock.
 
     Raises:
@@ -98,7 +98,7 @@ class Behaviour:
     def steady_commands(self) -> FloatArray:
         """Commands, with NaN for each command that was held for other than one control time step.
 
-        Such a command is known, but the next row is not one control time step after it.
+        The value of such a command is known, but the next row is not one control time step later.
         """
         commands = self["commands"]
         if self.late is None:
@@ -153,7 +153,7 @@ def collect(names: Names, samples: Iterable[Sample]) -> Behaviour:
 
 
 def late_steps(moments: Sequence[StepTiming | None]) -> BoolArray | None:
-    """Returns which steps were late, ``(steps,)``; None for a robot without its own clock."""
+    """Returns a mask of the late steps, ``(steps,)``; None for a robot without its own clock."""
     known = [moment for moment in moments if moment is not None]
     return np.array([moment.late for moment in known]) if known else None
 

@@ -45,12 +45,12 @@ def product(first: FloatArray, second: FloatArray) -> FloatArray:
 
     Args:
         first: ``(..., 4)``, w x y z.
-        second: The same, of a shape that broadcasts to that of the first.
+        second: ``(..., 4)``, w x y z, of a shape that broadcasts to that of ``first``.
     """
     scalar, axis = first[..., :1], first[..., 1:]
-    other, turned = second[..., :1], second[..., 1:]
-    real = scalar * other - (axis * turned).sum(axis=-1, keepdims=True)
-    vector = scalar * turned + other * axis + cross(axis, turned)
+    second_scalar, second_axis = second[..., :1], second[..., 1:]
+    real = scalar * second_scalar - (axis * second_axis).sum(axis=-1, keepdims=True)
+    vector = scalar * second_axis + second_scalar * axis + cross(axis, second_axis)
     return np.concatenate([real, vector], axis=-1)
 
 
@@ -59,7 +59,7 @@ def rotated(vectors: FloatArray, orientation: FloatArray) -> FloatArray:
 
     Args:
         vectors: ``(..., 3)``.
-        orientation: Of the body, ``(..., 4)``, w x y z.
+        orientation: Orientation of the body, ``(..., 4)``, w x y z.
     """
     twice = 2 * cross(orientation[..., 1:], vectors)
     return np.asarray(vectors + orientation[..., :1] * twice + cross(orientation[..., 1:], twice))
@@ -72,12 +72,12 @@ def cross(first: FloatArray, second: FloatArray) -> FloatArray:
 
     Args:
         first: ``(..., 3)``.
-        second: The same, of a shape that broadcasts to that of the first or the other way round.
+        second: ``(..., 3)``, of a shape that broadcasts with that of ``first``.
     """
     a, b, c = (first[..., i] for i in range(3))
     x, y, z = (second[..., i] for i in range(3))
-    found = np.empty(np.broadcast_shapes(first.shape, second.shape))
-    np.subtract(b * z, c * y, out=found[..., 0])
-    np.subtract(c * x, a * z, out=found[..., 1])
-    np.subtract(a * y, b * x, out=found[..., 2])
-    return found
+    result = np.empty(np.broadcast_shapes(first.shape, second.shape))
+    np.subtract(b * z, c * y, out=result[..., 0])
+    np.subtract(c * x, a * z, out=result[..., 1])
+    np.subtract(a * y, b * x, out=result[..., 2])
+    return result

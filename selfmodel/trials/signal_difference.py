@@ -8,7 +8,7 @@ from selfmodel.trials.signals import Signal
 
 
 def difference(signal: Signal, one: FloatArray, other: FloatArray) -> FloatArray:
-    """Returns the difference of values of a signal: the rotation between them for orientations.
+    """Returns ``one - other`` for values of a signal: the rotation between orientations.
 
     Args:
         signal: Name of the signal.

@@ -9,8 +9,8 @@ from types import MappingProxyType
 
 from selfmodel.trials.signals import Signal
 
-# About three times the scales of calibration: the model of a damaged robot is judged, and a
-# hypothesis that is right but for the reality gap must not count as wrong.
+# About three times the scales of calibration: the robot is damaged, and the loss of the true
+# hypothesis must stay small in spite of the reality gap.
 PREDICTION_ERROR_SCALES: Mapping[Signal, float] = MappingProxyType(
     {
         "joint_positions": 0.1,
@@ -46,7 +46,7 @@ An impact that is predicted a step early or late has a large error and contains 
 about masses."""
 
 # As large as the scales of diagnosis or larger, because two predictions are compared over 100 steps
-# instead of 12: a difference must be visible beside what the reality gap makes of it.
+# instead of 12: a difference must exceed the effect of the reality gap.
 DISAGREEMENT_SCALES: Mapping[Signal, float] = MappingProxyType(
     {
         "sensors": 1.0,
@@ -74,8 +74,8 @@ SERIES_SPREAD_FLOORS: Mapping[Signal, float] = MappingProxyType(
 )
 """Lower bound of the standard deviation that scales a column (``sensor-series``)."""
 
-# Equal to the floors of the series where both have the signal. The base's position is left out: it
-# grows over the trial, so members of an ensemble differ in it by their history.
+# Equal to the floors of the series where both have the signal. The base's position is left out: the
+# position is a sum over the trial, so early differences of the members remain until its end.
 ENSEMBLE_DEVIATION_FLOORS: Mapping[Signal, float] = MappingProxyType(
     {
         "sensors": 0.1,
@@ -86,10 +86,10 @@ ENSEMBLE_DEVIATION_FLOORS: Mapping[Signal, float] = MappingProxyType(
 )
 """Standard deviation added in squares to that of the members (``noisy-transfer``).
 
-It represents variation that no member is drawn with, such as measurement noise."""
+It represents variation that the members do not have, such as measurement noise."""
 
-# Amplitudes of the signals of a walking robot, which measurement noise is a fraction of; not errors
-# of predictions.
+# Amplitudes of the signals of a walking robot, not errors of predictions: measurement noise is
+# proportional to the amplitude.
 MEASUREMENT_FULL_SCALES: Mapping[Signal, float] = MappingProxyType(
     {
         "joint_velocities": 2.0,
@@ -102,5 +102,5 @@ MEASUREMENT_FULL_SCALES: Mapping[Signal, float] = MappingProxyType(
 )
 """Full scale of each logged signal; the level of measurement noise is a fraction of it.
 
-The full scale of a joint position is half the range of its hinge. Commands have no noise: they are
-known."""
+The full scale of a joint position is half the range of its hinge. Commands have no noise: they
+are not measured."""

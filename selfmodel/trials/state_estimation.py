@@ -1,7 +1,7 @@
 """State estimation: smoothed positions from logged positions and velocities.
 
-Logged positions are noisy; the displacement between two steps is known better, from the velocity.
-A position is the mean of the positions of the neighbouring steps, each propagated by the
+Logged positions are noisy; the displacement between two steps is more accurate from the velocity.
+An estimated position is the mean of the positions of the neighbouring steps, each propagated by the
 velocities in between.
 """
 
@@ -17,9 +17,9 @@ JOINTS: tuple[Signal, ...] = ("joint_positions", "joint_velocities")
 IMU: tuple[Signal, ...] = ("base_orientation", "base_angular_velocity")
 BASE: tuple[Signal, ...] = ("base_position", "base_linear_velocity")
 ONBOARD: tuple[Signal, ...] = JOINTS + IMU
-"""The part of the state that onboard sensors measure."""
+"""Signals of the state that onboard sensors measure."""
 STATE: tuple[Signal, ...] = ONBOARD + BASE
-"""The signals that make up the state."""
+"""Signals of the whole state."""
 
 NOISE_SHARE, NOISE_SHARE_PER_COLUMN = 0.6, 0.5
 """Smallest shares of successive residuals of opposite sign that count as noise: in the mean over
@@ -28,8 +28,8 @@ one half, except for joints that oscillate at every step."""
 
 MAX_UNEXPLAINED_SHARE = 0.5
 """Largest share of the residuals left after regression on the velocity changes at which the
-residuals count as dynamics, not noise. Noise in 370 trials with a gap left 0.98; an oscillating
-cheetah left less than 0.001."""
+residuals count as dynamics, not noise. Noise in 370 trials with a reality gap left 0.98; an
+oscillating cheetah left less than 0.001."""
 
 _SMOOTHED: tuple[tuple[Signal, Signal, int, float], ...] = (
     ("joint_positions", "joint_velocities", 3, 1e-3),
@@ -55,21 +55,22 @@ def estimated_states(
     """
     states = {signal: behaviour[signal] for signal in signals}
     timestep = float(behaviour.time[1] - behaviour.time[0]) if behaviour.steps > 1 else 0.0
-    for position, velocity, reach, little in _SMOOTHED:
+    for position, velocity, half_width, smallest_noise in _SMOOTHED:
         if position in states:
             values = behaviour[position]
-            ways = _steps_along(behaviour[velocity], timestep)
+            displacements = _integrated(behaviour[velocity], timestep)
             if behaviour.late is not None:
-                ways = np.where(behaviour.late[1:, np.newaxis], np.nan, ways)
-            moved = np.diff(values, axis=0) - ways
-            turns = np.diff(behaviour[velocity], axis=0) * timestep
-            if _is_noise(moved, little) and not _is_of_turns(moved, turns):
-                states[position] = _averaged(values, behaviour[velocity], ways, reach)
+                late = behaviour.late[1:, np.newaxis]
+                displacements = np.where(late, np.nan, displacements)
+            residuals = np.diff(values, axis=0) - displacements
+            changes = np.diff(behaviour[velocity], axis=0) * timestep
+            if _is_noise(residuals, smallest_noise) and not _is_linear_in(changes, residuals):
+                states[position] = _averaged(values, behaviour[velocity], displacements, half_width)
     return states
 
 
-def _steps_along(velocities: FloatArray, timestep: float) -> FloatArray:
-    """Displacement from each step to the next, integrated from the velocities.
+def _integrated(velocities: FloatArray, timestep: float) -> FloatArray:
+    """Returns displacements between successive steps from velocities, ``(steps - 1, width)``.
 
     The integrator is semi-implicit: a physics step moves by the velocity at its end. For a control
     step of two physics steps the weights of its first and last velocity are 1/4 and 3/4.
@@ -77,58 +78,60 @@ def _steps_along(velocities: FloatArray, timestep: float) -> FloatArray:
     return np.asarray((velocities[:-1] + 3 * velocities[1:]) / 4 * timestep)
 
 
-def _is_noise(moved: FloatArray, little: float) -> bool:
-    """Whether the residual displacements are mostly measurement noise, in every column.
+def _is_noise(residuals: FloatArray, smallest_noise: float) -> bool:
+    """Returns whether the residual displacements are mostly measurement noise, in every column.
 
     A position error makes the residual before it too large and the residual after it too small, so
     successive residuals have opposite signs: in two of three pairs for pure noise. Residuals from
     impacts and from the step length persist in sign. Single joints may oscillate at every step, but
     not all of them.
     """
-    product = moved[1:] * moved[:-1]
+    product = residuals[1:] * residuals[:-1]
     known = np.isfinite(product)
-    contradicting = np.sum(known & (product < 0), axis=0)
-    shares = contradicting / np.maximum(known.sum(axis=0), 1)
-    enough = np.abs(moved[np.isfinite(moved)])
+    sign_changes = np.sum(known & (product < 0), axis=0)
+    shares = sign_changes / np.maximum(known.sum(axis=0), 1)
+    magnitudes = np.abs(residuals[np.isfinite(residuals)])
     return bool(
-        len(enough)
-        and np.median(enough) > little
+        len(magnitudes)
+        and np.median(magnitudes) > smallest_noise
         and shares.mean() > NOISE_SHARE
         and np.all(shares > NOISE_SHARE_PER_COLUMN)
     )
 
 
-def _is_of_turns(moved: FloatArray, turns: FloatArray) -> bool:
-    """Whether the residual displacements are a linear function of the velocity changes.
+def _is_linear_in(changes: FloatArray, residuals: FloatArray) -> bool:
+    """Returns whether the residual displacements are a linear function of the velocity changes.
 
-    The residuals of a robot whose joints oscillate at every step look like noise, but are
-    proportional to the velocity changes: the step has other integration weights than those of two
-    physics steps. Noise is not proportional to the velocity changes.
+    The residuals of a robot whose joints oscillate at every step alternate in sign like noise, but
+    are proportional to the velocity changes: the step has other integration weights than those of
+    two physics steps. Noise is not proportional to the velocity changes.
     """
-    known = np.isfinite(moved) & np.isfinite(turns)
-    rest, turn = np.where(known, moved, 0.0), np.where(known, turns, 0.0)
-    weights = (rest * turn).sum(axis=0) / np.maximum((turn * turn).sum(axis=0), 1e-300)
-    left = np.abs(rest - weights * turn)[known]
-    return bool(np.median(left) < MAX_UNEXPLAINED_SHARE * np.median(np.abs(rest[known])))
+    known = np.isfinite(residuals) & np.isfinite(changes)
+    y, x = np.where(known, residuals, 0.0), np.where(known, changes, 0.0)
+    slopes = (y * x).sum(axis=0) / np.maximum((x * x).sum(axis=0), 1e-300)
+    unexplained = np.abs(y - slopes * x)[known]
+    return bool(np.median(unexplained) < MAX_UNEXPLAINED_SHARE * np.median(np.abs(y[known])))
 
 
 def _averaged(
-    values: FloatArray, velocities: FloatArray, ways: FloatArray, reach: int
+    values: FloatArray, velocities: FloatArray, displacements: FloatArray, half_width: int
 ) -> FloatArray:
+    """Returns positions averaged along the displacements, ``(steps, width)``; NaN if unknown."""
     steps = len(values)
-    along = np.concatenate([np.zeros((1, values.shape[1])), np.nancumsum(ways, axis=0)])
-    still = values - along
-    known = np.isfinite(still) & np.isfinite(velocities)
-    sums = _summed(np.where(known, still, 0.0))
+    path = np.concatenate([np.zeros((1, values.shape[1])), np.nancumsum(displacements, axis=0)])
+    deviations = values - path
+    known = np.isfinite(deviations) & np.isfinite(velocities)
+    sums = _summed(np.where(known, deviations, 0.0))
     counts = _summed(known.astype(np.float64))
-    first = np.maximum(np.arange(steps) - reach, 0)
-    last = np.minimum(np.arange(steps) + reach + 1, steps)
+    first = np.maximum(np.arange(steps) - half_width, 0)
+    last = np.minimum(np.arange(steps) + half_width + 1, steps)
     all_known = counts[last] - counts[first] == (last - first)[:, np.newaxis]
-    unknown_ways = _summed(np.isnan(ways).astype(np.float64))
-    all_known &= unknown_ways[last - 1] == unknown_ways[first]
-    mean = (sums[last] - sums[first]) / (last - first)[:, np.newaxis] + along
+    unknown_counts = _summed(np.isnan(displacements).astype(np.float64))
+    all_known &= unknown_counts[last - 1] == unknown_counts[first]
+    mean = (sums[last] - sums[first]) / (last - first)[:, np.newaxis] + path
     return np.where(all_known, mean, np.nan)
 
 
 def _summed(values: FloatArray) -> FloatArray:
+    """Returns the sums of the first k rows, ``(steps + 1, width)``, from k = 0."""
     return np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])

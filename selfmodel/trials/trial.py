@@ -15,7 +15,7 @@ STAGES: tuple[Stage, ...] = get_args(Stage)
 
 
 def stage_of(name: str) -> Stage | None:
-    """Returns the stage of a name; None if no stage has the name."""
+    """Returns the stage with a name; None if there is no such stage."""
     return next((stage for stage in STAGES if stage == name), None)
 
 
@@ -45,8 +45,8 @@ class Trial:
     Attributes:
         plan: The plan of the trial.
         robot: Name of the robot.
-        behaviour: Every signal that was observed: ``plan.steps`` steps, or fewer where the trial
-            was interrupted; NaN for values that were not observed.
+        behaviour: Observed signals: ``plan.steps`` steps, or fewer if the trial was interrupted;
+            NaN for values that were not observed.
         path: Path of the log.
     """
 

@@ -134,7 +134,7 @@ def test_a_table_says_each_factor_and_how_sure_it_is(folder: Path):
         (["none.mcap", "-o", "a.xml"], "none.mcap"),
         (
             ["intact.mcap", "numb.mcap", "-o", "a.xml"],
-            "numb.mcap: calibration needs segments of 16 steps or more, none of them late, with ",
+            "numb.mcap: calibration needs segments of 16 steps or more, without late steps, with ",
         ),
         (["numb.mcap", "-o", "a.xml"], "the log never has joint_velocities: leave"),
     ],

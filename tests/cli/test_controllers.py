@@ -89,7 +89,7 @@ def test_a_recovery_s_network_has_as_many_neurons_as_are_asked_for(tmp_path: Pat
         (("--controller", "cpq"), "unknown kind of controller 'cpq': did you mean cpg?"),
         (
             ("--controller", "cpg", "--neurons", "4"),
-            "a CPG has no hidden neurons, got --neurons 4: leave it out",
+            "a CPG has no hidden neurons, got --neurons 4: leave --neurons out",
         ),
         (("--controller", "cpg", "--case", "10"), "neuron:0 does not apply to a CPG"),
         (("--neurons", "101"), "less than or equal to 100"),

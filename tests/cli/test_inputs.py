@@ -31,7 +31,7 @@ from selfmodel.errors import InputError
         (
             "--kinds",
             "selfmodel.faults.neuron:SILENT_NEURON",
-            "no diagnosis may propose neuron: leave it out",
+            "no diagnosis may propose neuron: leave neuron out",
         ),
         ("--kinds", "break,frction", "unknown kind 'frction': did you mean friction?"),
         (

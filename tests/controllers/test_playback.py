@@ -43,7 +43,7 @@ def test_a_missing_command_is_replaced_by_the_one_before_it():
     expected = [[0.1, 0.2], [0.1, 0.2], [0.5, 0.2]]
     assert np.array_equal(played_back(("a", "b"), lost).commands, expected)
     lost[0] = np.nan
-    with pytest.raises(ValueError, match="of step 0 are not all known"):
+    with pytest.raises(ValueError, match="of step 0 are not all finite"):
         played_back(("a", "b"), lost)
 
 
@@ -53,8 +53,8 @@ def test_a_missing_command_is_replaced_by_the_one_before_it():
         (np.zeros((0, 2)), r"got \(0, 2\)"),
         (np.zeros((3, 1)), r"got \(3, 1\)"),
         (np.zeros(2), r"got \(2,\)"),
-        (np.array([[0.0, 1.0], [np.nan, 1.0]]), "of step 1 are not all known"),
-        (np.array([[0.0, np.inf]]), "of step 0 are not all known"),
+        (np.array([[0.0, 1.0], [np.nan, 1.0]]), "of step 1 are not all finite"),
+        (np.array([[0.0, np.inf]]), "of step 0 are not all finite"),
     ],
 )
 def test_commands_that_do_not_fit_are_refused(commands: np.ndarray, match: str):

@@ -61,7 +61,7 @@ def test_a_kind_that_cannot_strike_a_robot_is_passed_over_and_alone_refused():
 
 
 def test_a_kind_that_no_diagnosis_may_propose_is_refused(robot: Robot):
-    with pytest.raises(InputError, match="no diagnosis may propose neuron: leave it out"):
+    with pytest.raises(InputError, match="no diagnosis may propose neuron: leave neuron out"):
         HypothesisSpace.of((KINDS["break"], KINDS["neuron"]), robot.anatomy)
 
 

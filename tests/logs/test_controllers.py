@@ -125,7 +125,7 @@ def test_equal_controllers_give_equal_bytes_at_any_time():
         (archive(ranges=np.ones(2)), "its arrays have the ranks"),
         (archive(ranges=np.ones((2, 2), np.float32)), "its ranges is float32, expected float64"),
         (archive(ranges=np.full((2, 2), np.nan)), "needs a finite command range"),
-        (archive(ranges=np.zeros((2, 2))), "needs a finite command range of some width"),
+        (archive(ranges=np.zeros((2, 2))), "needs a finite command range of positive width"),
         (archive(kind=np.array("cpg")), "it holds genome.npy, hidden.npy"),
         (cpg(timestep=np.array(0.0)), "time step must be above 0 s"),
         (cpg(timestep=np.array(np.inf)), "time step must be above 0 s"),

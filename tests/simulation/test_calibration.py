@@ -184,7 +184,7 @@ def test_a_trial_that_lacks_part_of_the_state_is_refused_by_what_it_lacks():
     (whole,) = trials(QUADRUPED, 1)
     numb = lacking(whole, (*BASE, "base_angular_velocity"))
     expected = (
-        r"0\.mcap: calibration needs segments of 16 steps or more, none of them late, with "
+        r"0\.mcap: calibration needs segments of 16 steps or more, without late steps, with "
         r"joint_positions, .* and the log never has base_angular_velocity: leave this log out"
     )
     with pytest.raises(InputError, match=expected):
@@ -196,7 +196,7 @@ def test_a_trial_with_no_stretch_of_all_of_it_is_refused():
     early = lacking(whole, ("base_orientation",), slice(STEPS // 2))
     never_both = lacking(early, ("joint_velocities",), slice(STEPS // 2 - 1, None))
 
-    with pytest.raises(InputError, match="the log has none of use: leave"):
+    with pytest.raises(InputError, match="the log has no such segment: leave"):
         calibrate(QUADRUPED, [never_both], 1)
 
 

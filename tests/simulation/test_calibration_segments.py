@@ -206,7 +206,7 @@ def test_a_trial_that_is_too_short_is_refused():
 def test_a_trial_of_nothing_but_late_steps_is_refused(whole: Trial):
     run = replace(whole.behaviour, late=np.arange(STEPS) > 0)
 
-    with pytest.raises(InputError, match=r"none of them late, .* the log has none of use"):
+    with pytest.raises(InputError, match=r"without late steps, .* the log has no such segment"):
         calibration_segments_of(replace(whole, behaviour=run))
 
 
@@ -214,7 +214,7 @@ def test_a_trial_of_which_too_little_can_be_judged_is_refused(whole: Trial):
     """All of it is seen at some time, and together after five steps only."""
     blinking = lacking(whole, (*BASE, "base_orientation"), slice(6, None))
 
-    with pytest.raises(InputError, match=r"the log has none of use: leave"):
+    with pytest.raises(InputError, match=r"the log has no such segment: leave"):
         calibration_segments_of(blinking)
 
 

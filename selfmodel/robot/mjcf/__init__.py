@@ -1,1 +1,1 @@
-"""Any MJCF file, made into a robot."""
+"""Conversion of any MJCF file to a robot."""

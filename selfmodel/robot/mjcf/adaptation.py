@@ -36,11 +36,11 @@ MAX_SUBSTEPS = 1000
 
 @dataclass(frozen=True, eq=False)
 class AdaptedMjcf:
-    """An MJCF with all that a robot needs.
+    """An MJCF after adaptation to the requirements of a robot.
 
     Attributes:
         name: Name of the robot.
-        mjcf: The MJCF as one XML text without includes; ``assets`` has its files.
+        mjcf: The MJCF as one XML text without includes; ``assets`` contains its files.
         control_timestep: Time between two commands, s.
         assets: Contents of the files that the text names, by name.
         notes: Descriptions of the changes to the user's text, one sentence each.
@@ -61,7 +61,7 @@ def adapt(path: Path, settings: MjcfSettings) -> AdaptedMjcf:
         settings: Properties that the file does not contain.
 
     Raises:
-        InputError: The file cannot be a robot; the sentence has the reason and the remedy.
+        InputError: The file cannot be a robot; the message has the reason and the remedy.
     """
     data = read_file(path, "an MJCF file", MAX_MODEL_SIZE)
     try:
@@ -83,7 +83,7 @@ def adapt_text(
         settings: Properties that the text does not contain.
 
     Raises:
-        InputError: The text cannot be a robot; the sentence has the reason and the remedy.
+        InputError: The text cannot be a robot; the message has the reason and the remedy.
     """
     try:
         return _adapted(name, read_document(mjcf.encode(), InMemory(files)), settings)
@@ -111,7 +111,7 @@ def _adapted(name: str, document: Document, settings: MjcfSettings) -> AdaptedMj
     try:
         checked = checked_model(document.text, document.assets)
     except ValueError as error:
-        raise InputError(f"a log cannot contain it: {error}") from error
+        raise InputError(f"a log cannot contain the model: {error}") from error
     return AdaptedMjcf(
         name=name,
         mjcf=checked.mjcf,
@@ -130,13 +130,14 @@ def _control_timestep(physics: float, wanted: float | None) -> float:
             time step that is at least ``MIN_CONTROL_TIMESTEP``.
 
     Raises:
-        InputError: The control time step has too many physics steps, or no whole number of them.
+        InputError: The control time step has more than ``MAX_SUBSTEPS`` physics steps, or is not a
+            multiple of the physics time step.
     """
     control = MIN_CONTROL_TIMESTEP if wanted is None else wanted
     if control / physics > MAX_SUBSTEPS:
         raise InputError(
             f"expected at most {MAX_SUBSTEPS} physics steps in a control step of {control} s, got "
-            f"{control / physics:.3g}: give it a larger <option timestep>"
+            f"{control / physics:.3g}: give the MJCF a larger <option timestep>"
         )
     if wanted is None:
         return max(1, math.ceil(MIN_CONTROL_TIMESTEP / physics - 1e-9)) * physics

@@ -4,8 +4,9 @@ import struct
 import zlib
 
 ASSET_ENDINGS = (".stl", ".obj", ".msh", ".png", ".ktx", ".skn", ".bin")
-"""Endings of the names of such files. Archives are excluded: MuJoCo would read one in place of a
-mesh, and with the archive another model and that model's files from any folder."""
+"""Endings of the names of the files that a model in a log may name. Archives are excluded: MuJoCo
+would read an archive in place of a mesh, and with the archive another model and the files of that
+model from any folder."""
 
 _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _COMPRESSED_TEXTS = (b"iCCP", b"zTXt", b"iTXt")

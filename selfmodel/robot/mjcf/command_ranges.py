@@ -18,7 +18,7 @@ def add_command_ranges(document: Document, model: mujoco.MjModel, settings: Mjcf
         settings: Settings with the command range.
 
     Raises:
-        InputError: A motor has no command range, and the settings have none.
+        InputError: A motor has no command range, and the settings contain no command range.
     """
     if settings.ctrlrange is not None:
         ends = f"{settings.ctrlrange[0]!r} {settings.ctrlrange[1]!r}"
@@ -30,5 +30,5 @@ def add_command_ranges(document: Document, model: mujoco.MjModel, settings: Mjcf
         command_ranges(compile_model(document.text, document.assets))
     except InputError as error:
         raise InputError(
-            f"{error}; or set ctrlrange=[-1, 1] for all motors that have none"
+            f"{error}; or set ctrlrange=[-1, 1] for all motors without a command range"
         ) from error

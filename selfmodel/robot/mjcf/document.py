@@ -47,8 +47,8 @@ class Document:
 
     def section(self, name: str) -> ET.Element:
         """Returns the first section of that name, and adds the section if there is none."""
-        found = self.root.find(name)
-        return ET.SubElement(self.root, name) if found is None else found
+        section = self.root.find(name)
+        return ET.SubElement(self.root, name) if section is None else section
 
     def children(self, section: str) -> list[ET.Element]:
         """Returns the children of all sections of that name, in order."""
@@ -60,7 +60,7 @@ class Document:
 
 
 def read_document(mjcf: bytes, files: Files, name: str = "") -> Document:
-    """Returns the document of an MJCF: includes are inserted, and all named files are read.
+    """Returns the document of an MJCF, with includes inserted and all named files read.
 
     Args:
         mjcf: The MJCF.
@@ -77,7 +77,7 @@ def read_document(mjcf: bytes, files: Files, name: str = "") -> Document:
         raise InputError(_no_mjcf_message(root.tag))
     _include(root, files, "", {normpath(name)})
     if sum(1 for _ in root.iter()) > MAX_ELEMENTS:
-        raise InputError(f"it has more than {MAX_ELEMENTS} elements: remove static scenery")
+        raise InputError(f"the MJCF has more than {MAX_ELEMENTS} elements: remove static scenery")
     document = Document(root)
     _read_assets(document, files)
     return document
@@ -110,7 +110,7 @@ def _check_xml(data: bytes) -> None:
         count += 1
         if depth > MAX_DEPTH or count > MAX_ELEMENTS:
             raise InputError(
-                f"it has more than {MAX_ELEMENTS} elements, or {MAX_DEPTH} within each other"
+                f"the MJCF has more than {MAX_ELEMENTS} elements, or {MAX_DEPTH} within each other"
             )
 
     def end(_tag: str) -> None:
@@ -118,7 +118,7 @@ def _check_xml(data: bytes) -> None:
         depth -= 1
 
     def doctype(*_: object) -> None:
-        raise InputError("it has a <!DOCTYPE>, which no MJCF needs: remove it")
+        raise InputError("the MJCF has a <!DOCTYPE>, which no MJCF needs: remove the <!DOCTYPE>")
 
     parser = expat.ParserCreate()
     parser.StartElementHandler, parser.EndElementHandler = start, end
@@ -149,7 +149,7 @@ def _include(parent: ET.Element, files: Files, folder: str, included: set[str]) 
         path = normpath(name if files.has(name) else join(folder, name))
         data = files.read(path, f"a file to <include> ({name!r})", MAX_MODEL_SIZE)
         if path in included:
-            raise InputError(f"it includes {name!r} twice: name each file once")
+            raise InputError(f"the MJCF includes {name!r} twice: name each file once")
         included.add(path)
         inner = _parse(data)
         _include(inner, files, dirname(path), included)
@@ -170,7 +170,8 @@ def _read_assets(document: Document, files: Files) -> None:
                 data = files.read(path, what, MAX_SOURCE_ASSET_BYTES)
                 if sum(map(len, document.assets.values())) + len(data) > MAX_SOURCE_ASSET_BYTES:
                     raise InputError(
-                        f"its files have over {MAX_SOURCE_ASSET_BYTES} bytes: simplify them"
+                        f"the files of the MJCF have over {MAX_SOURCE_ASSET_BYTES} bytes: "
+                        f"simplify them"
                     )
                 names[path] = _plain_name(path, document.assets)
                 document.assets[names[path]] = data

@@ -23,7 +23,7 @@ def check_loggable(document: Document) -> None:
     """
     if _expanded_size(document.root) > MAX_ELEMENTS:
         copying = "> and <".join(_COPYING_ELEMENTS)
-        raise InputError(f"its <{copying}> make more than {MAX_ELEMENTS} elements")
+        raise InputError(f"the <{copying}> of the MJCF make more than {MAX_ELEMENTS} elements")
     try:
         checked_model(
             document.text,
@@ -33,7 +33,7 @@ def check_loggable(document: Document) -> None:
         )
     except ValueError as error:
         raise InputError(
-            f"the log of a trial contains the robot's model, and cannot contain this one: {error}"
+            f"the log of a trial contains the robot's model, and cannot contain this model: {error}"
         ) from error
 
 
@@ -51,14 +51,17 @@ def expand(document: Document) -> None:
             spec.compile()
             document.root = ET.fromstring(spec.to_xml())  # noqa: S314  # the text is from MuJoCo
         document.notes.append(
-            f"MuJoCo wrote out its <{'>, <'.join(used)}>, with numbers of six digits"
+            f"MuJoCo wrote out the <{'>, <'.join(used)}> elements, with numbers of six digits"
         )
         if any(element.tag in REFUSED_ELEMENTS for element in document.root.iter()):
-            raise InputError(f"MuJoCo cannot write out its <{'>, <'.join(used)}>: do it by hand")
+            raise InputError(
+                f"MuJoCo cannot write out the <{'>, <'.join(used)}> of the MJCF: write the copies "
+                f"and frames by hand"
+            )
     compilers = list(document.root.iter("compiler"))
     if any(compiler.get("settotalmass") for compiler in compilers):
         write_masses(document, compile_model(document.text, document.assets))
-        document.notes.append("its masses are written out, as settotalmass scales them")
+        document.notes.append("the masses are written out, as scaled by settotalmass")
 
 
 def _keep_all_elements(document: Document) -> None:
@@ -76,8 +79,8 @@ def _expanded_size(element: ET.Element) -> int:
     counts = element.get("count", "1").split() if element.tag in _COPYING_ELEMENTS else ["1"]
     if not all(count.isdecimal() and len(count) < 7 for count in counts):
         raise InputError(
-            f"its <{element.tag}> has count={element.get('count')!r}: expected whole numbers below "
-            f"1,000,000"
+            f"the MJCF's <{element.tag}> has count={element.get('count')!r}: expected whole "
+            f"numbers below 1,000,000"
         )
     return prod(map(int, counts)) * (1 + sum(_expanded_size(child) for child in element))
 

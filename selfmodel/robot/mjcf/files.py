@@ -45,8 +45,8 @@ class Folder:
         """Returns the content of a file; see ``Files.read``."""
         if not self._inside(name):
             raise InputError(
-                f"it names {what} outside its own folder, {name!r}: put the file into {self.path}, "
-                f"and name it relative to that folder"
+                f"the MJCF names {what} outside its own folder, {name!r}: put the file into "
+                f"{self.path}, and name it relative to that folder"
             )
         return read_file(self.path / name, what, limit)
 
@@ -65,19 +65,21 @@ class InMemory:
 
     def has(self, name: str) -> bool:
         """Returns whether the file exists."""
-        return self._found(name) is not None
+        return self._content(name) is not None
 
     def read(self, name: str, what: str, limit: int) -> bytes:
         """Returns the content of a file; see ``Files.read``."""
-        found = self._found(name)
-        if found is None:
-            raise InputError(f"it names {what}, which was not given with it: pass its content")
-        data = found.encode() if isinstance(found, str) else found
+        content = self._content(name)
+        if content is None:
+            raise InputError(
+                f"the MJCF names {what}, which is not given: pass the content of the file"
+            )
+        data = content.encode() if isinstance(content, str) else content
         if len(data) > limit:
             raise InputError(f"{name}: expected {what} of at most {limit} bytes, got more")
         return data
 
-    def _found(self, name: str) -> bytes | str | None:
+    def _content(self, name: str) -> bytes | str | None:
         plain = {normpath(path): content for path, content in self.files.items()}
         # MuJoCo also accepts a file in memory by its name without the folder.
         return plain.get(normpath(name), plain.get(basename(name)))

@@ -33,13 +33,13 @@ def turn_forward(document: Document, model: mujoco.MjModel, settings: MjcfSettin
     root = next((j for j in range(model.njnt) if model.jnt_type[j] == free), None)
     if root is None:
         raise InputError(
-            f"forward={settings.forward} needs a root body with a free joint: without one, turn "
-            f"the robot in its file until it walks along x"
+            f"forward={settings.forward} needs a root body with a free joint, got none: rotate the "
+            f"robot in its file, so that x is forward"
         )
     if np.any(model.opt.gravity[:2]) or np.any(model.opt.wind[:2]) or not _is_flat(model):
         raise InputError(
-            f"forward={settings.forward} turns the robot in place, and its world is not the same "
-            f"from all sides: turn the robot in its file until it walks along x"
+            f"forward={settings.forward} rotates the robot, and its world is not the same from all "
+            f"sides: rotate the robot in its file, so that x is forward"
         )
     body = int(model.jnt_bodyid[root])
     frames = BodyFrames.of(model)

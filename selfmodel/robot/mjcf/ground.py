@@ -13,7 +13,7 @@ from selfmodel.robot.mjcf.mujoco_errors import compile_model
 from selfmodel.robot.mjcf.names import UniqueNames
 
 _MAX_DISTANCE = 1e6
-"""Largest distance of a geom from the ground plane that is measured, m."""
+"""Largest measured distance of a geom from the ground plane, m."""
 
 
 def add_ground(document: Document, model: mujoco.MjModel) -> None:
@@ -36,8 +36,8 @@ def add_ground(document: Document, model: mujoco.MjModel) -> None:
     )
     if not contype | conaffinity:
         raise InputError(
-            "no geom of the robot can touch anything: give those of its limbs a contype of 1, or "
-            "its <option> a density or viscosity if it swims or flies"
+            "no geom of the robot can touch anything: give the geoms of its limbs a contype of 1, "
+            "or <option> a density or viscosity if the robot swims or flies"
         )
     plane = {
         "name": UniqueNames(model.geom(g).name for g in range(model.ngeom)).new("ground"),

@@ -19,7 +19,7 @@ _EQUALITY_TOLERANCE = 1e-6
 """Largest violation of an equality constraint in the keyframe, m or rad."""
 
 _OTHER_KEYFRAME = (
-    f"start it in another keyframe with keyframe=NAME, or in its reference pose with "
+    f"start the robot in another keyframe with keyframe=NAME, or in the reference pose with "
     f"keyframe={NO_KEYFRAME}"
 )
 
@@ -78,9 +78,9 @@ def _frames_at(model: mujoco.MjModel, qpos: FloatArray) -> BodyFrames:
         shift = float(qpos[address] - model.qpos0[address])
         frames.reference[joint] = float(qpos[address])
         if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE:
-            along = np.empty(3)
-            mujoco.mju_rotVecQuat(along, model.jnt_axis[joint], frames.orientation[body])
-            frames.position[body] += shift * along
+            direction = np.empty(3)
+            mujoco.mju_rotVecQuat(direction, model.jnt_axis[joint], frames.orientation[body])
+            frames.position[body] += shift * direction
             continue
         frames.position[body], frames.orientation[body] = turned_by_hinge(
             frames.position[body],
@@ -93,7 +93,7 @@ def _frames_at(model: mujoco.MjModel, qpos: FloatArray) -> BodyFrames:
 
 
 def _check_equalities(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Checks that equality constraints, relative to the reference pose, stay the same."""
+    """Checks that the new reference pose does not change the equality constraints."""
     if not model.neq:
         return
     rows = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_EQUALITY
@@ -105,7 +105,7 @@ def _check_equalities(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     ]
     if nonlinear or np.any(np.abs(data.efc_pos[: data.nefc][rows]) > _EQUALITY_TOLERANCE):
         raise InputError(
-            f"its equality constraints are violated in its keyframe, or are nonlinear: "
+            f"equality constraints are violated in the keyframe, or are nonlinear: "
             f"{_OTHER_KEYFRAME}"
         )
 
@@ -126,4 +126,4 @@ def _check_pose(before: mujoco.MjData, model: mujoco.MjModel) -> None:
         np.allclose(before.xpos, after.xpos, atol=_POSE_TOLERANCE)
         and np.allclose(alignment, 1, atol=_POSE_TOLERANCE)
     ):
-        raise InputError(f"its keyframe cannot be made its reference pose: {_OTHER_KEYFRAME}")
+        raise InputError(f"the keyframe cannot be made the reference pose: {_OTHER_KEYFRAME}")

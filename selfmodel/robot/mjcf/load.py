@@ -17,7 +17,7 @@ def load_mjcf(path: Path | str, settings: MjcfSettings | None = None) -> Robot:
             of the same name.
 
     Raises:
-        InputError: No robot can be made of the file; the message gives the reason and the remedy.
+        InputError: The file cannot be a robot; the message has the reason and the remedy.
     """
     file = Path(path)
     adapted = adapt(file, read_settings(file) if settings is None else settings)
@@ -28,7 +28,7 @@ def robot_from(adapted: AdaptedMjcf, source: str) -> Robot:
     """Returns the robot of an adapted MJCF.
 
     Args:
-        adapted: As ``adapt`` or ``adapt_text`` returns it.
+        adapted: Adapted MJCF, as returned by ``adapt`` or ``adapt_text``.
         source: The name of the MJCF in an error message.
 
     Raises:

@@ -36,7 +36,7 @@ def mujoco_errors_as_input_errors() -> Iterator[None]:
         if isinstance(error, InputError):
             raise
         message = " ".join(str(error).split()).removeprefix("Error: ")
-        raise InputError(f"MuJoCo cannot load it: {message}") from error
+        raise InputError(f"MuJoCo cannot load the model: {message}") from error
     finally:
         mujoco.set_mju_user_warning(handler)
 

@@ -15,7 +15,7 @@ _REFERENCES: Mapping[str, tuple[str, ...]] = {
     "actuator": ("actuator",),
     "sensor": (),
 }
-"""Attributes that refer to a part by its name, by kind of part. ``objname`` and ``refname`` are not
+"""Attributes that contain the name of a part, by kind of part. ``objname`` and ``refname`` are not
 included: ``objtype`` and ``reftype`` contain their kind."""
 
 

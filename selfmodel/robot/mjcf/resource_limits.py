@@ -1,4 +1,4 @@
-"""Limits of the memory and time that a model in a log may ask for."""
+"""Limits of the memory and time that a model in a log may require."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -9,8 +9,8 @@ MAX_MODEL_SIZE = 2 * 2**20
 hull of a million points."""
 
 MAX_ASSET_BYTES = 4 * 2**20
-"""Largest sum of all files that a model names, counted once per mention, in bytes; for the same
-reason."""
+"""Largest sum of all files that a model names, counted once per mention, in bytes; the reason is
+that of ``MAX_MODEL_SIZE``."""
 
 MAX_ELEMENTS = 20_000
 """Largest number of XML elements of a model."""
@@ -19,11 +19,11 @@ MAX_DEPTH = 200
 """Largest number of XML elements within each other."""
 
 MAX_ARRAY_ENTRIES = 2**23
-"""Largest sum of pixels, heights and numbers that a model asks for by their count."""
+"""Largest sum of pixels, heights and numbers whose counts a model contains."""
 
 MAX_USER_NUMBERS = 100
-"""Largest number of values of a ``user`` attribute; MuJoCo gives every element as many as the
-longest attribute has."""
+"""Largest number of values of a ``user`` attribute; MuJoCo gives every element as many values as
+the longest attribute has."""
 
 REFUSED_ELEMENTS: Mapping[str, str] = MappingProxyType(
     {
@@ -63,7 +63,7 @@ MAX_VALUES: Mapping[str, float] = MappingProxyType(
         ),
     }
 )
-"""Largest values of attributes by which a model asks for memory or time, by attribute."""
+"""Largest values of the attributes that set memory or time, by attribute."""
 
 ENTRIES_PER_UNIT: Mapping[str, int] = MappingProxyType(
     {

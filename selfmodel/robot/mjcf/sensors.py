@@ -21,7 +21,7 @@ _SITE_MARGIN = 0.005
 
 
 def add_sensors(document: Document, model: mujoco.MjModel, settings: MjcfSettings) -> None:
-    """Adds the missing angle and touch sensors, and removes those that measure no driven limb.
+    """Adds the missing angle and touch sensors, and removes sensors that measure no driven limb.
 
     Args:
         document: The MJCF, edited in place.
@@ -101,7 +101,7 @@ def _limbs_to_measure(
     default = [model.body(b).name for b in limbs if model.body_weldid[b] not in measured_limbs]
     known = [model.body(b).name for b in sorted(touching)]
     has = {model.body(b).name for b in measured}
-    return _chosen("body that can meet the ground", settings.touch, default, known, has)
+    return _chosen("body that can touch the ground", settings.touch, default, known, has)
 
 
 def _chosen(
@@ -111,7 +111,7 @@ def _chosen(
     known: list[str],
     has: set[str | None] | set[str],
 ) -> list[str]:
-    """Returns the wanted names, or the default ones, without those that have a sensor.
+    """Returns the wanted names, or the default names, except names of parts with a sensor.
 
     Args:
         kind: Kind of the parts in an error message.
@@ -129,11 +129,11 @@ def _chosen(
 
 def _ancestors(model: mujoco.MjModel, body: int) -> list[int]:
     """Returns a body and its ancestors, without the world."""
-    found = []
+    ancestors = []
     while body:
-        found.append(body)
+        ancestors.append(body)
         body = int(model.body_parentid[body])
-    return found
+    return ancestors
 
 
 def _touch_site(model: mujoco.MjModel, body: int) -> dict[str, str]:

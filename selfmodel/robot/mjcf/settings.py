@@ -17,12 +17,12 @@ FORWARD_DIRECTIONS: Mapping[str, float] = {"x": 0.0, "y": 90.0, "-x": 180.0, "-y
 """Angle of each possible forward direction, counterclockwise from x, degrees."""
 
 NO_KEYFRAME = "none"
-"""Setting of the keyframe for the reference pose of the MJCF."""
+"""Value of ``keyframe`` for the reference pose of the MJCF."""
 
 
 @dataclass(frozen=True)
 class MjcfSettings:
-    """How to read a robot from its MJCF.
+    """Settings for the conversion of an MJCF to a robot.
 
     Attributes:
         forward: Forward direction of the robot, in the world frame of the file.
@@ -54,17 +54,17 @@ def read_settings(path: Path, extra: Mapping[str, Any] | None = None) -> MjcfSet
         InputError: A setting is unknown or invalid, or the file cannot be read.
     """
     file = path.with_suffix(".toml")
-    found: dict[str, Any] = {}
+    loaded: dict[str, Any] = {}
     if file.exists():
         data = read_file(file, "a file of settings", MAX_SETTINGS_BYTES)
         try:
-            found = tomllib.loads(data.decode())
+            loaded = tomllib.loads(data.decode())
         except (ValueError, RecursionError) as error:  # also raised by endless digits and brackets
             raise InputError(f"{file}: expected a file of settings in TOML: {error}") from error
     try:
-        return checked_settings({**found, **(extra or {})})
+        return checked_settings({**loaded, **(extra or {})})
     except InputError as error:
-        raise InputError(f"{file}: {error}") if found else error from None
+        raise InputError(f"{file}: {error}") if loaded else error from None
 
 
 def parse_setting(text: str) -> dict[str, Any]:
@@ -89,13 +89,13 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
         given: Values by setting.
 
     Raises:
-        InputError: A setting is unknown or invalid; the sentence has its name and the valid values.
+        InputError: A setting is unknown or invalid; the message has its name and the valid values.
     """
     for key in given:
         if key == "neurons":
             raise InputError(
-                "neurons is not a setting of a robot, but of its controller: leave it out, and "
-                "give --neurons N to the command"
+                "neurons is a setting of a controller, not of a robot: leave neurons out, and give "
+                "--neurons N to the command"
             )
         if key not in {field.name for field in fields(MjcfSettings)}:
             raise unknown_name("setting", key, [field.name for field in fields(MjcfSettings)])

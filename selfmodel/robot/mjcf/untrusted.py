@@ -1,7 +1,7 @@
-"""Checks the model of a log before MuJoCo compiles it: no other files, and bounded sizes.
+"""Checks of the model of a log before MuJoCo compiles the model: no other files, bounded sizes.
 
 A log may come from any source. MuJoCo would read any file that the model names, and one line of a
-model can ask for a billion bodies.
+model can make a billion bodies.
 """
 
 import re
@@ -63,7 +63,7 @@ def checked_model(
         max_asset_bytes: Largest sum of all files that the model names, counted once per mention.
 
     Raises:
-        ValueError: The model is no XML, names other files, or exceeds a limit; the sentence
+        ValueError: The model is no XML, names other files, or exceeds a limit; the message
             contains the element.
     """
     if len(mjcf) > MAX_MODEL_SIZE:
@@ -112,7 +112,7 @@ class _Checker:
             named = attributes.get("file") or attributes.get("plugin") or attributes.get("name")
             raise ValueError(
                 f"the model has <{tag}>{f' ({named!r})' if named else ''}, which "
-                f"{REFUSED_ELEMENTS[tag]}: a model in a log may not"
+                f"{REFUSED_ELEMENTS[tag]}: expected a model without <{tag}> in a log"
             )
         self._count("actuator" if self._path[-1:] == ["actuator"] else tag)
         for name, text in attributes.items():
@@ -136,7 +136,7 @@ class _Checker:
         elif name in _FOLDER_ATTRIBUTES and text:
             self._folder = text
         elif name == "memory" and not _MEMORY_SIZE.fullmatch(text.strip()):
-            raise ValueError(f"the model asks for {text!r} of memory, expected less than 100 MB")
+            raise ValueError(f"the model has memory={text!r}, expected less than 100 MB")
         elif name in MAX_VALUES or name.startswith("nuser_") or (tag, name) == ("numeric", "size"):
             _check_limit(tag, name, text, MAX_VALUES.get(name, 100 if name[0] == "n" else 10_000))
         else:
@@ -178,20 +178,19 @@ class _Checker:
         self._entries += int(entries)
         if self._entries > MAX_ARRAY_ENTRIES:
             raise ValueError(
-                f"the model asks for more than {MAX_ARRAY_ENTRIES} pixels, heights and numbers "
-                f"in all"
+                f"the model has more than {MAX_ARRAY_ENTRIES} pixels, heights and numbers in all"
             )
 
     def _end(self, _: str) -> None:
         self._path.pop()
 
     def _doctype(self, *_: object) -> None:
-        raise ValueError("the model has a <!DOCTYPE>: a model in a log may not")
+        raise ValueError("the model has a <!DOCTYPE>, which is not allowed in a log")
 
 
 def _check_limit(tag: str, name: str, text: str, limit: float) -> None:
     if not _largest(tag, name, text) <= limit:
-        raise ValueError(f"the model's <{tag}> asks for {name}={text!r}, expected at most {limit}")
+        raise ValueError(f"the model's <{tag}> has {name}={text!r}, expected at most {limit}")
 
 
 def _largest(tag: str, name: str, text: str) -> float:
@@ -209,16 +208,16 @@ def _check_content(tag: str, name: str, text: str) -> None:
         )
     if (tag, name) == ("mesh", "builtin") and text.strip() != "none":
         raise ValueError(
-            f"the model's <mesh> is {text!r}, made of any number of points: a model "
-            f"in a log may not"
+            f"the model's <mesh> has builtin={text!r}, made of any number of points, which is not "
+            f"allowed in a log"
         )
     if (tag, name) == ("rangefinder", "camera"):
         raise ValueError(
-            "the model's <rangefinder> reads every pixel of a camera: a model in a log may not"
+            "the model's <rangefinder> reads every pixel of a camera, which is not allowed in a log"
         )
     if name in _MUSCLE_ATTRIBUTES and text.strip() == "muscle":
         raise ValueError(
-            f"the model's <{tag}> {REFUSED_ELEMENTS['muscle']}: a model in a log may not"
+            f"the model's <{tag}> {REFUSED_ELEMENTS['muscle']}, which is not allowed in a log"
         )
     if name == "user" and len(text.split()) > MAX_USER_NUMBERS:
         raise ValueError(

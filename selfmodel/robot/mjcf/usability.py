@@ -1,4 +1,4 @@
-"""Checks that a compiled model can be a robot, with the name of the part that prevents it."""
+"""Checks that a compiled model can be a robot; errors contain the name of the unsuitable part."""
 
 import mujoco
 import numpy as np
@@ -19,21 +19,23 @@ def check_usable(model: mujoco.MjModel) -> None:
     """Checks that a model can be simulated, driven, logged and diagnosed.
 
     Raises:
-        InputError: The model cannot be a robot; the sentence has the reason and the part.
+        InputError: The model cannot be a robot; the message has the reason and the part.
     """
     if not model.opt.timestep > 0 or not np.isfinite(model.opt.timestep):
-        raise InputError(f"its <option timestep> must be above 0 s, got {model.opt.timestep}")
+        raise InputError(
+            f"the model's <option timestep> must be above 0 s, got {model.opt.timestep}"
+        )
     _check_finite(model)
     if not model.nu:
         raise InputError(
-            "it has no actuators, and nothing to control: give each joint that a motor is to "
-            "drive one in <actuator>"
+            "the model has no actuators: give each joint that a motor is to drive an element in "
+            "<actuator>"
         )
     _check_one_tree(model)
     driven = driven_joints(model)
     if not driven:
         raise InputError(
-            "its motors drive no joint, and no fault of it could be diagnosed: give the joints of "
+            "the model's motors drive no joint, so no fault could be diagnosed: give the joints of "
             "its limbs motors in <actuator>"
         )
     try:
@@ -48,7 +50,8 @@ def check_usable(model: mujoco.MjModel) -> None:
 def _check_finite(model: mujoco.MjModel) -> None:
     for name in ("body_mass", "body_inertia", "body_pos", "geom_size", "jnt_range", "qpos0"):
         if not np.isfinite(getattr(model, name)).all():
-            raise InputError(f"expected finite numbers, got others in its {name.replace('_', ' ')}")
+            quantity = name.replace("_", " ")
+            raise InputError(f"expected finite numbers, got others in the model's {quantity}")
 
 
 def _check_one_tree(model: mujoco.MjModel) -> None:
@@ -66,7 +69,7 @@ def _check_passive_base(model: mujoco.MjModel, root: int) -> None:
     for motor in range(model.nu):
         for joint in motor_joints(model, motor).intersection(base_joints):
             raise InputError(
-                f"its motor {model.actuator(motor).name} drives {model.joint(joint).name} of the "
+                f"the motor {model.actuator(motor).name} drives {model.joint(joint).name} of the "
                 f"root body {model.body(root).name}, which only the limbs may move: remove the "
                 f"motor"
             )
@@ -82,8 +85,8 @@ def _check_stable(model: mujoco.MjModel) -> None:
     unstable = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL)
     if any(data.warning[w].number for w in (*unstable, mujoco.mjtWarning.mjWARN_BADQACC)):
         raise InputError(
-            f"its simulation diverges within {steps * model.opt.timestep:.2g} s, with its motors "
-            f"at rest: give it a smaller <option timestep>, or masses and joints of sane size"
+            f"the simulation diverges within {steps * model.opt.timestep:.2g} s, without "
+            f"commands: give the model a smaller <option timestep>, or realistic masses and joints"
         )
 
 

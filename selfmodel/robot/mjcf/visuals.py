@@ -16,7 +16,7 @@ _MAX_PATTERN_PIXELS = 64
 
 
 def drop_visuals(document: Document, model: mujoco.MjModel) -> bool:
-    """Removes skins; and visual meshes and image textures, if the files are too large for a log.
+    """Removes skins, and also visual meshes and image textures if the files exceed a log's limit.
 
     Procedural textures are shrunk, so that a model takes kilobytes in place of megabytes. The
     bodies keep the masses that the removed meshes gave them.
@@ -49,8 +49,9 @@ def drop_visuals(document: Document, model: mujoco.MjModel) -> bool:
     )
     if _asset_bytes(document) > MAX_ASSET_BYTES:
         raise InputError(
-            f"expected files of at most {MAX_ASSET_BYTES} bytes, because every trial's log carries "
-            f"them, got {_asset_bytes(document)} bytes: simplify the meshes of colliding geoms"
+            f"expected files of at most {MAX_ASSET_BYTES} bytes, because every trial's log "
+            f"contains them, got {_asset_bytes(document)} bytes: simplify the meshes of colliding "
+            f"geoms"
         )
     return True
 
@@ -61,10 +62,10 @@ def _asset_bytes(document: Document) -> int:
 
 def _remove_skins(root: ET.Element) -> int:
     """Removes all skins; returns their number."""
-    found = [(parent, child) for parent in root.iter() for child in parent if child.tag == "skin"]
-    for parent, skin in found:
+    skins = [(parent, child) for parent in root.iter() for child in parent if child.tag == "skin"]
+    for parent, skin in skins:
         parent.remove(skin)
-    return len(found)
+    return len(skins)
 
 
 def _drop_visual_meshes(document: Document, model: mujoco.MjModel) -> int:

@@ -74,7 +74,7 @@ AWKWARD: dict[str, Awkward] = {
     "other XML": Awkward("<html><body/></html>", "got <html>"),
     "an entity bomb": Awkward(BOMB, "<!DOCTYPE>"),
     "deep nesting": Awkward(_deep(5000), "200 within each other"),
-    "an element that MJCF has not": Awkward(mjcf(more="<leg/>"), "MuJoCo cannot load it"),
+    "an element that MJCF has not": Awkward(mjcf(more="<leg/>"), "MuJoCo cannot load the model"),
     "UTF-16": Awkward(f'<?xml version="1.0" encoding="utf-16"?>{mjcf()}'.encode("utf-16")),
     # Files.
     "a missing mesh": Awkward(mjcf(more=MESH.format("m", "m.obj")), "'m.obj'"),
@@ -85,7 +85,9 @@ AWKWARD: dict[str, Awkward] = {
         mjcf(more=MESH.format("m", "parts/m.obj"), torso=MESHED), "", {"parts/m.obj": CUBE}
     ),
     "a mesh that is junk": Awkward(
-        mjcf(more=MESH.format("m", "m.stl"), torso=MESHED), "MuJoCo cannot load it", {"m.stl": "x"}
+        mjcf(more=MESH.format("m", "m.stl"), torso=MESHED),
+        "MuJoCo cannot load the model",
+        {"m.stl": "x"},
     ),
     "an include": Awkward(
         mjcf(motors="", more='<include file="motors.xml"/>'),
@@ -230,7 +232,7 @@ AWKWARD: dict[str, Awkward] = {
     ),
     "NaN inertia": Awkward(
         mjcf(torso='<inertial pos="0 0 0" mass="1" diaginertia="nan 1 1"/>' + TORSO),
-        "MuJoCo cannot load it",
+        "MuJoCo cannot load the model",
     ),
     "NaN position": Awkward(mjcf().replace('pos="0 0 .35"', 'pos="0 nan .35"'), "finite"),
     "zero mass": Awkward(mjcf(torso='<geom size=".1" mass="0"/>', legs=LEGS), "mass"),
@@ -242,7 +244,7 @@ AWKWARD: dict[str, Awkward] = {
             more='<option timestep="0.05" integrator="Euler"/>'
             '<default><joint stiffness="1e7" springref="30"/></default>'
         ),
-        "its simulation diverges",
+        "the simulation diverges",
     ),
     "a huge memory": Awkward(mjcf(more='<size memory="900G"/>'), "memory"),
     # Keyframes and names.

@@ -47,11 +47,11 @@ def test_too_large_colliding_meshes_are_refused():
     text = mjcf(more=MESH.format("m", "m.obj"), torso=TORSO + '<geom type="mesh" mesh="m"/>')
     large = CUBE + "# a comment of many bytes\n" * (MAX_ASSET_BYTES // 20)
 
-    with pytest.raises(InputError, match=r"every trial's log carries them.*: simplify the meshes"):
+    with pytest.raises(InputError, match=r"every trial's log contains them.*: simplify the meshes"):
         made("cube", text, {"m.obj": large})
     assert made("cube", text, {"m.obj": CUBE}).assets.keys() == {"m.obj"}
 
 
 def test_a_missing_file_is_refused_by_name():
-    with pytest.raises(InputError, match=r"cube: it names .*'m\.obj'.* not given with it"):
+    with pytest.raises(InputError, match=r"cube: the MJCF names .*'m\.obj'.* is not given: pass"):
         made("cube", mjcf(more=MESH.format("m", "m.obj")), {})
