@@ -74,7 +74,7 @@ class TrialRecord:
         stage: Stage of the recovery.
         robot: Name of the robot.
         root: Name of the root body, whose motion is on ``/odom``.
-        control_timestep: Control time step, s; step k is at k times this.
+        control_timestep: Control time step, s; step k is at k times this value.
         steps: Planned number of control steps.
         seed: Seed of all random choices.
         controller_sha256: SHA-256 of the attached controller, or "" without one: then only the

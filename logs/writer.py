@@ -127,8 +127,8 @@ class TrialWriter:
         if (sample.moment is not None) != self._header.timed:
             has, given = ("no", "True") if self._header.timed else ("a", "False")
             raise InputError(
-                f"the sample of step {self.steps} has {has} moment, and timed is {given}: a trial "
-                f"is timed if its robot has a clock of its own"
+                f"the sample of step {self.steps} has {has} moment, but timed is {given} in the "
+                f"header: a trial is timed if its robot has a clock of its own"
             )
         sampled = sample_rows(sample)
         for part, rows in self._rows.items():
