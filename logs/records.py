@@ -142,7 +142,7 @@ class Imported:
 
 @dataclass(frozen=True)
 class TrialHeader:
-    """Content of a log's preamble beside the robot and the plan.
+    """Content of a log's preamble except the robot and the plan.
 
     Attributes:
         settings: The paper's numbers, for the record.

@@ -43,7 +43,7 @@ def write_trial(
         samples: Samples, one per control step as they happen; at most ``plan.steps`` are read.
             An iterable with a method ``close``, as a generator has, is closed before the log is,
             which stops the robot. A ``map`` over a generator has no ``close``: to process samples
-            on their way, use ``TrialWriter``.
+            before they are logged, use ``TrialWriter``.
         header: Other content of the log's preamble.
 
     Returns:

@@ -37,7 +37,7 @@ class UnsearchedFault:
     """A hypothesis with one fault of an unsearched kind.
 
     Attributes:
-        hypothesis: The whole hypothesis.
+        hypothesis: The complete hypothesis, including the fault of the unsearched kind.
         kind: Name of the unsearched kind.
     """
 

@@ -232,7 +232,7 @@ def test_the_contract_kit_wants_what_was_requested(logged_and_simulated: Both):
 
     with pytest.raises(ValueError, match=r"for a request of Segments, .* \(n, 3, 26, width\)"):
         check_comparator(Pieces(segments(trial)), trial, runs_of_shape(trial, 300))
-    with pytest.raises(ValueError, match=r"is a Ensemble: .* \(n, 4, 300, width\)"):
+    with pytest.raises(ValueError, match=r"a request of Ensemble, .* \(n, 4, 300, width\)"):
         check_comparator(Pieces(ENSEMBLE), trial, runs_of_shape(trial, 300))
 
 
