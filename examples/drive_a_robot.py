@@ -39,7 +39,7 @@ SILENCE = 0.1
 """Seconds without an answer after which an observation is missing."""
 
 
-# The driver begins here; the documentation includes it.
+# The driver begins here: the docs show it.
 class SocketRobot(dm_env.Environment):
     """Sends numbered targets and waits for the observation with the same number."""
 
