@@ -29,7 +29,7 @@ os.environ.setdefault("MUJOCO_GL", "disable")
 RESULTS = Path(__file__).with_name("results.json")
 POPULATION, STEPS = 100, 1000
 STEPS_OF_SUITE = 100
-"""Control steps for bodies of dm_control's suite; some cost a hundred times as much as ours."""
+"""Control steps for bodies of dm_control's suite; some cost 100 times as much as selfmodel's."""
 
 
 def main() -> None:

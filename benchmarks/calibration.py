@@ -129,7 +129,7 @@ def _against_truth(
 ) -> Facts:
     """Returns the errors of the factors' logarithms, and the errors divided by their deviations.
 
-    Each limb has its own factor, so no common one is true: the limbs' mass is left out.
+    Each limb has its own factor, so no common factor is true: the limbs' mass is left out.
     """
     motors = [gap.motors[name] for name in robot.anatomy.motors]
     true = np.array([gap.mass[robot.root], np.nan, gap.friction, gap.damping, *motors])

@@ -47,21 +47,21 @@ def main() -> None:
     """Prints a table per number of trials."""
     rows = _rows(Path(sys.argv[1]))
     for trials in sorted({row.trials for row in rows}):
-        mine = [row for row in rows if row.trials == trials]
+        same = [row for row in rows if row.trials == trials]
         print(f"After {trials} trial{'s' if trials > 1 else ''}:\n")
-        print("| truth | named | and degree near | robot or world | verdicts |")
+        print("| truth | named | and severity near | robot or world | verdicts |")
         print("|---|---|---|---|---|")
-        for truth in dict.fromkeys(row.truth for row in mine):
-            _print_line(f"`{truth}`", [row for row in mine if row.truth == truth])
-        _print_line("all", mine)
+        for truth in dict.fromkeys(row.truth for row in same):
+            _print_line(f"`{truth}`", [row for row in same if row.truth == truth])
+        _print_line("all", same)
         print()
 
 
 def compared(best: Hypothesis, truth: Hypothesis) -> tuple[bool, bool, bool]:
     """Returns ``Found.named``, ``Found.near`` and ``Found.side``."""
-    mine, theirs = _by_place(best.faults), _by_place(truth.faults)
-    named = mine.keys() == theirs.keys()
-    near = named and all(_near(mine[place], fault) for place, fault in theirs.items())
+    found, true = _by_place(best.faults), _by_place(truth.faults)
+    named = found.keys() == true.keys()
+    near = named and all(_near(found[place], fault) for place, fault in true.items())
     return named, near, _sides(best) == _sides(truth)
 
 

@@ -136,11 +136,11 @@ class _Residual:
         **_rest: object,
     ) -> tuple[FloatArray, Theirs, Theirs]:
         substeps = self._robot.substeps
-        made = self._signals(state[substeps - 1 :: substeps, 1:])  # column 0 is the time
+        simulated = self._signals(state[substeps - 1 :: substeps, 1:])  # column 0 is the time
         seen = self._signals(observed.data)
         rows = []
         for signal, scale in CALIBRATION_ERROR_SCALES.items():
-            rows.append((difference(signal, made[signal], seen[signal]) / scale).ravel())
+            rows.append((difference(signal, simulated[signal], seen[signal]) / scale).ravel())
         return np.concatenate(rows), observed, observed
 
     def _signals(self, rows: FloatArray) -> States:

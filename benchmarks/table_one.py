@@ -1,4 +1,4 @@
-"""``make results``: Table I of the paper on both robots, and how often the diagnosis is right.
+"""``make results``: Table I of the paper on both robots, with the rate of right diagnoses.
 
 Every run has its own folder and is repeated only if the robot, the settings or the version changed.
 Each uses one thread, and as many run at once as there are processors. Cost: a gait takes about

@@ -24,7 +24,7 @@ MAX_FREQUENCY = 8.0
 STILL = 0.05
 """Standard deviation below which a column counts as still, in its unit."""
 ON_LEVEL = 0.5
-"""Level above which a reading is on: where a binary reading changes, or half of an angle's range.
+"""Level above which a reading is on: between the values of a binary reading; half an angle's range.
 """
 ONSET_STEPS = 5
 """Window of the majority filter on readings before onsets are found, steps: contact chatters."""

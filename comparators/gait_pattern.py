@@ -37,21 +37,21 @@ class GaitPattern:
     the bounded loss of a group in a window is one loss:
 
     * duty: part of the time that each reading is above one half (for a touch: the duty factor);
-    * sequence: which reading rises above one half after which (for touches: the footfall sequence,
-      as frequencies of transitions from one to the next);
+    * sequence: the order in which readings rise above one half (for touches: the footfall
+      sequence), as frequencies of transitions from one reading to the next;
     * phase: the relation between every two readings or joints, as the complex coherency of their
       motion (its angle is the phase, its magnitude how constant the phase is);
     * rhythm: the distribution of the power of all motion over frequency, as a distance in Hz (a
       stride frequency that rises by 1 Hz moves all power by 1 Hz or more);
     * posture and excursion: the mean and the standard deviation of every reading and joint.
 
-    No reading is taken for a touch by its name or kind, which a log does not contain: one half is
-    where a binary reading changes, and for an angle it is half of the joint's range. A robot
-    without touch sensors is compared by its joints. Unobserved values of the trial are left out of
-    both gaits.
+    Readings are not classified as touches, because a log does not contain the kind of a sensor: one
+    half separates the values of a binary reading, and is half of the joint's range for an angle. A
+    robot without touch sensors is compared by its joints. Unobserved values of the trial are left
+    out of both gaits.
 
     Source: Hildebrand, "Symmetrical gaits of horses", Science 150 (1965), describes a gait by duty
-    factor and phase, and orders gaits by their footfall sequences. The rest is a choice made here.
+    factor and phase, and orders gaits by their footfall sequences. The rest is selfmodel's choice.
 
     Limits: the travel of the robot is not compared. Failures that do not change the gait (a sensor
     that the controller hardly uses) are close to the healthy robot. A time shift matters a little
@@ -68,7 +68,7 @@ class GaitPattern:
         """Returns the gait of the trial, from its observed readings and joint positions.
 
         Raises:
-            InputError: Neither was observed.
+            InputError: Neither readings nor joint positions were observed.
         """
         signals = observed_signals(trial, SIGNALS, self.name)
         logged = np.concatenate([trial.behaviour[signal] for signal in signals], axis=-1)

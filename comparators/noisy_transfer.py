@@ -21,7 +21,7 @@ WINDOW = 25
 
 @dataclass(frozen=True)
 class NoisyTransfer:
-    """How unlikely a trial is under an ensemble of perturbed simulations of each hypothesis.
+    """Shortfall of a trial's log likelihood under an ensemble of perturbed simulations.
 
     Each hypothesis is simulated with six self-models whose masses, friction, damping and motors
     were drawn at a reality gap of 0.05, the same six for every hypothesis (common random numbers).
@@ -34,26 +34,26 @@ class NoisyTransfer:
     members that all reproduce the trial, and the log likelihood of the trial; it is averaged over
     the features of a signal, and over the signals.
 
-    So noise counts as noise: where the members differ from each other, a difference from them
-    counts little, and where they agree, much. That replaces a decreasing weight of later moments,
-    and an ensemble that would fit any trial has a loss for its width. The base's orientation is
-    compared as the direction of gravity in the base's frame and the horizontal part of the forward
-    direction. Unobserved values of the trial are left out.
+    Therefore a difference from the members has a small loss where the members differ from each
+    other, and a large loss where they agree. This replaces a decreasing weight of later steps, and
+    an ensemble that is wide enough to fit any trial has a loss for its width. The base's
+    orientation is compared as the direction of gravity in the base's frame and the horizontal part
+    of the forward direction. Unobserved values of the trial are left out.
 
-    Source: the paper names noisy transfer as future work. Noise in what a simulation models badly:
-    Jakobi, Husbands and Harvey, "Noise and the reality gap" (ECAL 1995). Estimates of where a
-    simulation can be trusted: Koos, Mouret and Doncieux, "The transferability approach", IEEE
-    Transactions on Evolutionary Computation 17 (2013). The t distribution is the textbook's
+    Source: the paper names noisy transfer as future work. Noise in the badly modelled parts of a
+    simulation: Jakobi, Husbands and Harvey, "Noise and the reality gap" (ECAL 1995). Estimates of
+    where a simulation can be trusted: Koos, Mouret and Doncieux, "The transferability approach",
+    IEEE Transactions on Evolutionary Computation 17 (2013). The t distribution is the textbook's
     prediction of one more draw, such as in Gelman et al., "Bayesian Data Analysis". Windows,
-    features and floors are choices made here.
+    features and floors are selfmodel's choices.
 
     Limits: the level of the gap is assumed, not measured: a robot further from its model makes
     every hypothesis unlikely, and with a robot closer to its model hypotheses are distinguished
-    less sharply than possible; as no member is the model itself, not even the true hypothesis is
-    at 0 without a gap. Delay, measurement noise and structure are not drawn. The cost is six
-    simulations per hypothesis, where other comparators need one, and six members estimate a
-    deviation only roughly. Beyond the moment from which the members differ, a trial contains
-    little information. Features are taken to be independent.
+    less sharply than possible; because no member is the model itself, the distance of the true
+    hypothesis is above 0 even without a gap. Delay, measurement noise and structure are not drawn.
+    The cost is six simulations per hypothesis, where other comparators need one, and six members
+    estimate a deviation only roughly. Beyond the moment from which the members differ, a trial
+    contains little information. Features are taken to be independent.
 
     Attributes:
         name: The comparator's name.

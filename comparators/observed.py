@@ -26,7 +26,7 @@ def observed_signals(
     found = tuple(signal for signal in wanted if np.isfinite(trial.behaviour[signal]).any())
     if not found:
         raise InputError(
-            f"{trial.path}: {comparator} needs one at least of {', '.join(wanted)}, and the log "
+            f"{trial.path}: {comparator} needs at least one of {', '.join(wanted)}, and the log "
             f"has none of them: leave this log out, or give another comparator"
         )
     return found

@@ -36,7 +36,7 @@ class SegmentPrediction:
     commands, and is compared with the log at four steps. An error e of a signal whose scale is s
     has the loss ``log(1 + (e / s)^2)``, so that a chaotic moment cannot outweigh the rest; the loss
     is averaged over the columns of a signal and summed over the signals. Two more terms are added
-    to that of the motion: the predicted readings, against what the controller received, and the
+    to that of the motion: the predicted readings, against the controller's input, and the
     controller's arithmetic, the logged commands against the network's output for these readings.
 
     Source: prediction over a short horizon is multiple shooting (Bock & Plitt 1984) without the
@@ -69,10 +69,10 @@ class SegmentPrediction:
         return dataclasses.replace(self, max_segments=max(self.max_segments // 3, MIN_SEGMENTS))
 
     def prepare(self, trial: Trial) -> "PreparedSegments":
-        """Returns the segments of the trial and everything that they are compared with.
+        """Returns the segments of the trial and the logged values to compare them with.
 
         Raises:
-            InputError: The trial is too short, or was not observed well enough.
+            InputError: The trial is too short, or has too few observations.
         """
         behaviour, horizon = trial.behaviour, self.horizon
         states = estimated_states(behaviour, self.state)
@@ -118,8 +118,8 @@ class SegmentPrediction:
             raise InputError(
                 f"{trial.path}: {self.name} needs {', '.join(lacking or self.state)} at "
                 f"{MIN_SEGMENTS} or more of {count} moments of the trial, and the log does not "
-                f"have it: give a comparator that needs less (docs/how-it-works.md lists what each "
-                f"needs), or leave this log out"
+                f"have it: give a comparator that needs less (docs/how-to/choose-a-comparator.md "
+                f"lists the requirements), or leave this log out"
             )
         return starts[usable], steady[usable]
 
@@ -200,9 +200,9 @@ def _logged_readings(logged: FloatArray, starts: IndexArray, horizon: int) -> Lo
 def _readings_loss(predicted: FloatArray, logged: LoggedReadings, steady: BoolArray) -> FloatArray:
     """Returns the loss of the predicted readings, ``(n, segments)``.
 
-    The first row of a segment follows from the state alone. There an angle is certain, and a touch
-    is not, because millimetres decide, except at the start of the trial, in the initial pose. The
-    noise level of a sensor is estimated from all segments together, and added to each.
+    The first row of a segment follows from the state alone. Angles are certain there, but touches
+    only at the start of the trial, in the initial pose: elsewhere, millimetres decide. The loss of
+    the noise levels is estimated from all segments together, and added to each.
     """
     predicts_binary = np.isin(predicted, (0.0, 1.0)).all(axis=(1, 2))
     switches = np.asarray(logged.binary & predicts_binary)

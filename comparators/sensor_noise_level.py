@@ -24,8 +24,8 @@ ERROR_SCALE = 0.05
 def noise_level_loss(predicted: FloatArray, logged: FloatArray, graded: BoolArray) -> FloatArray:
     """Returns the loss of the predicted noise levels of the sensors, ``(n,)``.
 
-    Compared reading by reading, a hypothesis with noise predicts worse than one without: the noise
-    values of the log are others. The noise level can be compared.
+    Per reading, a hypothesis with noise predicts worse than one without, because its noise values
+    differ from those of the log. Noise levels are comparable.
 
     Args:
         predicted: Predicted readings, ``(n, segments, rows, sensors)``.

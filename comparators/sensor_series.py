@@ -43,10 +43,10 @@ class SensorSeries:
 
     Source: the paper names the comparison of sensor time series as future work, because
     displacement alone did not distinguish some compounds of failures. Windows, lags and weights are
-    choices made here.
+    selfmodel's choices.
 
-    Limits: beyond the lag, a stride that begins late is a wrong stride, and a gap between model
-    and robot makes strides late sooner or later. A failure that shows late has little weight.
+    Limits: beyond the lag, a stride that begins late counts as wrong, and a gap between model and
+    robot makes strides late sooner or later. A failure that shows late has little weight.
     Neighbouring windows are not independent, which a paired test over them must allow for.
 
     Attributes:

@@ -1,4 +1,4 @@
-"""An ablation through the Python API: which comparators find which failures, and how often.
+"""An ablation through the Python API: the rate of right diagnoses per comparator.
 
 Usage: python examples/ablation.py FOLDER
 """
@@ -11,7 +11,7 @@ from selfmodel.settings import Settings
 
 
 def main(folder: Path) -> None:
-    """Runs a small grid; called again with the same folder, it goes on where it was stopped."""
+    """Runs a small grid; a second call with the same folder continues an interrupted grid."""
     ablation = Ablation(
         robots=["quadruped"],
         cases=[1, 9],

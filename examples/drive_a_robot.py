@@ -69,7 +69,7 @@ class SocketRobot(dm_env.Environment):
             while len(self._heard) < self._observed.size:
                 self._link.settimeout(max(until - time.monotonic(), 1e-3))
                 if not (heard := self._link.recv(4096)):
-                    raise ConnectionError("the robot hung up")
+                    raise ConnectionError("the robot closed the connection")
                 self._heard += heard
             number, *values = self._observed.unpack(self._heard[: self._observed.size])
             self._heard = self._heard[self._observed.size :]
@@ -81,7 +81,7 @@ class SocketRobot(dm_env.Environment):
         with socket.create_connection(self._address, timeout=1.0) as link:
             link.sendall(self._targets.pack(STOP, *np.zeros(self._motors)))
             if not link.recv(1):  # acknowledgement
-                raise ConnectionError("the robot hung up")
+                raise ConnectionError("the robot closed the connection")
 
     def action_spec(self) -> dm_env.specs.Array:
         """Returns the spec of an action: motor targets, rad."""

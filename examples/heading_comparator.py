@@ -3,8 +3,8 @@
 Usage, from this folder:
 selfmodel recover quadruped --case 2 --comparator heading_comparator:HEADING
 
-Its distance is a mean over the steps of the trial, so the prepared trial has losses too (they are
-optional), which make a paired test between two hypotheses possible.
+Its distance is a mean over the steps of the trial, so the prepared trial also has losses. Losses
+are optional and make a paired test between two hypotheses possible.
 """
 
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ REQUEST = ClosedLoop(record=("base_orientation",))
 
 @dataclass(frozen=True)
 class Heading:
-    """The mean absolute difference of the headings, rad, over the steps where it was observed."""
+    """The mean absolute difference of the headings over the observed steps, rad."""
 
     name: str = "heading"
 

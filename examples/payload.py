@@ -1,4 +1,4 @@
-"""A kind of fault of your own: something heavy lies on the torso, or fell off it.
+"""A fault kind of your own: mass added to the torso, or removed from it.
 
 Usage:
   PYTHONPATH=examples selfmodel recover quadruped --damage payload=2 --kinds jam,payload:PAYLOAD

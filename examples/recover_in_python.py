@@ -24,7 +24,7 @@ def main(folder: Path) -> None:
     settings = Settings(generations=5).scaled(20)
     journal = create_journal(folder, robot.anatomy)
     recovery = recover(
-        healthy=SimulatedRobot(robot),  # anything with a `run` like PhysicalRobot's will do
+        healthy=SimulatedRobot(robot),  # or any object with PhysicalRobot's `run`
         damaged=SimulatedRobot(robot, truth),
         simulator=Simulator(robot, threads=2),
         comparator=FORWARD_DISPLACEMENT,

@@ -49,7 +49,7 @@ class Budget:
         if self._attached > ATTACHED_LIMIT:
             raise _excess(ATTACHED_LIMIT, "bytes attached")
         if self._other > OTHER_LIMIT:
-            raise _excess(OTHER_LIMIT, "bytes beside its messages and attachments")
+            raise _excess(OTHER_LIMIT, "bytes outside its messages and attachments")
 
     def chunk(self, size: int) -> None:
         """Counts a chunk before it is decompressed.

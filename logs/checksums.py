@@ -76,7 +76,7 @@ def _check_end(data: bytes, end: int) -> None:
     if data[end : end + len(MAGIC)] != MAGIC:
         raise ContradictionError("its last bytes are damaged")
     if len(data) > end + len(MAGIC):
-        raise ContradictionError("something follows its end")
+        raise ContradictionError("bytes follow its end")
 
 
 def _opened(record: McapRecord | None, budget: Budget) -> list[McapRecord]:

@@ -69,7 +69,7 @@ def create_journal(
     Args:
         folder: New or empty folder.
         anatomy: Parts of the robot.
-        kinds: Third-party kinds that the diagnoses may name, beside the built-in kinds.
+        kinds: Third-party kinds that the diagnoses may name, in addition to built-in kinds.
 
     Raises:
         InputError: The folder is not empty, or cannot be made.
@@ -100,7 +100,7 @@ def read_database(folder: Path, anatomy: Anatomy, kinds: Sequence[FaultKind] = (
     Args:
         folder: Folder of the run; see ``FolderJournal``.
         anatomy: Parts of the robot, to read the hypotheses.
-        kinds: Third-party kinds that the diagnoses may name, beside the built-in kinds.
+        kinds: Third-party kinds that the diagnoses may name, in addition to built-in kinds.
 
     Raises:
         InputError: The folder is not the folder of a run.

@@ -240,7 +240,7 @@ def read_attachment(path: Path, contents: Contents, name: str, expected: str = "
     if expected and sha256(data) != expected:
         raise CorruptError(
             path,
-            f"{name} is not the one that the trial was made with (SHA-256)",
+            f"{name} is not the file of the trial: its SHA-256 differs",
             good=contents.good,
         )
     return data

@@ -74,7 +74,7 @@ class TrialRecord:
         stage: Stage of the recovery.
         robot: Name of the robot.
         root: Name of the root body, whose motion is on ``/odom``.
-        control_timestep: Control time step, s; step k is at k times this.
+        control_timestep: Control time step, s; step k is at k times this value.
         steps: Planned number of control steps.
         seed: Seed of all random choices.
         controller_sha256: SHA-256 of the attached controller, or "" without one: then only the
@@ -142,7 +142,7 @@ class Imported:
 
 @dataclass(frozen=True)
 class TrialHeader:
-    """Content of a log's preamble beside the robot and the plan.
+    """Content of a log's preamble except the robot and the plan.
 
     Attributes:
         settings: The paper's numbers, for the record.

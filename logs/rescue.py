@@ -135,7 +135,7 @@ class _Work:
         self.budget.frame(frame.opcode, len(frame.body))
         self._tried += len(frame.body)
         if self._tried > _MAX_TRIED_BYTES:
-            raise ExcessError("too many of its bytes look like damaged records")
+            raise ExcessError("too many of its bytes could begin a damaged record")
 
 
 _MAX_TRIED_BYTES = 4 * FILE_LIMIT

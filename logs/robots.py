@@ -79,11 +79,11 @@ def describe_difference(names: Names, logged: Names) -> str:
     """Returns the differences between a robot's names and those of a log, as text."""
     differences = []
     for what in ("sensors", "motors", "hinges"):
-        mine, theirs = getattr(names, what), getattr(logged, what)
-        if mine != theirs:
-            lacks = [name for name in theirs if name not in mine]
+        own, recorded = getattr(names, what), getattr(logged, what)
+        if own != recorded:
+            lacks = [name for name in recorded if name not in own]
             differences.append(
-                f"it has {len(mine)} {what}, the log {len(theirs)}"
+                f"it has {len(own)} {what}, the log {len(recorded)}"
                 + (f", of which it lacks {', '.join(lacks[:3])}" if lacks else " or in other order")
             )
     return "; ".join(differences) or "their parts have the same names"

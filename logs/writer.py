@@ -43,7 +43,7 @@ def write_trial(
         samples: Samples, one per control step as they happen; at most ``plan.steps`` are read.
             An iterable with a method ``close``, as a generator has, is closed before the log is,
             which stops the robot. A ``map`` over a generator has no ``close``: to process samples
-            on their way, use ``TrialWriter``.
+            before they are logged, use ``TrialWriter``.
         header: Other content of the log's preamble.
 
     Returns:
@@ -127,8 +127,8 @@ class TrialWriter:
         if (sample.moment is not None) != self._header.timed:
             has, given = ("no", "True") if self._header.timed else ("a", "False")
             raise InputError(
-                f"the sample of step {self.steps} has {has} moment, and timed is {given}: a trial "
-                f"is timed if its robot has a clock of its own"
+                f"the sample of step {self.steps} has {has} moment, but timed is {given} in the "
+                f"header: a trial is timed if its robot has a clock of its own"
             )
         sampled = sample_rows(sample)
         for part, rows in self._rows.items():

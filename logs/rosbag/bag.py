@@ -24,7 +24,7 @@ from selfmodel.logs.rosbag.stored_sqlite import SQLITE_MAGIC, read_sqlite
 
 METADATA = "metadata.yaml"
 EXPECTED = "give a bag's folder, or its .mcap or .db3"
-AGAIN = "record it again, or unpack it by its own tool to see what is whole"
+AGAIN = "record it again, or unpack its intact part with the tool of its format"
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,7 @@ def _files(path: Path) -> list[Path]:
     if missing := [file.name for file in files if not file.is_file()]:
         raise CorruptError(
             path,
-            f"its {METADATA} lists {', '.join(missing)}, which is not there",
+            f"its {METADATA} lists missing files: {', '.join(missing)}",
             advice=f"add it, or remove {METADATA} to read the files that are there",
         )
     return files

@@ -176,8 +176,8 @@ def _steps(mapping: BagMapping, tracks: Tracks, timestep: float) -> Steps:
         raise mapping.document.error(
             ("duration" if mapping.duration is not None else "start",),
             f"every role has data for {max(0, last - first) / 1e9:.3f} s in all, got a start "
-            f"{mapping.start:g} s after that begins and {max(steps, 2)} steps of {timestep:g} s: "
-            f"ask for less, or leave out the role that has the least data",
+            f"{mapping.start:g} s after the first of these data and {max(steps, 2)} steps of "
+            f"{timestep:g} s: reduce start or duration, or omit the role with the least data",
         )
     if not 2 <= steps <= MAX_STEPS:
         raise mapping.document.error(

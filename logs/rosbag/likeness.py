@@ -74,11 +74,12 @@ def matched(wanted: Sequence[str], offered: Sequence[str]) -> dict[str, NameMatc
     for (ours, theirs), score in sorted(scores.items(), key=lambda item: -item[1]):
         if score < MIN_SIMILARITY or ours in found or theirs in used:
             continue
-        rivals = [
+        competing = [
             other for pair, other in scores.items() if (pair[0] == ours) != (pair[1] == theirs)
         ]
         found[ours] = NameMatch(
-            theirs, score >= CERTAIN_SIMILARITY and score - max(rivals, default=0.0) >= CERTAIN_LEAD
+            theirs,
+            score >= CERTAIN_SIMILARITY and score - max(competing, default=0.0) >= CERTAIN_LEAD,
         )
         used.add(theirs)
     return found

@@ -92,7 +92,7 @@ def base_signals(tracks: Tracks, steps: Steps, *, from_start: bool) -> dict[Sign
     if from_start:
         required = [(tracks.base_position, position), (tracks.base_orientation, orientation)]
         if any(len(track.times) and np.isnan(rows[0]).any() for track, rows in required):
-            raise ValueError("where the base is at the start of the trial is not known")
+            raise ValueError("the pose of the base at the start of the trial is unknown")
         if len(tracks.base_orientation.times):
             rotation = heading_removal(orientation[0])
             orientation = rotate_world(orientation, rotation)

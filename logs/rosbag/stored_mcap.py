@@ -20,7 +20,7 @@ from selfmodel.logs.errors import CorruptError, LogError, NotMcapError, Truncate
 from selfmodel.logs.framing import unpack_chunk
 from selfmodel.logs.rosbag.stored import Announced, DamageError, Stored, checked_time
 
-ADVICE = "record it again, or recover what is whole with `mcap recover`"
+ADVICE = "record it again, or recover its intact part with `mcap recover`"
 
 _FAILURES = (
     McapError,
@@ -79,7 +79,7 @@ def _items(file: IO[bytes]) -> Iterator[Announced | Stored]:
     if claimed is not None and claimed != count:
         raise DamageError(f"its statistics have {claimed} messages, its records {count}")
     if file.read(1):
-        raise DamageError("something follows its end")
+        raise DamageError("bytes follow its end")
 
 
 def _records(file: IO[bytes]) -> Iterator[McapRecord]:

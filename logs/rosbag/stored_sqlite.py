@@ -34,7 +34,7 @@ def read_sqlite(path: Path, name: Path) -> Iterator[Announced | Stored]:
             name,
             f"the file is damaged or no rosbag2 recording: {failure}",
             good=f"{count} messages before that can be read",
-            advice="record it again, or recover what is whole with `sqlite3 FILE .recover`",
+            advice="record it again, or recover its intact part with `sqlite3 FILE .recover`",
         ) from failure
 
 
@@ -58,8 +58,8 @@ def _refuse_unfinished(path: Path, name: Path) -> None:
         if beside.is_file() and beside.stat().st_size:
             raise IncompleteError(
                 name,
-                f"its recorder did not close it: {beside.name} holds what is not in it yet",
-                advice=f"bring them together with `sqlite3 {shlex.quote(str(path))} "
+                f"its recorder did not close it: {beside.name} has data that are not in it yet",
+                advice=f"merge both with `sqlite3 {shlex.quote(str(path))} "
                 f"'PRAGMA wal_checkpoint(TRUNCATE)'`",
             )
 
@@ -76,7 +76,7 @@ def _items(path: Path) -> Iterator[Announced | Stored]:
             "SELECT id, name, type, serialization_format FROM topics ORDER BY id"
         ):
             if not all(isinstance(text, str) for text in (topic, kind, encoding)):
-                raise DamageError(f"topic {number!r} is described by what is no text")
+                raise DamageError(f"the description of topic {number!r} is not text")
             topics[number] = topic
             yield Announced(topic, kind, encoding)
         for number, time, payload in database.execute(

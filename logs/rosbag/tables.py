@@ -77,7 +77,7 @@ def _explained(reason: str, text: str, line: int) -> str:
     if reason == "Cannot overwrite a value" and entry:
         return f"{entry[1]} is listed twice: expected each name once, remove one of the two"
     if reason.startswith(("Cannot declare", "Cannot mutate")):
-        return f"this table is there twice ({reason}): put its entries together"
+        return f"this table is listed twice ({reason}): merge its entries"
     return f"expected TOML: {reason}"
 
 

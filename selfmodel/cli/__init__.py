@@ -26,7 +26,7 @@ COMMANDS = {
 
 app = group(
     "selfmodel",
-    "Find out what changed in a legged robot from a few logged trials, and get it walking.",
+    "Diagnose what changed in a legged robot from a few logged trials, and recover its gait.",
     COMMANDS,
     completion=True,
 )
@@ -65,7 +65,7 @@ def main() -> None:
         # A full disk, a folder without write permission: the message contains the file's name.
         _fail(describe(error), 1)
     except MemoryError as error:
-        _fail(f"there is not enough memory ({error or 'for this'}): ask for less at once", 1)
+        _fail(f"there is not enough memory ({error or 'for this'}): request less at once", 1)
     except KeyboardInterrupt:
         _fail("interrupted", 130)
 

@@ -113,7 +113,7 @@ def _is_played_back(log: TrialLog) -> bool:
 
 
 def _notes(logs: list[TrialLog]) -> list[str]:
-    """Returns the limits of the logs that a reader of the ranking needs to know."""
+    """Returns the notes on limits of the logs that affect the ranking."""
     first = logs[0]
     notes = [
         f"{log.trial.path} has no controller: its commands are played back, so a sensor fault "

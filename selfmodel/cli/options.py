@@ -59,7 +59,7 @@ Damages = Annotated[
     typer.Option(
         *("--damage", "--damages"),
         metavar="NOTATION,...",
-        help="Further failures, in notation; the only ones with --case none.",
+        help="Further failures, in notation; with --case none, only these.",
         rich_help_panel=STUDY,
     ),
 ]
@@ -68,7 +68,7 @@ HypothesisText = Annotated[
     typer.Option(
         "--hypothesis",
         metavar="NOTATION",
-        help="Hypothesis that is simulated, such as break:front_left_knee.",
+        help="Hypothesis to simulate, such as break:front_left_knee.",
     ),
 ]
 
@@ -218,7 +218,7 @@ KindNames = Annotated[
     typer.Option(
         "--kinds",
         metavar="KIND,...",
-        help=f"Fault kinds that are searched: {', '.join(kind.name for kind in ALL_KINDS)}, "
+        help=f"Fault kinds to search: {', '.join(kind.name for kind in ALL_KINDS)}, "
         "package.module:object, or all.",
         rich_help_panel=DIAGNOSIS,
     ),
@@ -228,8 +228,8 @@ NamedKinds = Annotated[
     typer.Option(
         "--kinds",
         metavar="KIND,...",
-        help="Fault kinds of your own that notation may name, package.module:object, beside all "
-        "of selfmodel's.",
+        help="Third-party fault kinds that notation may name, package.module:object, in addition "
+        "to all of selfmodel's.",
         show_default=False,
     ),
 ]

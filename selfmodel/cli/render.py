@@ -37,7 +37,7 @@ def render(
         str | None,
         typer.Option(
             metavar="NOTATION",
-            help="Hypothesis that is simulated, such as break:front_left_knee.",
+            help="Hypothesis to simulate, such as break:front_left_knee.",
             show_default="intact",
         ),
     ] = None,

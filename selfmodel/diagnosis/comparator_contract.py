@@ -11,8 +11,8 @@ from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.trial import Trial
 
 DEPENDS_ON_BATCH = (
-    "must not depend on the other runs, not in the last bit: numpy adds in the order of memory, "
-    "which np.ascontiguousarray before a sum or a mean fixes"
+    "must not depend on the other runs, to the last bit: numpy sums in memory order, so "
+    "np.ascontiguousarray is required before a sum or a mean"
 )
 
 
@@ -55,7 +55,7 @@ def check_comparator(comparator: Comparator, trial: Trial, simulated: Behaviour)
     if isinstance(prepared, PiecewiseTrial):
         _check_pieces(prepared, again, requested, distances)
     if not _is_same(before, requested):
-        raise ValueError("a comparator must not change what it is given")
+        raise ValueError("a comparator must not change its arguments")
     if not _is_same(logged, trial.behaviour):
         raise ValueError("a comparator must not change the trial")
 
@@ -63,8 +63,8 @@ def check_comparator(comparator: Comparator, trial: Trial, simulated: Behaviour)
 def shown(request: Request, trial: Trial) -> Behaviour:
     """Returns a simulation that reproduces a trial to the bit.
 
-    No real simulation of segments does, not even of the true hypothesis, because the contact solver
-    starts from other initial guesses than in one long run: differences of about 1e-9 remain.
+    A real simulation of segments differs by about 1e-9 even for the true hypothesis, because the
+    contact solver starts from other initial guesses than in one long run.
 
     Args:
         request: The request of the prepared trial.
@@ -100,9 +100,9 @@ def _starts(request: Segments, behaviour: Behaviour) -> IndexArray:
         fits[segment] &= (ahead == commands).all(axis=(1, 2))
     if not fits.any(axis=1).all():
         raise ValueError(
-            f"the trial shows no step at which segment {int(np.argmin(fits.any(axis=1)))} could "
-            f"begin, with its states, its commands and {horizon} steps to go: a trial without "
-            f"noise does, if the segments are cut from it"
+            f"the trial has no step at which segment {int(np.argmin(fits.any(axis=1)))} could "
+            f"begin, with the segment's states and commands and {horizon} later steps: cut the "
+            f"segments from the trial, and give a trial without noise"
         )
     return np.asarray(fits.argmax(axis=1))
 
@@ -147,7 +147,7 @@ def _check_segments(request: Segments, trial: Trial) -> None:
                 f"{values.shape}"
             )
     if not all(np.isfinite(values).all() for values in (commands, *request.states.values())):
-        raise ValueError("the states and the commands of segments must all be known, got NaN")
+        raise ValueError("the states and the commands of segments must be finite")
 
 
 def _is_same_request(one: Request, other: Request) -> bool:
@@ -171,7 +171,7 @@ def _as_requested(request: Request, trial: Trial, simulated: Behaviour) -> Behav
     for signal in request.record:
         if simulated[signal].shape[1:-1] != lengths:
             raise ValueError(
-                f"its request is a {type(request).__name__}: {signal} must have been simulated as "
+                f"for a request of {type(request).__name__}, {signal} must have shape "
                 f"(n, {', '.join(map(str, lengths))}, width), got {simulated[signal].shape}"
             )
     return Behaviour(
@@ -206,7 +206,9 @@ def _checked_distances(prepared: PreparedTrial, simulated: Behaviour, runs: int)
     if not np.all(np.isfinite(distances)) or np.any(distances < 0):
         raise ValueError(f"distances must be finite and at least 0, got {distances}")
     if distances[0] != 0:
-        raise ValueError(f"a run that did what the trial shows must be at 0, got {distances[0]}")
+        raise ValueError(
+            f"the distance of a run that reproduces the trial must be 0, got {distances[0]}"
+        )
     return distances
 
 

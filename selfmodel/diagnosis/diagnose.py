@@ -121,7 +121,8 @@ class DiagnosticSearch:
         """Checks that the comparator accepts all trials, before any search.
 
         Raises:
-            InputError: The comparator rejects a trial; the message names every such trial, and why.
+            InputError: The comparator rejects a trial; the message contains every such trial and
+                the reason.
         """
         self.evidence.check([*self._intact, *trials])
         surrogate = surrogate_of(self.evidence, self._own_surrogate, trials)
@@ -147,7 +148,7 @@ class DiagnosticSearch:
             hypotheses = [self._space.decode(genome) for genome in genomes]
             distances = surrogate.distances(hypotheses)
             totals.update(zip(hypotheses, map(float, distances), strict=True))
-            return 0.0 - distances  # not -distances: a perfect fitness reads 0, not -0
+            return 0.0 - distances  # not -distances: a perfect fitness is 0, not -0
 
         search = Evolution(
             genes * GENE_VALUES,

@@ -9,7 +9,7 @@ from selfmodel.trials.data_frame import data_frame
 
 Verdict = Literal["explained", "ambiguous", "unexplained"]
 """``explained``: the best hypothesis predicts the trials about as well as the self-model predicts
-the healthy robot, and no other hypothesis does, ``undetectable`` ones apart. ``ambiguous``: other
+the healthy robot, and no other hypothesis except ``undetectable`` ones does. ``ambiguous``: other
 hypotheses are indistinguishable from the best. ``unexplained``: the best hypothesis predicts
 significantly worse than the self-model predicts the healthy robot, or significantly worse than with
 a fault of an unsearched kind, so a fault is missing; requires a trial of the healthy robot."""
@@ -37,7 +37,7 @@ class UnsearchedFault:
     """A hypothesis with one fault of an unsearched kind.
 
     Attributes:
-        hypothesis: The whole hypothesis.
+        hypothesis: The complete hypothesis, including the fault of the unsearched kind.
         kind: Name of the unsearched kind.
     """
 
@@ -55,7 +55,7 @@ class Diagnosis:
 
     Attributes:
         ranked: Candidates, at least one. The first is the best: the hypothesis with the fewest
-            faults of which every one makes the prediction significantly better; for a comparator
+            faults, each of which makes the prediction significantly better; for a comparator
             without a significance test, the one with the smallest distance. The others follow by
             distance, at equal distances by number of faults.
         trials: Number of trials.

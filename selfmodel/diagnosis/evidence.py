@@ -28,7 +28,7 @@ def _key(trial: Trial) -> TrialKey:
 class Evidence:
     """Losses of hypotheses on logged trials, cached by trial and hypothesis.
 
-    Trials are prepared once. Which hypotheses were computed changes no result.
+    Trials are prepared once. Losses are independent of the hypotheses computed before.
 
     Args:
         simulator: The self-model.
@@ -64,7 +64,8 @@ class Evidence:
         """Checks that the comparator can judge all trials, before any search.
 
         Raises:
-            InputError: The comparator cannot judge some trials; the message names each and why.
+            InputError: The comparator cannot judge some trials; the message contains the reason for
+                each.
         """
         problems = []
         for trial in trials:
@@ -106,7 +107,7 @@ class Evidence:
         record = prepared.request.record
         if not record or not set(record) <= set(possible):
             raise self._contract_error(
-                f"asked for the signals {record!r}, of {', '.join(possible)}"
+                f"requested the signals {record!r}, of {', '.join(possible)}"
             )
         return prepared
 
@@ -125,7 +126,7 @@ class Evidence:
         wrong = losses[~((losses >= 0) | diverged)]
         if len(wrong):
             raise self._contract_error(
-                f"gave a distance that is not a number of at least 0: {wrong[0]}"
+                f"returned a distance that is not a number of at least 0: {wrong[0]}"
             )
         return np.where(diverged, np.inf, losses)
 
@@ -133,11 +134,15 @@ class Evidence:
         if isinstance(prepared, PiecewiseTrial):
             losses = np.asarray(prepared.losses(simulated))
             if losses.ndim != 2 or len(losses) != count or not losses.shape[1]:
-                raise self._contract_error(f"gave losses {losses.shape} for {count} simulations")
+                raise self._contract_error(
+                    f"returned losses {losses.shape} for {count} simulations"
+                )
             return losses
         distances = np.asarray(prepared.distances(simulated))
         if distances.shape != (count,):
-            raise self._contract_error(f"gave {distances.shape} distances for {count} simulations")
+            raise self._contract_error(
+                f"returned {distances.shape} distances for {count} simulations"
+            )
         return np.asarray(distances[:, np.newaxis])
 
     def _contract_error(self, problem: str) -> InputError:

@@ -32,7 +32,9 @@ def check_fault_kind(kind: FaultKind, robot: Robot) -> None:
     """
     for what, text in (("name", kind.name), ("keyword", kind.keyword)):
         if not text or set(text) & set(" ,:+="):
-            raise ValueError(f"a kind needs a {what} without spaces and any of ,:+=, got {text!r}")
+            raise ValueError(
+                f"a kind needs a {what} without spaces and without any of ,:+=, got {text!r}"
+            )
     candidates = kind.candidates(robot.anatomy)
     if not candidates:
         raise ValueError(f"{kind.name} has no part or no level: nothing can be proposed")
@@ -93,10 +95,10 @@ def _check_edits(kind: FaultKind, candidates: tuple[Fault, ...], robot: Robot) -
 
 
 def _check_batch(kind: FaultKind, robot: Robot) -> None:
-    """Compares one candidate per part, in a batch with the healthy robot, and alone."""
+    """Checks that a robot with a fault moves equally alone and in a batch, for each part."""
     firsts = {fault.part: fault for fault in reversed(kind.candidates(robot.anatomy))}
     hypotheses = [INTACT, *(Hypothesis((fault,)) for fault in firsts.values())]
-    network = network_for(robot, MAX_HIDDEN_NEURONS)  # it has the neuron of every fault
+    network = network_for(robot, MAX_HIDDEN_NEURONS)  # with the neurons of all faults
     controller = Controller(network, np.linspace(-1, 1, network.weights))
     runs = [(hypothesis, controller) for hypothesis in hypotheses]
     simulator = Simulator(robot, 1)
@@ -111,7 +113,7 @@ def _check_batch(kind: FaultKind, robot: Robot) -> None:
 
 
 def _check_contacts(kind: FaultKind, candidates: tuple[Fault, ...], robot: Robot) -> None:
-    """Checks the hook with contact points on a step, and without contact points."""
+    """Checks ``adapt_to_contacts`` with contact points on a terrain step, and with none."""
     on_a_step = np.array([[x, 0.0, 0.02 * (x > 2)] for x in np.linspace(1.5, 3, 200)])
     for fault in candidates:
         for points in (on_a_step, np.empty((0, 3))):

@@ -11,7 +11,7 @@ from selfmodel.faults.hypothesis_space import HypothesisSpace
 def is_model_error(
     hypothesis: Hypothesis, fewer: Hypothesis, losses: LossFunctions, space: HypothesisSpace
 ) -> bool:
-    """Returns whether the extra faults of a hypothesis improve the healthy trials as much.
+    """Returns whether extra faults improve the healthy trials about as much as the damaged ones.
 
     Args:
         hypothesis: The hypothesis with the extra faults.

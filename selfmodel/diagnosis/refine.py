@@ -95,7 +95,7 @@ class _LocalSearch:
         return list(parts.values())
 
     def local_optima(self, start: Hypothesis) -> list[Hypothesis]:
-        """Pruned ends of the descents from a start; the last one leads to an earlier one.
+        """Pruned ends of successive descents from a start, until a hypothesis repeats.
 
         The descent over replacements is needed because a replaced fault may lower the loss more
         and correct no more than model error.
@@ -109,7 +109,7 @@ class _LocalSearch:
             optima[current] = None
 
     def pruned(self, hypothesis: Hypothesis) -> Hypothesis:
-        """The hypothesis without the faults that are not required, the least useful first."""
+        """The hypothesis after pruning: the fault whose removal costs least is removed first."""
         current = hypothesis
         while True:
             sufficient = [
@@ -133,14 +133,14 @@ class _LocalSearch:
             current = min(best[0], self.coarsely_fitted(best[0]), key=self.total_loss)
 
     def _shortlist(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """The best by the surrogate, sorted by the comparator."""
+        """The best hypotheses by the surrogate, sorted by the total loss of the comparator."""
         few = self._allowed(hypotheses)
         if len(few) > SHORTLIST_SIZE:
             few = by_total_loss(few, self._losses.surrogate)[:SHORTLIST_SIZE]
         return by_total_loss(few, self._losses.damaged)
 
     def _is_required(self, hypothesis: Hypothesis, fewer: Hypothesis) -> bool:
-        """Returns whether the extra faults are significantly better and no model error."""
+        """Returns whether the gain of the extra faults is significant and no model error."""
         return self.is_better(hypothesis, fewer) and not is_model_error(
             hypothesis, fewer, self._losses, self._space
         )

@@ -46,11 +46,11 @@ def with_mean_severities(
 ) -> Hypothesis:
     """Returns the hypothesis with the mean of the severities indistinguishable from the best.
 
-    Contact makes losses rugged over the severity, so the position of the minimum is random: of one
-    seed's frictions from 0.31 to 0.41 hardly any was a standard error worse than another, 0.31 had
-    the lowest loss, 0.4 was true, and the mean is 0.36. A severity whose loss is z standard errors
-    above the best, paired over the segments, has the weight exp(-z^2 / 2). Severities beyond one
-    that is ruled out have no weight.
+    Contact makes losses rugged over the severity, so the position of the minimum is random. With
+    one seed and a true friction of 0.4, hardly any friction from 0.31 to 0.41 was a standard error
+    worse than another, 0.31 had the lowest loss, and the mean is 0.36. A severity whose loss is z
+    standard errors above the best, paired over the segments, has the weight exp(-z^2 / 2).
+    Severities beyond a ruled-out severity have no weight.
 
     Args:
         hypothesis: With fitted severities.

@@ -15,7 +15,7 @@ proposed in addition to the true ones, across gaps of 0.1 and 0.2, none reached 
 
 MIN_Z_ACROSS_TRIALS = 5.0
 """Standard errors by which a mean loss has to exceed that of other trials. It is larger than
-``MIN_Z`` because the trials and gaits differ; it also limits the luck of hundreds of candidates."""
+``MIN_Z`` because trials and gaits differ, and because hundreds of candidates are tested."""
 
 LOSS_RATIO = 3.0
 """Ratio of mean losses that is significant whatever the standard error: a few segments are enough
@@ -34,7 +34,7 @@ def is_better(one: FloatArray, other: FloatArray) -> bool:
     Args:
         one: Losses of the first hypothesis, ``(segments,)``; infinite where a simulation diverged.
         other: Losses of the second hypothesis on the same segments, ``(segments,)``, likewise. A
-            hypothesis that diverged is never better; a finite one is better than it.
+            hypothesis that diverged is never better; a finite one is better than a diverged one.
     """
     if not np.isfinite(one).all():
         return False
@@ -102,7 +102,7 @@ def gain_is_model_error(
 def _gains(
     one: FloatArray, other: FloatArray, healthy_one: FloatArray, healthy_other: FloatArray
 ) -> tuple[FloatArray, FloatArray] | None:
-    """Gains of the first per damaged and per healthy segment; None if infinite or fewer than 2."""
+    """Gains of ``one`` per damaged and per healthy segment; None if infinite or fewer than 2."""
     losses = (one, other, healthy_one, healthy_other)
     if not all(np.isfinite(each).all() for each in losses) or min(len(one), len(healthy_one)) < 2:
         return None

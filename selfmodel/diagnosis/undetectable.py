@@ -1,4 +1,4 @@
-"""Undetectable faults: added to the best hypothesis, they change the loss in neither direction."""
+"""Undetectable faults: added to the best hypothesis, they change the loss insignificantly."""
 
 from collections.abc import Sequence
 

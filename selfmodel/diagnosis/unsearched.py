@@ -45,7 +45,7 @@ def best_unsearched_fault(
 
 
 def _candidates(best: Hypothesis, space: HypothesisSpace) -> dict[Hypothesis, Fault]:
-    """Hypotheses with the unsearched fault of each.
+    """Candidate hypotheses, each with its unsearched fault.
 
     Kinds that edit the specification, such as rough terrain, are excluded: each hypothesis needs a
     compiled model.

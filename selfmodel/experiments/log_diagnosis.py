@@ -1,4 +1,4 @@
-"""The set-up of a diagnosis from logged trials: robot, calibration, search, seed."""
+"""Set-up of a diagnosis from logged trials: robot, calibration, search, seed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ TrialSource = Trial | str | Path
 
 @dataclass(frozen=True, eq=False)
 class LogDiagnosis:
-    """A diagnosis that is set up: everything that the diagnostic EA needs.
+    """Inputs of a diagnosis from logged trials.
 
     Attributes:
         robot: The nominal robot.
@@ -54,7 +54,7 @@ def set_up_diagnosis(
     calibrate: bool,
     threads: int,
 ) -> LogDiagnosis:
-    """Returns a diagnosis that is set up.
+    """Returns the inputs of a diagnosis: reads the logs, calibrates, and sets up the search.
 
     Args:
         trials: Trials to explain. Without ``healthy``, those of the stage ``before`` are healthy

@@ -45,7 +45,7 @@ def _kinds(kinds: str | Sequence[FaultKind]) -> Sequence[FaultKind]:
 
 
 def _ignore(_event: object) -> None:
-    """The callback of a caller that gives none."""
+    """Default callback, which ignores the event."""
 
 
 def load_robot(name: str | Path, settings: MjcfSettings | None = None) -> Robot:
@@ -118,7 +118,7 @@ def evolve_controller(
         robot: The nominal robot.
         hypothesis: The faults of the robot in simulation.
         design: Name of a controller design, such as ``network`` or ``cpg``, or a design.
-        seeds: Controllers of the first generation, beside random controllers.
+        seeds: Controllers of the first generation, in addition to random controllers.
         settings: Parameters of the search; the paper's by default.
         seed: Seed of all random numbers.
         threads: Threads of the physics; 0 for all processors.
@@ -186,7 +186,7 @@ def replay(
     tolerance: float = 0.0,
     threads: int = 0,
 ) -> Replay:
-    """Returns a trial beside its simulation under a hypothesis.
+    """Returns the comparison of a trial with its simulation under a hypothesis.
 
     Args:
         trial: A logged trial.

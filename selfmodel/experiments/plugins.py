@@ -131,7 +131,7 @@ def _plug_in(what: str, name: str, group: str, built_in: Iterable[str]) -> objec
 
 
 def design(name: str, robot: Robot, neurons: int | None = None) -> Design:
-    """Returns the controller design of that name for a robot.
+    """Returns a controller design by name, for a robot.
 
     Args:
         name: One of ``DESIGNS``.

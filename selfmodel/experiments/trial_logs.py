@@ -62,7 +62,7 @@ def robot_of_logs(found: Sequence[TrialLog], override: str | None) -> Robot:
 
 
 def _override(name: str, own: Robot) -> Robot:
-    """Returns the robot that replaces the model in a log, adapted like it or as the file is."""
+    """Returns the robot that replaces the model in a log; an MJCF file is adapted or unchanged."""
     if not is_model(name):
         return robot_entry(name).robot()
     try:

@@ -39,8 +39,8 @@ FALLEN_TILT = np.radians(60)
 class Disagreement:
     """Disagreement of some hypotheses on controllers, cached by controller.
 
-    All hypotheses are simulated with the same commands, those that the controller computes under
-    the first hypothesis. In closed loop, a difference in one reading changes the whole motion, and
+    All hypotheses are simulated with the same commands: those of the controller under the first
+    hypothesis. In closed loop, a difference in one reading changes the whole motion, and
     a comparator that is given the commands gains no evidence from such a change.
 
     Args:

@@ -21,7 +21,7 @@ GENERATIONS = 8
 a gait moves almost as the gait does."""
 
 MAX_HYPOTHESES = 5
-"""Maximum hypotheses that a trial separates: the time of the choice grows with their number."""
+"""Maximum number of hypotheses to separate; the time of the choice grows with this number."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ def by_repair(situation: Situation) -> Controller:
 
 
 def by_disagreement(situation: Situation) -> Controller:
-    """Returns the controller with the largest disagreement of hypotheses, or finally a repair.
+    """Returns the controller with the largest disagreement of the hypotheses, or a repair.
 
     A repair is returned once the diagnosis is ``explained`` and either has no undetectable fault
     or has the same undetectable faults as the diagnosis before, which the last trial did not
@@ -108,8 +108,8 @@ def candidates_to_separate(diagnosis: Diagnosis) -> tuple[Hypothesis, ...]:
     """Returns the best hypothesis and the hypotheses to separate from it, at most five in all.
 
     These are the indistinguishable hypotheses or, if there are none and the diagnosis is
-    ``unexplained``, the next in the ranking; then the hypotheses with an undetectable fault. If all
-    of these are missing, they are the next in the ranking.
+    ``unexplained``, the next in the ranking; then the hypotheses with an undetectable fault. If
+    there are none of these either, the next in the ranking follow.
     """
     followers = tuple(
         candidate.hypothesis
@@ -129,8 +129,8 @@ def candidates(
     """Returns the distinct controllers to choose from, those of earlier trials first.
 
     Args:
-        known: Controllers of earlier trials, newest first. Candidates are those of the newest
-            one's design, except the newest, and one population of their offspring.
+        known: Controllers of earlier trials, newest first. Candidates are the controllers of the
+            newest controller's design, except the newest, and one population of their offspring.
         settings: Numbers of the EA.
         rng: Random number generator of all random choices.
     """

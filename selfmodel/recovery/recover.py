@@ -145,7 +145,7 @@ def recover(
         seed: Seed of all random choices.
         on_event: Callback, called with each event as it happens.
         gait: Controller of the robot before the failure; evolved if not given. The rest of the
-            recovery is the same for a gait that was evolved here and for the same gait, given.
+            recovery does not depend on whether the same gait is evolved or given.
         design: Design of the controllers to evolve; the paper's network if not given.
         kinds: Fault kinds that a diagnosis searches.
         calibrate: Fits the self-model to the trials before the failure; no fit if not given.
@@ -155,7 +155,7 @@ def recover(
     Returns:
         The trials, the last diagnosis and the number of evaluations.
     """
-    # Not of the calibrated model, which is written with fewer digits.
+    # From the nominal robot: the numbers of the calibrated model are rounded.
     design = network_for(simulator.robot) if design is None else design
     repair = RepairSearch(simulator, settings, design, score=score)
     tried: list[Hypothesis] = []

@@ -57,8 +57,8 @@ class RepairSearch:
 
         Args:
             hypothesis: Faults of the simulated robot.
-            seeds: Initial controllers beside random ones; controllers of another design are
-                ignored.
+            seeds: Initial controllers in addition to random ones; controllers of another design
+                are ignored.
             rng: Random number generator of all random choices.
             on_generation: Callback, called after each generation.
         """

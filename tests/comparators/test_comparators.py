@@ -136,11 +136,11 @@ class Broken:
         ("shape", "expected a distance for each of 4 runs"),
         ("sign", "must be finite and at least 0"),
         ("nan", "must be finite and at least 0"),
-        ("offset", "must be at 0, got 1"),
+        ("offset", "must be 0, got 1"),
         ("impure", "the same arguments must give the same distances"),
         ("crowd", "must not depend on the other runs"),
         ("again", "a trial that is prepared again must give the same distances"),
-        ("simulated", "a comparator must not change what it is given"),
+        ("simulated", "a comparator must not change its arguments"),
         ("trial", "a comparator must not change the trial"),
     ],
 )
@@ -230,9 +230,9 @@ def test_the_contract_kit_judges_requests_of_every_kind(logged_and_simulated: Bo
 def test_the_contract_kit_wants_what_was_requested(logged_and_simulated: Both):
     trial, _ = logged_and_simulated
 
-    with pytest.raises(ValueError, match=r"its request is a Segments: .* \(n, 3, 26, width\)"):
+    with pytest.raises(ValueError, match=r"for a request of Segments, .* \(n, 3, 26, width\)"):
         check_comparator(Pieces(segments(trial)), trial, runs_of_shape(trial, 300))
-    with pytest.raises(ValueError, match=r"is a Ensemble: .* \(n, 4, 300, width\)"):
+    with pytest.raises(ValueError, match=r"a request of Ensemble, .* \(n, 4, 300, width\)"):
         check_comparator(Pieces(ENSEMBLE), trial, runs_of_shape(trial, 300))
 
 
@@ -246,7 +246,7 @@ def test_the_contract_kit_sees_a_request_that_cannot_be_met(logged_and_simulated
         ("joint_positions", "must be a ClosedLoop, Segments or an Ensemble"),
         (replace(ENSEMBLE, members=0), "at least one member"),
         (segments(trial, lead=27), "a horizon of at least 1 step"),
-        (unknown, "must all be known"),
+        (unknown, "must be finite"),
         (narrow, "the commands of segments must have shape"),
         (fewer, "the states of joint_positions must have shape"),
         (replace(segments(trial), record=("commands",)), "Segments must record some of"),
@@ -283,7 +283,7 @@ def test_segments_are_given_their_commands_and_cannot_record_them(
     trial, _ = logged_and_simulated
     asks = replace(segments(trial), record=("joint_positions", "commands"))
 
-    with pytest.raises(InputError, match=r"'pieces' asked for the signals .*'commands'.*, of "):
+    with pytest.raises(InputError, match=r"'pieces' requested the signals .*'commands'.*, of "):
         Evidence(Simulator(quadruped, 1), Pieces(asks)).losses([INTACT], [trial])
 
 

@@ -144,5 +144,5 @@ def test_a_log_without_readings_and_joints_is_refused():
         signal: np.full_like(walking[signal], np.nan) for signal in ("sensors", "joint_positions")
     }
 
-    with pytest.raises(InputError, match="needs one at least of sensors, joint_positions"):
+    with pytest.raises(InputError, match="needs at least one of sensors, joint_positions"):
         GAIT_PATTERN.prepare(logged(changed(walking, **unknown)))

@@ -184,5 +184,5 @@ def test_a_log_with_nothing_to_compare_is_refused():
     walking = gait()
     nothing = {signal: np.full_like(walking[signal], np.nan) for signal in walking.signals}
 
-    with pytest.raises(InputError, match="noisy-transfer needs one at least of sensors"):
+    with pytest.raises(InputError, match="noisy-transfer needs at least one of sensors"):
         NOISY_TRANSFER.prepare(logged(changed(walking, **nothing)))

@@ -126,7 +126,7 @@ def test_a_log_with_nothing_to_compare_is_refused(comparator: Comparator):
     walking = gait()
     nothing = {signal: np.full_like(walking[signal], np.nan) for signal in walking.signals}
 
-    with pytest.raises(InputError, match="needs one at least of"):
+    with pytest.raises(InputError, match="needs at least one of"):
         comparator.prepare(logged(changed(walking, **nothing)))
 
 

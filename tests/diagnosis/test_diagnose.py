@@ -118,10 +118,10 @@ def test_of_hypotheses_that_explain_as_well_the_one_with_fewer_faults_ranks_firs
 @pytest.mark.parametrize(
     ("distances", "said"),
     [
-        (lambda _: 0.0, r"gave \(\) distances for 2 simulations"),
-        (lambda n: np.zeros((n, 1)), r"gave \(2, 1\) distances for 2"),
-        (lambda n: np.full(n, -1.0), "gave a distance that is not a number of at least 0"),
-        (lambda n: np.full(n, np.nan), "gave a distance that is not a number of at least 0"),
+        (lambda _: 0.0, r"returned \(\) distances for 2 simulations"),
+        (lambda n: np.zeros((n, 1)), r"returned \(2, 1\) distances for 2"),
+        (lambda n: np.full(n, -1.0), "returned a distance that is not a number of at least 0"),
+        (lambda n: np.full(n, np.nan), "returned a distance that is not a number of at least 0"),
     ],
 )
 def test_a_comparator_that_breaks_its_contract_is_named(

@@ -303,17 +303,17 @@ def test_what_is_prepared_must_be_a_prepared_trial(quadruped: Robot, trials: lis
 @pytest.mark.parametrize(
     ("comparator", "message"),
     [
-        (Plain(gives=lambda _: 1.0), r"gave \(\) distances for 2 simulations"),
-        (Plain(gives=lambda n: np.ones((n, 1))), r"gave \(2, 1\) distances for 2"),
+        (Plain(gives=lambda _: 1.0), r"returned \(\) distances for 2 simulations"),
+        (Plain(gives=lambda n: np.ones((n, 1))), r"returned \(2, 1\) distances for 2"),
         (Plain(gives=lambda n: np.full(n, -1.0)), "not a number of at least 0"),
         (Plain(gives=lambda n: np.full(n, np.nan)), "not a number of at least 0"),
-        (InPieces(gives=np.ones), r"gave losses \(2,\) for 2 simulations"),
-        (InPieces(gives=lambda n: np.ones((n + 1, 3))), r"gave losses \(3, 3\) for 2"),
-        (InPieces(gives=lambda n: np.ones((n, 0))), r"gave losses \(2, 0\) for 2"),
+        (InPieces(gives=np.ones), r"returned losses \(2,\) for 2 simulations"),
+        (InPieces(gives=lambda n: np.ones((n + 1, 3))), r"returned losses \(3, 3\) for 2"),
+        (InPieces(gives=lambda n: np.ones((n, 0))), r"returned losses \(2, 0\) for 2"),
         (InPieces(gives=lambda n: np.full((n, 3), -1.0)), "not a number of at least 0"),
         (InPieces(gives=lambda n: np.full((n, 3), np.nan)), "not a number of at least 0"),
-        (Plain(asks=ClosedLoop(())), r"asked for the signals \(\), of sensors, commands"),
-        (Plain(asks=ClosedLoop(("smell",))), r"asked for the signals \('smell',\), of sensors"),
+        (Plain(asks=ClosedLoop(())), r"requested the signals \(\), of sensors, commands"),
+        (Plain(asks=ClosedLoop(("smell",))), r"requested the signals \('smell',\), of sensors"),
     ],
 )
 def test_a_comparator_that_breaks_its_contract_is_named_with_what_it_did(

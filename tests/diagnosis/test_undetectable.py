@@ -132,6 +132,6 @@ def test_a_report_names_what_is_unseen(quadruped: Robot, best: str, besides: lis
     found = {"diagnosis": ranking_to_list(diagnosis.ranked), **confidence_to_dict(diagnosis)}
 
     assert found["unseen"] == besides
-    sure = ", and nothing else as well." if not besides else "."
-    more_said = f" Not ruled out besides: {', '.join(besides)}." if besides else ""
+    sure = ", and no other hypothesis does as well." if not besides else "."
+    more_said = f" Undetectable in these trials: {', '.join(besides)}." if besides else ""
     assert in_words(found) == f"Explained: {best} predicts the trials{sure}{more_said}"

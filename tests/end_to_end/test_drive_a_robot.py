@@ -114,8 +114,8 @@ def test_a_dropped_connection_stops_the_robot_and_leaves_a_whole_log(tmp_path: P
     log, _ = verify(tmp_path / "trial.mcap")
 
     assert process.returncode == 1
-    assert "the environment failed: ConnectionError: the robot hung up" in errors
-    assert "the environment failed: ConnectionError: the robot hung up" in log.reason
+    assert "the environment failed: ConnectionError: the robot closed the connection" in errors
+    assert "the environment failed: ConnectionError: the robot closed the connection" in log.reason
     assert (log.status, log.trial.behaviour.steps) == ("stopped", 70)
     assert heard(tmp_path) == [STOP, *range(71), STOP]
     told = selfmodel("logs", "info", "trial.mcap", cwd=tmp_path, PYTHONPATH=str(ROOT))

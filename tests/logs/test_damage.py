@@ -37,7 +37,7 @@ COUNTED = (Attachment, Message, Metadata)
         (lambda _: b"no log at all", NotMcapError, "not an MCAP file"),
         (lambda d: d[:9000], TruncatedError, "ends too early; .* messages .* complete"),
         (lambda d: d[:-1], TruncatedError, "625 messages on 7 topics"),
-        (lambda d: d + b"x", CorruptError, "something follows its end"),
+        (lambda d: d + b"x", CorruptError, "bytes follow its end"),
         (lambda d: d[:-8] + bytes(8), CorruptError, "last bytes are damaged"),
     ],
 )
@@ -176,7 +176,11 @@ def retyped(record: McapRecord) -> McapRecord:
             r"displacement is 1\.5 m in its result",
         ),
         (without(Attachment, "model.xml"), SchemaMismatchError, r"no attachment model\.xml"),
-        (attachment("model.xml", b"0.6", b"0.7"), CorruptError, r"model\.xml is not the one"),
+        (
+            attachment("model.xml", b"0.6", b"0.7"),
+            CorruptError,
+            r"model\.xml is not the file of the trial",
+        ),
         (attachment("controller.npz", b"<f8", b"<f4"), CorruptError, r"controller\.npz is not"),
         (
             attachment("settings.json", b"steps", b"stops"),

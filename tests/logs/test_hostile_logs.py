@@ -241,7 +241,7 @@ UNSIZED = zstandard.ZstdCompressor(write_content_size=False)
             "200000 records and chunks",
             marks=pytest.mark.fuzz,
         ),
-        ([note("n", bytes(33 * 2**20))], "33554432 bytes beside its messages"),
+        ([note("n", bytes(33 * 2**20))], "33554432 bytes outside its messages"),
         ([attachment("a", bytes(33 * 2**20))], "33554432 bytes attached"),
         ([attachment("a", b"x"), attachment("a", b"y")], "it has 'a' twice"),
         ([note("n"), note("n")], "it has 'n' twice"),

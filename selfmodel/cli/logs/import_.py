@@ -51,12 +51,12 @@ def import_(
     if suggest:
         if robot is None or out or mapping or as_json:
             raise InputError(
-                "--suggest needs --robot NAME|MODEL.xml, and goes with no other option"
+                "--suggest needs --robot NAME|MODEL.xml, and excludes all other options"
             )
         typer.echo(_suggestion(bag, robot), nl=False)
         return
     if robot is not None:
-        raise InputError("--robot goes with --suggest; the robot of an import is in its mapping")
+        raise InputError("--robot is for --suggest: the robot of an import is in its mapping")
     if out is None or mapping is None:
         raise InputError(
             "an import needs --out TRIAL.mcap and --mapping MAP.toml; "
@@ -102,7 +102,7 @@ def _mapped_robot(mapping: BagMapping, folder: Path) -> Robot:
     own = not is_model(name)
     if own and timestep is not None:
         raise mapping.document.error(
-            ("control_timestep",), f"{name} has a control time step of its own: remove this one"
+            ("control_timestep",), f"{name} has a control time step of its own: remove this entry"
         )
     if not own and timestep is None:
         raise mapping.document.error(

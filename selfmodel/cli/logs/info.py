@@ -103,13 +103,13 @@ def _print(one: dict[str, Any]) -> None:
         typer.echo(f"complete steps that can be salvaged: {one['salvageable_steps']}\n")
         return
     seconds = one["steps"] * one["control_timestep"]
-    way = one["displacement"]
+    dx = one["displacement"]
     text = (
         f"{one['file']} ({one['bytes'] / 1000:.0f} kB)\n"
         f"trial {one['trial']} ({one['stage']}) of {one['robot']}, {one['status']}"
         f"{': ' + one['reason'] if one['reason'] else ''}\n"
         f"{one['steps']} of {one['planned_steps']} steps of {one['control_timestep']:g} s = "
-        f"{seconds:.2f} s; {'displacement unknown' if way is None else f'{way:.3f} m forward'}; "
+        f"{seconds:.2f} s; {'displacement unknown' if dx is None else f'{dx:.3f} m forward'}; "
         f"seed {one['seed']}\n"
         f"driven by {one['driver']}\n"
         f"written with {', '.join(f'{name} {text}' for name, text in one['software'].items())}\n"

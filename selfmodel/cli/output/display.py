@@ -51,29 +51,29 @@ class _Lines:
             case SearchBegins(kind, hypothesis):
                 self._search = f"{kind} EA" if hypothesis is None else f"{kind} EA for {hypothesis}"
             case Generation() if event.number == event.total:
-                self._say(
+                self._print_line(
                     f"{self._search}: {counted(event.number, 'generation')}, "
                     f"{counted(event.evaluations, 'evaluation')}, {_rate(event)}/s, "
                     f"best {event.best:.4f}"
                 )
             case Calibration():
-                self._say(
+                self._print_line(
                     f"calibration: error {event.error_before:.3f} before, {event.error:.3f} after; "
                     f"delay {counted(event.parameters.delay, 'step')}"
                 )
             case DiscriminatingTrial():
                 apart = ", ".join(map(str, event.hypotheses))
-                self._say(f"the next trial discriminates between: {apart}")
+                self._print_line(f"the next trial discriminates between: {apart}")
             case Trial():
-                self._say(f"trial {event.plan.name}: {event.displacement:.3f} m forward")
+                self._print_line(f"trial {event.plan.name}: {event.displacement:.3f} m forward")
             case Diagnosis():
                 best = event.ranked[0]
-                self._say(
+                self._print_line(
                     f"diagnosis from {counted(event.trials, 'trial')}: "
                     f"{best.hypothesis} (distance {best.distance:.4f}), {event.verdict}"
                 )
 
-    def _say(self, line: str) -> None:
+    def _print_line(self, line: str) -> None:
         self._console.print(line, soft_wrap=True)
 
 

@@ -50,15 +50,15 @@ class Watch:
                         "", total=event.total, completed=event.finished
                     )
                 elif event.finished:
-                    self._say(f"{event.finished} of {event.total} were done before")
+                    self._print_line(f"{event.finished} of {event.total} were done before")
             case PartEnds():
                 self.done = event.number
                 if self._progress and self._task is not None:
                     self._progress.update(self._task, completed=event.number)
                 if event.error is not None or not self._progress:
-                    self._say(_line(event))
+                    self._print_line(_line(event))
 
-    def _say(self, line: str) -> None:
+    def _print_line(self, line: str) -> None:
         self._console.print(line, soft_wrap=True)
 
 

@@ -14,18 +14,20 @@ def in_words(found: Mapping[str, Any]) -> str:
             ``ranking_to_list``.
     """
     besides = ", ".join(found["unseen"])
-    return _verdict(found) + (f" Not ruled out besides: {besides}." if besides else "")
+    return _verdict(found) + (f" Undetectable in these trials: {besides}." if besides else "")
 
 
 def _verdict(found: Mapping[str, Any]) -> str:
     best = found["diagnosis"][0]["hypothesis"]
     match found["verdict"]:
         case "explained":
-            alone = "" if found["unseen"] else ", and nothing else as well"
+            alone = "" if found["unseen"] else ", and no other hypothesis does as well"
             return f"Explained: {best} predicts the trials{alone}."
         case "ambiguous":
             others = ", ".join(found["rivals"])
-            return f"Ambiguous: the trials cannot tell {best} from {others} ({found['test']})."
+            return (
+                f"Ambiguous: the trials do not distinguish {best} from {others} ({found['test']})."
+            )
     if found["outside"] is not None:
         better, kind = found["outside"]["hypothesis"], found["outside"]["kind"]
         return (
@@ -34,8 +36,8 @@ def _verdict(found: Mapping[str, Any]) -> str:
         )
     return (
         f"Unexplained: even {best} predicts the trials significantly worse than the self-model "
-        f"predicts the intact robot; something else is wrong, or what is wrong is of a kind that "
-        f"was not considered (--kinds)."
+        f"predicts the healthy robot; there is another fault, or one of a kind that was not "
+        f"searched (--kinds)."
     )
 
 

@@ -28,7 +28,8 @@ def check_figure(path: Path) -> None:
     """Checks the name of a figure.
 
     Raises:
-        InputError: It has another ending than a figure's, its folder is missing, or it exists.
+        InputError: The name has no extension of a figure, the folder is missing, or the file
+            exists.
     """
     if path.suffix.lower().removeprefix(".") not in FORMATS:
         raise InputError(f"--out needs a name that ends in .png, .svg or .pdf, got {str(path)!r}")

@@ -48,7 +48,7 @@ def filmed(film: Film) -> Iterator[NDArray[np.uint8]]:
 
 
 def _set_pose(model: mujoco.MjModel, data: mujoco.MjData, qpos: FloatArray) -> None:
-    """Computes what a pose shows: positions of bodies, camera and lights, without a step."""
+    """Sets a pose and computes the positions of bodies, camera and lights, without a step."""
     data.qpos = qpos
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)

@@ -44,8 +44,8 @@ def draw_trial(
         file: Log of the trial.
         out: File to write.
         hypothesis: Notation of the hypothesis to simulate.
-        kinds: Fault kinds that the notation may name, as ``--kinds`` has them.
-        model: Self-model to use instead of the log's, as ``--robot`` has it.
+        kinds: Fault kinds that the notation may name, as in ``--kinds``.
+        model: Self-model to use instead of the log's, as in ``--robot``.
         pictures: Pictures of a strip; None for a film.
         sticks: Draws with matplotlib instead of MuJoCo.
         threads: Threads of the physics; 0 for one per processor.

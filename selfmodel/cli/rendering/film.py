@@ -70,7 +70,8 @@ def film_of(
         robot: The healthy robot.
         hypothesis: Hypothesis whose detached and jammed bodies are marked.
         motions: Title and behaviour of each motion, all with the same times.
-        moments: Times of the frames, ``(frames,)``, s; each shows the last step not after it.
+        moments: Times of the frames, ``(frames,)``, s; a frame shows the last step at or before its
+            time.
     """
     embodiment = build(robot, hypothesis)
     model = embodiment.model

@@ -57,7 +57,7 @@ def mp4(frames: Frames) -> bytes:
         command = [program, "-nostdin", "-loglevel", "error"]
         command += ["-f", "rawvideo", "-pixel_format", "rgb24", "-video_size", f"{width}x{height}"]
         command += ["-framerate", str(RATE), "-i", "pipe:0"]
-        # yuv420p: every player shows it; faststart: the index comes first.
+        # yuv420p: every player supports it; faststart: the index comes first.
         command += ["-pix_fmt", "yuv420p", "-movflags", "+faststart", str(path)]
         with (
             messages.open("wb") as errors,
@@ -77,7 +77,7 @@ def _feed(encoder: subprocess.Popen[bytes], first: NDArray[np.uint8], frames: Fr
         raise WorkError("ffmpeg does not read frames")
     with ExitStack() as unfinished:
         unfinished.callback(encoder.kill)
-        # An ffmpeg that has ended is explained by its status and its messages.
+        # If ffmpeg has exited, its status and its messages contain the reason.
         with suppress(BrokenPipeError):
             encoder.stdin.write(first.tobytes())
             for frame in frames:

@@ -15,19 +15,19 @@ SMOOTHING = 0.5
 
 
 def gaze(film: Film, shot: Shot) -> FloatArray:
-    """Returns the point of view of the camera in each frame, ``(frames, 3)``, m.
+    """Returns the target point of the camera in each frame, ``(frames, 3)``, m.
 
-    It is the smoothed position of the root body.
+    The target is the smoothed position of the root body.
     """
     data = mujoco.MjData(film.model)
-    way = np.empty((len(film.time), 3))
-    for point, qpos in zip(way, shot.qpos, strict=True):
+    path = np.empty((len(film.time), 3))
+    for point, qpos in zip(path, shot.qpos, strict=True):
         data.qpos = qpos
         mujoco.mj_kinematics(film.model, data)
         point[:] = data.xpos[film.root]
     step = np.median(np.diff(film.time)) if len(film.time) > 1 else SMOOTHING
     reach = round(SMOOTHING / step / 2)
-    padded = np.pad(way, ((reach, reach), (0, 0)), mode="edge")
+    padded = np.pad(path, ((reach, reach), (0, 0)), mode="edge")
     window = np.ones(2 * reach + 1) / (2 * reach + 1)
     smooth = [np.convolve(padded[:, axis], window, mode="valid") for axis in range(3)]
     return np.stack(smooth, axis=1)

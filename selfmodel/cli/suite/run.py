@@ -103,9 +103,9 @@ def run(
 
     An interrupted study is continued by the same command.
     """
-    asked = inputs.texts("--domains", domains, DOMAINS)
-    wanted = None if tasks is None else inputs.texts("--tasks", tasks, tasks_of(asked))
-    chosen = bodies(asked, wanted)
+    domain_names = inputs.texts("--domains", domains, DOMAINS)
+    wanted = None if tasks is None else inputs.texts("--tasks", tasks, tasks_of(domain_names))
+    chosen = bodies(domain_names, wanted)
     # The last sample of a trial has no reward: an episode of the suite has 1000 rewards.
     length = steps if steps is not None else 1001 if score == "return" else 1000
     study = Study(

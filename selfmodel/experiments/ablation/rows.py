@@ -26,7 +26,7 @@ class AblationRow:
         distinct_hypotheses: Number of distinct hypotheses among the evaluations.
         seconds: Wall time of the diagnoses since the first trial, on one thread.
         before: Forward displacement before the failure, m.
-        after: Forward displacement with the same controller after it, m.
+        after: Forward displacement of the same controller after the failure, m.
         recovered: Forward displacement of the best recovery trial so far, m.
     """
 

@@ -150,7 +150,7 @@ def _in_a_recovery(setting: Setting) -> list[AblationRow]:
         case=cell.case,
         truth=setting.truth,
         comparator=setting.comparator,
-        # An experiment does not count the failing trial.
+        # The trials of an experiment exclude the failing trial.
         settings=dataclasses.replace(settings, trials=settings.trials - 1),
         seed=cell.seed,
         threads=1,

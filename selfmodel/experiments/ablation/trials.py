@@ -58,7 +58,8 @@ def after_failure(setting: Setting, number: int, controller: Controller) -> Tria
 def calibrated_robot(setting: Setting, healthy: Sequence[Trial]) -> Robot:
     """Returns the calibrated self-model, the same for all comparators.
 
-    The first call fits it to the trials before the failure and writes it beside the trials.
+    The first call fits the model to the trials before the failure and writes it into the folder of
+    the run.
     """
     path, robot = setting.folder / "calibrated.xml", setting.robot
     if not path.exists():

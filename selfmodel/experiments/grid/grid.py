@@ -30,7 +30,7 @@ class Job:
 
     Attributes:
         key: Name of the run and of its folder: letters, digits, ``.``, ``_``, ``-``, ``=``, ``%``.
-        parameters: All inputs of the results beside the seed, as JSON.
+        parameters: All inputs of the results except the seed, as JSON.
         seed: Seed of all random numbers.
         parts: Names of the parts to run, in order; a later call may request other parts.
     """

@@ -40,11 +40,11 @@ def run_tasks(
 ) -> Generator[tuple[Task, Answer | WorkerExit], None, None]:
     """Runs tasks in worker processes and yields each with its result, in order of completion.
 
-    A process that exits costs its current task; another process takes its place. Workers never
+    A process that exits fails its current task and is replaced by another process. Workers never
     receive Ctrl-C; closing the generator terminates all of them.
 
     Args:
-        perform: Does one task. It must be importable; an exception ends its process.
+        perform: Function that runs one task. It must be importable; an exception ends its process.
         chains: Tasks to run one after another, in order; chains run side by side, the first ones
             first.
         workers: Number of processes at a time, at least 1.
@@ -110,12 +110,12 @@ def _pool() -> Iterator[Callable[[Callable[..., Any]], _Worker]]:
     started: list[_Worker] = []
 
     def spawn(perform: Callable[..., Any]) -> _Worker:
-        ours, theirs = context.Pipe()
-        process = context.Process(target=_serve, args=(perform, theirs), daemon=True)
+        pipe, worker_end = context.Pipe()
+        process = context.Process(target=_serve, args=(perform, worker_end), daemon=True)
         with _sigint_blocked():
             process.start()
-        theirs.close()  # a pipe with one open end reports EOF when the process exits
-        started.append(_Worker(process, ours, deque()))
+        worker_end.close()  # a pipe with one open end reports EOF when the process exits
+        started.append(_Worker(process, pipe, deque()))
         return started[-1]
 
     try:

@@ -173,7 +173,7 @@ def _body(body: str) -> dict[str, Any]:
     robot = robots.robot_entry(body).robot()
     assets = hashlib.sha256()
     for name, content in sorted(robot.assets.items()):
-        # Digests have one length, so that the boundaries of names and contents count.
+        # Digests have a fixed length, so that names and contents cannot be confused.
         for part in (name.encode(), content):
             assets.update(hashlib.sha256(part).digest())
     return {

@@ -133,4 +133,4 @@ def _score_of(score: Score, robot: Robot, hidden: Hypothesis, trial: Trial) -> f
 
 
 def _ignore(_event: Event) -> None:
-    """The callback of a recovery without a display."""
+    """Callback that ignores the event."""

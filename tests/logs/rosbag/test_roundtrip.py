@@ -185,7 +185,7 @@ def test_options_that_do_not_go_together_are_told(driven: Path):
     for arguments, message in (
         ((), "an import needs --out TRIAL.mcap and --mapping MAP.toml"),
         (("--suggest",), "--suggest needs --robot"),
-        (("--robot", "quadruped"), "--robot goes with --suggest"),
+        (("--robot", "quadruped"), "--robot is for --suggest"),
     ):
         done = selfmodel("logs", "import", driven, *arguments)
         assert done.returncode == 2
