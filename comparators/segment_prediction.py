@@ -118,8 +118,8 @@ class SegmentPrediction:
             raise InputError(
                 f"{trial.path}: {self.name} needs {', '.join(lacking or self.state)} at "
                 f"{MIN_SEGMENTS} or more of {count} moments of the trial, and the log does not "
-                f"have it: give a comparator that needs less (docs/how-it-works.md lists what each "
-                f"needs), or leave this log out"
+                f"have it: give a comparator that needs less "
+                f"(docs/how-to/choose-a-comparator.md lists what each needs), or leave this log out"
             )
         return starts[usable], steady[usable]
 
