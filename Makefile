@@ -69,7 +69,7 @@ fuzz: $(READY) ## damage 30,000 logs at random and check that nothing goes unnot
 bench: $(READY) ## measure speed and memory; on a quiet machine
 	$(BIN)/python -m benchmarks.bench
 
-results: $(READY) ## run Table I on both robots and write docs/results.md; takes over an hour
+results: $(READY) ## run Table I on both robots and write docs/results/table-one.md; takes over an hour
 	$(BIN)/python -m benchmarks.table_one
 
 .PHONY: help setup demo test test-all docs lint types wheel viewers fuzz bench results

@@ -10,7 +10,10 @@ import venv
 import zipfile
 from pathlib import Path
 
-NEEDED = ("selfmodel/py.typed", "selfmodel/tasks/quadruped.xml", "selfmodel/tasks/hexapod.xml")
+NEEDED = (
+    *("selfmodel/py.typed", "selfmodel/__init__.pyi", "selfmodel/robot/__init__.pyi"),
+    *("selfmodel/tasks/quadruped.xml", "selfmodel/tasks/hexapod.xml"),
+)
 
 
 def main(wheel: Path) -> None:

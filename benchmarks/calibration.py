@@ -80,7 +80,7 @@ Way = Callable[[Robot, Sequence[Trial]], tuple[Parameters, list[float]]]
 def _peer() -> dict[str, Way]:
     """``mujoco.sysid``, if it is installed."""
     try:
-        from benchmarks.sysid_peer import sysid_parameters  # noqa: PLC0415
+        from benchmarks.sysid_peer import sysid_parameters  # noqa: PLC0415  # optional
     except ImportError as error:
         print(f"without mujoco.sysid: {error}")
         return {}

@@ -118,8 +118,7 @@ class SegmentPrediction:
             raise InputError(
                 f"{trial.path}: {self.name} needs {', '.join(lacking or self.state)} at "
                 f"{MIN_SEGMENTS} or more of {count} moments of the trial, and the log does not "
-                f"have it: give a comparator that needs less (docs/how-to/choose-a-comparator.md "
-                f"lists the requirements), or leave this log out"
+                f"have it: give a comparator that needs fewer signals, or leave this log out"
             )
         return starts[usable], steady[usable]
 

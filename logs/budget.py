@@ -40,16 +40,13 @@ class Budget:
             ExcessError: The file exceeds a limit.
         """
         self._frames += 1
-        if self._frames > FRAME_LIMIT:
-            raise _excess(FRAME_LIMIT, "records and chunks")
+        _check(self._frames, FRAME_LIMIT, "records and chunks")
         if opcode == Opcode.ATTACHMENT:
             self._attached += size
+            _check(self._attached, ATTACHED_LIMIT, "bytes attached")
         elif opcode not in (Opcode.CHUNK, Opcode.MESSAGE):
             self._other += size
-        if self._attached > ATTACHED_LIMIT:
-            raise _excess(ATTACHED_LIMIT, "bytes attached")
-        if self._other > OTHER_LIMIT:
-            raise _excess(OTHER_LIMIT, "bytes outside its messages and attachments")
+            _check(self._other, OTHER_LIMIT, "bytes outside its messages and attachments")
 
     def chunk(self, size: int) -> None:
         """Counts a chunk before it is decompressed.
@@ -61,8 +58,7 @@ class Budget:
             ExcessError: The file exceeds a limit.
         """
         self._unpacked += size
-        if self._unpacked > UNPACKED_LIMIT:
-            raise _excess(UNPACKED_LIMIT, "bytes, unpacked")
+        _check(self._unpacked, UNPACKED_LIMIT, "bytes, unpacked")
 
     def record(self, opcode: int, size: int) -> None:
         """Counts a record within a chunk.
@@ -75,11 +71,11 @@ class Budget:
             ExcessError: The file exceeds a limit.
         """
         self._records += 1
-        if self._records > RECORD_LIMIT:
-            raise _excess(RECORD_LIMIT, "messages")
+        _check(self._records, RECORD_LIMIT, "messages")
         if opcode != Opcode.MESSAGE:
             self.frame(opcode, size)
 
 
-def _excess(limit: int, unit: str) -> ExcessError:
-    return ExcessError(f"it holds more than a log may: {limit} {unit}")
+def _check(count: int, limit: int, unit: str) -> None:
+    if count > limit:
+        raise ExcessError(f"it holds more than a log may: {limit} {unit}")

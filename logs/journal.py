@@ -55,10 +55,27 @@ class FolderJournal:
     def read(self) -> Database:
         """Returns the finished trials and the diagnoses in the folder, read and verified.
 
+        A ``.part`` file, the log of an interrupted trial, is ignored.
+
         Raises:
+            InputError: The folder is not the folder of a run.
             LogError: A file is damaged, or of another robot.
         """
-        return _read_database(self.folder, self.space)
+        if not self.trials.is_dir():
+            raise InputError(
+                f"{self.folder}: expected the folder of a run, with a folder {TRIALS} in it"
+            )
+        trials = tuple(
+            read_log(path).trial for path in sorted(self.trials.glob("*.mcap"), key=_trial_order)
+        )
+        for trial in trials:
+            if trial.behaviour.names != self.space.anatomy.names:
+                raise SchemaMismatchError(
+                    trial.path,
+                    f"it is of the robot {trial.robot!r}, with other sensors, motors or hinges",
+                    advice="give the folder of a run of one robot",
+                )
+        return Database(trials, _read_diagnoses(self.folder, self.space))
 
 
 def create_journal(
@@ -90,38 +107,6 @@ def create_journal(
             f"{folder} cannot be made: {error.strerror}; choose another folder"
         ) from error
     return FolderJournal(folder, HypothesisSpace(anatomy, tuple(kinds)))
-
-
-def read_database(folder: Path, anatomy: Anatomy, kinds: Sequence[FaultKind] = ()) -> Database:
-    """Returns the finished trials and the diagnoses of a run, read and verified.
-
-    A ``.part`` file, the log of an interrupted trial, is ignored.
-
-    Args:
-        folder: Folder of the run; see ``FolderJournal``.
-        anatomy: Parts of the robot, to read the hypotheses.
-        kinds: Third-party kinds that the diagnoses may name, in addition to built-in kinds.
-
-    Raises:
-        InputError: The folder is not the folder of a run.
-        LogError: A file is damaged, or of another robot.
-    """
-    return _read_database(folder, HypothesisSpace(anatomy, tuple(kinds)))
-
-
-def _read_database(folder: Path, space: HypothesisSpace) -> Database:
-    if not (folder / TRIALS).is_dir():
-        raise InputError(f"{folder}: expected the folder of a run, with a folder {TRIALS} in it")
-    paths = sorted((folder / TRIALS).glob("*.mcap"), key=_trial_order)
-    trials = tuple(read_log(path).trial for path in paths)
-    for trial in trials:
-        if trial.behaviour.names != space.anatomy.names:
-            raise SchemaMismatchError(
-                trial.path,
-                f"it is of the robot {trial.robot!r}, with other sensors, motors or hinges",
-                advice="give the folder of a run of one robot",
-            )
-    return Database(trials, _read_diagnoses(folder, space))
 
 
 def _trial_order(path: Path) -> tuple[int, str]:

@@ -4,7 +4,7 @@ import importlib
 from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
@@ -24,6 +24,10 @@ from selfmodel.robot.state_access import current_value, signal_fields, state_wri
 from selfmodel.simulation.activations import activations_since_rest
 from selfmodel.trials.behaviour import Behaviour, Sample
 from selfmodel.trials.signals import SIGNALS, Signal
+
+if TYPE_CHECKING:
+    from dm_control.mujoco import Physics
+    from dm_control.suite.base import Task
 
 STATE: tuple[Signal, ...] = (
     "joint_positions",
@@ -75,7 +79,7 @@ class _Stepped:
         embodiment: The robot with its faults.
     """
 
-    def __init__(self, task: Any, robot: Robot, embodiment: Embodiment) -> None:  # noqa: ANN401
+    def __init__(self, task: "Task", robot: Robot, embodiment: Embodiment) -> None:
         self._task = task
         self._robot, self._embodiment = robot, embodiment
         self._fields = signal_fields(robot)
@@ -84,18 +88,18 @@ class _Stepped:
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401  # attributes of the suite's task
         return getattr(self._task, name)
 
-    def initialize_episode(self, _physics: Any) -> None:  # noqa: ANN401
+    def initialize_episode(self, _physics: "Physics") -> None:
         """Keeps the pose of the physics' reset and starts a new return."""
         self._reader = SensorReader(self._embodiment.model, self._robot.anatomy, [self._embodiment])
         self.returns.append(0.0)
 
-    def get_reward(self, physics: Any) -> float:  # noqa: ANN401
+    def get_reward(self, physics: "Physics") -> float:
         """Returns the suite's reward, and adds it to the return."""
         reward = float(self._task.get_reward(physics))
         self.returns[-1] += reward
         return reward
 
-    def get_observation(self, physics: Any) -> "OrderedDict[str, FloatArray | float]":  # noqa: ANN401
+    def get_observation(self, physics: "Physics") -> "OrderedDict[str, FloatArray | float]":
         """Returns the sensor readings, the state signals and the time, by signal name."""
         data = physics.data
         readings = np.empty((1, len(self._robot.anatomy.sensors)))
@@ -143,7 +147,7 @@ def episode_return(domain: str, task: str) -> Score:
     return Score("return", (*STATE, "commands"), of)
 
 
-def _sum(robot: Robot, physics: Any, task: Any, behaviour: Behaviour, run: int) -> float:  # noqa: ANN401
+def _sum(robot: Robot, physics: "Physics", task: "Task", behaviour: Behaviour, run: int) -> float:
     physics.reset()  # resets the solver's warm start too
     model, data, commands = physics.model, physics.data, behaviour["commands"][run]
     fields = {"qpos": np.zeros((len(commands), model.nq))}

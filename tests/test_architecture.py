@@ -11,7 +11,6 @@ import pytest
 ROOT = Path(__file__).parents[1]
 FOLDERS = {"selfmodel": "selfmodel", "tasks": "selfmodel.tasks"}
 FOLDERS |= {name: f"selfmodel.{name}" for name in ("comparators", "logs")}
-ADDED = ("selfmodel.tasks", "selfmodel.comparators", "selfmodel.logs")
 
 
 @cache
@@ -38,6 +37,16 @@ def imports(path: Path) -> set[str]:
             assert node.level == 0, f"{path}: a relative import hides which way it points"
             names |= {f"{node.module}.{alias.name}" for alias in node.names}
     return names
+
+
+@cache
+def exports(module: str) -> set[str]:
+    """The names that a face exports from its modules, by its stub; none for other modules."""
+    stub = modules()[module].with_suffix(".pyi")
+    if not stub.exists():
+        return set()
+    lines = ast.parse(stub.read_text(encoding="utf-8")).body
+    return {f"{module}.{line.module}.{alias.name}" for line in lines for alias in line.names}
 
 
 ROOMS = (
@@ -69,9 +78,9 @@ def room(module: str) -> str | None:
 
 @cache
 def imported_modules(module: str) -> set[str]:
-    """The modules of the package that a module imports, those under TYPE_CHECKING too."""
+    """The modules that a module imports, under TYPE_CHECKING too, or a face exports."""
     known = modules()
-    names = imports(known[module])
+    names = imports(known[module]) | exports(module)
     found = {name if name in known else name.rpartition(".")[0] for name in names}
     return {name for name in found if name in known and name != module}
 

@@ -74,7 +74,7 @@ def render(
         raise InputError("expected --hypothesis or --diagnosis, got both: leave one out")
     library = _choose_gl(out, stick=stick)
     # MuJoCo reads MUJOCO_GL as it is imported, so the library is chosen before.
-    from selfmodel.cli.rendering.drawing import draw_trial  # noqa: PLC0415
+    from selfmodel.cli.rendering.drawing import draw_trial  # noqa: PLC0415  # see above
 
     if diagnosis is not None:
         hypothesis = diagnosed(diagnosis)

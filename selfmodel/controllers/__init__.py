@@ -6,28 +6,6 @@ A controller is a design with a genome (`controller.py`). Each design is one fil
 its row in `selfmodel.logs.controllers.KINDS` (the arrays of its `.npz` file).
 """
 
-from typing import TYPE_CHECKING
-
 import lazy_loader
 
-if TYPE_CHECKING:
-    from selfmodel.controllers.command_source import CommandSource as CommandSource
-    from selfmodel.controllers.controller import (
-        Controller as Controller,
-        Design as Design,
-        draw_genomes as draw_genomes,
-    )
-    from selfmodel.controllers.cpg import Cpg as Cpg
-    from selfmodel.controllers.network import Network as Network
-    from selfmodel.controllers.playback import Playback as Playback
-else:
-    __getattr__, __dir__, __all__ = lazy_loader.attach(
-        __name__,
-        submod_attrs={
-            "command_source": ["CommandSource"],
-            "controller": ["Controller", "Design", "draw_genomes"],
-            "cpg": ["Cpg"],
-            "network": ["Network"],
-            "playback": ["Playback"],
-        },
-    )
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

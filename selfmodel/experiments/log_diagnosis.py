@@ -26,7 +26,6 @@ class LogDiagnosis:
     """Inputs of a diagnosis from logged trials.
 
     Attributes:
-        robot: The nominal robot.
         damaged: Trials to explain, in the order in which they were run.
         healthy: Trials of the healthy robot.
         calibration: Fit of the self-model to the healthy trials; None without a fit.
@@ -34,7 +33,6 @@ class LogDiagnosis:
         seed: Seed of all random numbers.
     """
 
-    robot: Robot
     damaged: tuple[Trial, ...]
     healthy: tuple[Trial, ...]
     calibration: Calibration | None
@@ -94,7 +92,6 @@ def set_up_diagnosis(
     fit = fitted(nominal, reference, count) if calibrate and reference else None
     simulator = Simulator(fit.robot if fit else nominal, count)
     return LogDiagnosis(
-        robot=nominal,
         damaged=tuple(to_explain),
         healthy=tuple(reference),
         calibration=fit,

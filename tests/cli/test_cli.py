@@ -13,8 +13,9 @@ import pytest
 
 from selfmodel import cli
 from selfmodel.errors import TrialError
+from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.logs import read_log, save_controller
-from selfmodel.logs.journal import read_database
+from selfmodel.logs.journal import FolderJournal
 from selfmodel.robot.robot import Robot
 from tests.helpers.command import DIAGNOSIS, SMALL, Done, selfmodel, selfmodel_process
 from tests.helpers.drivers import random_controllers
@@ -98,7 +99,7 @@ def test_the_database_is_read_back_from_the_folder(
     run: str, request: pytest.FixtureRequest, quadruped: Robot
 ):
     folder, told = request.getfixturevalue(run)
-    database = read_database(folder / "run", quadruped.anatomy)
+    database = FolderJournal(folder / "run", HypothesisSpace(quadruped.anatomy, ())).read()
 
     assert [t.displacement for t in database.trials] == [t["displacement"] for t in told["trials"]]
     assert [t.plan.stage for t in database.evidence] == ["after", *["recovery"] * TRIALS[run]]

@@ -27,7 +27,6 @@ from tests.helpers.socket_robot import OBSERVED, STOP, TIMESTEP, slow_quadruped
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "drive_a_robot.py"
 PAGE = ROOT / "docs" / "how-to" / "drive-a-robot.md"
-SERVER = (sys.executable, "-m", "tests.helpers.socket_robot")
 
 
 @contextmanager

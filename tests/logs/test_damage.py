@@ -26,8 +26,6 @@ from selfmodel.logs.records import HIDDEN, RESULT, TRIAL, with_digest, without_d
 CASES = Path(__file__).parents[3] / "shared" / "samples" / "mcap-conformance"
 Change = Callable[[McapRecord], McapRecord | None]
 
-COUNTED = (Attachment, Message, Metadata)
-
 
 @pytest.mark.parametrize(
     ("spoil", "error", "match"),

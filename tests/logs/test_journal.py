@@ -10,10 +10,11 @@ from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, UnsearchedFault
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, canonical
+from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import ENVIRONMENT, Fault, FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.logs import CorruptError, LogError, SchemaMismatchError, read_truth
-from selfmodel.logs.journal import FolderJournal, create_journal, read_database
+from selfmodel.logs.journal import FolderJournal, create_journal
 from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
@@ -82,7 +83,10 @@ def test_a_journal_reads_what_it_recorded(journal: FolderJournal, biped: Robot, 
     )
     journal.add(first)
     journal.add(second)
-    for database in (journal.read(), read_database(journal.folder, biped.anatomy)):
+    for database in (
+        journal.read(),
+        FolderJournal(journal.folder, HypothesisSpace(biped.anatomy, ())).read(),
+    ):
         assert [trial.plan for trial in database.trials] == [trial.plan for trial in trials]
         assert database.diagnoses == (first, second)
     assert sorted(path.name for path in (journal.folder / "trials").iterdir()) == [
@@ -160,12 +164,12 @@ def test_a_run_of_another_robot_is_refused(
 ):
     run(plan_of(biped, 3))
     with pytest.raises(SchemaMismatchError, match="it is of the robot 'biped'"):
-        read_database(journal.folder, quadruped.anatomy)
+        FolderJournal(journal.folder, HypothesisSpace(quadruped.anatomy, ())).read()
 
 
 def test_a_folder_without_a_run_is_said_so(biped: Robot, tmp_path: Path):
     with pytest.raises(InputError, match="expected the folder of a run"):
-        read_database(tmp_path, biped.anatomy)
+        FolderJournal(tmp_path, HypothesisSpace(biped.anatomy, ())).read()
 
 
 @pytest.mark.parametrize(

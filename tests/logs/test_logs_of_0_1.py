@@ -14,7 +14,8 @@ from mcap.reader import make_reader
 from typer.testing import CliRunner
 
 from selfmodel.cli import app
-from selfmodel.logs.journal import read_database
+from selfmodel.faults.hypothesis_space import HypothesisSpace
+from selfmodel.logs.journal import FolderJournal
 from selfmodel.tasks import ROBOTS
 
 DATA = Path(__file__).parents[1] / "data" / "logs-0.1"
@@ -106,7 +107,7 @@ def test_the_logs_of_a_run_give_the_diagnosis_that_the_run_found(
 
 @pytest.mark.parametrize(("run", "robot"), [("recovery", "quadruped"), ("cpg", "hexapod")])
 def test_a_run_is_read_from_its_folder(run: str, robot: str):
-    database = read_database(DATA / run, ROBOTS[robot].robot().anatomy)
+    database = FolderJournal(DATA / run, HypothesisSpace(ROBOTS[robot].robot().anatomy, ())).read()
     result = json.loads((DATA / run / "result.json").read_text(encoding="utf-8"))
 
     assert [t.displacement for t in database.trials] == [

@@ -54,7 +54,7 @@ def drawn(request: pytest.FixtureRequest, biped: Robot) -> Robot:
 
 
 @pytest.mark.parametrize("bent", [False, True])
-def test_links_stand_where_the_bodies_do(drawn: Robot, bent: bool):  # noqa: FBT001
+def test_links_stand_where_the_bodies_do(drawn: Robot, bent: bool):  # noqa: FBT001  # a parameter
     rng = np.random.default_rng(2)
     hinges = drawn.anatomy.hinges
     angles = {hinge: float(bent * rng.uniform(-0.5, 0.5)) for hinge in hinges}

@@ -19,7 +19,6 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.neuron import silent_neurons
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
-from selfmodel.recovery.events import Event
 from selfmodel.recovery.fitness import Score
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
@@ -103,7 +102,7 @@ def _recover(job: Job, _part: str, run: Path) -> Any:  # noqa: ANN401  # JSON
         score=plugins.score(shared["score"], parameters["body"], entry),
         physical=entry.physical,
     )
-    outcome = run_experiment(experiment, _ignore)
+    outcome = run_experiment(experiment, on_event=lambda _: None)
     before, *since = outcome.recovery.trials
     after, *recoveries = (_score_of(experiment.score, robot, truth, trial) for trial in since)
     diagnosis = outcome.recovery.diagnosis
@@ -130,7 +129,3 @@ def _score_of(score: Score, robot: Robot, hidden: Hypothesis, trial: Trial) -> f
     logged = trial.behaviour
     signals = {signal: logged[signal][np.newaxis] for signal in score.record}
     return float(score.of(robot, hidden, Behaviour(logged.names, logged.time, signals))[0])
-
-
-def _ignore(_event: Event) -> None:
-    """Callback that ignores the event."""

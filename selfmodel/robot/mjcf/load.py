@@ -9,7 +9,7 @@ from selfmodel.robot.robot import Robot
 
 
 def load_mjcf(path: Path | str, settings: MjcfSettings | None = None) -> Robot:
-    """Returns the robot that an MJCF file describes; see docs/robots.md.
+    """Returns the robot that an MJCF file describes; see docs/reference/mjcf.md.
 
     Args:
         path: The file, which is read only. It may name files in its folder and subfolders.

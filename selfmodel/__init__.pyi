@@ -1,0 +1,29 @@
+from .controllers.controller import Controller as Controller
+from .diagnosis.comparator import Comparator as Comparator
+from .diagnosis.comparator_contract import check_comparator as check_comparator
+from .diagnosis.diagnosis import Diagnosis as Diagnosis
+from .diagnosis.kind_contract import check_fault_kind as check_fault_kind
+from .experiments.one_call import (
+    calibrate as calibrate,
+    diagnose as diagnose,
+    evolve_controller as evolve_controller,
+    load_robot as load_robot,
+    parse_hypothesis as parse_hypothesis,
+    recover as recover,
+    replay as replay,
+    run_trial as run_trial,
+)
+from .experiments.reality import simulated_robot as simulated_robot
+from .faults.hypothesis import Hypothesis as Hypothesis
+from .faults.kind import FaultKind as FaultKind
+from .faults.registry import ALL_KINDS as ALL_KINDS, PAPER_KINDS as PAPER_KINDS
+from .logs.reader import read_log as read_log
+from .physical.environment_robot import EnvironmentRobot as EnvironmentRobot
+from .physical.interface import PhysicalRobot as PhysicalRobot
+from .recovery.recover import Recovery as Recovery
+from .robot.robot import Robot as Robot
+from .settings import Settings as Settings
+from .simulation.simulator import Simulator as Simulator
+from .trials.behaviour import Behaviour as Behaviour
+from .trials.trial import Trial as Trial
+from .version import __version__ as __version__

@@ -1,0 +1,24 @@
+from .broken import BROKEN as BROKEN
+from .build import build as build
+from .ground import FRICTION as FRICTION, SLOPE as SLOPE
+from .hypothesis import INTACT as INTACT, Hypothesis as Hypothesis
+from .hypothesis_space import HypothesisSpace as HypothesisSpace
+from .jammed import JAMMED as JAMMED, JAMMED_AT_ANGLE as JAMMED_AT_ANGLE
+from .kind import (
+    ENVIRONMENT as ENVIRONMENT,
+    Fault as Fault,
+    FaultKind as FaultKind,
+    uniform_bounds as uniform_bounds,
+    uniform_levels as uniform_levels,
+)
+from .motor import WEAK_MOTOR as WEAK_MOTOR
+from .neuron import SILENT_NEURON as SILENT_NEURON
+from .registry import ALL_KINDS as ALL_KINDS, KINDS as KINDS, PAPER_KINDS as PAPER_KINDS
+from .sensor import (
+    FAILED_SENSOR as FAILED_SENSOR,
+    SENSOR_BIAS as SENSOR_BIAS,
+    SENSOR_GAIN as SENSOR_GAIN,
+    SENSOR_NOISE as SENSOR_NOISE,
+)
+from .terrain import ROUGHNESS as ROUGHNESS
+from .wind import CROSSWIND as CROSSWIND, WIND as WIND

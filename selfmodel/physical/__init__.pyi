@@ -1,0 +1,5 @@
+from .environment_robot import EnvironmentRobot as EnvironmentRobot
+from .interface import PhysicalRobot as PhysicalRobot, TimedRobot as TimedRobot
+from .reality_gap import draw_gap as draw_gap
+from .safety_limits import Limit as Limit, joint_limits as joint_limits, tilt_limit as tilt_limit
+from .simulated_robot import SimulatedRobot as SimulatedRobot
