@@ -3,12 +3,11 @@ from .diagnosis.comparator import Comparator as Comparator
 from .diagnosis.comparator_contract import check_comparator as check_comparator
 from .diagnosis.diagnosis import Diagnosis as Diagnosis
 from .diagnosis.kind_contract import check_fault_kind as check_fault_kind
+from .experiments.arguments import load_robot as load_robot, parse_hypothesis as parse_hypothesis
 from .experiments.one_call import (
     calibrate as calibrate,
     diagnose as diagnose,
     evolve_controller as evolve_controller,
-    load_robot as load_robot,
-    parse_hypothesis as parse_hypothesis,
     recover as recover,
     replay as replay,
     run_trial as run_trial,

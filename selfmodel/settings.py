@@ -65,7 +65,8 @@ class Settings:
             )
         if self.population <= self.survivors:
             raise InputError(
-                f"population must exceed the {self.survivors} survivors, got {self.population}"
+                f"population must exceed the {self.survivors} survivors, got {self.population}: "
+                f"for another population use Settings().scaled({max(2, self.population)})"
             )
         if not 0 <= self.mutation <= 1:
             raise InputError(f"mutation is a probability in [0, 1], got {self.mutation}")

@@ -29,7 +29,6 @@ from selfmodel.comparators import DEFAULT
 from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
 from selfmodel.experiments import plugins, trial_logs
-from selfmodel.experiments.fitting import calibration_to_dict
 from selfmodel.experiments.log_diagnosis import by_stage, set_up_diagnosis
 from selfmodel.logs import TrialLog
 from selfmodel.recovery.explain import diagnose_trials
@@ -88,7 +87,7 @@ def diagnose(
         "logs": [log.trial.path for log in used],
         "played_back": [log.trial.path for log in used if _is_played_back(log)],
         "intact": [trial.path for trial in found.healthy],
-        "calibration": calibration_to_dict(found.calibration),
+        "calibration": found.calibration.to_dict() if found.calibration else None,
         "diagnosis": ranking_to_list(diagnosis.ranked),
         **confidence_to_dict(diagnosis),
         "evaluations": found.search.evaluations,

@@ -120,6 +120,9 @@ class Controller:
     def __hash__(self) -> int:
         return hash((self.design, self.genome.tobytes()))
 
+    def __repr__(self) -> str:
+        return f"<Controller: {self.design.summary(self.genome)}>"
+
     @property
     def summary(self) -> str:
         """Short description, such as ``its controller, a network of 3 hidden neurons``."""

@@ -1,10 +1,9 @@
+from .arguments import load_robot as load_robot, parse_hypothesis as parse_hypothesis
 from .grid import Job as Job, finished as finished, run_grid as run_grid
 from .one_call import (
     calibrate as calibrate,
     diagnose as diagnose,
     evolve_controller as evolve_controller,
-    load_robot as load_robot,
-    parse_hypothesis as parse_hypothesis,
     recover as recover,
     replay as replay,
     run_trial as run_trial,

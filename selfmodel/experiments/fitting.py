@@ -1,8 +1,6 @@
-"""Calibration in experiments and commands, and its JSON."""
+"""Calibration in experiments and commands."""
 
-import dataclasses
 from collections.abc import Sequence
-from typing import Any
 
 from selfmodel.errors import InputError
 from selfmodel.robot.robot import Robot
@@ -20,15 +18,3 @@ def fitted(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibration:
         return calibrate(robot, trials, threads)
     except InputError as error:
         raise InputError(f"{error}, or give --no-calibrate") from error
-
-
-def calibration_to_dict(fit: Calibration | None) -> dict[str, Any] | None:
-    """Returns a calibration as JSON; None without a calibration."""
-    if fit is None:
-        return None
-    return {
-        **dataclasses.asdict(fit.parameters),
-        "deviations": [float(deviation) for deviation in fit.deviations],
-        "error_before": fit.error_before,
-        "error": fit.error,
-    }

@@ -8,6 +8,7 @@ from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.errors import InputError
 from selfmodel.experiments import trial_logs
+from selfmodel.experiments.arguments import TrialSource
 from selfmodel.experiments.fitting import fitted
 from selfmodel.faults.kind import FaultKind
 from selfmodel.robot.robot import Robot
@@ -16,9 +17,6 @@ from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.threads import thread_count
 from selfmodel.trials.trial import Trial
-
-TrialSource = Trial | str | Path
-"""A trial, or the path of its log."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -70,19 +70,22 @@ class Recovery:
     def __repr__(self) -> str:
         lines = [f"<Recovery: {self.diagnosis.best}, {self.diagnosis.verdict}"]
         lines += [
-            f"  {row['trial']:14} {row['displacement']:8.3f} m  {row['hypothesis']}"
-            for row in self._rows()
+            f"  {trial.plan.name:14} {trial.displacement:8.3f} m  {tried}"
+            for trial, tried in zip(self.trials, self.tried, strict=True)
         ]
         return "\n".join(lines) + ">"
 
     def to_dict(self) -> dict[str, Any]:
-        """Returns the result as JSON values: trials, displacements in m, diagnosis, evaluations."""
+        """Returns the result as JSON values: trials, displacements in m, diagnosis, evaluations.
+
+        A displacement is None where the base was not observed.
+        """
         return {
             "trials": self._rows(),
             "displacement": {
-                "before": self.before,
-                "after": self.after,
-                "recovered": None if math.isnan(self.recovered) else self.recovered,
+                "before": _observed(self.before),
+                "after": _observed(self.after),
+                "recovered": _observed(self.recovered),
             },
             "diagnosis": self.diagnosis.to_dict(),
             "evaluations": {
@@ -106,11 +109,16 @@ class Recovery:
                 "trial": trial.plan.name,
                 "stage": trial.plan.stage,
                 "hypothesis": str(tried),
-                "displacement": trial.displacement,
+                "displacement": _observed(trial.displacement),
                 "log": trial.path,
             }
             for trial, tried in zip(self.trials, self.tried, strict=True)
         ]
+
+
+def _observed(displacement: float) -> float | None:
+    """JSON has no NaN, which is the displacement of an unobserved base."""
+    return None if math.isnan(displacement) else displacement
 
 
 def recover(

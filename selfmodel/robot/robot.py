@@ -54,6 +54,13 @@ class Robot:
                 f"physics time step {model.opt.timestep} s"
             )
 
+    def __repr__(self) -> str:
+        names = self.anatomy
+        return (
+            f"<Robot {self.name}: {len(names.joints)} joints, {len(names.motors)} motors, "
+            f"{len(names.sensors)} sensors, control time step {self.control_timestep:g} s>"
+        )
+
     @property
     def substeps(self) -> int:
         """Number of physics steps per control step."""

@@ -6,8 +6,9 @@ control delay, an integer, is found by exhaustive search.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
+from typing import Any
 
 import mujoco.minimize
 import numpy as np
@@ -20,6 +21,7 @@ from selfmodel.robot.control_delay import MAX_CONTROL_DELAY
 from selfmodel.robot.parameters import (
     Parameters,
     edited_model,
+    factor_names,
     from_factors,
     nominal,
     with_parameters,
@@ -33,6 +35,7 @@ from selfmodel.simulation.outcome import SimulationStats
 from selfmodel.simulation.prediction import predict
 from selfmodel.simulation.requests import Segments
 from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.data_frame import data_frame
 from selfmodel.trials.signal_difference import difference
 from selfmodel.trials.signal_scales import CALIBRATION_ERROR_SCALES
 from selfmodel.trials.state_estimation import BASE
@@ -84,6 +87,41 @@ class Calibration:
     deviations: FloatArray
     error_before: float
     error: float
+
+    def __repr__(self) -> str:
+        lines = [
+            f"<Calibration of {self.robot.name}: error {self.error_before:.3g} before, "
+            f"{self.error:.3g} after, control delay {self.parameters.delay}"
+        ]
+        lines += [
+            f"  {row['factor']:6.3f} (log deviation {row['deviation']:.3f})  {row['name']}"
+            for row in self._rows()
+        ]
+        return "\n".join(lines) + ">"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns the JSON values: factors, control delay, deviations and errors."""
+        return {
+            **asdict(self.parameters),
+            "deviations": [float(deviation) for deviation in self.deviations],
+            "error_before": self.error_before,
+            "error": self.error,
+        }
+
+    def to_pandas(self) -> Any:  # noqa: ANN401  # pandas is optional
+        """Returns the factors as a ``pandas.DataFrame``: name, factor and deviation.
+
+        Raises:
+            InputError: pandas is not installed.
+        """
+        return data_frame(self._rows())
+
+    def _rows(self) -> list[dict[str, Any]]:
+        names, factors = factor_names(self.robot), self.parameters.factors
+        return [
+            {"name": name, "factor": float(factor), "deviation": float(deviation)}
+            for name, factor, deviation in zip(names, factors, self.deviations, strict=True)
+        ]
 
 
 def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibration:

@@ -20,6 +20,7 @@ from selfmodel.simulation.ground_contacts import ground_contact_points
 from selfmodel.simulation.outcome import SimulationResult, SimulationStats
 from selfmodel.simulation.prediction import predict
 from selfmodel.simulation.requests import Ensemble, Segments
+from selfmodel.simulation.threads import thread_count
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import Signal
 
@@ -44,13 +45,15 @@ class Simulator:
 
     Args:
         robot: The healthy robot.
-        threads: Threads of MuJoCo's steps, including the caller's.
+        threads: Threads of MuJoCo's steps, including the caller's; 0 for all processors.
         stats: Statistics that are updated; new ones by default.
     """
 
-    def __init__(self, robot: Robot, threads: int, stats: SimulationStats | None = None) -> None:
+    def __init__(
+        self, robot: Robot, threads: int = 0, stats: SimulationStats | None = None
+    ) -> None:
         self.robot = robot
-        self.threads = threads
+        self.threads = thread_count(threads)
         self.stats = SimulationStats() if stats is None else stats
         affordable = MAX_CACHED_BYTES // int(robot.model.nbuffer)
         self._embodiment = lru_cache(max(1, min(MAX_CACHED_EMBODIMENTS, affordable)))(

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.data_frame import data_frame
 from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.trial import Trial
 
@@ -38,6 +40,40 @@ class Replay:
         squares = self.errors[signal][steps] ** 2
         observed = squares[~np.isnan(squares)]
         return float(np.sqrt(observed.mean())) if len(observed) else np.nan
+
+    def __repr__(self) -> str:
+        step = self.first_divergence_step
+        compared = "no divergence" if step is None else f"first divergence at step {step}"
+        state = "identical" if self.identical else compared
+        lines = [
+            f"<Replay of {self.simulated.steps} steps: {state}"
+            f"{', the simulation diverged' if self.diverged else ''}"
+        ]
+        if not self.identical:
+            lines += [f"  rms {self.rms(signal):10.3g}  {signal}" for signal in self.errors]
+        return "\n".join(lines) + ">"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns the JSON values; a signal's rms is None if not observed, or not finite."""
+        return {
+            "identical": self.identical,
+            "first_divergence_step": self.first_divergence_step,
+            "diverged": self.diverged,
+            "rms": {signal: _finite(self.rms(signal)) for signal in self.errors},
+        }
+
+    def to_pandas(self) -> Any:  # noqa: ANN401  # pandas is optional
+        """Returns the errors as a ``pandas.DataFrame``, one row per step, one column per signal.
+
+        Raises:
+            InputError: pandas is not installed.
+        """
+        return data_frame(
+            [
+                {"step": step, **{name: float(rows[step]) for name, rows in self.errors.items()}}
+                for step in range(self.simulated.steps)
+            ]
+        )
 
 
 def replay(
@@ -75,6 +111,11 @@ def replay(
         errors=errors,
         diverged=bool(outcome.diverged[0]),
     )
+
+
+def _finite(rms: float) -> float | None:
+    """JSON has neither NaN nor infinity."""
+    return rms if np.isfinite(rms) else None
 
 
 def _bits(values: FloatArray) -> FloatArray:

@@ -55,6 +55,15 @@ class Trial:
     behaviour: Behaviour
     path: str
 
+    def __repr__(self) -> str:
+        plan = self.plan
+        return (
+            f"<Trial {plan.name} of {self.robot}: stage {plan.stage}, "
+            f"{self.behaviour.steps} of {plan.steps} steps"
+            f"\n  {plan.controller.summary}"
+            f"\n  {self.path}>"
+        )
+
     @property
     def displacement(self) -> float:
         """Forward displacement, m."""

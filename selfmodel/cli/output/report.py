@@ -11,7 +11,6 @@ from selfmodel.cli.output.ranking import in_words, ranking_table
 from selfmodel.cli.output.tables import folding
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
 from selfmodel.experiments.experiment import Experiment, Outcome
-from selfmodel.experiments.fitting import calibration_to_dict
 from selfmodel.robot.designs import network_for
 
 
@@ -83,7 +82,7 @@ def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
         ],
         "diagnosis": ranking_to_list(recovery.diagnosis.ranked),
         **confidence_to_dict(recovery.diagnosis),
-        "calibration": calibration_to_dict(recovery.calibration),
+        "calibration": recovery.calibration.to_dict() if recovery.calibration else None,
         "correct": outcome.correct,
         "displacement": {
             "before": recovery.before,

@@ -1,0 +1,165 @@
+"""Arguments of the public functions: objects from names, notation and paths."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from selfmodel.diagnosis.comparator import Comparator
+from selfmodel.errors import InputError
+from selfmodel.experiments import plugins, trial_logs
+from selfmodel.experiments.robots import is_model, robot_entry
+from selfmodel.faults import KINDS, FaultKind
+from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.faults.notation import parse
+from selfmodel.robot.mjcf.load import load_mjcf
+from selfmodel.robot.mjcf.settings import MjcfSettings
+from selfmodel.robot.robot import Robot
+from selfmodel.trials.trial import Trial
+
+RobotSource = Robot | str | Path
+"""A robot, its name, or the path of its MJCF file."""
+
+TrialSource = Trial | str | Path
+"""A trial, or the path of its log."""
+
+KindSource = str | Sequence[str | FaultKind]
+"""Names of fault kinds separated by commas, or a sequence of names and fault kinds."""
+
+
+def load_robot(name: str | Path, settings: MjcfSettings | None = None) -> Robot:
+    """Returns a robot by name, or the robot of an MJCF file.
+
+    Example:
+        >>> import selfmodel
+        >>> selfmodel.load_robot("quadruped").anatomy.joint("front_left_knee").hinges
+        ('front_left_knee',)
+
+    Args:
+        name: ``quadruped``, ``hexapod``, ``suite-DOMAIN-TASK``, or the path of an MJCF file.
+        settings: Settings of the MJCF file; None for those of the TOML file beside it.
+
+    Raises:
+        InputError: The name is unknown, the file is no valid robot, or settings are given for a
+            robot by name.
+    """
+    if is_model(str(name)):
+        return load_mjcf(name, settings)
+    if settings is not None:
+        raise InputError(f"settings are for an MJCF file: {str(name)!r} is the name of a robot")
+    return robot_entry(str(name)).robot()
+
+
+def parse_hypothesis(
+    text: str, robot: Robot, kinds: Sequence[FaultKind] = tuple(KINDS.values())
+) -> Hypothesis:
+    """Returns the hypothesis of a text in notation.
+
+    Example:
+        >>> import selfmodel
+        >>> robot = selfmodel.load_robot("quadruped")
+        >>> print(selfmodel.parse_hypothesis("friction=0.4+break:front_left_knee", robot))
+        break:front_left_knee+friction=0.4
+
+    Args:
+        text: Terms ``kind:part``, ``kind:part=severity`` or ``kind=severity`` joined by ``+``, or
+            ``intact``.
+        robot: The robot whose parts the text names.
+        kinds: The fault kinds that the text may name.
+
+    Raises:
+        InputError: A term is malformed, or names an unknown kind or part.
+    """
+    return parse(text, robot.anatomy, kinds)
+
+
+def robot_of(source: RobotSource) -> Robot:
+    """Returns a robot, given as itself, by name or by MJCF file.
+
+    Raises:
+        InputError: The name is unknown, the file is no valid robot, or the type is another.
+    """
+    if isinstance(source, Robot):
+        return source
+    if not isinstance(source, str | Path):
+        raise _unexpected('a Robot, a name such as "quadruped" or the path of an MJCF file', source)
+    return load_robot(source)
+
+
+def hypothesis_of(source: Hypothesis | str, robot: Robot) -> Hypothesis:
+    """Returns a hypothesis, given as itself or in notation.
+
+    Raises:
+        InputError: The notation is invalid for the robot, or the type is another.
+    """
+    if isinstance(source, Hypothesis):
+        return source
+    if not isinstance(source, str):
+        raise _unexpected('a Hypothesis or notation such as "break:front_left_knee"', source)
+    return parse_hypothesis(source, robot)
+
+
+def comparator_of(source: Comparator | str) -> Comparator:
+    """Returns a comparator, given as itself or by name.
+
+    Raises:
+        InputError: The name is unknown, or its object is no comparator.
+    """
+    return plugins.comparator(source) if isinstance(source, str) else source
+
+
+def kinds_of(source: KindSource) -> tuple[FaultKind, ...]:
+    """Returns distinct fault kinds, given as themselves or by name.
+
+    Raises:
+        InputError: There are none, a name is unknown, or an item has another type.
+    """
+    found: list[FaultKind] = []
+    for item in [source] if isinstance(source, str | FaultKind) else source:
+        if not isinstance(item, str | FaultKind):
+            raise _unexpected("a FaultKind or its name", item)
+        found += plugins.kinds(item) if isinstance(item, str) else [item]
+    if not found:
+        raise InputError('expected at least one fault kind, got none: give kinds="break,jam"')
+    return tuple(dict.fromkeys(found))
+
+
+def sources_of(given: TrialSource | Sequence[TrialSource]) -> tuple[TrialSource, ...]:
+    """Returns a sequence of trials and paths, given as such or as one trial or path.
+
+    Raises:
+        InputError: An item has another type.
+    """
+    if isinstance(given, Trial | str | Path):
+        return (given,)
+    expected = "trials or paths of their logs"
+    if not isinstance(given, Sequence):
+        raise _unexpected(expected, given)
+    for item in given:
+        if not isinstance(item, Trial | str | Path):
+            raise _unexpected(expected, item)
+    return tuple(given)
+
+
+def trials_of(given: TrialSource | Sequence[TrialSource]) -> tuple[Trial, ...]:
+    """Returns trials, given as themselves or as paths of their logs.
+
+    Raises:
+        InputError: A log is unusable or given twice, or an item has another type.
+    """
+    sources = sources_of(given)
+    logs = iter(trial_logs.logs([Path(one) for one in sources if not isinstance(one, Trial)]))
+    return tuple(one if isinstance(one, Trial) else next(logs).trial for one in sources)
+
+
+def check_seed(seed: int | None) -> None:
+    """Checks a seed; None is valid.
+
+    Raises:
+        InputError: The seed is negative.
+    """
+    if seed is not None and seed < 0:
+        raise InputError(f"expected a seed of 0 or above, got {seed}: give one such as seed=0")
+
+
+def _unexpected(expected: str, got: object) -> InputError:
+    remedy = ": give its attribute trial" if hasattr(got, "trial") else ""
+    return InputError(f"expected {expected}, got an object of type {type(got).__name__}{remedy}")
