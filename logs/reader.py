@@ -92,6 +92,12 @@ def read_log(path: str | Path) -> TrialLog:
     of the controller, the layout and time of every message, the names, and the displacement. The
     hidden faults of a simulated robot are not read.
 
+    Example:
+        >>> import selfmodel
+        >>> log = selfmodel.read_log("before.mcap")
+        >>> print(log.trial.plan.stage, log.trial.behaviour.steps, log.status)
+        before 60 finished
+
     Raises:
         LogError: A check failed.
         InputError: The file does not exist.

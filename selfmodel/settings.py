@@ -25,6 +25,12 @@ class Settings:
     Source: the paper, sections III and IV. Its surviving text has lost digits; the values of
     ``steps``, ``population``, ``generations`` and ``survivors`` are reconstructed.
 
+    Example:
+        >>> import selfmodel
+        >>> settings = selfmodel.Settings(generations=5).scaled(20)
+        >>> print(settings.generations, settings.population, settings.survivors)
+        5 20 10
+
     Attributes:
         steps: Control steps of a run.
         trials: Physical trials after the failing one.

@@ -21,6 +21,18 @@ def check_comparator(comparator: Comparator, trial: Trial, simulated: Behaviour)
 
     If the prepared trial has losses, it is checked as a ``PiecewiseTrial``.
 
+    Example:
+        >>> import selfmodel
+        >>> from selfmodel.comparators import FORWARD_DISPLACEMENT
+        >>> robot = selfmodel.load_robot("quadruped")
+        >>> walk = selfmodel.read_log("before.mcap").trial.plan.controller
+        >>> physical = selfmodel.simulated_robot(robot)
+        >>> trial = selfmodel.run_trial(physical, walk, "checked.mcap", robot=robot, steps=20)
+        >>> damaged = selfmodel.parse_hypothesis("break:front_left_knee", robot)
+        >>> runs = [(selfmodel.Hypothesis(), walk), (damaged, walk)]
+        >>> simulated = selfmodel.Simulator(robot).run(runs, 20, ["base_position"]).behaviour
+        >>> selfmodel.check_comparator(FORWARD_DISPLACEMENT, trial, simulated)
+
     Args:
         comparator: The comparator to check.
         trial: A logged trial.

@@ -22,6 +22,11 @@ STEPS = 20
 def check_fault_kind(kind: FaultKind, robot: Robot) -> None:
     """Checks that a kind fulfils the contract of ``FaultKind``.
 
+    Example:
+        >>> import selfmodel
+        >>> kind = selfmodel.PAPER_KINDS[0]
+        >>> selfmodel.check_fault_kind(kind, selfmodel.load_robot("quadruped"))
+
     Args:
         kind: The kind to check, searchable or not.
         robot: A robot that the kind applies to.

@@ -49,26 +49,25 @@ def load_robot(name: str | Path, settings: MjcfSettings | None = None) -> Robot:
 
 
 def parse_hypothesis(
-    text: str, robot: Robot, kinds: Sequence[FaultKind] = tuple(KINDS.values())
+    text: str, robot: RobotSource, kinds: Sequence[FaultKind] = tuple(KINDS.values())
 ) -> Hypothesis:
     """Returns the hypothesis of a text in notation.
 
     Example:
         >>> import selfmodel
-        >>> robot = selfmodel.load_robot("quadruped")
-        >>> print(selfmodel.parse_hypothesis("friction=0.4+break:front_left_knee", robot))
+        >>> print(selfmodel.parse_hypothesis("friction=0.4+break:front_left_knee", "quadruped"))
         break:front_left_knee+friction=0.4
 
     Args:
         text: Terms ``kind:part``, ``kind:part=severity`` or ``kind=severity`` joined by ``+``, or
             ``intact``.
-        robot: The robot whose parts the text names.
+        robot: The robot whose parts the text names, its name, or the path of its MJCF file.
         kinds: The fault kinds that the text may name.
 
     Raises:
         InputError: A term is malformed, or names an unknown kind or part.
     """
-    return parse(text, robot.anatomy, kinds)
+    return parse(text, robot_of(robot).anatomy, kinds)
 
 
 def robot_of(source: RobotSource) -> Robot:

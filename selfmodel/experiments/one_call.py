@@ -71,9 +71,8 @@ def evolve_controller(
     Example:
         >>> import selfmodel
         >>> settings = selfmodel.Settings(steps=20, generations=2).scaled(4)
-        >>> robot = selfmodel.load_robot("quadruped")
-        >>> selfmodel.evolve_controller(robot, settings=settings).design.weights
-        68
+        >>> selfmodel.evolve_controller("quadruped", settings=settings)
+        <Controller: a network of 3 hidden neurons>
 
     Args:
         robot: The nominal robot, its name, or the path of its MJCF file.
@@ -108,6 +107,16 @@ def run_trial(
 ) -> Trial:
     """Runs a physical trial, logs it while it runs, and returns the trial read from the log.
 
+    Example:
+        >>> import selfmodel
+        >>> settings = selfmodel.Settings(steps=20, generations=2).scaled(4)
+        >>> walk = selfmodel.evolve_controller("quadruped", settings=settings)
+        >>> physical = selfmodel.simulated_robot("quadruped")
+        >>> selfmodel.run_trial(physical, walk, "walk.mcap", robot="quadruped", steps=20)
+        <Trial walk of quadruped: stage single, 20 of 20 steps
+          its controller, a network of 3 hidden neurons
+          walk.mcap>
+
     Args:
         physical: The physical robot.
         controller: Controller or playback that drives the robot.
@@ -134,6 +143,17 @@ def calibrate(
 ) -> Calibration:
     """Returns the self-model of a robot, fitted to trials of the healthy robot.
 
+    Example:
+        >>> import selfmodel
+        >>> walk = selfmodel.read_log("before.mcap").trial.plan.controller
+        >>> physical = selfmodel.simulated_robot("quadruped")
+        >>> trial = selfmodel.run_trial(
+        ...     physical, walk, "healthy.mcap", robot="quadruped", steps=60
+        ... )
+        >>> fit = selfmodel.calibrate(trial, "quadruped")
+        >>> fit.parameters.friction
+        1.0
+
     Args:
         trials: Trials of the healthy robot, or paths of their logs, at least one.
         robot: The nominal robot, its name, or the path of its MJCF file.
@@ -155,6 +175,11 @@ def replay(
     threads: int = 0,
 ) -> Replay:
     """Returns the comparison of a trial with its simulation under a hypothesis.
+
+    Example:
+        >>> import selfmodel
+        >>> selfmodel.replay("after.mcap", "break:front_left_knee", "quadruped").identical
+        False
 
     Args:
         trial: A logged trial, or the path of its log.
@@ -186,6 +211,15 @@ def diagnose(
     on_event: Callable[[Event], None] = _ignore,
 ) -> Diagnosis:
     """Returns the hypotheses that explain logged trials, ranked, with a verdict.
+
+    Example:
+        >>> import selfmodel
+        >>> settings = selfmodel.Settings(generations=2).scaled(6)
+        >>> diagnosis = selfmodel.diagnose(
+        ...     "after.mcap", healthy="before.mcap", settings=settings, calibrate=False
+        ... )
+        >>> print(diagnosis.best, diagnosis.verdict)
+        break:front_left_knee explained
 
     Args:
         trials: Trials to explain, or paths of their logs, in the order in which they were run.
@@ -243,6 +277,15 @@ def recover(
     """Runs a recovery: the robot walks, fails, is diagnosed from its logs, and walks again.
 
     Source: the paper, section III.
+
+    Example:
+        >>> import selfmodel
+        >>> healthy = selfmodel.simulated_robot("quadruped")
+        >>> damaged = selfmodel.simulated_robot("quadruped", "break:front_left_knee")
+        >>> settings = selfmodel.Settings(steps=60, trials=1, generations=1).scaled(4)
+        >>> recovery = selfmodel.recover(healthy, damaged, "quadruped", "run", settings=settings)
+        >>> print(recovery.diagnosis.best, recovery.diagnosis.verdict)
+        break:front_left_knee explained
 
     Args:
         healthy: The physical robot before its failure.

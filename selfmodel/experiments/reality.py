@@ -3,6 +3,7 @@
 import json
 from dataclasses import dataclass
 
+from selfmodel.experiments.arguments import RobotSource, check_seed, hypothesis_of, robot_of
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.physical.reality_gap import RealityGap, draw_gap
 from selfmodel.physical.simulated_robot import SimulatedRobot
@@ -37,8 +38,8 @@ class Reality:
 
 
 def simulated_robot(
-    robot: Robot,
-    hypothesis: Hypothesis = INTACT,
+    robot: RobotSource,
+    hypothesis: Hypothesis | str = INTACT,
     *,
     gap: float = 0.0,
     structure: bool = False,
@@ -51,22 +52,24 @@ def simulated_robot(
 
     Example:
         >>> import selfmodel
-        >>> robot = selfmodel.load_robot("quadruped")
-        >>> damaged = selfmodel.parse_hypothesis("break:front_left_knee", robot)
-        >>> physical = selfmodel.simulated_robot(robot, damaged, gap=0.05)
+        >>> physical = selfmodel.simulated_robot("quadruped", "break:front_left_knee", gap=0.05)
 
     Args:
-        robot: The nominal robot.
-        hypothesis: The faults of the physical robot.
+        robot: The nominal robot, its name, or the path of its MJCF file.
+        hypothesis: The faults of the physical robot, or their notation.
         gap: Level of the reality gap, the relative standard deviation of its factors; 0 is none.
         structure: Whether the physical robot also differs in structure from its model.
         seed: Seed of the gap, the structure and the noise.
 
     Raises:
-        InputError: The level is out of range.
+        InputError: The level is out of range, the seed is negative, the robot is unknown, or the
+            notation is invalid.
     """
-    stream = 1 if hypothesis.faults else 0
-    return draw_reality(robot, seed, gap, structure=structure).robot(robot, hypothesis, stream)
+    check_seed(seed)
+    robot = robot_of(robot)
+    hidden = hypothesis_of(hypothesis, robot)
+    stream = 1 if hidden.faults else 0
+    return draw_reality(robot, seed, gap, structure=structure).robot(robot, hidden, stream)
 
 
 def draw_reality(robot: Robot, seed: int, level: float, *, structure: bool) -> Reality:

@@ -15,6 +15,12 @@ class Hypothesis:
     which equal hypotheses have equal effects on a robot. The constructor does not check its
     argument.
 
+    Example:
+        >>> import selfmodel
+        >>> both = selfmodel.parse_hypothesis("jam:back_left_knee+friction=0.4", "quadruped")
+        >>> print(both, len(both))
+        friction=0.4+jam:back_left_knee 2
+
     Attributes:
         faults: Faults, sorted, without faults that another fault absorbs.
     """

@@ -90,8 +90,8 @@ class Calibration:
 
     def __repr__(self) -> str:
         lines = [
-            f"<Calibration of {self.robot.name}: error {self.error_before:.3g} before, "
-            f"{self.error:.3g} after, control delay {self.parameters.delay}"
+            f"<Calibration of {self.robot.name}: control delay {self.parameters.delay}",
+            f"  error {self.error_before:.3g} before, {self.error:.3g} after",
         ]
         lines += [
             f"  {row['factor']:6.3f} (log deviation {row['deviation']:.3f})  {row['name']}"

@@ -43,6 +43,16 @@ MAX_CACHED_BYTES = 2**29
 class Simulator:
     """Batch simulator of one robot; a run is bit-identical in every batch and thread count.
 
+    Example:
+        >>> import selfmodel
+        >>> robot = selfmodel.load_robot("quadruped")
+        >>> walk = selfmodel.read_log("before.mcap").trial.plan.controller
+        >>> damaged = selfmodel.parse_hypothesis("break:front_left_knee", robot)
+        >>> runs = [(selfmodel.Hypothesis(), walk), (damaged, walk)]
+        >>> result = selfmodel.Simulator(robot).run(runs, steps=20, record=["base_position"])
+        >>> result.behaviour["base_position"].shape
+        (2, 20, 3)
+
     Args:
         robot: The healthy robot.
         threads: Threads of MuJoCo's steps, including the caller's; 0 for all processors.

@@ -45,10 +45,8 @@ class Replay:
         step = self.first_divergence_step
         compared = "no divergence" if step is None else f"first divergence at step {step}"
         state = "identical" if self.identical else compared
-        lines = [
-            f"<Replay of {self.simulated.steps} steps: {state}"
-            f"{', the simulation diverged' if self.diverged else ''}"
-        ]
+        broken = ", the simulation diverged" if self.diverged else ""
+        lines = [f"<Replay of {self.simulated.steps} steps: {state}{broken}"]
         if not self.identical:
             lines += [f"  rms {self.rms(signal):10.3g}  {signal}" for signal in self.errors]
         return "\n".join(lines) + ">"

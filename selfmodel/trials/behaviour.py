@@ -50,6 +50,12 @@ class Behaviour:
     Row k is the state in which command k was computed, so the last command has no consequence in
     the record. A batch has a leading axis of runs.
 
+    Example:
+        >>> import selfmodel
+        >>> behaviour = selfmodel.read_log("before.mcap").trial.behaviour
+        >>> behaviour["base_position"].shape
+        (60, 3)
+
     Attributes:
         names: Column names of the signals.
         time: Seconds since the start of the run, ``(steps,)``, strictly increasing.
