@@ -1,0 +1,196 @@
+"""Promises of the public functions: names, paths and objects are equal arguments; clear errors."""
+
+import json
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+import selfmodel
+from selfmodel.comparators import DEFAULT, FORWARD_DISPLACEMENT
+from selfmodel.errors import InputError
+from selfmodel.faults import BROKEN, JAMMED
+from tests.helpers.command import selfmodel as command
+
+LOGS = Path(__file__).parents[1] / "data" / "logs-0.1" / "recovery" / "trials"
+BEFORE, AFTER = LOGS / "00-before.mcap", LOGS / "01-after.mcap"
+SMALL = selfmodel.Settings(steps=60, trials=1, generations=1).scaled(4)
+KNEE = "break:front_left_knee"
+
+
+def diagnosis(
+    trials: object = AFTER, healthy: object = BEFORE, **options: object
+) -> selfmodel.Diagnosis:
+    """A small diagnosis without a calibration."""
+    return selfmodel.diagnose(
+        trials,
+        healthy=healthy,
+        **{"settings": SMALL, "calibrate": False, "comparator": FORWARD_DISPLACEMENT, **options},
+    )
+
+
+@pytest.fixture(scope="module")
+def reference() -> selfmodel.Diagnosis:
+    return diagnosis()
+
+
+@pytest.fixture
+def recovery(tmp_path: Path) -> selfmodel.Recovery:
+    healthy = selfmodel.simulated_robot("quadruped")
+    damaged = selfmodel.simulated_robot("quadruped", KNEE)
+    return selfmodel.recover(healthy, damaged, "quadruped", tmp_path / "run", settings=SMALL)
+
+
+@pytest.mark.parametrize(
+    ("after", "before"),
+    [(str(AFTER), str(BEFORE)), ([AFTER], (BEFORE,)), ([str(AFTER)], [BEFORE])],
+    ids=["texts", "sequences", "sequences of both"],
+)
+def test_one_log_is_a_path_a_text_or_a_sequence(
+    after: object, before: object, reference: selfmodel.Diagnosis
+):
+    assert diagnosis(after, before) == reference
+
+
+def test_without_healthy_trials_the_stage_decides(reference: selfmodel.Diagnosis):
+    assert diagnosis([BEFORE, AFTER], ()) == reference
+
+
+def test_trials_are_diagnosed_as_their_logs_are():
+    before, after = (selfmodel.read_log(path).trial for path in (BEFORE, AFTER))
+    robot = selfmodel.load_robot("quadruped")
+
+    from_logs = diagnosis(robot=robot)
+
+    assert diagnosis(after, before, robot=robot) == from_logs
+    assert diagnosis([after], BEFORE, robot="quadruped", seed=after.plan.seed) == from_logs
+
+
+def test_a_comparator_by_name_is_the_comparator():
+    assert diagnosis(comparator=DEFAULT.name) == diagnosis(comparator=DEFAULT)
+
+
+@pytest.mark.parametrize(
+    "kinds", ["break, jam", ["break", "jam"], ["break", JAMMED], [BROKEN, JAMMED]]
+)
+def test_kinds_are_names_or_objects(kinds: object):
+    assert diagnosis(kinds=kinds) == diagnosis(kinds=(BROKEN, JAMMED))
+
+
+def test_a_diagnosis_is_that_of_the_command_line(tmp_path: Path):
+    done = command(
+        *("diagnose", str(BEFORE), str(AFTER), "--no-calibrate", "--json"),
+        *("--population", "8", "--generations", "1"),
+        cwd=tmp_path,
+    )
+    settings = selfmodel.Settings(steps=60, trials=1, generations=1).scaled(8)
+
+    found = diagnosis(comparator=DEFAULT, settings=settings)
+
+    assert json.loads(done.stdout)["diagnosis"] == found.to_dict()["ranked"]
+    assert json.loads(done.stdout)["verdict"] == found.verdict
+
+
+def test_a_recovery_is_readable_serialisable_and_a_table(
+    recovery: selfmodel.Recovery, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setitem(sys.modules, "pandas", SimpleNamespace(DataFrame=list))
+    first, *rows = repr(recovery).splitlines()
+
+    assert first == f"<Recovery: {recovery.diagnosis.best}, {recovery.diagnosis.verdict}"
+    assert [row.split()[0] for row in rows] == ["00-before", "01-after", "02-recovery"]
+    values = json.loads(json.dumps(recovery.to_dict(), allow_nan=False))
+    assert values["displacement"]["after"] == recovery.after
+    assert recovery.to_pandas() == values["trials"]
+    assert all(Path(row["log"]).is_file() for row in values["trials"])
+
+
+def test_a_trial_runs_and_replays_to_the_bit(tmp_path: Path):
+    walk = selfmodel.evolve_controller("quadruped", KNEE, settings=SMALL)
+    physical = selfmodel.simulated_robot("quadruped", KNEE)
+    path = tmp_path / "walk.mcap"
+    trial = selfmodel.run_trial(physical, walk, path, robot="quadruped", steps=60)
+
+    assert trial.plan.controller == walk
+    for source in (trial, path, str(path)):
+        assert selfmodel.replay(source, KNEE, "quadruped").identical
+    assert not selfmodel.replay(trial, "intact", "quadruped").identical
+
+
+def test_an_exact_model_stays_as_it_is(tmp_path: Path):
+    walk = selfmodel.read_log(BEFORE).trial.plan.controller
+    physical = selfmodel.simulated_robot("quadruped")
+    path = tmp_path / "walk.mcap"
+    trial = selfmodel.run_trial(physical, walk, path, robot="quadruped", steps=60)
+    robot = selfmodel.load_robot("quadruped")
+
+    for source in (trial, [trial], path, [str(path)]):
+        fit = selfmodel.calibrate(source, robot)
+        assert fit.robot is robot
+        assert fit.error < 0.01
+
+
+def test_a_controller_evolves_equally_from_names_and_objects():
+    robot = selfmodel.load_robot("quadruped")
+    knee = selfmodel.parse_hypothesis(KNEE, robot)
+
+    named = selfmodel.evolve_controller("quadruped", KNEE, design="cpg", settings=SMALL, seed=1)
+
+    assert named.design.name == "cpg"
+    assert named == selfmodel.evolve_controller(
+        robot, knee, design=named.design, settings=SMALL, seed=1, threads=1
+    )
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"trials": []}, "expected at least one trial to explain, got none"),
+        ({"trials": 3}, "expected trials or paths of their logs, got an object of type int"),
+        ({"trials": [3]}, "expected trials or paths of their logs, got an object of type int"),
+        ({"trials": "no.mcap"}, r"no\.mcap: expected a log file"),
+        ({"trials": [AFTER, AFTER]}, "are the same log: give each log once"),
+        ({"healthy": AFTER}, "are the same log: give each log once"),
+        ({"comparator": "gait"}, "unknown comparator 'gait'"),
+        ({"kinds": "brake"}, "unknown kind 'brake'"),
+        ({"kinds": ["brake"]}, "unknown kind 'brake'"),
+        ({"kinds": [3]}, "expected a FaultKind or its name, got an object of type int"),
+        ({"kinds": []}, "expected at least one fault kind, got none: give kinds="),
+        ({"robot": "octopod"}, "unknown robot 'octopod'"),
+        ({"robot": 3}, 'expected a Robot, a name such as "quadruped" .* got .* type int'),
+        ({"seed": -1}, "expected a seed of 0 or above, got -1"),
+    ],
+)
+def test_a_wrong_argument_is_refused_in_a_sentence(options: dict[str, object], message: str):
+    with pytest.raises(InputError, match=message):
+        diagnosis(**options)
+
+
+def test_a_log_in_place_of_its_trial_is_refused_with_the_remedy():
+    with pytest.raises(InputError, match="type TrialLog: give its attribute trial"):
+        diagnosis([selfmodel.read_log(AFTER)])
+
+
+def test_a_trial_without_a_log_requires_a_robot():
+    with pytest.raises(InputError, match="a trial without a log has no model of its robot: give"):
+        diagnosis(selfmodel.read_log(AFTER).trial)
+
+
+def test_an_unknown_design_and_a_negative_seed_are_refused():
+    with pytest.raises(InputError, match="unknown kind of controller 'net'"):
+        selfmodel.evolve_controller("quadruped", design="net", settings=SMALL)
+    with pytest.raises(InputError, match="expected a seed of 0 or above, got -1"):
+        selfmodel.evolve_controller("quadruped", settings=SMALL, seed=-1)
+
+
+def test_a_replay_of_wrong_notation_is_refused():
+    with pytest.raises(InputError, match="unknown kind of fault"):
+        selfmodel.replay(BEFORE, "brake:front_left_knee", "quadruped")
+    with pytest.raises(InputError, match=r"expected a Hypothesis or notation .* type int"):
+        selfmodel.replay(BEFORE, 3, "quadruped")
+
+
+def test_a_small_population_alone_is_refused_with_the_remedy():
+    with pytest.raises(InputError, match=r"for another population use Settings\(\)\.scaled\(4\)"):
+        selfmodel.Settings(population=4)

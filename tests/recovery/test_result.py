@@ -1,0 +1,121 @@
+"""Promises of the results: readable in a few lines, serialisable as JSON, tables."""
+
+import dataclasses
+import json
+import math
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import selfmodel
+from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.recovery.recover import Recovery
+from selfmodel.robot.parameters import nominal
+from selfmodel.robot.robot import Robot
+from selfmodel.simulation.calibration import Calibration
+from selfmodel.simulation.trial_replay import Replay
+from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.trial import Trial
+
+LOGS = Path(__file__).parents[1] / "data" / "logs-0.1" / "recovery" / "trials"
+
+
+@pytest.fixture(autouse=True)
+def _tables_are_lists(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pandas", SimpleNamespace(DataFrame=list))
+
+
+@pytest.fixture
+def trial() -> Trial:
+    return selfmodel.read_log(LOGS / "00-before.mcap").trial
+
+
+@pytest.fixture
+def different(trial: Trial) -> Replay:
+    return selfmodel.replay(trial, "intact", "quadruped")
+
+
+@pytest.fixture
+def fit(quadruped: Robot) -> Calibration:
+    parameters = dataclasses.replace(nominal(quadruped), friction=1.25, delay=2)
+    return Calibration(quadruped, parameters, np.full(12, 0.15), 0.75, 0.5)
+
+
+def without_base(trial: Trial) -> Trial:
+    behaviour = trial.behaviour
+    unobserved = np.full_like(behaviour["base_position"], np.nan)
+    signals = {**behaviour.signals, "base_position": unobserved}
+    return dataclasses.replace(trial, behaviour=dataclasses.replace(behaviour, signals=signals))
+
+
+def test_an_unobserved_displacement_is_none_everywhere(trial: Trial):
+    diagnosis = Diagnosis((Candidate(INTACT, 0.0),), 1, 0.0, (), "explained", "by hand")
+    blind = without_base(trial)
+    recovery = Recovery((blind,) * 3, (INTACT,) * 3, diagnosis, 0, 0, 0)
+
+    values = json.loads(json.dumps(recovery.to_dict(), allow_nan=False))
+
+    assert math.isnan(recovery.before)
+    assert values["displacement"] == {"before": None, "after": None, "recovered": None}
+    assert [row["displacement"] for row in recovery.to_pandas()] == [None] * 3
+    assert "nan m  intact" in repr(recovery)
+
+
+def test_a_calibration_is_readable_serialisable_and_a_table(fit: Calibration):
+    title, errors, *rows = repr(fit).splitlines()
+
+    assert title == "<Calibration of quadruped: control delay 2"
+    assert errors == "  error 0.75 before, 0.5 after"
+    assert rows[2] == "   1.250 (log deviation 0.150)  friction"
+    assert len(rows) == 12
+    assert json.loads(json.dumps(fit.to_dict(), allow_nan=False)) == {
+        **{"root_mass": 1.0, "limb_mass": 1.0, "friction": 1.25, "damping": 1.0},
+        **{"motor_gains": [1.0] * 8, "delay": 2, "deviations": [0.15] * 12},
+        **{"error_before": 0.75, "error": 0.5},
+    }
+    assert fit.to_pandas()[2] == {"name": "friction", "factor": 1.25, "deviation": 0.15}
+
+
+def test_a_replay_is_serialisable_and_a_table(different: Replay):
+    values = json.loads(json.dumps(different.to_dict(), allow_nan=False))
+    rows = different.to_pandas()
+
+    assert list(values) == ["identical", "first_divergence_step", "diverged", "rms"]
+    assert values["rms"] == {signal: different.rms(signal) for signal in SIGNALS}
+    assert [row["step"] for row in rows] == list(range(60))
+    assert rows[7]["commands"] == different.errors["commands"][7]
+
+
+def test_the_rms_of_an_unobserved_signal_is_none(trial: Trial):
+    found = selfmodel.replay(without_base(trial), "intact", "quadruped")
+
+    assert found.to_dict()["rms"]["base_position"] is None
+
+
+def test_the_repr_of_a_replay_has_the_errors_only_of_a_different_one(different: Replay):
+    same = dataclasses.replace(different, identical=True, first_divergence_step=None)
+
+    assert repr(same) == "<Replay of 60 steps: identical>"
+    assert repr(different).startswith("<Replay of 60 steps: first divergence at step 0\n  rms ")
+    assert len(repr(different).splitlines()) == 1 + len(SIGNALS)
+
+
+def test_the_repr_of_a_robot_a_trial_and_a_controller_is_short(trial: Trial, quadruped: Robot):
+    assert repr(quadruped) == (
+        "<Robot quadruped: 8 joints, 8 motors, 8 sensors, control time step 0.01 s>"
+    )
+    assert repr(trial.plan.controller) == "<Controller: a network of 5 hidden neurons>"
+    assert repr(trial).splitlines() == [
+        "<Trial 00-before of quadruped: stage before, 60 of 60 steps",
+        "  its controller, a network of 5 hidden neurons",
+        f"  {trial.path}>",
+    ]
+
+
+def test_a_simulator_uses_all_processors_by_default(quadruped: Robot):
+    assert selfmodel.Simulator(quadruped).threads >= 1
+    assert selfmodel.Simulator(quadruped, 3).threads == 3
