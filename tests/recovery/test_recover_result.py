@@ -73,9 +73,15 @@ def test_a_calibration_is_readable_serialisable_and_a_table(fit: Calibration):
     assert rows[2] == "   1.250 (log deviation 0.150)  friction"
     assert len(rows) == 12
     assert json.loads(json.dumps(fit.to_dict(), allow_nan=False)) == {
-        **{"root_mass": 1.0, "limb_mass": 1.0, "friction": 1.25, "damping": 1.0},
-        **{"motor_gains": [1.0] * 8, "delay": 2, "deviations": [0.15] * 12},
-        **{"error_before": 0.75, "error": 0.5},
+        "root_mass": 1.0,
+        "limb_mass": 1.0,
+        "friction": 1.25,
+        "damping": 1.0,
+        "motor_gains": [1.0] * 8,
+        "delay": 2,
+        "deviations": [0.15] * 12,
+        "error_before": 0.75,
+        "error": 0.5,
     }
     assert fit.to_pandas()[2] == {"name": "friction", "factor": 1.25, "deviation": 0.15}
 
