@@ -23,11 +23,11 @@ from selfmodel.logs.records import TrialHeader
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery import recover as loop
 from selfmodel.recovery.events import Event
-from selfmodel.recovery.explain import diagnose_trials
 from selfmodel.recovery.next_trial import NextTrial, by_repair
 from selfmodel.recovery.random_streams import repair_stream
 from selfmodel.recovery.recover import Recovery
 from selfmodel.recovery.repair import RepairSearch
+from selfmodel.recovery.sequential_diagnosis import diagnose_trials
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.robot.robot import Robot
