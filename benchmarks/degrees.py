@@ -2,7 +2,7 @@
 
 ``python -m benchmarks.degrees FOLDER`` prints the tables of
 ``docs/results/faults-and-environments.md``;
-``selfmodel ablate --damages ... --out FOLDER`` makes the rows.
+``selfmodel ablate --damage ... --out FOLDER`` makes the rows.
 """
 
 import csv

@@ -16,7 +16,7 @@ import numpy as np
 from absl import logging
 
 from selfmodel.arrays import FloatArray
-from selfmodel.robot.parameters import Parameters, edited_model, factor_names, from_factors
+from selfmodel.robot.parameters import Parameters, factor_names, from_factors, model_with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state_access import signal_fields, state_writer
 from selfmodel.simulation.calibration import CANDIDATE_DELAYS, MAX_LOG_FACTOR
@@ -69,7 +69,7 @@ def _builder(robot: Robot) -> Theirs:
 
     @lru_cache(64)
     def build(row: tuple[float, ...]) -> mujoco.MjModel:
-        return edited_model(robot, from_factors(np.exp(np.array(row)), 0))
+        return model_with_parameters(robot, from_factors(np.exp(np.array(row)), 0))
 
     return lambda parameters, _spec: build(tuple(parameters.as_vector().tolist()))
 

@@ -28,7 +28,7 @@ from selfmodel.errors import InputError
 from selfmodel.files import read_file
 from selfmodel.logs.errors import LogWriteError
 
-LARGEST = 2**20
+MAX_CONTROLLER_BYTES = 2**20
 """Largest size of a controller file, bytes; those of the paper's robots are under 3,000."""
 
 Arrays = Mapping[str, NDArray[Any]]
@@ -118,7 +118,7 @@ def load_controller(path: Path) -> Controller:
     Raises:
         InputError: The file contains no controller; the message names the file.
     """
-    return parse_controller(read_file(path, "a controller file", LARGEST), str(path))
+    return parse_controller(read_file(path, "a controller file", MAX_CONTROLLER_BYTES), str(path))
 
 
 def controller_bytes(controller: Controller) -> bytes:
@@ -186,12 +186,12 @@ _FAILURES = (
 
 
 def _arrays(data: bytes) -> dict[str, NDArray[Any]]:
-    if len(data) > LARGEST:
-        raise ValueError(f"it has more than {LARGEST} bytes")
+    if len(data) > MAX_CONTROLLER_BYTES:
+        raise ValueError(f"it has more than {MAX_CONTROLLER_BYTES} bytes")
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         members = {info.filename: info for info in archive.infolist()}
-        if sum(info.file_size for info in members.values()) > LARGEST:
-            raise ValueError(f"it unpacks to more than {LARGEST} bytes")
+        if sum(info.file_size for info in members.values()) > MAX_CONTROLLER_BYTES:
+            raise ValueError(f"it unpacks to more than {MAX_CONTROLLER_BYTES} bytes")
         kind = _kind(archive) if "kind.npy" in members else "network"
         expected = KINDS[kind].types | ({"ranges": _RANGES} if "ranges.npy" in members else {})
         names = {f"{name}.npy" for name in expected}

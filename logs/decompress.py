@@ -8,7 +8,7 @@ import zstandard
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 """First bytes of a zstd frame. A CDR message begins with 0."""
 
-LARGEST = 256 * 2**20
+MAX_DECOMPRESSED_BYTES = 256 * 2**20
 """Maximum decompressed size of a chunk or a message, bytes."""
 
 RATIO = 100
@@ -19,7 +19,7 @@ class BombError(ValueError):
     """Decompressed data exceed their limit."""
 
 
-def unzstd(data: bytes, limit: int = LARGEST) -> bytes:
+def unzstd(data: bytes, limit: int = MAX_DECOMPRESSED_BYTES) -> bytes:
     """Returns the content of a zstd frame.
 
     Args:
@@ -36,7 +36,7 @@ def unzstd(data: bytes, limit: int = LARGEST) -> bytes:
     return _within(unpacked, limit)
 
 
-def unlz4(data: bytes, limit: int = LARGEST) -> bytes:
+def unlz4(data: bytes, limit: int = MAX_DECOMPRESSED_BYTES) -> bytes:
     """Returns the content of an lz4 frame.
 
     Args:
@@ -61,11 +61,12 @@ def unzstd_file(packed: Path, unpacked: Path) -> None:
     """Decompresses a zstd file into another file.
 
     Raises:
-        BombError: The content exceeds ``RATIO`` times the file's size, and ``LARGEST``.
+        BombError: The content exceeds ``RATIO`` times the file's size, and
+            ``MAX_DECOMPRESSED_BYTES``.
         zstandard.ZstdError: The data are damaged.
         OSError: Reading or writing failed.
     """
-    limit = max(LARGEST, RATIO * packed.stat().st_size)
+    limit = max(MAX_DECOMPRESSED_BYTES, RATIO * packed.stat().st_size)
     with packed.open("rb") as source, unpacked.open("wb") as target:
         decompressor = zstandard.ZstdDecompressor()
         with decompressor.stream_reader(source, read_across_frames=True) as reader:

@@ -161,7 +161,7 @@ class TrialWriter:
                 self._finish(FINISHED)
             elif error is not None and self._header.timed and self._sound:
                 if self.steps:
-                    self._finish(STOPPED, _in_words(error))
+                    self._finish(STOPPED, _stop_reason(error))
                 else:
                     self._log.abandon()
         except (OSError, InputError) as failure:
@@ -198,7 +198,7 @@ class TrialWriter:
         self._log.finish()
 
 
-def _in_words(error: BaseException) -> str:
+def _stop_reason(error: BaseException) -> str:
     text = " ".join(f"{type(error).__name__}: {describe(error)}".split()).removesuffix(":")
     # A file name that is not UTF-8 contains surrogates, which a log cannot contain.
     return text.encode("utf-8", "backslashreplace").decode()

@@ -15,7 +15,7 @@ from mcap.exceptions import EndOfFile, InvalidMagic, McapError
 from mcap.records import Channel, Chunk, Footer, McapRecord, Message, Schema, Statistics
 from mcap.stream_reader import StreamReader, breakup_chunk
 
-from selfmodel.logs.decompress import LARGEST
+from selfmodel.logs.decompress import MAX_DECOMPRESSED_BYTES
 from selfmodel.logs.errors import CorruptError, LogError, NotMcapError, TruncatedError
 from selfmodel.logs.framing import unpack_chunk
 from selfmodel.logs.rosbag.stored import Announced, DamageError, Stored, checked_time
@@ -83,7 +83,9 @@ def _items(file: IO[bytes]) -> Iterator[Announced | Stored]:
 
 
 def _records(file: IO[bytes]) -> Iterator[McapRecord]:
-    reader = StreamReader(file, emit_chunks=True, validate_crcs=True, record_size_limit=LARGEST)
+    reader = StreamReader(
+        file, emit_chunks=True, validate_crcs=True, record_size_limit=MAX_DECOMPRESSED_BYTES
+    )
     ended = False
     for record in reader.records:
         if isinstance(record, Chunk):
@@ -96,8 +98,10 @@ def _records(file: IO[bytes]) -> Iterator[McapRecord]:
 
 
 def _unpacked(chunk: Chunk) -> Chunk:
-    if chunk.uncompressed_size > LARGEST:
-        raise DamageError(f"a chunk claims {chunk.uncompressed_size} bytes, more than {LARGEST}")
+    if chunk.uncompressed_size > MAX_DECOMPRESSED_BYTES:
+        raise DamageError(
+            f"a chunk claims {chunk.uncompressed_size} bytes, more than {MAX_DECOMPRESSED_BYTES}"
+        )
     unpack_chunk(chunk)
     return chunk
 

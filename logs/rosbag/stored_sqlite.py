@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
-from selfmodel.logs.decompress import LARGEST
+from selfmodel.logs.decompress import MAX_DECOMPRESSED_BYTES
 from selfmodel.logs.errors import CorruptError, IncompleteError
 from selfmodel.logs.rosbag.stored import Announced, DamageError, Stored, checked_time
 
@@ -68,7 +68,7 @@ def _items(path: Path) -> Iterator[Announced | Stored]:
     # Immutable: SQLite cannot create its lock files on a read-only disk.
     address = f"{path.resolve().as_uri()}?mode=ro&immutable=1"
     with closing(sqlite3.connect(address, uri=True)) as database:
-        database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST)
+        database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MAX_DECOMPRESSED_BYTES)
         database.execute("PRAGMA trusted_schema=OFF")
         _check(database)
         topics: dict[int, str] = {}

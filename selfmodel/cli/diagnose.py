@@ -24,14 +24,14 @@ from selfmodel.cli.options import (
 )
 from selfmodel.cli.output.display import display
 from selfmodel.cli.output.plain import counted, plain
-from selfmodel.cli.output.ranking import in_words, ranking_table
+from selfmodel.cli.output.ranking import confidence_sentence, ranking_table
 from selfmodel.comparators import DEFAULT
 from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
 from selfmodel.experiments import plugins, trial_logs
 from selfmodel.experiments.log_diagnosis import by_stage, set_up_diagnosis
 from selfmodel.logs import TrialLog
-from selfmodel.recovery.explain import diagnose_trials
+from selfmodel.recovery.sequential_diagnosis import diagnose_trials
 from selfmodel.settings import Settings
 
 
@@ -143,6 +143,6 @@ def _print(result: dict[str, Any]) -> None:
         f"{result['comparator']}: {result['evaluations']} evaluations by the EA, "
         f"{result['distinct_hypotheses']} distinct hypotheses, {result['seconds']:.1f} s."
     )
-    typer.echo(in_words(result))
+    typer.echo(confidence_sentence(result))
     for path in result["intact"]:
         typer.echo(f"from before the failure, not explained: {Path(path)}")

@@ -32,11 +32,11 @@ from selfmodel.logs.records import TrialHeader
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery import recover as loop
 from selfmodel.recovery.events import Event
-from selfmodel.recovery.explain import diagnose_trials
 from selfmodel.recovery.next_trial import NextTrial, by_repair
 from selfmodel.recovery.random_streams import repair_stream
 from selfmodel.recovery.recover import Recovery
 from selfmodel.recovery.repair import RepairSearch
+from selfmodel.recovery.sequential_diagnosis import diagnose_trials
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation import calibration, trial_replay

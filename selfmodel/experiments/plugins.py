@@ -124,9 +124,11 @@ def _plug_in(what: str, name: str, group: str, built_in: Iterable[str]) -> objec
     try:
         return getattr(importlib.import_module(module), attribute)
     except (ImportError, AttributeError, SyntaxError, TypeError, ValueError) as error:
+        moved = isinstance(error, ImportError) and (error.name or "").startswith("selfmodel")
+        hint = "; it was written for selfmodel 0.1, whose modules have moved: see the changelog"
         raise InputError(
-            f"cannot find the {what} {name!r}: {error}; expected package.module:object, "
-            f"importable from here, or one of {', '.join(known)}"
+            f"cannot find the {what} {name!r}: {error}{hint if moved else ''}; expected "
+            f"package.module:object, importable from here, or one of {', '.join(known)}"
         ) from error
 
 

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.robot.custom_numerics import CONTROL_DELAY
+from selfmodel.robot.control_delay import CONTROL_DELAY
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.scaling import scale_model
 
@@ -61,7 +61,7 @@ def from_factors(factors: FloatArray, delay: int) -> Parameters:
     return Parameters(root, limbs, friction, damping, tuple(motors), delay)
 
 
-def edited_model(robot: Robot, parameters: Parameters) -> mujoco.MjModel:
+def model_with_parameters(robot: Robot, parameters: Parameters) -> mujoco.MjModel:
     """Returns a copy of a robot's model with scaled parameters; the control delay is unchanged."""
     masses = _mass_factors(robot, parameters)
     return scale_model(
@@ -78,9 +78,9 @@ def with_parameters(robot: Robot, parameters: Parameters) -> Robot:
     """Returns a robot whose MJCF has scaled parameters and their control delay.
 
     MuJoCo writes numbers of six digits into an MJCF, so the model of the robot equals that of
-    ``edited_model`` to one part in a million.
+    ``model_with_parameters`` to one part in a million.
     """
-    return with_model(robot, edited_model(robot, parameters), parameters.delay)
+    return with_model(robot, model_with_parameters(robot, parameters), parameters.delay)
 
 
 def with_model(robot: Robot, model: mujoco.MjModel, delay: int) -> Robot:

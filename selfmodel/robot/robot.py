@@ -8,7 +8,7 @@ import numpy as np
 
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.anatomy_reader import driven_joints, read_anatomy
-from selfmodel.robot.custom_numerics import CONTROL_DELAY, control_delay
+from selfmodel.robot.control_delay import control_delay, has_control_delay
 from selfmodel.robot.floating_base import find_root_body
 from selfmodel.robot.model_checks import check_model
 
@@ -73,9 +73,8 @@ class Robot:
 
     @property
     def is_calibrated(self) -> bool:
-        """Whether the model is the result of a calibration, which adds a ``CONTROL_DELAY``."""
-        index: int = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_NUMERIC, CONTROL_DELAY)
-        return index >= 0
+        """Whether the model is the result of a calibration, which adds a control delay."""
+        return has_control_delay(self.model)
 
     @property
     def standing_height(self) -> float:

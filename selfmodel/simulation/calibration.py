@@ -20,9 +20,9 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.robot.control_delay import MAX_CONTROL_DELAY
 from selfmodel.robot.parameters import (
     Parameters,
-    edited_model,
     factor_names,
     from_factors,
+    model_with_parameters,
     nominal,
     with_parameters,
 )
@@ -277,7 +277,7 @@ def _predictor(
     """
     delay = models[0].delay
     embodiments = [
-        apply_faults(edited_model(robot, parameters), robot.anatomy, INTACT)
+        apply_faults(model_with_parameters(robot, parameters), robot.anatomy, INTACT)
         for parameters in models
     ]
 

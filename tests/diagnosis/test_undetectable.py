@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pytest
 
-from selfmodel.cli.output.ranking import in_words
+from selfmodel.cli.output.ranking import confidence_sentence
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
 from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
@@ -134,4 +134,4 @@ def test_a_report_names_what_is_unseen(quadruped: Robot, best: str, besides: lis
     assert found["unseen"] == besides
     sure = ", and no other hypothesis does as well." if not besides else "."
     more_said = f" Undetectable in these trials: {', '.join(besides)}." if besides else ""
-    assert in_words(found) == f"Explained: {best} predicts the trials{sure}{more_said}"
+    assert confidence_sentence(found) == f"Explained: {best} predicts the trials{sure}{more_said}"

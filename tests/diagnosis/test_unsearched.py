@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 import pytest
 
-from selfmodel.cli.output.ranking import in_words
+from selfmodel.cli.output.ranking import confidence_sentence
 from selfmodel.comparators import SEGMENT_PREDICTION, SENSOR_SERIES
 from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
@@ -166,7 +166,9 @@ def test_a_weak_failure_of_another_kind_is_unexplained_and_named_across_a_gap(
 
     assert (found.verdict == "unexplained") == (kind is not None)
     assert (found.unsearched.kind if found.unsearched else None) == kind
-    told = in_words({"diagnosis": ranking_to_list(found.ranked), **confidence_to_dict(found)})
+    told = confidence_sentence(
+        {"diagnosis": ranking_to_list(found.ranked), **confidence_to_dict(found)}
+    )
     assert told.startswith(
         f"Unexplained: {found.unsearched.hypothesis}" if found.unsearched else "Expl"
     )

@@ -88,3 +88,13 @@ def test_a_name_that_two_packages_define_is_refused(tmp_path: Path):
 
     with pytest.raises(InputError, match="two installed packages have the comparator 'number'"):
         plugins.comparator("number")
+
+
+def test_a_plug_in_of_version_0_1_is_refused_with_the_place_of_the_new_names(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    (tmp_path / "old_plug_in.py").write_text("from selfmodel.behaviour import Behaviour\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+
+    with pytest.raises(InputError, match=r"written for selfmodel 0\.1, whose modules have moved"):
+        plugins.comparator("old_plug_in:OBJECT")

@@ -13,7 +13,7 @@ from selfmodel.controllers.cpg import Cpg
 from selfmodel.controllers.network import Network
 from selfmodel.errors import InputError
 from selfmodel.logs import load_controller, save_controller
-from selfmodel.logs.controllers import LARGEST, controller_bytes, parse_controller
+from selfmodel.logs.controllers import MAX_CONTROLLER_BYTES, controller_bytes, parse_controller
 
 PARTS = st.lists(st.text("abc_é", min_size=1, max_size=5), max_size=5).map(tuple)
 
@@ -119,7 +119,7 @@ def test_equal_controllers_give_equal_bytes_at_any_time():
         (archive(hidden=np.array(3.0)), "its arrays have the types"),
         (archive(hidden=np.array(-3)), "got a genome of shape"),
         (archive(sensors=np.array([None, "x"])), "does not fit its size"),
-        (archive(genome=np.zeros(LARGEST)), "1048576 bytes"),
+        (archive(genome=np.zeros(MAX_CONTROLLER_BYTES)), "1048576 bytes"),
         (archive(ranges=np.ones((1, 2))), "2 motors need a command range each, got 1"),
         (archive(ranges=np.ones((2, 3))), "too many values to unpack"),
         (archive(ranges=np.ones(2)), "its arrays have the ranks"),
@@ -157,7 +157,7 @@ def test_a_bomb_is_not_unpacked():
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive_file:
         for name in ("kind", "sensors", "motors", "hidden", "genome"):
-            archive_file.writestr(f"{name}.npy", bytes(50 * LARGEST))
+            archive_file.writestr(f"{name}.npy", bytes(50 * MAX_CONTROLLER_BYTES))
     with pytest.raises(InputError, match="unpacks to more than"):
         parse_controller(file.getvalue(), "here")
 

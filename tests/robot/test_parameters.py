@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from selfmodel.robot.custom_numerics import CONTROL_DELAY
+from selfmodel.robot.control_delay import CONTROL_DELAY
 from selfmodel.robot.parameters import (
     Parameters,
-    edited_model,
     factor_names,
     from_factors,
+    model_with_parameters,
     nominal,
     with_parameters,
 )
@@ -92,7 +92,7 @@ def assert_alike(one: mujoco.MjModel, other: mujoco.MjModel) -> None:
 
 def test_friction_is_that_of_geoms_and_of_contact_pairs():
     robot = Robot("legs", LEGS.format(compiler="", inertial="", damping="0.7", **NAMED), 0.02)
-    model = edited_model(robot, some(robot))
+    model = model_with_parameters(robot, some(robot))
 
     np.testing.assert_allclose(model.geom_friction[:, 0], robot.model.geom_friction[:, 0] * 1.2)
     np.testing.assert_allclose(model.pair_friction, [[0.72, 0.84, 0.01, 0.0001, 0.0001]])
@@ -102,7 +102,7 @@ def test_the_mjcf_of_a_robot_contains_its_parameters(robot: Robot):
     parameters = some(robot)
     said = with_parameters(robot, parameters)
 
-    assert_alike(edited_model(robot, parameters), said.model)
+    assert_alike(model_with_parameters(robot, parameters), said.model)
     assert said.control_delay == 2
     assert said.anatomy.names == robot.anatomy.names
     assert [joint.name for joint in said.anatomy.joints] == [
@@ -119,7 +119,7 @@ def test_the_mjcf_of_a_robot_contains_its_parameters(robot: Robot):
 def test_masses_are_written_in_whatever_way_the_model_defines_them(way: str):
     text = LEGS.format(**{"compiler": "", "inertial": "", "damping": "0.7"} | NAMED | WAYS[way])
     robot = Robot("legs", text, 0.01)
-    edited = edited_model(robot, some(robot))
+    edited = model_with_parameters(robot, some(robot))
     before = robot.model
 
     np.testing.assert_allclose(edited.body("base").mass, 1.3 * before.body("base").mass)
@@ -141,7 +141,7 @@ def test_nominal_parameters_change_nothing(robot: Robot):
 
     assert set(parameters.factors) == {1.0}
     assert parameters.delay == 0
-    assert_alike(robot.model, edited_model(robot, parameters))
+    assert_alike(robot.model, model_with_parameters(robot, parameters))
     assert len(factor_names(robot)) == len(parameters.factors)
     assert len(set(factor_names(robot))) == len(parameters.factors)
 
@@ -161,7 +161,7 @@ def test_a_row_of_factors_is_the_parameters(factors: list[float], delay: int):
 
 def test_the_robot_stays_as_it_was(quadruped: Robot):
     before = quadruped.model.body_mass.copy(), quadruped.model.dof_damping.copy()
-    edited_model(quadruped, some(quadruped))
+    model_with_parameters(quadruped, some(quadruped))
     with_parameters(quadruped, some(quadruped))
 
     np.testing.assert_array_equal(quadruped.model.body_mass, before[0])

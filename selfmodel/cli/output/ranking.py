@@ -6,7 +6,7 @@ from typing import Any
 from rich.table import Table
 
 
-def in_words(found: Mapping[str, Any]) -> str:
+def confidence_sentence(found: Mapping[str, Any]) -> str:
     """Returns the verdict and the alternatives to the best hypothesis, in one or two sentences.
 
     Args:

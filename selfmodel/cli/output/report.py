@@ -7,7 +7,7 @@ import typer
 from rich.console import Console
 
 from selfmodel.cli.output.plain import counted
-from selfmodel.cli.output.ranking import in_words, ranking_table
+from selfmodel.cli.output.ranking import confidence_sentence, ranking_table
 from selfmodel.cli.output.tables import folding
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
 from selfmodel.experiments.experiment import Experiment, Outcome
@@ -38,7 +38,7 @@ def print_report(experiment: Experiment, outcome: Outcome) -> None:
     # Not through rich, which reads markup in a folder's name and folds it.
     typer.echo(
         f"truth: {found['truth']}{_reality(found)}; the diagnosis is {verdict}.\n"
-        f"{in_words(found)}\n"
+        f"{confidence_sentence(found)}\n"
         f"The robot went {found['displacement']['before']:.2f} m before, "
         f"{found['displacement']['after']:.2f} m after the failure, and "
         f"{found['displacement']['recovered']:.2f} m at best in "

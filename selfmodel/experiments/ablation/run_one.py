@@ -23,7 +23,7 @@ from selfmodel.experiments.ablation.trials import (
 from selfmodel.experiments.experiment import Experiment, run
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.recovery.events import Event
-from selfmodel.recovery.explain import diagnose_trials
+from selfmodel.recovery.sequential_diagnosis import diagnose_trials
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Trial

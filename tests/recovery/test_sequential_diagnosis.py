@@ -17,7 +17,7 @@ from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.recovery.events import Event, SearchBegins
-from selfmodel.recovery.explain import diagnose_trials
+from selfmodel.recovery.sequential_diagnosis import diagnose_trials
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
