@@ -3,8 +3,7 @@ from .diagnosis.comparator import Comparator as Comparator
 from .diagnosis.comparator_contract import check_comparator as check_comparator
 from .diagnosis.diagnosis import Diagnosis as Diagnosis
 from .diagnosis.kind_contract import check_fault_kind as check_fault_kind
-from .experiments.arguments import load_robot as load_robot, parse_hypothesis as parse_hypothesis
-from .experiments.one_call import (
+from .experiments.api import (
     calibrate as calibrate,
     diagnose as diagnose,
     evolve_controller as evolve_controller,
@@ -12,6 +11,7 @@ from .experiments.one_call import (
     replay as replay,
     run_trial as run_trial,
 )
+from .experiments.arguments import load_robot as load_robot, parse_hypothesis as parse_hypothesis
 from .experiments.reality import simulated_robot as simulated_robot
 from .faults.hypothesis import Hypothesis as Hypothesis
 from .faults.kind import FaultKind as FaultKind

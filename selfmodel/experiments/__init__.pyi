@@ -1,6 +1,4 @@
-from .arguments import load_robot as load_robot, parse_hypothesis as parse_hypothesis
-from .grid import Job as Job, finished as finished, run_grid as run_grid
-from .one_call import (
+from .api import (
     calibrate as calibrate,
     diagnose as diagnose,
     evolve_controller as evolve_controller,
@@ -8,4 +6,6 @@ from .one_call import (
     replay as replay,
     run_trial as run_trial,
 )
+from .arguments import load_robot as load_robot, parse_hypothesis as parse_hypothesis
+from .grid import Job as Job, finished as finished, run_grid as run_grid
 from .reality import draw_reality as draw_reality, simulated_robot as simulated_robot
