@@ -175,7 +175,7 @@ def test_a_diagnosis_that_cannot_calibrate_says_how_to_do_without(folder: Path):
 
     assert done.returncode == 2
     assert "numb.mcap: calibration needs" in done.stderr
-    assert "leave this log out, or give --no-calibrate" in done.stderr
+    assert "leave this log out, or leave the calibration out (--no-calibrate" in done.stderr
 
 
 def test_a_model_that_names_files_is_refused(tmp_path: Path):
