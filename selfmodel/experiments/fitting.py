@@ -17,4 +17,6 @@ def fitted(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibration:
     try:
         return calibrate(robot, trials, threads)
     except InputError as error:
-        raise InputError(f"{error}, or leave the calibration out (--no-calibrate, calibrate=False)") from error
+        raise InputError(
+            f"{error}, or leave the calibration out (--no-calibrate, calibrate=False)"
+        ) from error
