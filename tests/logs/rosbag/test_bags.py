@@ -222,7 +222,7 @@ def test_a_message_of_another_type_than_it_says_is_refused(tmp_path: Path):
 
 
 def test_what_unpacks_to_too_much_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(decompress, "LARGEST", 10**6)
+    monkeypatch.setattr(decompress, "MAX_DECOMPRESSED_BYTES", 10**6)
     bomb = tmp_path / "bag.mcap.zstd"
     bomb.write_bytes(zstandard.compress(bytes(10**8)))
     with pytest.raises(CorruptError, match="unpacks to more than 100 times its size"):
