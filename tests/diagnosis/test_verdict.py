@@ -142,6 +142,7 @@ def test_a_failure_of_table_one_is_found_and_explained(
     assert (found.intact_distance > 1e-4) == (case != 9)
 
 
+@pytest.mark.search
 def test_a_hidden_neuron_is_unexplained(quadruped: Robot, gait: Controller, before: list[Trial]):
     found = diagnosed(quadruped, [trial(quadruped, CASES[10], gait)], before)
 

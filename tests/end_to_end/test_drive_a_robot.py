@@ -72,6 +72,7 @@ def heard(folder: Path) -> list[int]:
     return []
 
 
+@pytest.mark.process
 def test_delays_and_silence_are_marked_and_the_trial_goes_on(tmp_path: Path):
     with robot(tmp_path, **{"30": 0.04, "90": "silent", "91": "silent"}) as port:
         told, errors = (process := driver(tmp_path, port)).communicate(timeout=120)
