@@ -2,12 +2,13 @@
 
 import sys
 from importlib.metadata import version
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from selfmodel.cli.lazy import group
 from selfmodel.cli.output.plain import plain
+from selfmodel.cli.output.printing import print_lines, print_notes
 from selfmodel.errors import InputError, WorkError, describe
 
 COMMANDS = {
@@ -34,7 +35,7 @@ app = group(
 
 def _print_version(wanted: bool) -> None:  # noqa: FBT001  # typer passes the value by position
     if wanted:
-        typer.echo(f"selfmodel {version('selfmodel')}")
+        print_lines(f"selfmodel {version('selfmodel')}")
         raise typer.Exit
 
 
@@ -51,6 +52,10 @@ def selfmodel(
     """Parses the options that come before the command."""
 
 
+UsageError: Any = typer.BadParameter.__base__
+"""Error of unknown commands, options and values; typer has no public name for it."""
+
+
 def main() -> None:
     """Runs the command line.
 
@@ -58,7 +63,9 @@ def main() -> None:
     """
     try:
         # The same usage line for `python -m selfmodel` as for the installed command.
-        app(prog_name="selfmodel")
+        sys.exit(app(prog_name="selfmodel", standalone_mode=False))
+    except UsageError as error:
+        sys.exit(_print_usage(error))
     except InputError as error:
         _fail(describe(error), 2)
     except (OSError, WorkError) as error:
@@ -66,10 +73,19 @@ def main() -> None:
         _fail(describe(error), 1)
     except MemoryError as error:
         _fail(f"there is not enough memory ({error or 'for this'}): request less at once", 1)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, typer.Abort):
         _fail("interrupted", 130)
 
 
+def _print_usage(error: Any) -> int:  # noqa: ANN401  # typer hides the type
+    """Prints a usage error with the usage line, and returns the exit status."""
+    # Without arguments, the message is the help page: lines of ours.
+    if error.ctx is None or error.message != error.ctx.get_help():
+        error.message = plain(error.message)
+    error.show()
+    return int(error.exit_code)
+
+
 def _fail(message: str, status: int) -> None:
-    typer.echo(f"error: {plain(message)}", err=True)
+    print_notes(f"error: {message}")
     sys.exit(status)

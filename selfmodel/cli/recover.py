@@ -1,5 +1,6 @@
 """``selfmodel recover``: the paper's loop, from a healthy gait to one for the damaged robot."""
 
+import json
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated
@@ -30,7 +31,8 @@ from selfmodel.cli.options import (
     Trials,
 )
 from selfmodel.cli.output.display import display
-from selfmodel.cli.output.report import as_object, print_report
+from selfmodel.cli.output.printing import print_json, print_notes
+from selfmodel.cli.output.report import facts, print_report
 from selfmodel.comparators import DEFAULT
 from selfmodel.controllers.controller import check_silent_neurons
 from selfmodel.experiments import plugins, robots
@@ -106,16 +108,17 @@ def recover(
         with display() as on_event:
             outcome = run(experiment, on_event)
     except KeyboardInterrupt:
-        typer.echo(f"interrupted: the finished trials are in {experiment.folder}", err=True)
+        print_notes(f"interrupted: the finished trials are in {experiment.folder}")
         raise typer.Exit(130) from None
-    result = as_object(experiment, outcome)
+    found = facts(experiment, outcome)
+    result = json.dumps(found, indent=2, allow_nan=False)
     try:
         replace_file(experiment.folder / "result.json", f"{result}\n".encode())
     finally:  # the result is printed even if the disk is full
         if as_json:
-            typer.echo(result)
+            print_json(found)
         else:
-            print_report(experiment, outcome)
+            print_report(found, experiment.folder)
 
 
 def _new_folder(robot: str) -> Path:

@@ -1,6 +1,6 @@
 """``selfmodel trial``: one logged trial of the simulated physical robot."""
 
-import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +22,7 @@ from selfmodel.cli.options import (
     Steps,
     Structural,
 )
+from selfmodel.cli.output.printing import print_json, print_lines, print_notes
 from selfmodel.controllers.controller import Controller, check_silent_neurons, draw_genomes
 from selfmodel.experiments import plugins, robots, trial_logs
 from selfmodel.experiments.reality import draw_reality
@@ -70,7 +71,7 @@ def trial(
     try:
         logged = run_trial(reality.robot(made, hidden), plan, out, made, header)
     except KeyboardInterrupt:
-        typer.echo(f"interrupted: the steps so far are in {out}.part", err=True)
+        print_notes(f"interrupted: the steps so far are in {out}.part")
         raise typer.Exit(130) from None
     facts = {
         "log": str(out),
@@ -80,9 +81,9 @@ def trial(
         "structure": structure,
         "seed": seed,
         "steps": logged.behaviour.steps,
-        "displacement": logged.displacement,
+        "displacement": logged.displacement if math.isfinite(logged.displacement) else None,
     }
     if as_json:
-        typer.echo(json.dumps(facts, indent=2))
+        print_json(facts)
     else:
-        typer.echo(f"{made.name} ({hidden}) went {logged.displacement:.3f} m forward: {out}")
+        print_lines(f"{made.name} ({hidden}) went {logged.displacement:.3f} m forward: {out}")

@@ -1,6 +1,5 @@
 """``selfmodel logs import``: a rosbag2 recording of a robot as a trial log."""
 
-import json
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,7 +8,8 @@ import typer
 
 from selfmodel.cli.inputs import check_log_name
 from selfmodel.cli.options import Json
-from selfmodel.cli.output.plain import counted, plain
+from selfmodel.cli.output.plain import counted
+from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.tables import show
 from selfmodel.controllers.controller import Controller
 from selfmodel.errors import InputError
@@ -53,7 +53,7 @@ def import_(
             raise InputError(
                 "--suggest needs --robot NAME|MODEL.xml, and excludes all other options"
             )
-        typer.echo(_suggestion(bag, robot), nl=False)
+        print_lines(*_suggestion(bag, robot).removesuffix("\n").split("\n"))
         return
     if robot is not None:
         raise InputError("--robot is for --suggest: the robot of an import is in its mapping")
@@ -91,7 +91,7 @@ def _import(bag: Path, out: Path, path: Path, *, as_json: bool) -> None:
     recording = import_bag(bag, mapping, made)
     write_recording(out, made, recording, mapping, controller)
     if as_json:
-        typer.echo(json.dumps(_facts(out, mapping, recording), indent=2, allow_nan=False))
+        print_json(_facts(out, mapping, recording))
     else:
         _print(out, recording)
 
@@ -138,7 +138,7 @@ def _facts(out: Path, mapping: BagMapping, recording: Recording) -> dict[str, An
 def _print(out: Path, recording: Recording) -> None:
     rows = [
         (
-            plain(topic),
+            topic,
             str(found.messages),
             _number(found.rate),
             _number(found.jitter, 1e3),
@@ -150,9 +150,11 @@ def _print(out: Path, recording: Recording) -> None:
     ]
     show(("topic", "msgs", "Hz", "jitter, ms", "gaps", "longest, ms", "late, ms"), rows)
     valid = ", ".join(f"{signal} {share:.0%}" for signal, share in recording.valid.items())
-    for note in recording.notes:
-        typer.echo(f"note: {plain(note)}")
-    typer.echo(f"observed: {valid}\n{counted(recording.behaviour.steps, 'step')}: {out}")
+    print_lines(
+        *(f"note: {note}" for note in recording.notes),
+        f"observed: {valid}",
+        f"{counted(recording.behaviour.steps, 'step')}: {out}",
+    )
 
 
 def _number(value: float | None, scale: float = 1.0) -> str:

@@ -17,6 +17,9 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from selfmodel.cli.output.console import text_console
+from selfmodel.cli.output.plain import plain
+from selfmodel.cli.output.printing import print_notes
 from selfmodel.experiments.grid import GridBegins, PartEnds
 
 
@@ -59,13 +62,13 @@ class Watch:
                     self._print_line(_line(event))
 
     def _print_line(self, line: str) -> None:
-        self._console.print(line, soft_wrap=True)
+        self._console.print(plain(line), soft_wrap=True)
 
 
 @contextmanager
 def grid_display() -> Iterator[Watch]:
     """Yields a display of grid events on standard error."""
-    console = Console(stderr=True, highlight=False, markup=False, emoji=False)
+    console = text_console(stderr=True)
     if not sys.stderr.isatty():
         yield Watch(console, None)
         return
@@ -100,10 +103,9 @@ def run_shown(run: Callable[[Watch], Sequence[PartEnds]], out: Path) -> Sequence
         try:
             return run(on_event)
         except KeyboardInterrupt:
-            typer.echo(
+            print_notes(
                 f"interrupted: {on_event.done} of {on_event.total} are done and kept in {out}; the "
-                f"same command continues with the rest",
-                err=True,
+                f"same command continues with the rest"
             )
             raise typer.Exit(130) from None
 
@@ -116,9 +118,8 @@ def as_objects(failed: Sequence[PartEnds]) -> list[dict[str, str | None]]:
 def end(failed: Sequence[PartEnds]) -> None:
     """Ends the command with status 1 and a line if a part failed."""
     if failed:
-        typer.echo(
+        print_notes(
             f"{len(failed)} failed, the first of them {failed[0].key} {failed[0].part}: "
-            f"{failed[0].error}; the same command tries them again",
-            err=True,
+            f"{failed[0].error}; the same command tries them again"
         )
         raise typer.Exit(1)
