@@ -14,7 +14,8 @@ from selfmodel.cli.output.tables import show
 from selfmodel.controllers.controller import Controller
 from selfmodel.errors import InputError
 from selfmodel.experiments import robots, trial_logs
-from selfmodel.experiments.robots import is_model
+from selfmodel.experiments.robots import LARGEST_MODEL, is_model
+from selfmodel.files import read_file
 from selfmodel.logs.files import refuse_existing
 from selfmodel.logs.rosbag.bag import open_bag
 from selfmodel.logs.rosbag.importer import Recording, import_bag, write_recording
@@ -75,8 +76,9 @@ def _suggestion(bag: Path, name: str) -> str:
 
 def _timestep(path: Path) -> float:
     """Returns the multiple of a model's physics time step nearest to ``TIMESTEP``, s."""
+    data = read_file(path, "an MJCF file", LARGEST_MODEL)
     try:
-        physics = float(mujoco.MjModel.from_xml_path(str(path)).opt.timestep)
+        physics = float(mujoco.MjModel.from_xml_string(data.decode()).opt.timestep)
     except ValueError as error:
         what = " ".join(str(error).split())
         raise InputError(f"{path}: expected an MJCF file of a robot: {what}") from error
