@@ -50,6 +50,7 @@ def exports(module: str) -> set[str]:
 
 
 ROOMS = (
+    "sandbox",
     "controllers",
     "trials",
     "robot",
