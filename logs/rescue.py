@@ -41,9 +41,10 @@ def rescue(path: Path, budget: Budget = DEFAULT_BUDGET) -> Contents:
             one time.
         InputError: The file does not exist, or cannot be opened.
     """
-    found = _Found()
+    found, meter = _Found(), Meter(budget)
     try:
         for record in _intact_records(read_bytes(path, budget), budget):
+            meter.name(record)
             found.add(record)
         contents = found.contents()
     except ContradictionError as error:
