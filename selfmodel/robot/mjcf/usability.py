@@ -25,7 +25,6 @@ def check_usable(model: mujoco.MjModel) -> None:
         raise InputError(
             f"the model's <option timestep> must be above 0 s, got {model.opt.timestep}"
         )
-    _check_finite(model)
     if not model.nu:
         raise InputError(
             "the model has no actuators: give each joint that a motor is to drive an element in "
@@ -45,13 +44,6 @@ def check_usable(model: mujoco.MjModel) -> None:
         raise InputError(str(error)) from error
     _check_passive_base(model, root)
     _check_stable(model)
-
-
-def _check_finite(model: mujoco.MjModel) -> None:
-    for name in ("body_mass", "body_inertia", "body_pos", "geom_size", "jnt_range", "qpos0"):
-        if not np.isfinite(getattr(model, name)).all():
-            quantity = name.replace("_", " ")
-            raise InputError(f"expected finite numbers, got others in the model's {quantity}")
 
 
 def _check_one_tree(model: mujoco.MjModel) -> None:
