@@ -23,24 +23,38 @@ MUJOCO_ERRORS = (
 
 
 @contextmanager
-def mujoco_errors_as_input_errors(task: str = "load the model") -> Iterator[None]:
-    """Converts MuJoCo's exceptions to ``InputError``, and suppresses its warnings.
+def mujoco_errors_as_input_errors(task: str) -> Iterator[None]:
+    """Converts MuJoCo's exceptions to ``InputError``.
 
     Args:
-        task: Task that MuJoCo fails at, for the message.
+        task: Task that MuJoCo fails at, such as ``"load the model"``, for the message.
 
     Raises:
         InputError: MuJoCo raised an exception.
     """
     try:
-        with uncounted_warnings(), warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            yield
+        yield
     except MUJOCO_ERRORS as error:
         if isinstance(error, InputError):
             raise
         message = " ".join(str(error).split()).removeprefix("Error: ")
         raise InputError(f"MuJoCo cannot {task}: {message}") from error
+
+
+@contextmanager
+def loading_a_model() -> Iterator[None]:
+    """Converts MuJoCo's exceptions to ``InputError``, and suppresses its warnings.
+
+    Raises:
+        InputError: MuJoCo raised an exception.
+    """
+    with (
+        mujoco_errors_as_input_errors("load the model"),
+        uncounted_warnings(),
+        warnings.catch_warnings(),
+    ):
+        warnings.simplefilter("ignore")
+        yield
 
 
 def compile_model(mjcf: str, assets: dict[str, bytes]) -> mujoco.MjModel:
@@ -49,5 +63,5 @@ def compile_model(mjcf: str, assets: dict[str, bytes]) -> mujoco.MjModel:
     Raises:
         InputError: MuJoCo cannot compile the MJCF.
     """
-    with mujoco_errors_as_input_errors():
+    with loading_a_model():
         return mujoco.MjModel.from_xml_string(mjcf, assets)

@@ -6,7 +6,7 @@ import numpy as np
 from selfmodel.errors import InputError
 from selfmodel.robot.anatomy_reader import driven_joints
 from selfmodel.robot.floating_base import find_root_body, joints_of_body
-from selfmodel.robot.mjcf.mujoco_errors import mujoco_errors_as_input_errors
+from selfmodel.robot.mjcf.mujoco_errors import loading_a_model
 from selfmodel.robot.model_checks import check_model
 from selfmodel.robot.transmission import motor_joints
 
@@ -71,7 +71,7 @@ def _check_stable(model: mujoco.MjModel) -> None:
     """Checks that a short simulation without commands does not diverge."""
     data = mujoco.MjData(model)
     steps = min(_MAX_PROBE_STEPS, max(1, round(_PROBE_SECONDS / model.opt.timestep)))
-    with mujoco_errors_as_input_errors():
+    with loading_a_model():
         for _ in range(steps):
             mujoco.mj_step(model, data)
     unstable = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL)
