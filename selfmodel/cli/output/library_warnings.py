@@ -33,7 +33,8 @@ def counted_warnings() -> Iterator[None]:
             if number > before.get(text, 0):
                 found[f"MuJoCo warned {{}}: {text}"] = number - before.get(text, 0)
         for text, number in found.items():
-            typer.echo(plain(f"note: {text.replace('{}', counted(number, 'time'), 1)}"), err=True)
+            sentence = text.replace("{}", counted(number, "time"), 1)
+            typer.echo(plain(f"note: {' '.join(sentence.split())}"), err=True)
 
 
 def _mujoco_warnings() -> Mapping[str, int]:
