@@ -197,9 +197,7 @@ def test_an_absurd_number_is_refused_before_the_search_and_named(quadruped: Robo
     trial = with_value(sound, "base_position", 7, 1, value)
     simulator = Simulator(quadruped, 2)
     diagnose = DiagnosticSearch(simulator, SEGMENT_PREDICTION, Settings())
-    with pytest.raises(
-        InputError, match=r"base_position y is .* at step 7, expected at most 1e\+08"
-    ):
+    with pytest.raises(InputError, match=r"base_position y is .* at step 7, expected at"):
         diagnose.check([trial])
     assert simulator.stats.runs == 0
 

@@ -19,7 +19,7 @@ def counted_warnings() -> Iterator[None]:
     """Collects warnings during a block, and prints each once with its number after the block."""
     found: Counter[str] = Counter()
 
-    def count(message: Warning | str, category: type[Warning], *_: object) -> None:
+    def count(message: Warning | str, category: type[Warning], *_: object, **__: object) -> None:
         found[f"Python warned {{}}: {category.__name__}: {message}"] += 1
 
     before = _mujoco_warnings()

@@ -13,6 +13,12 @@ def overflow() -> None:
         np.square(np.array([1e308]))
 
 
+def fail() -> None:
+    with counted_warnings():
+        overflow()
+        raise SystemExit(2)
+
+
 def test_each_warning_is_one_sentence_with_its_number(capsys: pytest.CaptureFixture[str]):
     with counted_warnings():
         for _ in range(37):
@@ -28,9 +34,8 @@ def test_each_warning_is_one_sentence_with_its_number(capsys: pytest.CaptureFixt
 
 
 def test_they_are_printed_before_an_error_leaves(capsys: pytest.CaptureFixture[str]):
-    with pytest.raises(SystemExit), counted_warnings():
-        overflow()
-        raise SystemExit(2)
+    with pytest.raises(SystemExit):
+        fail()
     assert "note: Python warned 1 time: " in capsys.readouterr().err
     with pytest.raises(RuntimeWarning):  # warnings are as before
         overflow()
