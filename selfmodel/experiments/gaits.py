@@ -5,9 +5,10 @@ from pathlib import Path
 from typing import Any
 
 from selfmodel.controllers.controller import Design
+from selfmodel.experiments.grid import PartResult
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.logs.atomic import write_atomic
 from selfmodel.logs.controllers import controller_bytes
+from selfmodel.logs.files import replace_file
 from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.random_streams import repair_stream
 from selfmodel.recovery.repair import RepairSearch
@@ -33,7 +34,7 @@ def evolve_gait(
     *,
     design: Design | None = None,
     score: Score = DISPLACEMENT,
-) -> dict[str, Any]:
+) -> PartResult:
     """Evolves the first gait of a recovery with the same seed, and writes it.
 
     Args:
@@ -45,9 +46,9 @@ def evolve_gait(
         score: Fitness of the repair EA.
 
     Returns:
-        Number of evaluations, as JSON.
+        Number of evaluations, as JSON, and the file.
     """
     repair = RepairSearch(Simulator(robot, threads=1), settings, design, score=score)
     gait = repair(INTACT, (), repair_stream(seed, 0), lambda _generation: None)
-    write_atomic(path, controller_bytes(gait))
-    return {"evaluations": repair.evaluations}
+    replace_file(path, controller_bytes(gait))
+    return PartResult({"evaluations": repair.evaluations}, [path])

@@ -3,13 +3,12 @@
 import hashlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 from selfmodel.controllers.controller import Controller
 from selfmodel.experiments import robots, trial_logs
 from selfmodel.experiments.ablation.plan import Ablation, Cell, model_digest
 from selfmodel.experiments.gaits import evolve_gait, gait_settings
-from selfmodel.experiments.grid import GridBegins, Job, PartEnds, run_grid
+from selfmodel.experiments.grid import GridBegins, Job, PartEnds, PartResult, run_grid
 from selfmodel.experiments.study_files import key_of
 from selfmodel.settings import Settings
 from selfmodel.version import __version__
@@ -76,7 +75,7 @@ def digests(bank: Path, cell: Cell, settings: Settings) -> list[str] | None:
     return [hashlib.sha256(path.read_bytes()).hexdigest() for path in paths]
 
 
-def _evolve(job: Job, _part: str, run: Path) -> Any:  # noqa: ANN401  # JSON
+def _evolve(job: Job, _part: str, run: Path) -> PartResult:
     robot = job.parameters["robot"]
     return evolve_gait(
         _path(run.parent, robot, job.seed),
