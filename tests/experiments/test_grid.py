@@ -132,18 +132,18 @@ def test_a_run_is_extended_by_a_part_and_keeps_the_others(tmp_path: Path):
         ("foreseen", "the cause and the cure"),
         (
             "bug",
-            "an unexpected error, ZeroDivisionError; its traceback is in "
-            "{run}/tracebacks/{part}.txt",
+            "an unexpected error, ZeroDivisionError; its traceback is in {traceback}",
         ),
         ("crash", "its process ended with status 7; standard error may have the reason"),
     ],
 )
 def test_a_failure_is_kept_and_stops_no_other(tmp_path: Path, fails: str, sentence: str):
     bad = Job("bad", {"factor": 1, "fails": fails}, 0, ("a", "b"))
+    texts = tmp_path / "bad" / "tracebacks"
     failed = run_grid(tmp_path, [bad, *jobs(2)], work, workers=1, on_progress=silent)
 
     assert [(each.key, each.part, each.error) for each in failed] == [
-        ("bad", part, sentence.format(run=tmp_path / "bad", part=part)) for part in ("a", "b")
+        ("bad", part, sentence.format(traceback=texts / f"{part}.txt")) for part in ("a", "b")
     ]
     kept = json.loads((tmp_path / "bad" / "parts" / "a.json").read_text())
     assert (kept["status"], kept["error"]) == ("failed", failed[0].error)
