@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from selfmodel.controllers.controller import Design
-from selfmodel.experiments.grid import PartResult
+from selfmodel.errors import InputError
+from selfmodel.experiments.grid import PartResult, finished
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.logs.controllers import controller_bytes
 from selfmodel.logs.files import replace_file
@@ -24,6 +25,22 @@ def gait_settings(settings: Settings) -> dict[str, Any]:
     """Returns the settings that affect a gait, as JSON."""
     values = dataclasses.asdict(settings)
     return {name: values[name] for name in values if name not in DIAGNOSIS_SETTINGS}
+
+
+def check_not_evolved(path: Path) -> None:
+    """Checks that the grid of a missing gait has not finished it.
+
+    Args:
+        path: File of the gait, in the folder of its grid.
+
+    Raises:
+        InputError: The gait was evolved, and its file is missing.
+    """
+    if any(part.key == path.stem for part in finished(path.parent)):
+        raise InputError(
+            f"{path} is missing, a gait of the study: restore the file, or delete "
+            f"{path.with_suffix('')} to evolve the gait again"
+        )
 
 
 def evolve_gait(

@@ -59,6 +59,8 @@ def run_part(folder: Path, work: Work, task: tuple[Job, str]) -> PartAnswer:
         if error is not None:
             data = part_bytes(job.definition, part, {**failed(error), "seconds": seconds})
         write_part(run, part, data)
+        if error is None:
+            _traceback_path(run, part).unlink(missing_ok=True)  # of an earlier failure
     except OSError as cause:
         return PartAnswer(perf_counter() - start, str(cause), ends_grid=True)
     return PartAnswer(seconds, error)
@@ -66,8 +68,12 @@ def run_part(folder: Path, work: Work, task: tuple[Job, str]) -> PartAnswer:
 
 def _unexpected(cause: Exception, run: Path, part: str) -> str:
     """Writes the traceback of an unexpected exception and returns the error of the part."""
-    path = run / TRACEBACKS / f"{quote(part, safe='')}.txt"
+    path = _traceback_path(run, part)
     make_folder(path.parent)
     replace_file(path, "".join(traceback.format_exception(cause)).encode(errors="replace"))
     line = " ".join(traceback.format_exception_only(cause)[-1].split())
     return f"an unexpected error, {line[:300]}; its traceback is in {path}"
+
+
+def _traceback_path(run: Path, part: str) -> Path:
+    return run / TRACEBACKS / f"{quote(part, safe='')}.txt"
