@@ -30,7 +30,7 @@ from selfmodel.cli.options import (
     Trials,
 )
 from selfmodel.cli.output.display import display
-from selfmodel.cli.output.report import as_object, print_report
+from selfmodel.cli.output.report import as_object, print_report, result_file
 from selfmodel.comparators import DEFAULT
 from selfmodel.controllers.controller import check_silent_neurons
 from selfmodel.experiments import plugins, robots
@@ -108,12 +108,11 @@ def recover(
     except KeyboardInterrupt:
         typer.echo(f"interrupted: the finished trials are in {experiment.folder}", err=True)
         raise typer.Exit(130) from None
-    result = as_object(experiment, outcome)
     try:
-        replace_file(experiment.folder / "result.json", f"{result}\n".encode())
+        replace_file(experiment.folder / "result.json", result_file(experiment, outcome))
     finally:  # the result is printed even if the disk is full
         if as_json:
-            typer.echo(result)
+            typer.echo(as_object(experiment, outcome))
         else:
             print_report(experiment, outcome)
 

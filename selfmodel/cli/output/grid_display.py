@@ -17,6 +17,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from selfmodel.cli.output.plain import counted
 from selfmodel.experiments.grid import GridBegins, PartEnds
 
 
@@ -106,6 +107,21 @@ def run_shown(run: Callable[[Watch], Sequence[PartEnds]], out: Path) -> Sequence
                 err=True,
             )
             raise typer.Exit(130) from None
+
+
+def note_unverified(count: int, out: Path) -> None:
+    """Prints a line if a table has parts without digests.
+
+    Args:
+        count: Number of the parts.
+        out: Folder of the grid.
+    """
+    if count:
+        typer.echo(
+            f"note: version 0.1 wrote {counted(count, 'part')} in {out}, without digests: their "
+            f"content was not verified",
+            err=True,
+        )
 
 
 def as_objects(failed: Sequence[PartEnds]) -> list[dict[str, str | None]]:

@@ -1,6 +1,9 @@
 """Outcome of ``selfmodel recover``, as text and as JSON."""
 
+import dataclasses
 import json
+import os
+from pathlib import Path
 from typing import Any
 
 import typer
@@ -11,12 +14,29 @@ from selfmodel.cli.output.ranking import confidence_sentence, ranking_table
 from selfmodel.cli.output.tables import folding
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
 from selfmodel.experiments.experiment import Experiment, Outcome
+from selfmodel.logs.result_files import file_digest, result_bytes
 from selfmodel.robot.designs import network_for
 
 
 def as_object(experiment: Experiment, outcome: Outcome) -> str:
     """Returns the outcome as one JSON object."""
     return json.dumps(facts(experiment, outcome), indent=2, allow_nan=False)
+
+
+def result_file(experiment: Experiment, outcome: Outcome) -> bytes:
+    """Returns the ``result.json`` of a run: the outcome with its settings, and its logs' digests.
+
+    Raises:
+        OSError: A log cannot be read.
+    """
+    logs = [Path(trial.path) for trial in outcome.recovery.trials]
+    return result_bytes(
+        {
+            **facts(experiment, outcome),
+            "settings": dataclasses.asdict(experiment.settings),
+            "files": {os.path.relpath(log, experiment.folder): file_digest(log) for log in logs},
+        }
+    )
 
 
 def print_report(experiment: Experiment, outcome: Outcome) -> None:

@@ -130,6 +130,7 @@ def run(
         out,
     )
     results = write_results(out)
+    grid_display.note_unverified(results.unverified, out)
     if as_json:
         found = {**results.as_dict(), "failures": grid_display.as_objects(failed)}
         typer.echo(json.dumps(found, indent=1, allow_nan=False))

@@ -150,9 +150,13 @@ def _serve(perform: Callable[..., Any], pipe: Connection) -> None:
     while True:
         try:
             task = pipe.recv()
-        except EOFError:
+        except (EOFError, ConnectionError):
             return
-        pipe.send(perform(task))
+        answer = perform(task)
+        try:
+            pipe.send(answer)
+        except ConnectionError:  # the command was killed meanwhile
+            return
 
 
 def _exit_with_parent() -> None:
