@@ -9,7 +9,9 @@ import typer
 from selfmodel.cli.lazy import group
 from selfmodel.cli.output.library_warnings import counted_warnings
 from selfmodel.cli.output.plain import plain
+from selfmodel.cli.output.streams import flush_output, open_streams
 from selfmodel.errors import InputError, WorkError, describe
+from selfmodel.physical.stop_signals import handle_stop_signals, status_of
 
 COMMANDS = {
     "robots": ("selfmodel.cli.robots:robots", "List the robots, or the parts of one."),
@@ -55,21 +57,40 @@ def selfmodel(
 def main() -> None:
     """Runs the command line.
 
-    Exit status: 0 done; 1 the work failed; 2 wrong usage or bad input; 130 interrupted.
+    Exit status: 0 done; 1 the work failed; 2 wrong usage or bad input; 130, 143 or 129 after
+    SIGINT, SIGTERM or SIGHUP.
     """
+    open_streams()
+    with handle_stop_signals():
+        try:
+            _run()
+        except InputError as error:
+            _fail(describe(error), 2)
+        except BrokenPipeError:
+            sys.exit(1)  # the reader has read enough
+        except (OSError, WorkError) as error:
+            # A full disk, a folder without write permission: the message contains the file's name.
+            _fail(describe(error), 1)
+        except MemoryError as error:
+            _fail(f"there is not enough memory ({error or 'for this'}): request less at once", 1)
+        except KeyboardInterrupt as interruption:
+            notes = "; ".join(getattr(interruption, "__notes__", ()))
+            _fail(f"interrupted: {notes}" if notes else "interrupted", status_of(interruption))
+
+
+def _run() -> None:
     try:
         with counted_warnings():
             # The same usage line for `python -m selfmodel` as for the installed command.
             app(prog_name="selfmodel")
-    except InputError as error:
-        _fail(describe(error), 2)
-    except (OSError, WorkError) as error:
-        # A full disk, a folder without write permission: the message contains the file's name.
-        _fail(describe(error), 1)
-    except MemoryError as error:
-        _fail(f"there is not enough memory ({error or 'for this'}): request less at once", 1)
-    except KeyboardInterrupt:
-        _fail("interrupted", 130)
+    except SystemExit as end:
+        # typer replaces every KeyboardInterrupt by the exit status 130.
+        reason = end.__context__ and end.__context__.__cause__
+        if isinstance(reason, KeyboardInterrupt):
+            raise reason from None
+        raise
+    finally:
+        flush_output()
 
 
 def _fail(message: str, status: int) -> None:

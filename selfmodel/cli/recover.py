@@ -105,9 +105,9 @@ def recover(
     try:
         with display() as on_event:
             outcome = run(experiment, on_event)
-    except KeyboardInterrupt:
-        typer.echo(f"interrupted: the finished trials are in {experiment.folder}", err=True)
-        raise typer.Exit(130) from None
+    except KeyboardInterrupt as interruption:
+        interruption.add_note(f"the finished trials are in {experiment.folder}")
+        raise
     try:
         replace_file(experiment.folder / "result.json", result_file(experiment, outcome))
     finally:  # the result is printed even if the disk is full

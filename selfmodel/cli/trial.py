@@ -27,6 +27,7 @@ from selfmodel.experiments import plugins, robots, trial_logs
 from selfmodel.experiments.reality import draw_reality
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.neuron import silent_neurons
+from selfmodel.logs.atomic import partial_path
 from selfmodel.logs.physical_trial import run_trial
 from selfmodel.logs.records import TrialHeader
 from selfmodel.robot.designs import DESIGNS
@@ -69,9 +70,10 @@ def trial(
     header = TrialHeader(settings, hidden=str(hidden), gap=reality.text)
     try:
         logged = run_trial(reality.robot(made, hidden), plan, out, made, header)
-    except KeyboardInterrupt:
-        typer.echo(f"interrupted: the steps so far are in {out}.part", err=True)
-        raise typer.Exit(130) from None
+    except KeyboardInterrupt as interruption:
+        if (part := partial_path(out)).exists():
+            interruption.add_note(f"the steps so far are in {part}")
+        raise
     facts = {
         "log": str(out),
         "robot": made.name,

@@ -91,7 +91,7 @@ def _line(event: PartEnds) -> str:
 def run_shown(run: Callable[[Watch], Sequence[PartEnds]], out: Path) -> Sequence[PartEnds]:
     """Runs a grid with a progress display; returns the failed parts.
 
-    Ctrl-C ends the command with status 130, and a line with the command to continue.
+    Ctrl-C and the other stop signals end the command with a line that tells how to continue.
 
     Args:
         run: Runs the grid; calls its argument with each event.
@@ -100,13 +100,12 @@ def run_shown(run: Callable[[Watch], Sequence[PartEnds]], out: Path) -> Sequence
     with grid_display() as on_event:
         try:
             return run(on_event)
-        except KeyboardInterrupt:
-            typer.echo(
-                f"interrupted: {on_event.done} of {on_event.total} are done and kept in {out}; the "
-                f"same command continues with the rest",
-                err=True,
+        except KeyboardInterrupt as interruption:
+            interruption.add_note(
+                f"{on_event.done} of {on_event.total} are done and kept in {out}; the same command "
+                f"continues with the rest"
             )
-            raise typer.Exit(130) from None
+            raise
 
 
 def note_unverified(count: int, out: Path) -> None:
