@@ -7,9 +7,12 @@ from typing import Annotated, Any
 import typer
 
 from selfmodel.cli.lazy import group
+from selfmodel.cli.output.library_warnings import counted_warnings
 from selfmodel.cli.output.plain import plain
 from selfmodel.cli.output.printing import print_lines, print_notes
+from selfmodel.cli.output.streams import flush_output, open_streams
 from selfmodel.errors import InputError, WorkError, describe
+from selfmodel.physical.stop_signals import handle_stop_signals, status_of
 
 COMMANDS = {
     "robots": ("selfmodel.cli.robots:robots", "List the robots, or the parts of one."),
@@ -59,22 +62,40 @@ UsageError: Any = typer.BadParameter.__base__
 def main() -> None:
     """Runs the command line.
 
-    Exit status: 0 done; 1 the work failed; 2 wrong usage or bad input; 130 interrupted.
+    Exit status: 0 done; 1 the work failed; 2 wrong usage or bad input; 130, 143 or 129 after
+    SIGINT, SIGTERM or SIGHUP.
     """
+    open_streams()
+    with handle_stop_signals():
+        try:
+            _run()
+        except InputError as error:
+            _fail(describe(error), 2)
+        except BrokenPipeError:
+            sys.exit(1)  # the reader has read enough
+        except (OSError, WorkError) as error:
+            # A full disk, a folder without write permission: the message contains the file's name.
+            _fail(describe(error), 1)
+        except MemoryError as error:
+            _fail(f"there is not enough memory ({error or 'for this'}): request less at once", 1)
+        except KeyboardInterrupt as interruption:
+            notes = "; ".join(getattr(interruption, "__notes__", ()))
+            _fail(f"interrupted: {notes}" if notes else "interrupted", status_of(interruption))
+
+
+def _run() -> None:
     try:
-        # The same usage line for `python -m selfmodel` as for the installed command.
-        sys.exit(app(prog_name="selfmodel", standalone_mode=False))
+        with counted_warnings():
+            # The same usage line for `python -m selfmodel` as for the installed command.
+            status = app(prog_name="selfmodel", standalone_mode=False)
+    except typer.Abort as end:
+        # typer replaces every KeyboardInterrupt.
+        raise end.__cause__ or KeyboardInterrupt from None
     except UsageError as error:
-        sys.exit(_print_usage(error))
-    except InputError as error:
-        _fail(describe(error), 2)
-    except (OSError, WorkError) as error:
-        # A full disk, a folder without write permission: the message contains the file's name.
-        _fail(describe(error), 1)
-    except MemoryError as error:
-        _fail(f"there is not enough memory ({error or 'for this'}): request less at once", 1)
-    except (KeyboardInterrupt, typer.Abort):
-        _fail("interrupted", 130)
+        status = _print_usage(error)
+    finally:
+        flush_output()
+    sys.exit(status)
 
 
 def _print_usage(error: Any) -> int:  # noqa: ANN401  # typer hides the type

@@ -118,6 +118,7 @@ def ablate(
         out,
     )
     results = write_results(out)
+    grid_display.note_unverified(results.unverified, out)
     if as_json:
         found = {
             **as_dict(results.rows, results.scores),

@@ -1,6 +1,5 @@
 """``selfmodel recover``: the paper's loop, from a healthy gait to one for the damaged robot."""
 
-import json
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated
@@ -31,8 +30,8 @@ from selfmodel.cli.options import (
     Trials,
 )
 from selfmodel.cli.output.display import display
-from selfmodel.cli.output.printing import print_json, print_notes
-from selfmodel.cli.output.report import facts, print_report
+from selfmodel.cli.output.printing import print_json
+from selfmodel.cli.output.report import facts, print_report, result_file
 from selfmodel.comparators import DEFAULT
 from selfmodel.controllers.controller import check_silent_neurons
 from selfmodel.experiments import plugins, robots
@@ -107,13 +106,13 @@ def recover(
     try:
         with display() as on_event:
             outcome = run(experiment, on_event)
-    except KeyboardInterrupt:
-        print_notes(f"interrupted: the finished trials are in {experiment.folder}")
-        raise typer.Exit(130) from None
+    except KeyboardInterrupt as interruption:
+        interruption.add_note(f"the finished trials are in {experiment.folder}")
+        raise
     found = facts(experiment, outcome)
-    result = json.dumps(found, indent=2, allow_nan=False)
     try:
-        replace_file(experiment.folder / "result.json", f"{result}\n".encode())
+        logs = [Path(trial.path) for trial in outcome.recovery.trials]
+        replace_file(experiment.folder / "result.json", result_file(experiment, found, logs))
     finally:  # the result is printed even if the disk is full
         if as_json:
             print_json(found)

@@ -18,7 +18,7 @@ from rich.progress import (
 )
 
 from selfmodel.cli.output.console import text_console
-from selfmodel.cli.output.plain import plain
+from selfmodel.cli.output.plain import counted, plain
 from selfmodel.cli.output.printing import print_notes
 from selfmodel.experiments.grid import GridBegins, PartEnds
 
@@ -93,7 +93,7 @@ def _line(event: PartEnds) -> str:
 def run_shown(run: Callable[[Watch], Sequence[PartEnds]], out: Path) -> Sequence[PartEnds]:
     """Runs a grid with a progress display; returns the failed parts.
 
-    Ctrl-C ends the command with status 130, and a line with the command to continue.
+    Ctrl-C and the other stop signals end the command with a line that tells how to continue.
 
     Args:
         run: Runs the grid; calls its argument with each event.
@@ -102,12 +102,26 @@ def run_shown(run: Callable[[Watch], Sequence[PartEnds]], out: Path) -> Sequence
     with grid_display() as on_event:
         try:
             return run(on_event)
-        except KeyboardInterrupt:
-            print_notes(
-                f"interrupted: {on_event.done} of {on_event.total} are done and kept in {out}; the "
-                f"same command continues with the rest"
+        except KeyboardInterrupt as interruption:
+            interruption.add_note(
+                f"{on_event.done} of {on_event.total} are done and kept in {out}; the same command "
+                f"continues with the rest"
             )
-            raise typer.Exit(130) from None
+            raise
+
+
+def note_unverified(count: int, out: Path) -> None:
+    """Prints a line if a table has parts without digests.
+
+    Args:
+        count: Number of the parts.
+        out: Folder of the grid.
+    """
+    if count:
+        print_notes(
+            f"note: version 0.1 wrote {counted(count, 'part')} in {out}, without digests: their "
+            f"content was not verified"
+        )
 
 
 def as_objects(failed: Sequence[PartEnds]) -> list[dict[str, str | None]]:

@@ -1,5 +1,8 @@
 """Outcome of ``selfmodel recover``, as text and as JSON."""
 
+import dataclasses
+import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +12,7 @@ from selfmodel.cli.output.ranking import confidence_sentence, ranking_table
 from selfmodel.cli.output.tables import folding, print_tables
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
 from selfmodel.experiments.experiment import Experiment, Outcome
+from selfmodel.logs.result_files import file_digest, result_bytes
 from selfmodel.robot.designs import network_for
 
 
@@ -48,6 +52,26 @@ def _reality(found: dict[str, Any]) -> str:
     """Returns the reality gap of the physical robot as a clause."""
     gap = f", at a reality gap of {found['gap']:g}" if found["gap"] else ""
     return gap + (", with structural mismatch" if found["structure"] else "")
+
+
+def result_file(experiment: Experiment, found: dict[str, Any], logs: Sequence[Path]) -> bytes:
+    """Returns the ``result.json`` of a run: the outcome with its settings, and its logs' digests.
+
+    Args:
+        experiment: The run.
+        found: Result of ``facts``.
+        logs: Logs of the run's trials.
+
+    Raises:
+        OSError: A log cannot be read.
+    """
+    return result_bytes(
+        {
+            **found,
+            "settings": dataclasses.asdict(experiment.settings),
+            "files": {os.path.relpath(log, experiment.folder): file_digest(log) for log in logs},
+        }
+    )
 
 
 def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:

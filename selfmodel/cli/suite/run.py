@@ -130,6 +130,7 @@ def run(
         out,
     )
     results = write_results(out)
+    grid_display.note_unverified(results.unverified, out)
     if as_json:
         found = {**results.as_dict(), "failures": grid_display.as_objects(failed)}
         print_json(found, indent=1)
