@@ -14,6 +14,7 @@ from selfmodel.cli.output.tables import show
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError, TrialLog
 from selfmodel.logs.info import Info, has_truth, read_info
+from selfmodel.logs.provenance import UNTIED
 from selfmodel.logs.salvage import salvageable_steps
 
 
@@ -88,6 +89,7 @@ def _as_object(path: Path, found: Info) -> dict[str, Any]:
         "clock": _clock(found.log),
         "truth": "hidden" if has_truth(found) else "unknown",
         "source": dict(found.source),
+        "digest": found.digest,
     }
 
 
@@ -113,7 +115,8 @@ def _print(one: dict[str, Any]) -> None:
         f"seed {one['seed']}\n"
         f"driven by {one['driver']}\n"
         f"written with {', '.join(f'{name} {text}' for name, text in one['software'].items())}\n"
-        f"true hypothesis: {_TRUTH[one['truth']]}"
+        f"true hypothesis: {_TRUTH[one['truth']]}\n"
+        f"digest: {one['digest'] or f'none: {UNTIED}'}"
     )
     typer.echo(plain(text))
     if clock := one["clock"]:

@@ -9,7 +9,9 @@ import typer
 
 from selfmodel.cli.inputs import check_log_name
 from selfmodel.cli.options import Json, NewLog
-from selfmodel.cli.output.plain import counted
+from selfmodel.cli.output.plain import counted, plain
+from selfmodel.logs.belonging import Discarded
+from selfmodel.logs.provenance import UNTIED
 from selfmodel.logs.salvage import salvage as save
 
 
@@ -35,6 +37,22 @@ def salvage(
         typer.echo(f"{topic}: {counted(count, 'message')} lost")
     for name in saved.lost:
         typer.echo(f"{name} is lost: {_CONSEQUENCES[name]}")
+    for other in saved.discarded:
+        typer.echo(plain(_left_out(other)))
+    if not saved.tied:
+        typer.echo(
+            f"not tied to its trial: {UNTIED}; if this file is a mixture of two trials, so is the "
+            f"new log"
+        )
+
+
+def _left_out(other: Discarded) -> str:
+    if not other.trial:
+        return f"left out: {counted(other.steps, 'step')} without a seal"
+    return (
+        f"left out: {counted(other.steps, 'step')} in {counted(other.batches, 'chunk')} sealed for "
+        f"the trial {other.trial} ({other.identity[:12]})"
+    )
 
 
 _CONSEQUENCES = {
