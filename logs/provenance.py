@@ -117,7 +117,7 @@ def parse_seal(payload: bytes, nanoseconds: int) -> Seal:
 
 
 def topic_key(topic: str, kind: str, encoding: str, schema: bytes) -> bytes:
-    """Returns the digest that stands for a topic, its type, encoding and definition in a batch."""
+    """Returns the digest of a topic, its type, encoding and definition, for use in a batch."""
     text = json.dumps([topic, kind, encoding, schema.decode("latin-1")])
     return sha256(text.encode()).digest()[:8]
 

@@ -27,7 +27,7 @@ from selfmodel.settings import Settings
 from selfmodel.trials.signals import SIGNALS
 from tests.logs.conftest import MJCF, made_up, plan_of, timed
 
-STEPS = 230
+STEPS = 130
 
 
 @dataclass(frozen=True)
