@@ -42,9 +42,10 @@ def rescue(path: Path, budget: Budget = DEFAULT_BUDGET) -> Rescued:
             one time.
         InputError: The file does not exist, or cannot be opened.
     """
-    found = Findings()
+    found, meter = Findings(), Meter(budget)
     try:
         for record in _intact_records(read_bytes(path, budget), budget):
+            meter.name(record)
             found.add(record)
         rescued = own_contents(found)
     except ContradictionError as error:

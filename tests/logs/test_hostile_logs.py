@@ -246,7 +246,7 @@ UNSIZED = zstandard.ZstdCompressor(write_content_size=False)
         ([chunk(message(bytes(16_000_000)))] * 30, "bytes, unpacked"),
         pytest.param(
             [note(f"n{k}") for k in range(210_000)],
-            "200000 records and chunks",
+            "10000 names",
             marks=pytest.mark.fuzz,
         ),
         ([note("n", bytes(33 * 2**20))], "33333333 bytes outside its messages"),
@@ -266,6 +266,16 @@ def test_a_bomb_gets_an_error_and_not_the_memory(log: Path, more: list[bytes], m
     put(log, *more)
     assert re.search(match, outcome(lambda: read_log(log)).error)
     outcome(lambda: salvageable_steps(log))
+
+
+def test_thousands_of_channels_are_refused_and_not_listed(log: Path):
+    put(log, *(channel(k, f"/t{k}") for k in range(100, 10_100)))
+
+    done = CliRunner().invoke(app, ["info", str(log)])
+
+    assert done.exit_code == 1
+    assert "more than the 10000 names that a budget of 1 GB allows" in done.output
+    assert salvageable_steps(log) == 0
 
 
 def test_a_log_that_is_put_together_again_is_sound(log: Path):
