@@ -156,10 +156,11 @@ def test_a_part_of_another_run_is_refused(grid: Path):
     refused(grid, PART, "expected the part result of the run run-00, with its digest, got another")
 
 
-def test_a_part_under_another_name_is_refused(grid: Path):
-    shutil.copy(grid / PART, grid / "run-00" / "parts" / "better.json")
+@pytest.mark.parametrize(("name", "part"), [("better", "better"), ("%72esult", "result")])
+def test_a_part_is_not_counted_twice_under_another_name(grid: Path, name: str, part: str):
+    shutil.copy(grid / PART, grid / "run-00" / "parts" / f"{name}.json")
 
-    with pytest.raises(InputError, match=r"better\.json: expected the part better of the run"):
+    with pytest.raises(InputError, match=rf"{name}\.json: expected the part {part} of the run"):
         [*finished(grid)]
 
 
