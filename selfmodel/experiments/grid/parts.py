@@ -171,6 +171,11 @@ def _read(path: Path, definition: Definition, digests: dict[Path, str]) -> Resul
             f"{path}: expected the part {part} of the run {definition.values['key']}, with its "
             f"digest, got another part or no digest; {REMEDY}"
         )
+    if found.made_with != definition.made_with:
+        raise InputError(
+            f"{path} was made with {listed(found.made_with)}, its run with "
+            f"{listed(definition.made_with)}: a study is of one version of each; {REMEDY}"
+        )
     _check_files(path, outcome.get("files", {}), digests)
     return found
 
