@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from selfmodel.errors import InputError
+from selfmodel.files import encodable
 from selfmodel.logs.atomic import partial_path
 from selfmodel.logs.contents import Contents, Messages
 from selfmodel.logs.errors import CorruptError, LogError, SchemaMismatchError
@@ -107,7 +108,8 @@ def _saved(path: Path, budget: Budget) -> tuple[Contents, Salvaged]:
     behaviour = read_behaviour(path, contents, record, span, controller)
     result = Result(INTERRUPTED, span, float(forward_displacement(behaviour)))
     contents.metadata[RESULT] = result.texts()
-    contents.metadata[SALVAGE] = {"source": path.name, "complete_steps": str(len(whole))}
+    source = encodable(path.name)
+    contents.metadata[SALVAGE] = {"source": source, "complete_steps": str(len(whole))}
     interpret(path, contents)
     lost_messages = {name: count for name, count in missing.items() if count}
     return contents, Salvaged("", len(whole), span, record.steps, lost_messages, lost)

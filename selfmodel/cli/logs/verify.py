@@ -1,13 +1,13 @@
 """``selfmodel logs verify``: every check on every log."""
 
-import json
 from pathlib import Path
 from typing import Any
 
 import typer
 
 from selfmodel.cli.options import DEFAULT_BUDGET, FileBudget, Json, LogFiles
-from selfmodel.cli.output.plain import counted, plain
+from selfmodel.cli.output.plain import counted
+from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError
 from selfmodel.logs.verify import verify as check
@@ -22,10 +22,9 @@ def verify(files: LogFiles, *, budget: FileBudget = DEFAULT_BUDGET, as_json: Jso
     allowed = Budget.parse(budget)
     checked = [_checked(path, allowed) for path in files]
     if as_json:
-        typer.echo(json.dumps({"ok": all(one["ok"] for one in checked), "files": checked}))
+        print_json({"ok": all(one["ok"] for one in checked), "files": checked}, indent=None)
     else:
-        for one in checked:
-            typer.echo(plain(_line(one)))
+        print_lines(*map(_line, checked))
     raise typer.Exit(0 if all(one["ok"] for one in checked) else 1)
 
 
