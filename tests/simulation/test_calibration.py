@@ -2,6 +2,7 @@
 
 import dataclasses
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -244,3 +245,24 @@ def test_errors_of_a_calibration_are_finite_whatever_the_simulation(
 
     monkeypatch.setattr(calibration, "predict", lost)
     assert 0 < prediction_error(QUADRUPED, trials(QUADRUPED, 1), threads=1) <= calibration.MAX_ERROR
+
+
+@pytest.mark.search
+def test_the_estimated_steps_are_within_a_factor_of_two(monkeypatch: pytest.MonkeyPatch):
+    steps = 0
+
+    def counted(*arguments: object, **options: Any) -> SimulationResult:
+        nonlocal steps
+        stats = options["stats"]
+        before = stats.steps
+        found = predict(*arguments, **options)
+        steps += stats.steps - before
+        return found
+
+    monkeypatch.setattr(calibration, "predict", counted)
+    two = trials(with_parameters(QUADRUPED, TRUE))
+    estimate = calibration.simulated_steps(QUADRUPED, two)
+    assert steps == 0
+    calibrate(QUADRUPED, two, threads=1)
+
+    assert 0.5 < estimate / steps < 2
