@@ -2,7 +2,6 @@
 
 import dataclasses
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +20,7 @@ from selfmodel.simulation.calibration import (
     calibrate,
     prediction_error,
 )
-from selfmodel.simulation.outcome import SimulationResult
+from selfmodel.simulation.outcome import SimulationResult, SimulationStats
 from selfmodel.simulation.prediction import predict
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import collect
@@ -251,11 +250,10 @@ def test_errors_of_a_calibration_are_finite_whatever_the_simulation(
 def test_the_estimated_steps_are_within_a_factor_of_two(monkeypatch: pytest.MonkeyPatch):
     steps = 0
 
-    def counted(*arguments: object, **options: Any) -> SimulationResult:
+    def counted(*arguments: object, stats: SimulationStats, **options: object) -> SimulationResult:
         nonlocal steps
-        stats = options["stats"]
         before = stats.steps
-        found = predict(*arguments, **options)
+        found = predict(*arguments, stats=stats, **options)
         steps += stats.steps - before
         return found
 
