@@ -279,7 +279,7 @@ def test_thousands_of_channels_are_refused_and_not_listed(log: Path):
 
 
 def test_a_log_that_is_put_together_again_is_sound(log: Path):
-    put(log, note("n"), attachment("a", b"x"), chunk(b""))
+    put(log, note("n"), chunk(b""))
     assert read_log(log).trial.behaviour.steps == 120
 
 
@@ -303,8 +303,9 @@ def test_a_search_for_what_is_whole_ends(log: Path, data: bytes):
 def test_names_are_harmless_in_a_terminal_and_as_paths(log: Path):
     evil = "../../etc/\x1b[2J\x1b]0;owned\x07\x9b31m\u202e"
     rewritten(log, says(TRIAL, robot=evil, name=evil))
-    rewritten(log, says(SOFTWARE, **{evil: evil}))
-    put(log, attachment(evil, b"x"), note(evil), channel(90, evil))
+    attached = Attachment(0, 0, evil, "x", b"x")
+    rewritten(log, says(SOFTWARE, **{evil: evil}), more=[attached])
+    put(log, note(evil), channel(90, evil))
     assert read_log(log).trial.robot == evil
     for command in ("info", "verify"):
         result = CliRunner().invoke(app, [command, str(log)])
