@@ -108,7 +108,7 @@ def endings(count: int, seed: int, watchdog: float | None = None) -> list[Ending
 
 def main() -> None:
     """Prints a line per signal, and each fault; the exit status is 1 if there is one."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description="Ends drivers by signals at random moments.")
     parser.add_argument("--count", type=int, default=50)
     parser.add_argument("--seed", type=int, default=11)
     parser.add_argument("--watchdog", type=float)

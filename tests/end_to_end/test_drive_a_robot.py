@@ -53,8 +53,8 @@ def robot(folder: Path, **failures: float | str) -> Iterator[str]:
         process.communicate()
 
 
-def driver(folder: Path, port: str) -> subprocess.Popen[str]:
-    command = [sys.executable, EXAMPLE, "127.0.0.1", port, folder / "trial.mcap"]
+def driver(folder: Path, port: str, *options: str) -> subprocess.Popen[str]:
+    command = [sys.executable, EXAMPLE, "127.0.0.1", port, folder / "trial.mcap", *options]
     return subprocess.Popen(
         command,
         cwd=folder,
@@ -110,7 +110,8 @@ def observed(commands: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
 @pytest.mark.process
 def test_a_dropped_connection_stops_the_robot_and_leaves_a_whole_log(tmp_path: Path):
     with robot(tmp_path, **{"70": "hang up"}) as port:
-        _, errors = (process := driver(tmp_path, port)).communicate(timeout=120)
+        process = driver(tmp_path, port, "--watchdog", "30")
+        _, errors = process.communicate(timeout=120)
     log, _ = verify(tmp_path / "trial.mcap")
 
     assert process.returncode == 1
