@@ -53,8 +53,8 @@ def robot(folder: Path, **failures: float | str) -> Iterator[str]:
         process.communicate()
 
 
-def driver(folder: Path, port: str) -> subprocess.Popen[str]:
-    command = [sys.executable, EXAMPLE, "127.0.0.1", port, folder / "trial.mcap"]
+def driver(folder: Path, port: str, *options: str) -> subprocess.Popen[str]:
+    command = [sys.executable, EXAMPLE, "127.0.0.1", port, folder / "trial.mcap", *options]
     return subprocess.Popen(
         command,
         cwd=folder,
@@ -110,7 +110,8 @@ def observed(commands: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
 @pytest.mark.process
 def test_a_dropped_connection_stops_the_robot_and_leaves_a_whole_log(tmp_path: Path):
     with robot(tmp_path, **{"70": "hang up"}) as port:
-        _, errors = (process := driver(tmp_path, port)).communicate(timeout=120)
+        process = driver(tmp_path, port, "--watchdog", "30")
+        _, errors = process.communicate(timeout=120)
     verified = verify(tmp_path / "trial.mcap")
     log = verified.log
 
@@ -156,17 +157,31 @@ def test_a_robot_that_is_not_there_is_said_so_and_can_be_tried_again(tmp_path: P
     assert "Traceback" not in errors
 
 
-def test_ctrl_c_stops_the_robot_and_leaves_a_whole_log(tmp_path: Path):
+@pytest.mark.parametrize(
+    ("number", "status", "ends", "reason"),
+    [
+        (signal.SIGTERM, 143, "", "Terminated: SIGTERM"),
+        pytest.param(signal.SIGHUP, 129, "", "Terminated: SIGHUP", marks=pytest.mark.process),
+        pytest.param(
+            *(signal.SIGINT, -signal.SIGINT, "KeyboardInterrupt", "KeyboardInterrupt"),
+            marks=pytest.mark.process,
+        ),
+    ],
+)
+def test_a_stop_signal_stops_the_robot_and_leaves_a_whole_log(
+    tmp_path: Path, number: signal.Signals, status: int, ends: str, reason: str
+):
     with robot(tmp_path) as port:
         process = driver(tmp_path, port)
         while len(heard(tmp_path)) < 60 and process.poll() is None:
             time.sleep(0.02)
-        process.send_signal(signal.SIGINT)
+        process.send_signal(number)
         _, errors = process.communicate(timeout=120)
     log = verify(tmp_path / "trial.mcap").log
 
-    assert errors.strip().endswith("KeyboardInterrupt")
-    assert (log.status, log.reason) == ("stopped", "KeyboardInterrupt")
+    assert process.returncode == status
+    assert errors.strip().rpartition("\n")[2] == ends
+    assert (log.status, log.reason) == ("stopped", reason)
     first, *commands, last = heard(tmp_path)
     assert (first, last) == (STOP, STOP)
     assert commands == list(range(len(commands)))

@@ -39,7 +39,6 @@ from selfmodel.logs.provenance import (
     topic_key,
 )
 from selfmodel.logs.records import (
-from selfmodel.sandbox.budget import Budget
     DIGEST,
     HIDDEN,
     LAST_BATCH,
@@ -51,6 +50,7 @@ from selfmodel.sandbox.budget import Budget
     with_digest,
     without_digest,
 )
+from selfmodel.sandbox.budget import Budget
 
 CASES = Path(__file__).parents[3] / "shared" / "samples" / "mcap-conformance"
 Change = Callable[[McapRecord], McapRecord | None]
