@@ -175,6 +175,14 @@ def test_no_damage_to_a_controller_raises_anything_else(kind: str):
             parse_controller(bytes(damaged), "here")
 
 
+def test_a_damaged_header_warns_of_nothing():
+    # "\\h" is an invalid escape, for which Python warns as it reads the header.
+    damaged = controller_bytes(controller()).replace(b"'shape'", b"'\\hape'")
+
+    with pytest.raises(InputError, match="expected a controller"):
+        parse_controller(damaged, "here")
+
+
 def test_a_file_that_is_not_there_is_said_so(tmp_path: Path):
     with pytest.raises(InputError, match=r"no\.npz: expected a controller file that can be read"):
         load_controller(tmp_path / "no.npz")

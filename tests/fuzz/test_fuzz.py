@@ -1,0 +1,147 @@
+"""No input of any reader leads to anything but a declared error; and the campaign can fail."""
+
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from selfmodel.errors import InputError
+from tests.fuzz import oracle
+from tests.fuzz.campaign import Plan, Tally, run, work_folder
+from tests.fuzz.target import Case, Target
+from tests.fuzz.targets import TARGETS
+
+STUDY = "study-folders"
+
+
+def campaign(folder: Path, target: Target, count: int, processes: int = 1) -> Tally:
+    """Runs a small campaign; its findings are in the folder ``failures``."""
+    plan = Plan([target], 0, 0, count, 600.0, processes, folder / "failures")
+    with work_folder() as work:
+        return run(plan, work, lambda *_: None)[target.name]
+
+
+def reports(folder: Path) -> str:
+    return "\n".join(path.read_text() for path in sorted(folder.rglob("report.txt")))
+
+
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [
+        ("damaged-logs", 60),
+        *(pytest.param(name, 80, marks=pytest.mark.fuzz) for name in TARGETS if name != STUDY),
+        pytest.param(
+            *(STUDY, 80),
+            marks=[
+                pytest.mark.fuzz,
+                pytest.mark.xfail(reason="a part that was altered by hand is a traceback"),
+            ],
+        ),
+        pytest.param("damaged-logs", 1_000, marks=pytest.mark.fuzz),
+    ],
+)
+def test_no_input_leads_to_anything_but_a_declared_error(name: str, count: int, tmp_path: Path):
+    tally = campaign(tmp_path, TARGETS[name], count, processes=2)
+
+    assert not tally.findings, reports(tmp_path)
+    assert tally.cases == count
+    assert any(not outcome.endswith("Error") for outcome in tally.outcomes), "none was accepted"
+
+
+def failing(check: Callable[[], str]) -> Target:
+    """A target whose case 3 of a batch of 5 has a check of its own; the others pass."""
+    numbers = iter(range(5))
+
+    def make(_: np.random.Generator) -> Case:
+        bad = next(numbers) == 3
+        return Case("made", {"input": b"x"}, check if bad else lambda: "fine")
+
+    return Target("failing", 1, lambda _: make)
+
+
+def _raise() -> str:
+    raise KeyError("x")
+
+
+def _refuse_without_a_word() -> str:
+    raise InputError("")
+
+
+def _print() -> str:
+    print("RuntimeWarning", file=sys.stderr)  # noqa: T201  # it is a finding
+    return "fine"
+
+
+def _leave() -> str:
+    Path("MUJOCO_LOG.TXT").touch()
+    return "fine"
+
+
+def _leave_part() -> str:
+    Path("log.mcap.part").touch()
+    return "fine"
+
+
+def _change() -> str:
+    Path("input").write_bytes(b"y")
+    return "fine"
+
+
+def _fill() -> str:
+    return "fine" if np.ones(5_000_000).any() else ""
+
+
+def _spin() -> str:
+    while time.process_time() < 1e6:
+        pass
+    return "fine"
+
+
+def _crash() -> str:
+    os.kill(os.getpid(), signal.SIGSEGV)
+    return "fine"
+
+
+@pytest.mark.parametrize(
+    ("check", "reported"),
+    [
+        (_raise, "KeyError: 'x'"),
+        (_refuse_without_a_word, "InputError"),
+        (_print, "printed:\nRuntimeWarning"),
+        (_leave, "files left or changed: MUJOCO_LOG.TXT"),
+        (_change, "files left or changed: input"),
+        (_fill, "took 40 MB"),
+        (_spin, "its process ended with SIGPROF"),
+        (_crash, "its process ended with SIGSEGV"),
+    ],
+)
+def test_a_finding_is_reported_with_its_command_and_ends_no_campaign(
+    check: Callable[[], str], reported: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(oracle, "SECONDS", 0.1)
+    monkeypatch.setattr(oracle, "MEGABYTES", 20)
+
+    tally = campaign(tmp_path, failing(check), 5)
+
+    assert (tally.outcomes.total(), tally.findings.total()) == (4, 1)
+    report = reports(tmp_path)
+    assert "python -m tests.fuzz --only failing --seed 0 --first " in report
+    assert reported in report
+
+
+def test_a_part_file_may_be_left(tmp_path: Path):
+    assert not campaign(tmp_path, failing(_leave_part), 5).findings
+
+
+def test_equal_seeds_make_equal_cases(tmp_path: Path):
+    make = TARGETS["sealed-logs"].prepare(tmp_path)
+
+    first, again, other = (make(np.random.default_rng(seed)) for seed in (1, 1, 2))
+
+    assert (first.what, first.files) == (again.what, again.files)
+    assert first.files != other.files
