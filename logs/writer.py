@@ -1,7 +1,7 @@
 """Writer of a trial's log, while the trial runs."""
 
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
@@ -18,6 +18,11 @@ from selfmodel.logs.logfile import LogFile
 from selfmodel.logs.preamble import write_preamble
 from selfmodel.logs.records import FINISHED, RESULT, STOPPED, Result, TrialHeader, checked_name
 from selfmodel.physical.cleanup import Cleanup
+from selfmodel.physical.stop_signals import (
+    handle_stop_signals,
+    hold_stop_signals,
+    release_stop_signals,
+)
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Sample
 from selfmodel.trials.signals import Names
@@ -54,14 +59,22 @@ def write_trial(
         IncompleteError: There were fewer samples than planned; the ``.part`` contains them.
         LogWriteError: The disk is full, or failed.
     """
-    # The robot is stopped in any case.
+    iterator = itertools.islice(samples, plan.steps)
+    # The robot is stopped in any case, and a signal interrupts nothing but the robot.
     with (
+        handle_stop_signals(),
+        hold_stop_signals(),
         TrialWriter(path, robot, plan, header) as writer,
         Cleanup(getattr(samples, "close", lambda: None)),
     ):
-        for sample in itertools.islice(samples, plan.steps):
+        while (sample := _next(iterator)) is not None:
             writer.add(sample)
     return path
+
+
+def _next(samples: Iterator[Sample]) -> Sample | None:
+    with release_stop_signals():
+        return next(samples, None)
 
 
 class TrialWriter:

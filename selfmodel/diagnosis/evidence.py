@@ -15,6 +15,8 @@ from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments, recordable
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.magnitudes import check_magnitudes
+from selfmodel.trials.signals import Signal
 from selfmodel.trials.trial import Trial
 
 TrialKey = tuple[str, int]
@@ -97,7 +99,9 @@ class Evidence:
     def _prepare(self, trial: Trial) -> PreparedTrial:
         key = _key(trial)
         if key not in self._prepared:
-            self._prepared[key] = self._checked(self._comparator.prepare(trial))
+            prepared = self._checked(self._comparator.prepare(trial))
+            check_magnitudes(trial, _compared_signals(prepared.request))
+            self._prepared[key] = prepared
         return self._prepared[key]
 
     def _checked(self, prepared: PreparedTrial) -> PreparedTrial:
@@ -150,6 +154,12 @@ class Evidence:
             f"the comparator {self._comparator.name!r} {problem}: run "
             f"selfmodel.diagnosis.comparator_contract.check_comparator on it"
         )
+
+
+def _compared_signals(request: Request) -> tuple[Signal, ...]:
+    """Returns the signals of a trial that a comparison depends on, each once."""
+    states = (*request.states, "commands") if isinstance(request, Segments) else ()
+    return tuple(dict.fromkeys((*states, *request.record)))
 
 
 def simulate(
