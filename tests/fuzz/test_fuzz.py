@@ -16,8 +16,6 @@ from tests.fuzz.campaign import Plan, Tally, run, work_folder
 from tests.fuzz.target import Case, Target
 from tests.fuzz.targets import TARGETS
 
-STUDY = "study-folders"
-
 
 def campaign(folder: Path, target: Target, count: int, processes: int = 1) -> Tally:
     """Runs a small campaign; its findings are in the folder ``failures``."""
@@ -34,14 +32,7 @@ def reports(folder: Path) -> str:
     ("name", "count"),
     [
         ("damaged-logs", 60),
-        *(pytest.param(name, 80, marks=pytest.mark.fuzz) for name in TARGETS if name != STUDY),
-        pytest.param(
-            *(STUDY, 80),
-            marks=[
-                pytest.mark.fuzz,
-                pytest.mark.xfail(reason="a part that was altered by hand is a traceback"),
-            ],
-        ),
+        *(pytest.param(name, 80, marks=pytest.mark.fuzz) for name in TARGETS),
         pytest.param("damaged-logs", 1_000, marks=pytest.mark.fuzz),
     ],
 )

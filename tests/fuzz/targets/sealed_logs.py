@@ -21,6 +21,7 @@ from selfmodel.logs.reader import TrialLog
 from selfmodel.logs.robots import robot_of
 from selfmodel.logs.salvage import salvage
 from selfmodel.logs.verify import verify
+from selfmodel.sandbox import DEFAULT_BUDGET
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.trial_replay import replay
 from tests.fuzz.mcap_file import read_file
@@ -58,7 +59,7 @@ def prepare(folder: Path) -> Make:
 def check(comparator: Comparator) -> str:
     """Uses a log in every way."""
     log = read_log(LOG) if _accepted(partial(read_log, LOG)) else None
-    facts = _facts(LOG)
+    facts = _facts(LOG, DEFAULT_BUDGET)
     json.dumps(facts, allow_nan=False)
     _accepted(partial(read_truth, LOG))
     _accepted(partial(read_gap, LOG))
