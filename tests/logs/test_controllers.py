@@ -128,6 +128,7 @@ def test_equal_controllers_give_equal_bytes_at_any_time():
         (archive(ranges=np.zeros((2, 2))), "needs a finite command range of positive width"),
         (archive(kind=np.array("cpg")), "it holds genome.npy, hidden.npy"),
         (cpg(timestep=np.array(0.0)), "time step must be above 0 s"),
+        (cpg(timestep=np.array(1e308)), r"at most 3600 s, got 1e\+308"),
         (cpg(timestep=np.array(np.inf)), "time step must be above 0 s"),
         (cpg(timestep=np.array(1)), "its arrays have the types"),
         (cpg(genome=np.zeros(8)), "has 9 weights, got a genome of shape"),
