@@ -17,9 +17,10 @@ from typing import Any
 
 from selfmodel.errors import InputError
 from selfmodel.files import check_regular, read_file
+from selfmodel.sandbox.budget import DEFAULT_BUDGET
 
-MAX_BYTES = 16 * 2**20
-"""Largest JSON file, bytes: parsed, its values take up to 25 times as much memory."""
+MAX_BYTES = DEFAULT_BUDGET.json_bytes
+"""Largest JSON file that is written and read, bytes."""
 
 MADE_WITH = "made_with"
 DIGEST = "sha256"

@@ -156,10 +156,11 @@ def test_a_part_of_another_run_is_refused(grid: Path):
     refused(grid, PART, "expected the part result of the run run-00, with its digest, got another")
 
 
-def test_a_part_under_another_name_is_refused(grid: Path):
-    shutil.copy(grid / PART, grid / "run-00" / "parts" / "better.json")
+@pytest.mark.parametrize(("name", "part"), [("better", "better"), ("%72esult", "result")])
+def test_a_part_is_not_counted_twice_under_another_name(grid: Path, name: str, part: str):
+    shutil.copy(grid / PART, grid / "run-00" / "parts" / f"{name}.json")
 
-    with pytest.raises(InputError, match=r"better\.json: expected the part better of the run"):
+    with pytest.raises(InputError, match=rf"{name}\.json: expected the part {part} of the run"):
         [*finished(grid)]
 
 
@@ -188,16 +189,20 @@ def test_a_deleted_definition_is_written_anew_and_the_parts_are_kept(grid: Path)
     assert len([*finished(grid)]) == 2
 
 
-@pytest.fixture
-def older(grid: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A grid whose second run was made with another version of numpy."""
-    with monkeypatch.context() as patch:
-        others = {**result_files.versions(), "numpy": "1.0.0"}
+def make_older(*paths: Path) -> None:
+    """Rewrites files as another version of numpy would have made them."""
+    others = {**result_files.versions(), "numpy": "1.0.0"}
+    with pytest.MonkeyPatch.context() as patch:
         patch.setattr(result_files, "versions", lambda: others)
-        for name in ("run.json", "parts/result.json"):
-            path = grid / "run-01" / name
+        for path in paths:
             content = result_files.verified(json.loads(path.read_bytes())).content
             path.write_bytes(result_files.result_bytes(content))
+
+
+@pytest.fixture
+def older(grid: Path) -> Path:
+    """A grid whose second run was made with another version of numpy."""
+    make_older(grid / "run-01" / "run.json", grid / "run-01" / "parts" / "result.json")
     return grid
 
 
@@ -207,6 +212,12 @@ def test_a_folder_of_other_versions_is_not_continued(older: Path):
     with pytest.raises(InputError, match=rf"run-01 was made with .*numpy 1\.0\.0.*{installed}"):
         resume(older, job(0))
     assert not (older / "run-02").exists()
+
+
+def test_a_part_of_another_version_than_its_run_is_refused(grid: Path):
+    make_older(grid / PART)
+
+    refused(grid, PART, r"numpy 1\.0\.0, its run with .*: a study is of one version")
 
 
 def test_parts_of_two_versions_are_not_in_one_table(older: Path):

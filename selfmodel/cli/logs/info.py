@@ -14,6 +14,7 @@ from selfmodel.cli.output.tables import show
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError, TrialLog
 from selfmodel.logs.info import Info, has_truth, read_info
+from selfmodel.logs.provenance import UNTIED
 from selfmodel.logs.salvage import salvageable_steps
 from selfmodel.sandbox.budget import Budget
 
@@ -90,6 +91,7 @@ def _as_object(path: Path, found: Info) -> dict[str, Any]:
         "clock": _clock(found.log),
         "truth": "hidden" if has_truth(found) else "unknown",
         "source": dict(found.source),
+        "digest": found.digest,
     }
 
 
@@ -119,6 +121,7 @@ def _print(one: dict[str, Any]) -> None:
         f"driven by {one['driver']}",
         f"written with {', '.join(f'{name} {text}' for name, text in one['software'].items())}",
         f"true hypothesis: {_TRUTH[one['truth']]}",
+        f"digest: {one['digest'] or f'none: {UNTIED}'}",
     )
     if clock := one["clock"]:
         late, missing = (

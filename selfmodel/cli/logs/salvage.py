@@ -10,6 +10,8 @@ from selfmodel.cli.inputs import check_log_name
 from selfmodel.cli.options import DEFAULT_BUDGET, FileBudget, Json, NewLog
 from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_json, print_lines
+from selfmodel.logs.belonging import Discarded
+from selfmodel.logs.provenance import UNTIED
 from selfmodel.logs.salvage import salvage as save
 from selfmodel.sandbox.budget import Budget
 
@@ -37,6 +39,21 @@ def salvage(
         print_lines(f"{topic}: {counted(count, 'message')} lost")
     for name in saved.lost:
         print_lines(f"{name} is lost: {_CONSEQUENCES[name]}")
+    print_lines(*map(_left_out, saved.discarded))
+    if not saved.tied:
+        print_lines(
+            f"not tied to its trial: {UNTIED}; if this file is a mixture of two trials, so is the "
+            f"new log"
+        )
+
+
+def _left_out(other: Discarded) -> str:
+    if not other.trial:
+        return f"left out: {counted(other.steps, 'step')} without a seal"
+    return (
+        f"left out: {counted(other.steps, 'step')} in {counted(other.batches, 'chunk')} sealed for "
+        f"the trial {other.trial} ({other.identity[:12]})"
+    )
 
 
 _CONSEQUENCES = {

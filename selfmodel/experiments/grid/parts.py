@@ -165,10 +165,16 @@ def _read(path: Path, definition: Definition, digests: dict[Path, str]) -> Resul
     if definition.made_with is None and found.made_with is None:
         return found
     part = unquote(path.stem)
-    if (outcome.get("definition"), outcome.get("part")) != (definition.values, part):
+    is_own = (outcome.get("definition"), outcome.get("part")) == (definition.values, part)
+    if not is_own or path != part_path(path.parents[1], part):
         raise InputError(
             f"{path}: expected the part {part} of the run {definition.values['key']}, with its "
             f"digest, got another part or no digest; {REMEDY}"
+        )
+    if found.made_with != definition.made_with:
+        raise InputError(
+            f"{path} was made with {listed(found.made_with)}, its run with "
+            f"{listed(definition.made_with)}: a study is of one version of each; {REMEDY}"
         )
     _check_files(path, outcome.get("files", {}), digests)
     return found
