@@ -18,6 +18,7 @@ from mcap.writer import CompressionType
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError, TrialLog, read_log
 from selfmodel.logs.framing import Frame, frames, parse
+from selfmodel.logs.provenance import PROVENANCE
 from selfmodel.logs.records import SETTINGS_FILE
 from selfmodel.logs.salvage import salvage
 from tests.fuzz.mcap_file import read_file, written
@@ -56,7 +57,7 @@ DAMAGES = (*raw.OPERATORS, record_dropped, record_doubled)
 
 
 class Form:
-    """A log in one packing, and the steps that each of its chunks has messages of.
+    """A log in one packing, and the steps and chunks of each of its batches.
 
     Args:
         data: The file.
@@ -70,25 +71,33 @@ class Form:
         models = [text for frame, text in every if frame.opcode == Opcode.ATTACHMENT]
         # The trial's record, its model, and the chunks that announce the topics.
         self._needed = [first[0], *models]
-        self._steps: list[tuple[bytes, Counter[int]]] = []
+        self._batches: list[tuple[set[bytes], Counter[int]]] = []
+        texts: set[bytes] = set()
+        times: Counter[int] = Counter()
+        seals = -1
         for frame, text in every:
             if frame.opcode != Opcode.CHUNK:
                 continue
-            records = breakup_chunk(parse(frame), validate_crc=True)
-            if any(isinstance(record, Channel) for record in records):
-                self._needed.append(text)
-            times = [record.log_time for record in records if isinstance(record, Message)]
-            self._steps.append((text, Counter(times)))
+            for record in breakup_chunk(parse(frame), validate_crc=True):
+                if isinstance(record, Channel):
+                    self._needed.append(text)
+                    seals = record.id if record.topic == PROVENANCE else seals
+                elif isinstance(record, Message):
+                    texts.add(text)
+                    times[record.log_time] += 1
+                    if record.channel_id == seals:
+                        self._batches.append((texts, times))
+                        texts, times = set(), Counter()
 
     def surviving_steps(self, damaged: bytes) -> int:
-        """Returns the number of steps that have all their messages in undamaged chunks."""
-        if not self._steps or any(text not in damaged for text in self._needed):
+        """Returns the number of steps that have all their messages in undamaged batches."""
+        if not self._batches or any(text not in damaged for text in self._needed):
             return 0
         full: Counter[int] = Counter()
         left: Counter[int] = Counter()
-        for text, times in self._steps:
+        for texts, times in self._batches:
             full += times
-            if text in damaged:
+            if all(text in damaged for text in texts):
                 left += times
         return sum(left[time] == count for time, count in full.items())
 
