@@ -134,19 +134,16 @@ def _displacement(file: McapFile) -> str | None:
     rows = [item.data for item in _all(file, Message) if item.channel_id in channels]
     if not rows or len({len(row) for row in rows}) > 1:
         return None
-    first = rows[0]
-    # x is the first number after the header and two names.
-    at = first.find(b"\x00", 20)
-    offset = _first_float(first)
-    if at < 0 or offset + 8 > len(first):
+    offset = first_float(rows[0])
+    if offset + 8 > len(rows[0]):
         return None
-    x = [float(np.frombuffer(row, "<f8", 1, offset)[0]) for row in (rows[0], rows[-1])]
+    start, end = (np.frombuffer(row, "<f8", 1, offset)[0] for row in (rows[0], rows[-1]))
     with np.errstate(all="ignore"):
-        return repr(float(np.float64(x[1]) - np.float64(x[0])))
+        return repr(float(end - start))
 
 
-def _first_float(payload: bytes) -> int:
-    """Offset of the first number of an Odometry: after a stamp and two names."""
+def first_float(payload: bytes) -> int:
+    """Returns the offset of the first number of an Odometry: after a stamp and two names."""
     at = 4 + 8
     for _ in range(2):
         at += -(at - 4) % 4
