@@ -15,6 +15,9 @@ MAX_SETTINGS_BYTES = 2**16
 FORWARD_DIRECTIONS: Mapping[str, float] = {"x": 0.0, "y": 90.0, "-x": 180.0, "-y": 270.0}
 """Angle of each possible forward direction, counterclockwise from x, degrees."""
 
+MAX_CONTROL_TIMESTEP = 10.0
+"""Upper bound of the control time step, s."""
+
 NO_KEYFRAME = "none"
 """Value of ``keyframe`` for the reference pose of the MJCF."""
 
@@ -99,8 +102,11 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
         if key not in {field.name for field in fields(MjcfSettings)}:
             raise unknown_name("setting", key, [field.name for field in fields(MjcfSettings)])
     step = given.get("control_timestep")
-    if step is not None and not (_is_number(step) and 0 < step <= 10):
-        raise InputError(f"control_timestep needs a number from above 0 to 10 s, got {step!r}")
+    if step is not None and not (_is_number(step) and 0 < step <= MAX_CONTROL_TIMESTEP):
+        raise InputError(
+            f"control_timestep needs a number from above 0 to {MAX_CONTROL_TIMESTEP:g} s, "
+            f"got {step!r}"
+        )
     forward, keyframe = given.get("forward", "x"), given.get("keyframe", "")
     if not isinstance(forward, str) or forward not in FORWARD_DIRECTIONS:
         raise InputError(f"forward needs one of {', '.join(FORWARD_DIRECTIONS)}, got {forward!r}")
