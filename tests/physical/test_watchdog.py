@@ -56,7 +56,7 @@ def bench() -> Iterator[Hanging]:
 def test_a_driver_that_hangs_is_stopped_and_its_log_is_whole(bench: Hanging, tmp_path: Path):
     with pytest.raises(TrialError, match=r"the driver did not return from step within 0\.1 s"):
         logged(bench, tmp_path, watchdog=LIMIT)
-    log, _ = verify(tmp_path / "trial.mcap")
+    log = verify(tmp_path / "trial.mcap").log
 
     assert bench.executed[-1] == "stop"
     assert (log.status, log.trial.behaviour.steps) == ("stopped", 7)
