@@ -1,7 +1,7 @@
 """MCAP file under construction: a ``.part`` until it is finished, flushed on request."""
 
 import contextlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from mcap.writer import CompressionType, Writer
@@ -59,7 +59,7 @@ class LogFile:
         self._files: dict[str, str] = {}
         self._keys: dict[int, bytes] = {}
         self._batch: list[tuple[int, int, bytes]] = []
-        self._bytes = self._batches = 0
+        self._batches = 0
         self._trial, self._seals = "", -1
         self._identity = self._last = b""
         self._mcap = Writer(
@@ -109,20 +109,25 @@ class LogFile:
         self._keys[channel] = topic_key(topic, kind, "cdr", text)
         return channel
 
-    def messages(self, rows: Iterable[tuple[int, int, bytes, int]]) -> None:
+    def messages(
+        self, channels: Sequence[int], rows: Iterable[tuple[int, int, int, bytes]]
+    ) -> None:
         """Writes messages.
 
         Args:
-            rows: Channel number, time in ns, payload and sequence number of each message.
+            channels: Channel numbers.
+            rows: Sequence number, index into ``channels``, time in ns, and payload of each message.
         """
-        write, batch = self._mcap.add_message, self._batch
+        write, keep, size = self._mcap.add_message, self._batch.append, 0
         with as_write_error(partial_path(self.path)):
-            for channel, nanoseconds, payload, sequence in rows:
+            for sequence, index, nanoseconds, payload in rows:
+                channel = channels[index]
                 write(channel, nanoseconds, payload, nanoseconds, sequence)
-                batch.append((channel, nanoseconds, payload))
-                self._bytes += len(payload)
-                if self._bytes > CHUNK:
+                keep((channel, nanoseconds, payload))
+                size += len(payload)
+                if size > CHUNK:
                     self.flush()
+                    size = 0
 
     def flush(self) -> None:
         """Flushes to the operating system; a kill of the process then loses no data."""
@@ -159,7 +164,7 @@ class LogFile:
         time = times[-1]
         self._mcap.add_message(self._seals, time, seal.payload(time), time, seal.index)
         self._batch.clear()
-        self._bytes, self._batches, self._last = 0, self._batches + 1, seal.digest
+        self._batches, self._last = self._batches + 1, seal.digest
 
     def abandon(self) -> None:
         """Closes and deletes the unfinished file."""
