@@ -253,9 +253,9 @@ def _write(out: Path, contents: Contents, result: Result) -> None:
 def _write_messages(log: LogFile, every: dict[str, Messages]) -> None:
     channels = [log.channel(topic, messages.type) for topic, messages in every.items()]
     rows = [
-        (time, index, payload)
+        (0, index, time, payload)
         for index, messages in enumerate(every.values())
         for payload, (time, _) in zip(messages.payloads, messages.times, strict=True)
     ]
-    rows.sort(key=lambda row: row[:2])
-    log.messages(channels, ((0, index, time, payload) for time, index, payload in rows))
+    rows.sort(key=lambda row: (row[2], row[1]))
+    log.messages(channels, rows)
