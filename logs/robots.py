@@ -1,25 +1,29 @@
 """Robot of a log, built from the untrusted model in the log."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-
-import mujoco
+from collections.abc import Sequence
 
 from selfmodel.errors import InputError
 from selfmodel.logs.errors import SchemaMismatchError
 from selfmodel.logs.reader import TrialLog
 from selfmodel.robot.mjcf.adaptation import MAX_SUBSTEPS
+from selfmodel.robot.mjcf.mujoco_errors import MUJOCO_ERRORS
 from selfmodel.robot.mjcf.untrusted import checked_model
+from selfmodel.robot.mujoco_log import uncounted_warnings
 from selfmodel.robot.robot import Robot
+from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.trials.signals import Names
 
 GOOD = "its observations are intact"
 
 
-def robot_of(log: TrialLog) -> Robot:
+def robot_of(log: TrialLog, budget: Budget = DEFAULT_BUDGET) -> Robot:
     """Returns the robot of the model in a log.
 
     MuJoCo can read no files but the log's attachments.
+
+    Args:
+        log: The log.
+        budget: Memory and time that the model may take.
 
     Raises:
         LogError: The model is invalid, names other files, exceeds a limit, or is of another robot
@@ -28,9 +32,9 @@ def robot_of(log: TrialLog) -> Robot:
     path = log.trial.path
     try:
         checked = checked_model(log.mjcf, log.assets)
-        with _silent():
+        with uncounted_warnings():
             robot = Robot(log.trial.robot, checked.mjcf, log.control_timestep, checked.files)
-    except _FAILURES as error:
+    except MUJOCO_ERRORS as error:
         raise SchemaMismatchError(
             path, f"its model cannot be loaded: {_line(error)}", good=GOOD
         ) from error
@@ -53,28 +57,6 @@ def robot_of(log: TrialLog) -> Robot:
     return robot
 
 
-_FAILURES = (
-    ValueError,
-    KeyError,  # a part without a name
-    OverflowError,  # more physics steps than there are numbers
-    MemoryError,
-    RuntimeError,  # "unknown exception": MuJoCo is out of memory
-    mujoco.FatalError,
-)
-"""Exceptions that MuJoCo and a robot's parts raise for an invalid model."""
-
-
-@contextmanager
-def _silent() -> Iterator[None]:
-    """Context manager that keeps MuJoCo from writing warnings to a file in the working folder."""
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda _: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(before)
-
-
 def describe_difference(names: Names, logged: Names) -> str:
     """Returns the differences between a robot's names and those of a log, as text."""
     differences = []
@@ -89,8 +71,12 @@ def describe_difference(names: Names, logged: Names) -> str:
     return "; ".join(differences) or "their parts have the same names"
 
 
-def common_robot(logs: Sequence[TrialLog]) -> Robot:
+def common_robot(logs: Sequence[TrialLog], budget: Budget = DEFAULT_BUDGET) -> Robot:
     """Returns the common robot of logs.
+
+    Args:
+        logs: The logs.
+        budget: Memory and time that the model may take.
 
     Raises:
         InputError: There is no log, or two logs are of different robots.
@@ -110,7 +96,7 @@ def common_robot(logs: Sequence[TrialLog]) -> Robot:
                 f"the logs are {what}: {first.trial.path} is of {first.trial.robot!r}, "
                 f"{other.trial.path} of {other.trial.robot!r}; give logs of one robot"
             )
-    return robot_of(first)
+    return robot_of(first, budget)
 
 
 def _identity(log: TrialLog) -> tuple[object, ...]:

@@ -13,10 +13,9 @@ from selfmodel.errors import InputError, describe
 from selfmodel.logs.atomic import partial_path
 from selfmodel.logs.encoder import Encoder, empty_rows, sample_rows
 from selfmodel.logs.errors import IncompleteError, salvage_it
-from selfmodel.logs.files import as_write_error
 from selfmodel.logs.logfile import LogFile
 from selfmodel.logs.preamble import write_preamble
-from selfmodel.logs.records import FINISHED, RESULT, STOPPED, Result, TrialHeader, checked_name
+from selfmodel.logs.records import FINISHED, STOPPED, Result, TrialHeader, checked_name
 from selfmodel.physical.cleanup import Cleanup
 from selfmodel.physical.stop_signals import (
     handle_stop_signals,
@@ -198,17 +197,18 @@ class TrialWriter:
             return
         self._sound = False
         rows = {part: rows[:count] for part, rows in self._rows.items()}
-        with as_write_error(partial_path(self.path)):
-            for step, topic, stamp, payload in self._encoder.encode(self._written, rows):
-                self._log.message(self._channels[topic], stamp, payload, step)
+        channels = self._channels
+        self._log.messages(
+            (channels[topic], stamp, payload, step)
+            for step, topic, stamp, payload in self._encoder.encode(self._written, rows)
+        )
         self._log.flush()
         self._written = self.steps
         self._sound = True
 
     def _finish(self, status: str, reason: str = "") -> None:
         result = Result(status, self.steps, self._end - self._start, reason)
-        self._log.metadata(RESULT, result.texts())
-        self._log.finish()
+        self._log.finish(result)
 
 
 def _stop_reason(error: BaseException) -> str:

@@ -2,12 +2,14 @@
 
 import sys
 from importlib.metadata import version
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from selfmodel.cli.lazy import group
+from selfmodel.cli.lazy import Interrupted, group
+from selfmodel.cli.output.library_warnings import counted_warnings
 from selfmodel.cli.output.plain import plain
+from selfmodel.cli.output.printing import print_lines, print_notes
 from selfmodel.cli.output.streams import flush_output, open_streams
 from selfmodel.errors import InputError, WorkError, describe
 from selfmodel.physical.stop_signals import handle_stop_signals, status_of
@@ -36,7 +38,7 @@ app = group(
 
 def _print_version(wanted: bool) -> None:  # noqa: FBT001  # typer passes the value by position
     if wanted:
-        typer.echo(f"selfmodel {version('selfmodel')}")
+        print_lines(f"selfmodel {version('selfmodel')}")
         raise typer.Exit
 
 
@@ -51,6 +53,10 @@ def selfmodel(
     ] = False,
 ) -> None:
     """Parses the options that come before the command."""
+
+
+UsageError: Any = typer.BadParameter.__base__
+"""Error of unknown commands, options and values; typer has no public name for it."""
 
 
 def main() -> None:
@@ -79,18 +85,27 @@ def main() -> None:
 
 def _run() -> None:
     try:
-        # The same usage line for `python -m selfmodel` as for the installed command.
-        app(prog_name="selfmodel")
-    except SystemExit as end:
-        # typer replaces every KeyboardInterrupt by the exit status 130.
-        reason = end.__context__ and end.__context__.__cause__
-        if isinstance(reason, KeyboardInterrupt):
-            raise reason from None
-        raise
+        with counted_warnings():
+            # The same usage line for `python -m selfmodel` as for the installed command.
+            status = app(prog_name="selfmodel", standalone_mode=False)
+    except Interrupted as end:
+        raise end.interruption from None
+    except UsageError as error:
+        status = _print_usage(error)
     finally:
         flush_output()
+    sys.exit(status)
+
+
+def _print_usage(error: Any) -> int:  # noqa: ANN401  # typer hides the type
+    """Prints a usage error with the usage line, and returns the exit status."""
+    # Without arguments, the message is the help page: lines of ours.
+    if error.ctx is None or error.message != error.ctx.get_help():
+        error.message = plain(error.message)
+    error.show()
+    return int(error.exit_code)
 
 
 def _fail(message: str, status: int) -> None:
-    typer.echo(f"error: {plain(message)}", err=True)
+    print_notes(f"error: {message}")
     sys.exit(status)

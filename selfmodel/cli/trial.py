@@ -1,10 +1,9 @@
 """``selfmodel trial``: one logged trial of the simulated physical robot."""
 
-import json
+import math
 from pathlib import Path
 
 import numpy as np
-import typer
 
 from selfmodel.cli import inputs
 from selfmodel.cli.options import (
@@ -22,6 +21,7 @@ from selfmodel.cli.options import (
     Steps,
     Structural,
 )
+from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.controllers.controller import Controller, check_silent_neurons, draw_genomes
 from selfmodel.experiments import plugins, robots, trial_logs
 from selfmodel.experiments.reality import draw_reality
@@ -82,9 +82,9 @@ def trial(
         "structure": structure,
         "seed": seed,
         "steps": logged.behaviour.steps,
-        "displacement": logged.displacement,
+        "displacement": logged.displacement if math.isfinite(logged.displacement) else None,
     }
     if as_json:
-        typer.echo(json.dumps(facts, indent=2))
+        print_json(facts)
     else:
-        typer.echo(f"{made.name} ({hidden}) went {logged.displacement:.3f} m forward: {out}")
+        print_lines(f"{made.name} ({hidden}) went {logged.displacement:.3f} m forward: {out}")

@@ -79,7 +79,7 @@ def test_delays_and_silence_are_marked_and_the_trial_goes_on(tmp_path: Path):
         told, errors = (process := driver(tmp_path, port)).communicate(timeout=120)
     assert process.returncode == 0, errors
     assert told == f"250 steps: {tmp_path / 'trial.mcap'}\n"
-    log, _ = verify(tmp_path / "trial.mcap")
+    log = verify(tmp_path / "trial.mcap").log
     behaviour, timing = log.trial.behaviour, log.timing
 
     assert (log.status, log.reason, behaviour.steps) == ("finished", "", 250)
@@ -113,7 +113,8 @@ def test_a_dropped_connection_stops_the_robot_and_leaves_a_whole_log(tmp_path: P
     with robot(tmp_path, **{"70": "hang up"}) as port:
         process = driver(tmp_path, port, "--watchdog", "30")
         _, errors = process.communicate(timeout=120)
-    log, _ = verify(tmp_path / "trial.mcap")
+    verified = verify(tmp_path / "trial.mcap")
+    log = verified.log
 
     assert process.returncode == 1
     assert "the environment failed: ConnectionError: the robot closed the connection" in errors
@@ -126,7 +127,8 @@ def test_a_dropped_connection_stops_the_robot_and_leaves_a_whole_log(tmp_path: P
     missing = counted(int(log.timing.missing.sum()), "observation")
     assert f"clock: {late} late, {missing} missing" in told.stdout
     told = selfmodel("logs", "verify", "trial.mcap", cwd=tmp_path, PYTHONPATH=str(ROOT))
-    assert told.stdout == f"ok: trial.mcap: 70 steps, stopped ({log.reason})\n"
+    stopped = f"ok: trial.mcap: 70 steps, stopped ({log.reason})"
+    assert told.stdout == f"{stopped}; digest {verified.digest}\n"
 
 
 @pytest.mark.process
@@ -177,7 +179,7 @@ def test_a_stop_signal_stops_the_robot_and_leaves_a_whole_log(
             time.sleep(0.02)
         process.send_signal(number)
         _, errors = process.communicate(timeout=120)
-    log, _ = verify(tmp_path / "trial.mcap")
+    log = verify(tmp_path / "trial.mcap").log
 
     assert process.returncode == status
     assert errors.strip().rpartition("\n")[2] == ends
@@ -206,7 +208,7 @@ def test_the_trial_of_the_docs_runs(tmp_path: Path):
     (block,) = (block for block in blocks(PAGE) if block.language == "python")
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "MUJOCO_GL": "disable"}
     subprocess.run([sys.executable, "-c", block.text], cwd=tmp_path, env=environment, check=True)
-    log, _ = verify(tmp_path / "walk.mcap")
+    log = verify(tmp_path / "walk.mcap").log
 
     assert (log.status, log.trial.behaviour.steps) == ("finished", 300)
     assert log.timing is not None
