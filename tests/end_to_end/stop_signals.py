@@ -79,7 +79,7 @@ def _judged(folder: Path, number: signal.Signals, phase: str, status: int, error
     faults = []
     if files == ["trial.mcap"]:
         try:
-            log = verify(folder / "trial.mcap")[0].status
+            log = verify(folder / "trial.mcap").log.status
         except InputError as error:
             faults.append(f"the log does not verify: {error}")
     elif files:
