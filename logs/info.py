@@ -9,6 +9,7 @@ import numpy as np
 from selfmodel.logs.contents import Contents, read_contents
 from selfmodel.logs.reader import TrialLog, interpret
 from selfmodel.logs.records import HIDDEN, IMPORT, SALVAGE
+from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.trials.signals import SIGNALS, Signal
 
 
@@ -40,6 +41,7 @@ class Info:
         observed: Fraction of observed numbers by signal, in [0, 1].
         driver: Description of the controller, or of its replacement by recorded commands.
         source: Origin of an imported or salvaged trial; empty for other trials.
+        digest: SHA-256 over records, files and messages; "" in a log of an earlier version.
     """
 
     log: TrialLog
@@ -50,16 +52,21 @@ class Info:
     observed: Mapping[Signal, float]
     driver: str
     source: Mapping[str, str]
+    digest: str
 
 
-def read_info(path: Path) -> Info:
+def read_info(path: Path, budget: Budget = DEFAULT_BUDGET) -> Info:
     """Returns the summary of a log, without the hidden faults of a simulated robot.
+
+    Args:
+        path: The log.
+        budget: Memory that the file may take.
 
     Raises:
         LogError: The file is damaged, or not a trial log.
         InputError: The file does not exist.
     """
-    contents = read_contents(path)
+    contents = read_contents(path, budget=budget)
     log = interpret(path, contents)
     behaviour, driver = log.trial.behaviour, log.trial.plan.controller
     return Info(
@@ -74,6 +81,7 @@ def read_info(path: Path) -> Info:
         },
         driver=driver.summary,
         source=contents.metadata.get(SALVAGE) or contents.metadata.get(IMPORT) or {},
+        digest=contents.digest,
     )
 
 

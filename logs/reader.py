@@ -45,8 +45,10 @@ from selfmodel.logs.records import (
     sha256,
     trial_record,
 )
+from selfmodel.logs.schemas import is_known, schema_text
 from selfmodel.logs.signals import read_behaviour
 from selfmodel.logs.timing import Timing, read_timing
+from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.trial import Trial, TrialPlan
@@ -85,7 +87,7 @@ class TrialLog:
     imported: bool
 
 
-def read_log(path: str | Path) -> TrialLog:
+def read_log(path: str | Path, budget: Budget = DEFAULT_BUDGET) -> TrialLog:
     """Returns the content of a log.
 
     Verified are the checksums and counts of the file, the digests of its records, of the model and
@@ -98,12 +100,16 @@ def read_log(path: str | Path) -> TrialLog:
         >>> print(log.trial.plan.stage, log.trial.behaviour.steps, log.status)
         before 60 finished
 
+    Args:
+        path: The log.
+        budget: Memory that the file may take.
+
     Raises:
         LogError: A check failed.
         InputError: The file does not exist.
     """
     path = Path(path)
-    return interpret(path, read_contents(path, unread=(HIDDEN,)))
+    return interpret(path, read_contents(path, (HIDDEN,), budget))
 
 
 def interpret(path: Path, contents: Contents) -> TrialLog:
@@ -118,6 +124,7 @@ def interpret(path: Path, contents: Contents) -> TrialLog:
     """
     record = read_record(path, contents)
     result = _result(path, contents, record)
+    _check_definitions(path, contents)
     mjcf = read_attachment(path, contents, MODEL_FILE, record.model_sha256)
     controller = read_controller(path, contents, record)
     behaviour = read_behaviour(path, contents, record, result.steps, controller)
@@ -265,6 +272,13 @@ def read_controller(path: Path, contents: Contents, record: TrialRecord) -> Cont
         return parse_controller(data, CONTROLLER_FILE)
     except InputError as error:
         raise SchemaMismatchError(path, str(error), good=contents.good) from error
+
+
+def _check_definitions(path: Path, contents: Contents) -> None:
+    for topic, messages in contents.topics.items():
+        if is_known(messages.type) and messages.schema != schema_text(messages.type).encode():
+            what = f"on {topic}: its definition of {messages.type} is not that of selfmodel"
+            raise SchemaMismatchError(path, what, good=contents.good)
 
 
 def _result(path: Path, contents: Contents, record: TrialRecord) -> Result:

@@ -1,18 +1,16 @@
 """``selfmodel diagnose``: hypotheses ranked by how well they predict logged trials."""
 
 import dataclasses
-import json
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-import typer
-from rich.console import Console
-
 from selfmodel.cli.options import (
+    DEFAULT_BUDGET,
     DEFAULT_KINDS,
     Calibrated,
     ComparatorName,
+    FileBudget,
     Json,
     KindNames,
     LogFiles,
@@ -23,8 +21,10 @@ from selfmodel.cli.options import (
     Threads,
 )
 from selfmodel.cli.output.display import display
-from selfmodel.cli.output.plain import counted, plain
+from selfmodel.cli.output.plain import counted
+from selfmodel.cli.output.printing import print_json, print_lines, print_notes
 from selfmodel.cli.output.ranking import confidence_sentence, ranking_table
+from selfmodel.cli.output.tables import print_tables
 from selfmodel.comparators import DEFAULT
 from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
@@ -32,6 +32,7 @@ from selfmodel.experiments import plugins, trial_logs
 from selfmodel.experiments.log_diagnosis import by_stage, set_up_diagnosis
 from selfmodel.logs import TrialLog
 from selfmodel.recovery.sequential_diagnosis import diagnose_trials
+from selfmodel.sandbox.budget import Budget
 from selfmodel.settings import Settings
 
 
@@ -46,6 +47,7 @@ def diagnose(
     generations: LoggedGenerations = None,
     seed: LoggedSeed = None,
     threads: Threads = 0,
+    budget: FileBudget = DEFAULT_BUDGET,
     as_json: Json = False,
 ) -> None:
     """Rank hypotheses by how well they predict logged trials, without a robot.
@@ -56,8 +58,9 @@ def diagnose(
     start = perf_counter()
     judge = plugins.comparator(comparator)
     considered = plugins.kinds(kinds)
-    logs = trial_logs.logs(files)
-    model = trial_logs.robot_of_logs(logs, robot)
+    allowed = Budget.parse(budget)
+    logs = trial_logs.logs(files, allowed)
+    model = trial_logs.robot_of_logs(logs, robot, allowed)
     failed, healthy = by_stage([log.trial for log in logs])
     used = [log for log in logs if log.trial in failed]
     first = used[0]
@@ -72,8 +75,7 @@ def diagnose(
         calibrate=calibrate,
         threads=threads,
     )
-    for note in _notes(used):
-        typer.echo(f"note: {note}", err=True)
+    print_notes(*(f"note: {note}" for note in _notes(used)))
     with display() as on_event:
         if found.calibration is not None:
             on_event(found.calibration)
@@ -95,7 +97,7 @@ def diagnose(
         "seconds": perf_counter() - start,
     }
     if as_json:
-        typer.echo(json.dumps(result, indent=2, allow_nan=False))
+        print_json(result)
     else:
         _print(result)
 
@@ -137,12 +139,11 @@ def _notes(logs: list[TrialLog]) -> list[str]:
 
 
 def _print(result: dict[str, Any]) -> None:
-    Console(markup=False).print(ranking_table(result["diagnosis"]))
-    typer.echo(
-        f"{plain(result['robot'])}, {counted(len(result['logs']), 'log')}, "
+    print_tables(ranking_table(result["diagnosis"]))
+    print_lines(
+        f"{result['robot']}, {counted(len(result['logs']), 'log')}, "
         f"{result['comparator']}: {result['evaluations']} evaluations by the EA, "
-        f"{result['distinct_hypotheses']} distinct hypotheses, {result['seconds']:.1f} s."
+        f"{result['distinct_hypotheses']} distinct hypotheses, {result['seconds']:.1f} s.",
+        confidence_sentence(result),
+        *(f"from before the failure, not explained: {Path(path)}" for path in result["intact"]),
     )
-    typer.echo(confidence_sentence(result))
-    for path in result["intact"]:
-        typer.echo(f"from before the failure, not explained: {Path(path)}")

@@ -1,18 +1,27 @@
 """``selfmodel render``: a trial as a film or a strip of pictures, from its log."""
 
-import json
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from selfmodel.cli.inputs import check_folder
-from selfmodel.cli.options import Json, LogFile, NamedKinds, SelfModel, Threads
-from selfmodel.cli.output.plain import counted, plain
+from selfmodel.cli.options import (
+    DEFAULT_BUDGET,
+    FileBudget,
+    Json,
+    LogFile,
+    NamedKinds,
+    SelfModel,
+    Threads,
+)
+from selfmodel.cli.output.plain import counted
+from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.rendering import gl, video
 from selfmodel.cli.rendering.diagnosed import diagnosed
 from selfmodel.errors import InputError
 from selfmodel.logs.files import refuse_existing
+from selfmodel.sandbox.budget import Budget
 
 STRIPS = (".png", ".svg", ".pdf")
 """File extensions of a strip of pictures."""
@@ -59,6 +68,7 @@ def render(
         int, typer.Option(min=2, max=50, metavar="N", help="Pictures of a strip.")
     ] = 6,
     threads: Threads = 0,
+    budget: FileBudget = DEFAULT_BUDGET,
     as_json: Json = False,
 ) -> None:
     """Draw a logged trial beside a simulation of the same controller.
@@ -87,10 +97,11 @@ def render(
         pictures=None if out.suffix.lower() in FILMS else pictures,
         sticks=library is None,
         threads=threads,
+        budget=Budget.parse(budget),
     )
     result |= {"drawn_by": "matplotlib" if library is None else "mujoco", "gl": library}
     if as_json:
-        typer.echo(json.dumps(result, indent=2, allow_nan=False))
+        print_json(result)
     else:
         _print(result)
 
@@ -118,11 +129,8 @@ def _choose_gl(out: Path, *, stick: bool) -> str | None:
 
 
 def _print(result: dict[str, Any]) -> None:
-    typer.echo(
-        plain(
-            f"{result['out']}: {counted(result['frames'], 'picture')} of {result['robot']}, as "
-            f"logged and as "
-        )
-        + f"{result['hypothesis']}, drawn by {result['drawn_by']}"
+    print_lines(
+        f"{result['out']}: {counted(result['frames'], 'picture')} of {result['robot']}, as "
+        f"logged and as {result['hypothesis']}, drawn by {result['drawn_by']}"
         + (f" ({result['gl']})" if result["gl"] else "")
     )

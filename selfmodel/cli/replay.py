@@ -1,6 +1,5 @@
 """``selfmodel replay``: a logged trial simulated again, and compared with its log."""
 
-import json
 import math
 from pathlib import Path
 from typing import Annotated, Any
@@ -8,14 +7,25 @@ from typing import Annotated, Any
 import mujoco
 import typer
 
-from selfmodel.cli.options import HypothesisText, Json, LogFile, NamedKinds, SelfModel, Threads
-from selfmodel.cli.output.plain import counted, plain
+from selfmodel.cli.options import (
+    DEFAULT_BUDGET,
+    FileBudget,
+    HypothesisText,
+    Json,
+    LogFile,
+    NamedKinds,
+    SelfModel,
+    Threads,
+)
+from selfmodel.cli.output.plain import counted
+from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.replay_figure import check_figure, draw
 from selfmodel.cli.output.tables import show
 from selfmodel.errors import InputError
 from selfmodel.experiments import plugins, trial_logs
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.logs import TrialLog
+from selfmodel.sandbox.budget import Budget
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.threads import thread_count
 from selfmodel.simulation.trial_replay import Replay, replay as simulate
@@ -50,13 +60,15 @@ def replay(
         ),
     ] = None,
     threads: Threads = 0,
+    budget: FileBudget = DEFAULT_BUDGET,
     as_json: Json = False,
 ) -> None:
     """Simulate a logged trial again from its log, and compare the two bit by bit."""
     if out is not None:
         check_figure(out)
-    (log,) = trial_logs.logs([file])
-    robot = trial_logs.robot_of_logs([log], model)
+    allowed = Budget.parse(budget)
+    (log,) = trial_logs.logs([file], allowed)
+    robot = trial_logs.robot_of_logs([log], model, allowed)
     assumed = HypothesisSpace(robot.anatomy, plugins.kinds(kinds)).parse(hypothesis)
     logged = log.software.get("mujoco", "unknown")
     exact = logged == mujoco.__version__ and not log.imported
@@ -85,7 +97,7 @@ def replay(
         draw(out, log, found, str(assumed))
         result["figure"] = str(out)
     if as_json:
-        typer.echo(json.dumps(result, indent=2, allow_nan=False))
+        print_json(result)
     else:
         _print(result, log, found)
 
@@ -95,32 +107,31 @@ def _finite(value: float) -> float | None:
 
 
 def _print(result: dict[str, Any], log: TrialLog, found: Replay) -> None:
-    typer.echo(
-        plain(f"{result['log']}: {counted(result['steps'], 'step')} of {result['robot']}")
-        + ", replayed as "
-        + result["hypothesis"]
+    print_lines(
+        f"{result['log']}: {counted(result['steps'], 'step')} of {result['robot']}, replayed as "
+        f"{result['hypothesis']}"
     )
     versions = result["mujoco"]
     if versions["logged"] != versions["running"]:
-        typer.echo(
-            f"The log was made with MuJoCo {plain(versions['logged'])}, this is "
+        print_lines(
+            f"The log was made with MuJoCo {versions['logged']}, this is "
             f"{versions['running']}: differences below {TOLERANCE:g} count as equal."
         )
     if log.imported:
-        typer.echo(
+        print_lines(
             f"The log was imported, and resampled: differences below {TOLERANCE:g} count as equal."
         )
     if found.diverged:
-        typer.echo("The simulation diverged: with this hypothesis the model is unstable.")
+        print_lines("The simulation diverged: with this hypothesis the model is unstable.")
     if found.identical:
-        typer.echo("identical: every observed number equals the simulated one, to the bit.")
+        print_lines("identical: every observed number equals the simulated one, to the bit.")
         return
     step = found.first_divergence_step
     if step is None:
-        typer.echo(f"equal at every step, within {result['tolerance']:g}.")
+        print_lines(f"equal at every step, within {result['tolerance']:g}.")
     else:
         time = step * log.control_timestep
-        typer.echo(f"They differ from step {step} ({time:g} s). Root mean square difference:")
+        print_lines(f"They differ from step {step} ({time:g} s). Root mean square difference:")
     show(("time, s", *(title for _, title in COLUMNS)), _rows(log, found), texts=0)
 
 

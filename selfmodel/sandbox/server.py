@@ -1,0 +1,109 @@
+"""Server process: forks a restricted child per request, so that a child costs milliseconds.
+
+The server imports the modules of the tasks; it never reads a file's content itself.
+"""
+
+import importlib
+import json
+import os
+import resource
+import signal
+import socket
+import sys
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from selfmodel.errors import InputError, WorkError
+from selfmodel.sandbox.budget import Budget
+from selfmodel.sandbox.limits import address_space, restrict
+from selfmodel.sandbox.message import Message, receive, send
+
+CONTROL_BYTES = 2**16
+"""Largest request or answer on the control channel, bytes."""
+
+Task = Callable[[Message, Budget, Path], Message]
+"""Function that runs in a child: the request, the budget and the scratch folder."""
+
+
+def serve(control: socket.socket) -> None:
+    """Serves requests until the client closes the control channel.
+
+    A request is JSON (``task``, ``memory``, ``time``, ``scratch``) with the file descriptor of a
+    data channel, on which the child receives its message and sends its answer. The server's own
+    answer is the exit status and the use of the child.
+
+    Args:
+        control: Channel of sequenced packets from the client.
+    """
+    for ended in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(ended, signal.SIG_IGN)  # the client decides; its end closes the channel
+    while True:
+        request, descriptors, _, _ = socket.recv_fds(control, CONTROL_BYTES, 1)
+        if not request:
+            return
+        facts = json.loads(request)
+        module, _, name = facts["task"].partition(":")
+        task = getattr(importlib.import_module(module), name)
+        with socket.socket(fileno=descriptors[0]) as channel:
+            child = os.fork()
+            if child == 0:
+                control.close()
+                _run(channel, task, facts)
+        _, status, usage = os.wait4(child, 0)
+        answer = {
+            "status": os.waitstatus_to_exitcode(status),
+            "seconds": usage.ru_utime + usage.ru_stime,
+        }
+        control.send(json.dumps(answer).encode())
+
+
+def _run(channel: socket.socket, task: Task, facts: dict[str, Any]) -> None:
+    """Runs a task in this child, and ends the process."""
+    budget = Budget(facts["memory"], facts["time"])
+    scratch = Path(facts["scratch"])
+    status = 1
+    try:
+        for ended in (signal.SIGTERM, signal.SIGHUP):
+            signal.signal(ended, signal.SIG_DFL)
+        message = receive(channel, sys.maxsize)
+        before = address_space() or 0
+        restrict(budget, scratch)
+        answer = _answer(task, message, budget, scratch)
+        peak = (address_space("VmPeak") or before) - before
+        send(channel, Message({**answer.facts, "peak": peak}, answer.blobs))
+        status = 0
+    except BaseException:  # noqa: BLE001  # the child ends here, whatever happened
+        status = _EX_SOFTWARE
+    finally:
+        os._exit(status)
+
+
+_EX_SOFTWARE = 70
+
+
+def _answer(task: Task, message: Message, budget: Budget, scratch: Path) -> Message:
+    try:
+        result = task(message, budget, scratch)
+    except (InputError, WorkError) as error:
+        name, own = type(error).__name__, {k: str(v) for k, v in vars(error).items() if k[0] != "_"}
+        return Message({"error": name, "message": str(error), "fields": own})
+    except (MemoryError, RecursionError) as error:
+        # The traceback may hold the memory.
+        error.__traceback__ = None
+        return Message({"error": type(error).__name__, "message": "", "fields": {}})
+    except Exception:  # noqa: BLE001  # an error of this package: the client raises it
+        return Message({"error": "", "message": traceback.format_exc(), "fields": {}})
+    return Message({"result": dict(result.facts)}, result.blobs)
+
+
+def main() -> None:
+    """Runs the server on the channel that is the process's standard input."""
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    with socket.socket(fileno=os.dup(0)) as control:
+        serve(control)
+
+
+if __name__ == "__main__":
+    main()

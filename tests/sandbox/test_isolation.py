@@ -1,0 +1,175 @@
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from selfmodel.errors import InputError
+from selfmodel.logs.errors import CorruptError
+from selfmodel.sandbox.budget import Budget, BudgetError
+from selfmodel.sandbox.isolation import ChildError, Isolated, run_isolated
+from selfmodel.sandbox.message import Message
+
+SHORT = Budget(time=18)
+"""One second of processor time for a file."""
+
+
+def call(task: str, blobs: dict[str, bytes] | None = None, **facts: object) -> Isolated:
+    return run_isolated(
+        f"tests.helpers.isolated_tasks:{task}",
+        Message(facts, blobs or {}),
+        what="robot.xml",
+        budget=SHORT,
+        errors=(CorruptError,),
+    )
+
+
+@settings(deadline=None)
+@given(
+    st.dictionaries(st.text(), st.integers() | st.text() | st.none()),
+    st.dictionaries(st.text(max_size=5), st.binary()),
+)
+def test_a_task_receives_and_returns_values_unchanged(
+    facts: dict[str, object], blobs: dict[str, bytes]
+):
+    found = run_isolated(
+        "tests.helpers.isolated_tasks:echo", Message(facts, blobs), what="x", budget=SHORT
+    )
+
+    assert (found.facts["facts"], dict(found.blobs)) == (facts, blobs)
+
+
+def test_a_message_may_be_larger_than_the_buffers_of_a_channel():
+    data = bytes(range(256)) * 100_000
+
+    assert call("echo", {"data": data}).blobs["data"] == data
+
+
+def test_a_task_that_takes_more_memory_than_the_budget_is_refused_with_the_remedy():
+    with pytest.raises(BudgetError, match=r"robot.xml takes more than 1 GB .* --budget memory="):
+        call("allocate", bytes=2 * SHORT.memory)
+
+
+def test_a_task_within_the_budget_has_its_memory():
+    assert call("allocate", bytes=SHORT.memory // 4).facts["bytes"] == SHORT.memory // 4
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the address space is known on Linux")
+def test_the_peak_of_the_memory_is_reported():
+    assert call("allocate", bytes=10**8).peak >= 10**8
+
+
+@pytest.mark.process
+def test_a_task_that_does_not_end_is_stopped_after_the_time_of_the_budget():
+    with pytest.raises(BudgetError, match=r"more than 1 s of processor time.*--budget time="):
+        call("loop")
+
+
+@pytest.mark.process
+def test_a_task_that_waits_for_ever_is_stopped():
+    with pytest.raises(BudgetError):
+        run_isolated(
+            "tests.helpers.isolated_tasks:wait", Message({}), what="x", budget=Budget(time=1)
+        )
+
+
+def test_a_crash_is_one_sentence():
+    with pytest.raises(ChildError, match=r"robot\.xml made the process .* crash with SIG"):
+        call("crash")
+
+
+def test_after_a_crash_the_next_task_runs():
+    with pytest.raises(ChildError):
+        call("crash")
+
+    assert call("echo", x=1).facts["facts"] == {"x": 1}
+
+
+def test_an_error_for_the_user_is_raised_again_with_its_message():
+    with pytest.raises(InputError, match="expected a robot, got a chair"):
+        call("refuse")
+
+
+def test_an_error_of_a_log_keeps_its_parts():
+    with pytest.raises(CorruptError) as caught:
+        call("refuse_log")
+
+    error = caught.value
+    assert (error.path, error.what, error.advice) == ("a.mcap", "it is damaged", "make it again")
+
+
+def test_unbounded_recursion_is_one_sentence():
+    with pytest.raises(InputError, match=r"robot\.xml is nested too deeply"):
+        call("nest")
+
+
+def test_a_mistake_of_the_task_is_raised_with_its_traceback():
+    with pytest.raises(RuntimeError, match=r"(?s)isolated_tasks.py.*ZeroDivisionError: a mistake"):
+        call("fail")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="Landlock is a part of Linux")
+def test_a_task_changes_no_file_outside_its_scratch_folder(tmp_path: Path):
+    existing = tmp_path / "existing"
+    existing.write_text("kept")
+    paths = [str(existing), str(tmp_path / "new")]
+
+    found = call("write", paths=paths)
+
+    if "changed" in found.facts["results"]:
+        pytest.skip("this kernel has no Landlock")
+    assert found.facts["results"] == ["PermissionError", "PermissionError"]
+    assert existing.read_text() == "kept"
+    assert [path.name for path in tmp_path.iterdir()] == ["existing"]
+
+
+def test_a_task_cannot_fill_the_disk():
+    with pytest.raises((ChildError, RuntimeError)):
+        call("fill_disk", bytes=2 * SHORT.unpacked_bytes)
+
+
+def test_calls_from_several_threads_get_their_own_answers():
+    answers: dict[int, object] = {}
+
+    def ask(number: int) -> None:
+        answers[number] = call("echo", number=number).facts["facts"]
+
+    threads = [threading.Thread(target=ask, args=(number,)) for number in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+
+    assert answers == {number: {"number": number} for number in range(8)}
+
+
+@pytest.mark.process
+def test_an_interrupted_call_leaves_no_answer_to_the_next():
+    timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        call("wait")
+
+    assert call("echo", x=2).facts["facts"] == {"x": 2}
+
+
+def _echo_in_a_fork(pipe: "multiprocessing.connection.Connection") -> None:
+    pipe.send(call("echo", x=3).facts["facts"])
+
+
+@pytest.mark.process
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_a_forked_process_has_a_server_of_its_own():
+    call("echo", x=1)
+    context = multiprocessing.get_context("fork")
+    own, other = context.Pipe()
+    process = context.Process(target=_echo_in_a_fork, args=(other,))
+    process.start()
+
+    assert own.recv() == {"x": 3}
+    process.join()
+    assert call("echo", x=4).facts["facts"] == {"x": 4}
