@@ -32,6 +32,7 @@ def mujoco_errors_as_input_errors(task: str) -> Iterator[None]:
     Raises:
         InputError: MuJoCo raised an exception.
     """
+    configure()
     try:
         yield
     except MUJOCO_ERRORS as error:
