@@ -62,7 +62,7 @@ def _logged(robot: Robot) -> str:
     out = Path("trial.mcap")
     plan = plan_of(robot, STEPS)
     write_trial(out, robot, plan, made_up(robot, STEPS), TrialHeader(SETTINGS))
-    log, _ = verify(out)
+    log = verify(out).log
     again = robot_of(read_log(out))
     out.unlink()
     if again.anatomy != robot.anatomy:
