@@ -34,8 +34,8 @@ from selfmodel.logs.records import (
     sha256,
 )
 from selfmodel.logs.rescue import rescue
-from selfmodel.logs.signals import read_behaviour, read_names
 from selfmodel.logs.schemas import schema_text
+from selfmodel.logs.signals import read_behaviour, read_names
 from selfmodel.logs.topics import (
     DESCRIPTION,
     DESCRIPTION_TYPE,

@@ -13,7 +13,7 @@ from tests.fuzz.bag_checks import check_bag
 from tests.fuzz.mcap_file import McapFile, read_file
 from tests.fuzz.mutate import data as raw, jsons, records
 from tests.fuzz.mutate.numbers import text
-from tests.fuzz.seeds import biped, recording
+from tests.fuzz.seeds import OTHER_MAPPING, biped, recording
 from tests.fuzz.target import Case, Make, Target
 from tests.logs.rosbag.bags import storage, write_bag
 from tests.logs.rosbag.conftest import MAPPING
@@ -25,9 +25,11 @@ def prepare(folder: Path) -> Make:
     """Returns the maker of bags."""
     bag = write_bag(folder / "bag", recording(SECONDS))
     data, metadata = storage(bag).read_bytes(), (bag / "metadata.yaml").read_bytes()
-    file, robot, mapping = read_file(data), biped(), parse_mapping(MAPPING, "MAP.toml")
+    file, robot = read_file(data), biped()
+    mappings = [parse_mapping(text, "MAP.toml") for text in (MAPPING, OTHER_MAPPING)]
 
     def make(rng: np.random.Generator) -> Case:
+        mapping = mappings[rng.integers(len(mappings))]
         check = partial(check_bag, mapping=mapping, robot=robot)
         kind = rng.random()
         if kind < 0.15:
