@@ -1,14 +1,13 @@
 """Settings of a user for the properties of a robot that its MJCF does not contain."""
 
 import sys
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.files import read_file
+from selfmodel.files import load_toml, read_file
 
 MAX_SETTINGS_BYTES = 2**16
 """Largest settings file, in bytes."""
@@ -61,8 +60,8 @@ def read_settings(path: Path, extra: Mapping[str, Any] | None = None) -> MjcfSet
     if file.exists():
         data = read_file(file, "a file of settings", MAX_SETTINGS_BYTES)
         try:
-            loaded = tomllib.loads(data.decode())
-        except (ValueError, RecursionError) as error:  # also raised by endless digits and brackets
+            loaded = load_toml(data.decode())
+        except ValueError as error:
             raise InputError(f"{file}: expected a file of settings in TOML: {error}") from error
     try:
         return checked_settings({**loaded, **(extra or {})})
@@ -80,8 +79,8 @@ def parse_setting(text: str) -> dict[str, Any]:
     if not equals or not value.strip():
         raise InputError(f"expected a setting such as forward=-x, got {text!r}")
     try:
-        return {key.strip(): tomllib.loads(f"value = {value}")["value"]}
-    except (ValueError, RecursionError):
+        return {key.strip(): load_toml(f"value = {value}")["value"]}
+    except ValueError:
         return {key.strip(): value.strip()}  # an unquoted word
 
 
