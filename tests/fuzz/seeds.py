@@ -11,7 +11,8 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.trial import TrialPlan
 from tests.logs.conftest import MJCF, made_up, plan_of, timed
-from tests.logs.rosbag.conftest import MAPPING, recorded
+from tests.logs.rosbag.bags import T0, Item, made, pose_stamped, trajectory
+from tests.logs.rosbag.conftest import JOINTS, MAPPING, angle, recorded
 
 DATA = Path(__file__).parents[1] / "data" / "logs-0.1"
 """Small files of version 0.1, which are in the repository."""
@@ -42,6 +43,22 @@ def playback_log(path: Path, robot: Robot, steps: int) -> Path:
     return write_trial(path, robot, plan, iter(samples), header)
 
 
-def recording(seconds: float) -> list[tuple[str, int, object]]:
+OTHER_MAPPING = (
+    MAPPING.replace('topic = "/commands"', 'topic = "/trajectory"')
+    .replace('order = ["RHY", "RHX", "LHY", "LHX"]\n', "")
+    .replace('topic = "/odom"', 'topic = "/pose"')
+    + '[touch.right_touch]\ntopic = "/right_foot"\n'
+)
+"""Mapping of the other topics of ``recording``: messages of other types."""
+
+
+def recording(seconds: float) -> list[Item]:
     """Returns the messages of a short recording of the biped, in the order of time."""
-    return sorted(recorded(seconds), key=lambda item: item[1])
+    items = recorded(seconds)
+    for k in range(round(seconds * 100)):
+        stamp = T0 + k * 10**7
+        at = [angle(joint, k / 100) for joint in range(4)]
+        items.append(("/trajectory", stamp, trajectory(stamp, JOINTS, at)))
+        items.append(("/pose", stamp, pose_stamped(stamp, (k / 100, 0, 0.5), (1, 0, 0, 0))))
+        items.append(("/right_foot", stamp, made("std_msgs/msg/Float32", data=float(k % 9))))
+    return sorted(items, key=lambda item: item[1])

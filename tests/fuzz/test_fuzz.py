@@ -15,10 +15,11 @@ from mcap.records import Message
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError, read_log
 from tests.fuzz import oracle
-from tests.fuzz.campaign import Plan, Tally, run, work_folder
+from tests.fuzz.campaign import Plan, run, work_folder
 from tests.fuzz.mcap_file import McapFile, read_file, replaced, written
-from tests.fuzz.sealed import BASE, first_float, seal
+from tests.fuzz.seal import BASE, first_float, seal
 from tests.fuzz.seeds import biped, trial_log
+from tests.fuzz.tally import Tally
 from tests.fuzz.target import Case, Target
 from tests.fuzz.targets import TARGETS
 

@@ -10,26 +10,26 @@ from mcap.records import Message
 
 from selfmodel.logs.rosbag.mapping_file import parse_mapping
 from tests.fuzz.bag_checks import check_bag
-from tests.fuzz.mcap_file import COMPRESSIONS, McapFile, read_file, written
-from tests.fuzz.mutate import data as raw, jsons
+from tests.fuzz.mcap_file import McapFile, read_file
+from tests.fuzz.mutate import data as raw, jsons, records
 from tests.fuzz.mutate.numbers import text
-from tests.fuzz.sealed import channel, messages, names, payload, schema, time
-from tests.fuzz.seeds import biped, recording
+from tests.fuzz.seeds import OTHER_MAPPING, biped, recording
 from tests.fuzz.target import Case, Make, Target
 from tests.logs.rosbag.bags import storage, write_bag
 from tests.logs.rosbag.conftest import MAPPING
 
 SECONDS = 0.25
-OPERATORS = (payload, payload, payload, names, time, messages, messages, channel, schema)
 
 
 def prepare(folder: Path) -> Make:
     """Returns the maker of bags."""
     bag = write_bag(folder / "bag", recording(SECONDS))
     data, metadata = storage(bag).read_bytes(), (bag / "metadata.yaml").read_bytes()
-    file, robot, mapping = read_file(data), biped(), parse_mapping(MAPPING, "MAP.toml")
+    file, robot = read_file(data), biped()
+    mappings = [parse_mapping(text, "MAP.toml") for text in (MAPPING, OTHER_MAPPING)]
 
     def make(rng: np.random.Generator) -> Case:
+        mapping = mappings[rng.integers(len(mappings))]
         check = partial(check_bag, mapping=mapping, robot=robot)
         kind = rng.random()
         if kind < 0.15:
@@ -50,23 +50,17 @@ def prepare(folder: Path) -> Make:
 
 
 def _mutated(file: McapFile, rng: np.random.Generator) -> tuple[bytes, str]:
-    changed = file.copy()
-    what = []
-    for _ in range(int(rng.choice([1, 1, 1, 2, 3]))):
-        operator = OPERATORS[rng.integers(len(OPERATORS))]
-        what.append(f"{operator.__name__}: {operator(changed, rng)}")
+    changed, names = records.mutated(file, records.BAG, rng)
     if rng.random() < 0.1:
-        what.append("messages packed")
+        names.append("messages packed")
         for index, item in enumerate(changed.items):
             if isinstance(item, Message):
                 new = zstandard.compress(item.data)
                 if rng.random() < 0.01:
                     new = raw.mutated(new, rng)[0]
                 changed.items[index] = dataclasses.replace(item, data=new)
-    packing = COMPRESSIONS[rng.integers(len(COMPRESSIONS))]
-    chunk = (None, 2**10, 2**18)[rng.integers(3)]
     checksums = bool(rng.random() < 0.5)
-    return written(changed, packing, chunk, checksums=checksums), "; ".join(what)
+    return records.packed(changed, rng, checksums=checksums), "; ".join(names)
 
 
 def _metadata(data: bytes, rng: np.random.Generator) -> tuple[bytes, str]:

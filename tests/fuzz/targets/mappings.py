@@ -9,7 +9,7 @@ from selfmodel.logs.rosbag.importer import import_bag
 from selfmodel.logs.rosbag.mapping_file import read_mapping
 from selfmodel.robot.robot import Robot
 from tests.fuzz.mutate import tomls
-from tests.fuzz.seeds import DATA, biped, recording
+from tests.fuzz.seeds import DATA, OTHER_MAPPING, biped, recording
 from tests.fuzz.target import Case, Make, Target
 from tests.logs.rosbag.bags import storage, write_bag
 from tests.logs.rosbag.conftest import MAPPING
@@ -22,7 +22,11 @@ def prepare(folder: Path) -> Make:
     """Returns the maker of mappings."""
     bag = storage(write_bag(folder / "bag", recording(SECONDS)))
     robot = biped()
-    seeds = (MAPPING.encode(), MAPPING.encode(), (DATA / "imported" / "map.toml").read_bytes())
+    seeds = (
+        MAPPING.encode(),
+        OTHER_MAPPING.encode(),
+        (DATA / "imported" / "map.toml").read_bytes(),
+    )
 
     def make(rng: np.random.Generator) -> Case:
         data, what = tomls.mutated(seeds[rng.integers(len(seeds))], rng)

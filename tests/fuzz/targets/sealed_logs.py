@@ -25,7 +25,8 @@ from selfmodel.sandbox import DEFAULT_BUDGET
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.trial_replay import replay
 from tests.fuzz.mcap_file import read_file
-from tests.fuzz.sealed import mutated_and_sealed
+from tests.fuzz.mutate import records
+from tests.fuzz.seal import seal
 from tests.fuzz.seeds import DATA, biped, playback_log, trial_log
 from tests.fuzz.target import Case, Make, Target
 
@@ -48,10 +49,11 @@ def prepare(folder: Path) -> Make:
 
     def make(rng) -> Case:  # noqa: ANN001  # see Make
         number = int(rng.choice(len(files), p=(0.35, 0.25, 0.25, 0.15)))
-        data, what = mutated_and_sealed(files[number], rng)
+        changed, names = records.mutated(files[number], records.LOG, rng)
+        seal(changed)
         comparator = every[rng.integers(len(every))]
-        text = f"{comparator.name} on {paths[number].name}: {what}"
-        return Case(text, {NAME: data}, partial(check, comparator))
+        what = f"{comparator.name} on {paths[number].name}: {'; '.join(names)}"
+        return Case(what, {NAME: records.packed(changed, rng)}, partial(check, comparator))
 
     return make
 
