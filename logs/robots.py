@@ -9,27 +9,39 @@ from selfmodel.errors import InputError
 from selfmodel.logs.errors import SchemaMismatchError
 from selfmodel.logs.reader import TrialLog
 from selfmodel.robot.mjcf.adaptation import MAX_SUBSTEPS
+from selfmodel.robot.mjcf.rehearsal import rehearse
 from selfmodel.robot.mjcf.untrusted import checked_model
 from selfmodel.robot.robot import Robot
+from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget, BudgetError
 from selfmodel.trials.signals import Names
 
 GOOD = "its observations are intact"
 
 
-def robot_of(log: TrialLog) -> Robot:
+def robot_of(log: TrialLog, budget: Budget = DEFAULT_BUDGET) -> Robot:
     """Returns the robot of the model in a log.
 
-    MuJoCo can read no files but the log's attachments.
+    MuJoCo can read no files but the log's attachments. A child process compiles and steps the model
+    before this process compiles it.
+
+    Args:
+        log: The log.
+        budget: Limits of memory and time.
 
     Raises:
-        LogError: The model is invalid, names other files, exceeds a limit, or is of another robot
-            than the messages.
+        LogError: The model is invalid, names other files, exceeds the budget, cannot be
+            simulated, or is of another robot than the messages.
     """
     path = log.trial.path
     try:
-        checked = checked_model(log.mjcf, log.assets)
+        checked = checked_model(log.mjcf, log.assets, budget)
+        cost = rehearse(checked.mjcf, checked.files, log.control_timestep, budget)
         with _silent():
             robot = Robot(log.trial.robot, checked.mjcf, log.control_timestep, checked.files)
+    except BudgetError as error:
+        raise SchemaMismatchError(
+            path, f"its model cannot be loaded: {error}", good=GOOD, advice=""
+        ) from error
     except _FAILURES as error:
         raise SchemaMismatchError(
             path, f"its model cannot be loaded: {_line(error)}", good=GOOD
@@ -40,6 +52,10 @@ def robot_of(log: TrialLog) -> Robot:
             f"its model takes {robot.substeps:.6g} physics steps for each of "
             f"{log.control_timestep} s, expected at most {MAX_SUBSTEPS}",
             good=GOOD,
+        )
+    if cost.failure:
+        raise SchemaMismatchError(
+            path, f"its model cannot be simulated: {_line(cost.failure)}", good=GOOD
         )
     names = log.trial.behaviour.names
     if (robot.anatomy.names, robot.root) != (names, log.root):
@@ -89,8 +105,8 @@ def describe_difference(names: Names, logged: Names) -> str:
     return "; ".join(differences) or "their parts have the same names"
 
 
-def common_robot(logs: Sequence[TrialLog]) -> Robot:
-    """Returns the common robot of logs.
+def common_robot(logs: Sequence[TrialLog], budget: Budget = DEFAULT_BUDGET) -> Robot:
+    """Returns the common robot of logs; see ``robot_of``.
 
     Raises:
         InputError: There is no log, or two logs are of different robots.
@@ -110,7 +126,7 @@ def common_robot(logs: Sequence[TrialLog]) -> Robot:
                 f"the logs are {what}: {first.trial.path} is of {first.trial.robot!r}, "
                 f"{other.trial.path} of {other.trial.robot!r}; give logs of one robot"
             )
-    return robot_of(first)
+    return robot_of(first, budget)
 
 
 def _identity(log: TrialLog) -> tuple[object, ...]:
@@ -123,5 +139,5 @@ def _identity(log: TrialLog) -> tuple[object, ...]:
     )
 
 
-def _line(error: Exception) -> str:
+def _line(error: Exception | str) -> str:
     return " ".join(str(error).split())

@@ -11,7 +11,6 @@ import pytest
 from selfmodel.logs import LogError, read_log
 from selfmodel.logs.reader import TrialLog
 from selfmodel.logs.robots import robot_of
-from selfmodel.robot.mjcf.resource_limits import MAX_ASSET_BYTES
 from selfmodel.robot.mjcf.untrusted import checked_model
 from tests.logs.conftest import MJCF
 from tests.logs.hostile import outcome

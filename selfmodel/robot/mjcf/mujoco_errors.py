@@ -12,19 +12,27 @@ MUJOCO_ERRORS = (
     ValueError,
     KeyError,
     OverflowError,
-    MemoryError,
-    RuntimeError,  # "unknown exception": MuJoCo is out of memory
+    RuntimeError,
     mujoco.FatalError,
 )
 """Exceptions that MuJoCo raises for an invalid model."""
 
+_OUT_OF_MEMORY = ("ould not allocate", "unknown exception")
+"""Parts of MuJoCo's messages when it is out of memory; the second is a C++ ``bad_alloc``."""
+
 
 @contextmanager
-def mujoco_errors_as_input_errors() -> Iterator[None]:
+def mujoco_errors_as_input_errors(
+    prefix: str = "MuJoCo cannot load the model: ",
+) -> Iterator[None]:
     """Converts MuJoCo's exceptions to ``InputError``, and suppresses its warnings.
+
+    Args:
+        prefix: Beginning of the message.
 
     Raises:
         InputError: MuJoCo raised an exception.
+        MemoryError: MuJoCo is out of memory.
     """
     handler = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda _: None)
@@ -36,7 +44,9 @@ def mujoco_errors_as_input_errors() -> Iterator[None]:
         if isinstance(error, InputError):
             raise
         message = " ".join(str(error).split()).removeprefix("Error: ")
-        raise InputError(f"MuJoCo cannot load the model: {message}") from error
+        if any(phrase in message for phrase in _OUT_OF_MEMORY):
+            raise MemoryError(message) from None
+        raise InputError(f"{prefix}{message}") from error
     finally:
         mujoco.set_mju_user_warning(handler)
 
