@@ -28,6 +28,10 @@ def robot_of(log: TrialLog, budget: Budget = DEFAULT_BUDGET) -> Robot:
         log: The log.
         budget: Limits of memory and time.
 
+    Args:
+        log: The log.
+        budget: Memory and time that the model may take.
+
     Raises:
         LogError: The model is invalid, names other files, exceeds the budget, cannot be
             simulated, or is of another robot than the messages.
@@ -107,6 +111,10 @@ def describe_difference(names: Names, logged: Names) -> str:
 
 def common_robot(logs: Sequence[TrialLog], budget: Budget = DEFAULT_BUDGET) -> Robot:
     """Returns the common robot of logs; see ``robot_of``.
+
+    Args:
+        logs: The logs.
+        budget: Memory and time that the model may take.
 
     Raises:
         InputError: There is no log, or two logs are of different robots.
