@@ -11,7 +11,7 @@ from typing import Any
 
 from selfmodel.errors import InputError
 from selfmodel.settings import Settings
-from selfmodel.trials.trial import STAGES, Stage, stage_of
+from selfmodel.trials.trial import STAGES, Stage, checked_seed, stage_of
 
 FORMAT = "1"
 """Version of the format of a log; a reader refuses unknown versions."""
@@ -76,7 +76,7 @@ class TrialRecord:
         root: Name of the root body, whose motion is on ``/odom``.
         control_timestep: Control time step, s; step k is at k times this value.
         steps: Planned number of control steps.
-        seed: Seed of all random choices.
+        seed: Seed of all random choices, from 0 to ``trial.MAX_SEED``.
         controller_sha256: SHA-256 of the attached controller, or "" without one: then only the
             commands are known.
         model_sha256: SHA-256 of the attached model.
@@ -189,7 +189,7 @@ def trial_record(texts: Mapping[str, str]) -> TrialRecord:
         root=texts["root"],
         control_timestep=timestep,
         steps=int(texts["steps"]),
-        seed=int(texts["seed"]),
+        seed=checked_seed(int(texts["seed"])),
         controller_sha256=texts["controller_sha256"],
         model_sha256=texts["model_sha256"],
     )

@@ -1,16 +1,15 @@
 """Robot of a log, built from the untrusted model in the log."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-
-import mujoco
+from collections.abc import Sequence
 
 from selfmodel.errors import InputError
 from selfmodel.logs.errors import SchemaMismatchError
 from selfmodel.logs.reader import TrialLog
 from selfmodel.robot.mjcf.adaptation import MAX_SUBSTEPS
+from selfmodel.robot.mjcf.mujoco_errors import MUJOCO_ERRORS
 from selfmodel.robot.mjcf.rehearsal import rehearse
 from selfmodel.robot.mjcf.untrusted import checked_model
+from selfmodel.robot.mujoco_log import uncounted_warnings
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget, BudgetError
 from selfmodel.trials.signals import Names
@@ -26,27 +25,22 @@ def robot_of(log: TrialLog, budget: Budget = DEFAULT_BUDGET) -> Robot:
 
     Args:
         log: The log.
-        budget: Limits of memory and time.
-
-    Args:
-        log: The log.
         budget: Memory and time that the model may take.
 
     Raises:
-        LogError: The model is invalid, names other files, exceeds the budget, cannot be
-            simulated, or is of another robot than the messages.
+        LogError: The model is invalid, names other files, exceeds the budget, or is of another robot than the messages.
     """
     path = log.trial.path
     try:
         checked = checked_model(log.mjcf, log.assets, budget)
-        cost = rehearse(checked.mjcf, checked.files, log.control_timestep, budget)
-        with _silent():
+        rehearse(checked.mjcf, checked.files, log.control_timestep, budget)
+        with uncounted_warnings():
             robot = Robot(log.trial.robot, checked.mjcf, log.control_timestep, checked.files)
     except BudgetError as error:
         raise SchemaMismatchError(
             path, f"its model cannot be loaded: {error}", good=GOOD, advice=""
         ) from error
-    except _FAILURES as error:
+    except MUJOCO_ERRORS as error:
         raise SchemaMismatchError(
             path, f"its model cannot be loaded: {_line(error)}", good=GOOD
         ) from error
@@ -56,10 +50,6 @@ def robot_of(log: TrialLog, budget: Budget = DEFAULT_BUDGET) -> Robot:
             f"its model takes {robot.substeps:.6g} physics steps for each of "
             f"{log.control_timestep} s, expected at most {MAX_SUBSTEPS}",
             good=GOOD,
-        )
-    if cost.failure:
-        raise SchemaMismatchError(
-            path, f"its model cannot be simulated: {_line(cost.failure)}", good=GOOD
         )
     names = log.trial.behaviour.names
     if (robot.anatomy.names, robot.root) != (names, log.root):
@@ -71,28 +61,6 @@ def robot_of(log: TrialLog, budget: Budget = DEFAULT_BUDGET) -> Robot:
             good=GOOD,
         )
     return robot
-
-
-_FAILURES = (
-    ValueError,
-    KeyError,  # a part without a name
-    OverflowError,  # more physics steps than there are numbers
-    MemoryError,
-    RuntimeError,  # "unknown exception": MuJoCo is out of memory
-    mujoco.FatalError,
-)
-"""Exceptions that MuJoCo and a robot's parts raise for an invalid model."""
-
-
-@contextmanager
-def _silent() -> Iterator[None]:
-    """Context manager that keeps MuJoCo from writing warnings to a file in the working folder."""
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda _: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(before)
 
 
 def describe_difference(names: Names, logged: Names) -> str:
@@ -147,5 +115,5 @@ def _identity(log: TrialLog) -> tuple[object, ...]:
     )
 
 
-def _line(error: Exception | str) -> str:
+def _line(error: Exception) -> str:
     return " ".join(str(error).split())

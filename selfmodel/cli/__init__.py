@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from selfmodel.cli.lazy import group
+from selfmodel.cli.output.library_warnings import counted_warnings
 from selfmodel.cli.output.plain import plain
 from selfmodel.errors import InputError, WorkError, describe
 
@@ -57,8 +58,9 @@ def main() -> None:
     Exit status: 0 done; 1 the work failed; 2 wrong usage or bad input; 130 interrupted.
     """
     try:
-        # The same usage line for `python -m selfmodel` as for the installed command.
-        app(prog_name="selfmodel")
+        with counted_warnings():
+            # The same usage line for `python -m selfmodel` as for the installed command.
+            app(prog_name="selfmodel")
     except InputError as error:
         _fail(describe(error), 2)
     except (OSError, WorkError) as error:

@@ -21,6 +21,7 @@ from selfmodel.cli.options import (
 from selfmodel.cli.output.plain import counted, plain
 from selfmodel.cli.output.replay_figure import check_figure, draw
 from selfmodel.cli.output.tables import show
+from selfmodel.errors import InputError
 from selfmodel.experiments import plugins, trial_logs
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.logs import TrialLog
@@ -74,6 +75,11 @@ def replay(
     tolerance = 0.0 if exact else TOLERANCE
     simulator = Simulator(robot, thread_count(threads))
     found = simulate(log.trial, assumed, simulator, tolerance)
+    if not found.observed:
+        raise InputError(
+            f"{file}: nothing was observed: every number of the log is NaN, so there is nothing to "
+            f"compare a simulation with: give a log with observations"
+        )
     result = {
         "log": str(file),
         "robot": robot.name,

@@ -1,5 +1,6 @@
 """The diagnostic search: an EA over hypotheses, local refinement, and the verdict."""
 
+import math
 from collections.abc import Callable, Sequence
 from functools import partial
 
@@ -16,7 +17,7 @@ from selfmodel.diagnosis.significance import TEST, is_better
 from selfmodel.diagnosis.surrogate import Surrogate, own_surrogate, surrogate_of
 from selfmodel.diagnosis.undetectable import undetectable_faults
 from selfmodel.diagnosis.unsearched import best_unsearched_fault
-from selfmodel.diagnosis.verdict import verdict_of
+from selfmodel.diagnosis.verdict import all_diverged, verdict_of
 from selfmodel.evolution import Evolution, GenerationCallback, evolve
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import GENE_VALUES, HypothesisSpace
@@ -96,6 +97,10 @@ class DiagnosticSearch:
         self._proposed |= ranked
         judged = list(ranked)
         totals = dict(zip(judged, map(float, self.evidence.distances(judged, trials)), strict=True))
+        if not math.isfinite(totals[best]):
+            best = _ranked(totals)[0]
+        if not math.isfinite(totals[best]):
+            return all_diverged(_ranked(totals)[: self._settings.kept], trials)
         others = [one for one in _ranked(totals) if one != best]
         indistinguishable = self._indistinguishable(best, others, losses, is_piecewise=is_piecewise)
         unsearched = best_unsearched_fault(best, self._space, losses)

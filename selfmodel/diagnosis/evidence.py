@@ -10,11 +10,14 @@ from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis.comparator import Comparator, PiecewiseTrial, PreparedTrial, as_comparator
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.simulation.batch_memory import largest_batch
 from selfmodel.simulation.cache import Cache
 from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments, recordable
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.magnitudes import check_magnitudes
+from selfmodel.trials.signals import Signal
 from selfmodel.trials.trial import Trial
 
 TrialKey = tuple[str, int]
@@ -97,7 +100,9 @@ class Evidence:
     def _prepare(self, trial: Trial) -> PreparedTrial:
         key = _key(trial)
         if key not in self._prepared:
-            self._prepared[key] = self._checked(self._comparator.prepare(trial))
+            prepared = self._checked(self._comparator.prepare(trial))
+            check_magnitudes(trial, _compared_signals(prepared.request))
+            self._prepared[key] = prepared
         return self._prepared[key]
 
     def _checked(self, prepared: PreparedTrial) -> PreparedTrial:
@@ -116,7 +121,16 @@ class Evidence:
         return cache.get_or_compute(hypotheses, partial(self._compute, trial))
 
     def _compute(self, trial: Trial, hypotheses: list[Hypothesis]) -> FloatArray:
-        prepared = self._prepare(trial)
+        prepared, simulator = self._prepare(trial), self._simulator
+        size = largest_batch(
+            simulator.robot, prepared.request, trial.behaviour.steps, simulator.budget
+        )
+        batches = [hypotheses[first : first + size] for first in range(0, len(hypotheses), size)]
+        return np.concatenate([self._batch_losses(prepared, trial, batch) for batch in batches])
+
+    def _batch_losses(
+        self, prepared: PreparedTrial, trial: Trial, hypotheses: list[Hypothesis]
+    ) -> FloatArray:
         result = simulate(self._simulator, prepared.request, trial, hypotheses)
         diverged = result.diverged[:, np.newaxis]
         # The losses of diverged simulations are replaced below.
@@ -150,6 +164,12 @@ class Evidence:
             f"the comparator {self._comparator.name!r} {problem}: run "
             f"selfmodel.diagnosis.comparator_contract.check_comparator on it"
         )
+
+
+def _compared_signals(request: Request) -> tuple[Signal, ...]:
+    """Returns the signals of a trial that a comparison depends on, each once."""
+    states = (*request.states, "commands") if isinstance(request, Segments) else ()
+    return tuple(dict.fromkeys((*states, *request.record)))
 
 
 def simulate(

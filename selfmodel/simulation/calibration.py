@@ -27,6 +27,8 @@ from selfmodel.robot.parameters import (
     with_parameters,
 )
 from selfmodel.robot.robot import Robot
+from selfmodel.sandbox.budget import DEFAULT_BUDGET
+from selfmodel.simulation.batch_memory import hypothesis_bytes
 from selfmodel.simulation.calibration_segments import (
     CalibrationSegments,
     calibration_segments_of,
@@ -58,6 +60,10 @@ changes the time at which a foot makes contact."""
 
 CANDIDATE_DELAYS = range(MAX_CONTROL_DELAY + 1)
 """Control delays of the exhaustive search, control steps."""
+
+MAX_ERROR = 1e6
+"""Bound on the absolute error of a prediction, in ``CALIBRATION_ERROR_SCALES``: the error of a
+simulation that is no longer finite. The solver does not end on numbers that are not finite."""
 
 MAX_ITERATIONS = 3
 """Largest number of iterations of the least-squares solver."""
@@ -142,13 +148,15 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
         threads: Threads of MuJoCo's steps.
 
     Raises:
-        InputError: There are no trials, or too little of a trial was observed.
+        InputError: There are no trials, too little of a trial was observed, or every simulation
+            diverged.
     """
     if not trials:
         raise InputError("expected at least one trial of the healthy robot, got none")
     data = [calibration_segments_of(trial) for trial in trials]
     start = nominal(robot)
-    before = _error(robot, start, data, threads)
+    stats = SimulationStats()
+    before = _error(robot, start, data, threads, stats)
     deviations = np.full(len(start.factors), PRIOR_DEVIATION)
     if before < EXACT_ERROR:
         return Calibration(robot, start, deviations, before, before)
@@ -171,6 +179,12 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
         verbose=mujoco.minimize.Verbosity.SILENT,
     )
     fitted_parameters = from_factors(np.exp(fitted.ravel()), delay)
+    error = _error(robot, fitted_parameters, data, threads, stats)
+    if stats.diverged == stats.runs:
+        raise InputError(
+            f"{', '.join(trial.path for trial in trials)}: no simulation of the healthy robot "
+            f"remained finite, before and after the fit: check the model and the units of the log"
+        )
     # Independent segments: long simulations are chaotic, so their derivatives are meaningless.
     independent = _with_estimated_base(robot, fitted_parameters, data, threads)
     slopes = _slopes(residuals_at(delay, independent), fitted)
@@ -181,7 +195,7 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
         parameters=fitted_parameters,
         deviations=np.sqrt(np.diag(spread)),
         error_before=before,
-        error=_error(robot, fitted_parameters, data, threads),
+        error=error,
     )
 
 
@@ -201,7 +215,7 @@ def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> flo
         InputError: Too little of a trial was observed.
     """
     data = [calibration_segments_of(trial) for trial in trials]
-    return _error(robot, nominal(robot), data, threads)
+    return _error(robot, nominal(robot), data, threads, SimulationStats())
 
 
 Residual = Callable[[FloatArray], FloatArray]
@@ -225,22 +239,26 @@ def _residuals(
     """Returns the residuals of the data, then those of the prior; see ``Residual``."""
     logarithms = np.reshape(logarithms, (len(logarithms), -1))
     models = [from_factors(np.exp(row), delay) for row in logarithms.T]
-    errors = _errors(robot, models, data, threads)
+    errors = _errors(robot, models, data, threads, SimulationStats())
     weight = np.sqrt(len(errors)) * PRIOR_WEIGHT / PRIOR_DEVIATION
     return np.concatenate([_damped(errors), weight * logarithms])
 
 
 def _error(
-    robot: Robot, parameters: Parameters, data: Sequence[CalibrationSegments], threads: int
+    robot: Robot,
+    parameters: Parameters,
+    data: Sequence[CalibrationSegments],
+    threads: int,
+    stats: SimulationStats,
 ) -> float:
-    return float(np.sqrt(np.mean(_errors(robot, [parameters], data, threads) ** 2)))
+    return float(np.sqrt(np.mean(_errors(robot, [parameters], data, threads, stats) ** 2)))
 
 
 def _with_estimated_base(
     robot: Robot, fitted_parameters: Parameters, data: Sequence[CalibrationSegments], threads: int
 ) -> list[CalibrationSegments]:
     """Returns independent segments; an unobserved base begins in its predicted state."""
-    predict_with = _predictor(robot, [fitted_parameters], threads)
+    predict_with = _predictor(robot, [fitted_parameters], threads, SimulationStats())
 
     def independent(own: CalibrationSegments) -> CalibrationSegments:
         segments = own.segments
@@ -254,22 +272,46 @@ def _with_estimated_base(
 
 
 def _errors(
-    robot: Robot, models: Sequence[Parameters], data: Sequence[CalibrationSegments], threads: int
+    robot: Robot,
+    models: Sequence[Parameters],
+    data: Sequence[CalibrationSegments],
+    threads: int,
+    stats: SimulationStats,
 ) -> FloatArray:
-    """Returns prediction errors divided by their scales, ``(errors, models)``."""
-    predict_with = _predictor(robot, models, threads)
+    """Returns prediction errors divided by their scales, ``(errors, models)``, all finite.
+
+    The models are predicted in batches, so that their memory is bounded.
+    """
+    needed = max(hypothesis_bytes(robot, own.segments, steps=0) for own in data)
+    size = max(1, DEFAULT_BUDGET.models_bytes // needed)
+    batches = [models[first : first + size] for first in range(0, len(models), size)]
+    return np.concatenate(
+        [_batch_errors(robot, batch, data, threads, stats) for batch in batches], axis=1
+    )
+
+
+def _batch_errors(
+    robot: Robot,
+    models: Sequence[Parameters],
+    data: Sequence[CalibrationSegments],
+    threads: int,
+    stats: SimulationStats,
+) -> FloatArray:
+    predict_with = _predictor(robot, models, threads, stats)
     rows = []
     for own in data:
         predicted = predict_with(own.segments)
         for signal, scale in CALIBRATION_ERROR_SCALES.items():
             if signal in own.observed:
-                error = difference(signal, predicted[signal][:, :, 1:], own.observed[signal])
-                rows.append((error / scale)[:, own.judged].reshape(len(models), -1))
-    return np.concatenate(rows, axis=1).T
+                with np.errstate(over="ignore", invalid="ignore"):  # bounded below
+                    error = difference(signal, predicted[signal][:, :, 1:], own.observed[signal])
+                    rows.append((error / scale)[:, own.judged].reshape(len(models), -1))
+    errors = np.nan_to_num(np.concatenate(rows, axis=1).T, nan=MAX_ERROR)
+    return np.clip(errors, -MAX_ERROR, MAX_ERROR)
 
 
 def _predictor(
-    robot: Robot, models: Sequence[Parameters], threads: int
+    robot: Robot, models: Sequence[Parameters], threads: int, stats: SimulationStats
 ) -> Callable[[Segments], Behaviour]:
     """Returns a function that predicts segments with models of equal delay.
 
@@ -282,9 +324,7 @@ def _predictor(
     ]
 
     def predict_with(segments: Segments) -> Behaviour:
-        outcome = predict(
-            robot, embodiments, segments, threads=threads, stats=SimulationStats(), delay=delay
-        )
+        outcome = predict(robot, embodiments, segments, threads=threads, stats=stats, delay=delay)
         return outcome.behaviour
 
     return predict_with

@@ -125,6 +125,10 @@ def message(data: bytes = b"") -> bytes:
             (TRIAL, {"control_timestep": step}, "control_timestep must be above 0 s")
             for step in ("1e-300", "5e-324", "1e300", "-0.01", "0", "nan", "inf", "1e-10")
         ],
+        *[
+            (TRIAL, {"seed": seed}, "its record selfmodel.trial is wrong")
+            for seed in ("-1", str(2**63), "1.5", "nan", "9" * 900)
+        ],
         (TRIAL, {"steps": str(10**15)}, "after 120 of 1000000000000000 steps"),
         (TRIAL, {"steps": "9" * 900}, "after 120 of 99999"),
         (TRIAL, {"steps": "9" * 5000}, "at most 1000 characters in steps"),
@@ -299,3 +303,10 @@ def test_names_are_harmless_in_a_terminal_and_as_paths(log: Path):
     with pytest.raises(InputError, match="is valid"):
         salvage(log, log.with_name("new.mcap"))
     assert [path.name for path in log.parent.iterdir()] == ["trial.mcap"]
+
+
+def test_a_seed_that_no_trial_can_have_is_refused_by_verify(log: Path):
+    rewritten(log, says(TRIAL, seed="-5"))
+    result = CliRunner().invoke(app, ["verify", str(log)])
+    assert result.exit_code != 0
+    assert "seed must be a whole number from 0 to" in result.output

@@ -28,6 +28,8 @@ def _verdict(found: Mapping[str, Any]) -> str:
             return (
                 f"Ambiguous: the trials do not distinguish {best} from {others} ({found['test']})."
             )
+    if found["reason"] is not None:
+        return f"Unexplained: {found['reason']}."
     if found["outside"] is not None:
         better, kind = found["outside"]["hypothesis"], found["outside"]["kind"]
         return (

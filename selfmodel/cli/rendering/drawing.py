@@ -14,7 +14,8 @@ from selfmodel.cli.output.plain import counted
 from selfmodel.cli.rendering import camera, video
 from selfmodel.cli.rendering.film import Film, evenly, film_of
 from selfmodel.cli.rendering.filmstrip import stick_frames, strip
-from selfmodel.errors import WorkError
+from selfmodel.cli.rendering.poses import POSE
+from selfmodel.errors import InputError, WorkError
 from selfmodel.experiments import plugins, trial_logs
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
@@ -26,6 +27,7 @@ from selfmodel.sandbox.budget import Budget
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.threads import thread_count
 from selfmodel.simulation.trial_replay import replay
+from selfmodel.trials.magnitudes import check_magnitudes
 
 
 def draw_trial(
@@ -84,6 +86,12 @@ def _filmed(
 ) -> tuple[Film, dict[str, Any]]:
     """Returns the film of a trial and its simulation, and the facts of the simulation."""
     logged = log.trial.behaviour
+    check_magnitudes(log.trial, POSE)
+    if pictures is None and not logged.time[-1] * video.RATE < video.MAX_FRAMES:
+        raise InputError(
+            f"{log.trial.path}: the trial takes {logged.time[-1]:g} s, and a film takes at most "
+            f"{video.MAX_FRAMES / video.RATE:g} s: write a strip of pictures, such as trial.png"
+        )
     found = replay(log.trial, assumed, Simulator(robot, threads))
     whole = np.arange(int(float(logged.time[-1]) * video.RATE) + 1) / video.RATE
     moments = whole if pictures is None else evenly(logged.time, pictures)

@@ -8,6 +8,7 @@ import multiprocessing
 import os
 import signal
 import threading
+import warnings
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
@@ -144,6 +145,8 @@ def _serve(perform: Callable[..., Any], pipe: Connection) -> None:
     """Main function of a worker: runs the tasks from a pipe until the pipe is closed."""
     threading.Thread(target=_exit_with_parent, daemon=True).start()
     os.dup2(2, 1)  # standard output is for the results of the command
+    # A result contains whether a simulation diverged; a worker's raw text does not name the task.
+    warnings.simplefilter("ignore", RuntimeWarning)
     while True:
         try:
             task = pipe.recv()

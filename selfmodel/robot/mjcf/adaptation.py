@@ -91,7 +91,7 @@ def adapt_message(message: Message, budget: Budget, _scratch: Path) -> Message:
         for name, value in facts["settings"].items()
     }
     adapted = _adapted(facts["name"], document, MjcfSettings(**settings), budget)
-    with mujoco_errors_as_input_errors(prefix=""):
+    with mujoco_errors_as_input_errors("use the model"):
         Robot(adapted.name, adapted.mjcf, adapted.control_timestep, adapted.assets)
     result = {
         "name": adapted.name,

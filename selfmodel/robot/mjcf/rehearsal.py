@@ -23,6 +23,15 @@ MAX_STEPPING_SECONDS = 0.1
 
 _MAX_REMEMBERED = 8
 
+_DIVERGED = tuple(
+    int(kind)
+    for kind in (
+        mujoco.mjtWarning.mjWARN_BADQPOS,
+        mujoco.mjtWarning.mjWARN_BADQVEL,
+        mujoco.mjtWarning.mjWARN_BADQACC,
+    )
+)
+
 
 @dataclass(frozen=True)
 class ModelCost:
@@ -94,9 +103,9 @@ def run_on_model(task: str, message: Message, budget: Budget) -> Isolated:
 
 def build_and_step(message: Message, _budget: Budget, _scratch: Path) -> Message:
     """Task of a child process: measures a robot, as ``ModelCost``."""
+    facts = message.facts
     start = perf_counter()
-    with mujoco_errors_as_input_errors(prefix=""):
-        facts = message.facts
+    with mujoco_errors_as_input_errors("use the model"):
         robot = Robot("robot", facts["mjcf"], facts["control_timestep"], message.blobs)
         build_seconds = perf_counter() - start
         data = mujoco.MjData(robot.model)
@@ -123,7 +132,7 @@ def _first_steps(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[list[float
         except mujoco.FatalError as error:
             failure = " ".join(str(error).split())
         seconds.append(perf_counter() - start)
-    for kind, warning in enumerate(data.warning):
-        if warning.number:
-            failure = failure or mujoco.mju_warningText(kind, warning.lastinfo)
+    for kind in _DIVERGED:
+        if data.warning[kind].number:
+            failure = failure or mujoco.mju_warningText(kind, data.warning[kind].lastinfo)
     return seconds, failure
