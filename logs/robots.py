@@ -28,8 +28,8 @@ def robot_of(log: TrialLog, budget: Budget = DEFAULT_BUDGET) -> Robot:
         budget: Memory and time that the model may take.
 
     Raises:
-        LogError: The model is invalid, names other files, exceeds the budget, or is of another robot
-            than the messages.
+        LogError: The model is invalid, names other files, exceeds the budget, or is of another
+            robot than the messages.
     """
     path = log.trial.path
     try:

@@ -42,7 +42,7 @@ def test_a_batch_fits_into_the_budget(quadruped: Robot):
 
 
 def test_a_hypothesis_that_does_not_fit_alone_is_refused_with_the_remedy(quadruped: Robot):
-    with pytest.raises(BudgetError, match="one hypothesis takes .* GB.*--budget memory="):
+    with pytest.raises(BudgetError, match=r"one hypothesis takes .* GB.*--budget memory="):
         largest_batch(quadruped, ClosedLoop(RECORD), 10**7, Budget())
 
 
