@@ -52,7 +52,7 @@ HFIELD = '<asset><hfield name="h" nrow="2800" ncol="2800" size="1 1 1 1"/></asse
 @pytest.mark.process
 def test_many_hypotheses_of_a_large_model_are_judged_within_the_budget(quadruped: Robot):
     large = quadruped.mjcf.replace("<worldbody>", HFIELD, 1)
-    texts = [f"motor:front_left_knee*{k / 100:.2f}" for k in range(10, 50)]
+    texts = [f"motor:front_left_knee={k / 100:.2f}" for k in range(10, 50)]
 
     def judged() -> None:
         robot = Robot("large", large, quadruped.control_timestep)
