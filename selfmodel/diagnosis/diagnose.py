@@ -13,6 +13,7 @@ from selfmodel.diagnosis.evidence import Evidence
 from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
 from selfmodel.diagnosis.model_error import any_fault_is_model_error
 from selfmodel.diagnosis.refine import refined
+from selfmodel.diagnosis.search_cost import SearchSize
 from selfmodel.diagnosis.significance import TEST, is_better
 from selfmodel.diagnosis.surrogate import Surrogate, own_surrogate, surrogate_of
 from selfmodel.diagnosis.undetectable import undetectable_faults
@@ -132,6 +133,22 @@ class DiagnosticSearch:
         self.evidence.check([*self._intact, *trials])
         surrogate = surrogate_of(self.evidence, self._own_surrogate, trials)
         surrogate.evidence.check(surrogate.trials)
+
+    def simulated_steps(self, trials: Sequence[Trial]) -> int:
+        """Returns the estimated number of control steps that a diagnosis of some trials simulates.
+
+        Args:
+            trials: Trials that the comparator accepts; see ``check``.
+        """
+        surrogate = surrogate_of(self.evidence, self._own_surrogate, trials)
+        return SearchSize(
+            settings=self._settings,
+            candidates=len(self._space.coarse_candidates),
+            surrogate_steps=surrogate.evidence.steps_per_hypothesis(surrogate.trials),
+            is_refined=self.evidence.is_piecewise(trials),
+            uses_segments=self.evidence.uses_segments(trials),
+            has_healthy=bool(self._intact),
+        ).simulated_steps
 
     @property
     def distinct_hypotheses(self) -> int:

@@ -8,6 +8,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis.comparator import Comparator, PiecewiseTrial, PreparedTrial, as_comparator
+from selfmodel.diagnosis.search_cost import steps_of
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.simulation.batch_memory import largest_batch
@@ -78,6 +79,14 @@ class Evidence:
                 problems.append(str(error))
         if problems:
             raise InputError("; ".join(problems))
+
+    def steps_per_hypothesis(self, trials: Sequence[Trial]) -> int:
+        """Returns the control steps that a comparison of one hypothesis with all trials simulates.
+
+        Raises:
+            InputError: The comparator cannot judge one of the trials.
+        """
+        return sum(steps_of(self._prepare(one).request, one.behaviour.steps) for one in trials)
 
     def distances(self, hypotheses: Sequence[Hypothesis], trials: Sequence[Trial]) -> FloatArray:
         """Returns the distance of each hypothesis from all trials together, ``(n,)``.

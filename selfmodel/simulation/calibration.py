@@ -199,6 +199,25 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
     )
 
 
+def simulated_steps(robot: Robot, trials: Sequence[Trial]) -> int:
+    """Returns the number of control steps that ``calibrate`` simulates at most, but for retries.
+
+    A model that predicts the trials exactly takes one prediction of each.
+
+    Args:
+        robot: The robot as its model describes it.
+        trials: The trials, as for ``calibrate``.
+
+    Raises:
+        InputError: Too little of a trial was observed.
+    """
+    cut = [calibration_segments_of(trial).segments for trial in trials]
+    slopes = 2 * len(nominal(robot).factors)
+    # Errors before and after, each delay, then slopes and a new point per iteration.
+    models = 3 + len(CANDIDATE_DELAYS) + MAX_ITERATIONS * (slopes + 1) + slopes
+    return models * sum(len(segments.commands) * segments.horizon for segments in cut)
+
+
 def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> float:
     """Returns the prediction error of a self-model on trials.
 

@@ -246,7 +246,7 @@ UNSIZED = zstandard.ZstdCompressor(write_content_size=False)
         ([chunk(message(bytes(16_000_000)))] * 30, "bytes, unpacked"),
         pytest.param(
             [note(f"n{k}") for k in range(210_000)],
-            "200000 records and chunks",
+            "10000 names",
             marks=pytest.mark.fuzz,
         ),
         ([note("n", bytes(33 * 2**20))], "33333333 bytes outside its messages"),
@@ -268,8 +268,18 @@ def test_a_bomb_gets_an_error_and_not_the_memory(log: Path, more: list[bytes], m
     outcome(lambda: salvageable_steps(log))
 
 
+def test_thousands_of_channels_are_refused_and_not_listed(log: Path):
+    put(log, *(channel(k, f"/t{k}") for k in range(100, 10_100)))
+
+    done = CliRunner().invoke(app, ["info", str(log)])
+
+    assert done.exit_code == 1
+    assert "more than the 10000 names that a budget of 1 GB allows" in done.output
+    assert salvageable_steps(log) == 0
+
+
 def test_a_log_that_is_put_together_again_is_sound(log: Path):
-    put(log, note("n"), attachment("a", b"x"), chunk(b""))
+    put(log, note("n"), chunk(b""))
     assert read_log(log).trial.behaviour.steps == 120
 
 
@@ -293,8 +303,9 @@ def test_a_search_for_what_is_whole_ends(log: Path, data: bytes):
 def test_names_are_harmless_in_a_terminal_and_as_paths(log: Path):
     evil = "../../etc/\x1b[2J\x1b]0;owned\x07\x9b31m\u202e"
     rewritten(log, says(TRIAL, robot=evil, name=evil))
-    rewritten(log, says(SOFTWARE, **{evil: evil}))
-    put(log, attachment(evil, b"x"), note(evil), channel(90, evil))
+    attached = Attachment(0, 0, evil, "x", b"x")
+    rewritten(log, says(SOFTWARE, **{evil: evil}), more=[attached])
+    put(log, note(evil), channel(90, evil))
     assert read_log(log).trial.robot == evil
     for command in ("info", "verify"):
         result = CliRunner().invoke(app, [command, str(log)])

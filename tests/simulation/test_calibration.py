@@ -20,7 +20,7 @@ from selfmodel.simulation.calibration import (
     calibrate,
     prediction_error,
 )
-from selfmodel.simulation.outcome import SimulationResult
+from selfmodel.simulation.outcome import SimulationResult, SimulationStats
 from selfmodel.simulation.prediction import predict
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import collect
@@ -244,3 +244,23 @@ def test_errors_of_a_calibration_are_finite_whatever_the_simulation(
 
     monkeypatch.setattr(calibration, "predict", lost)
     assert 0 < prediction_error(QUADRUPED, trials(QUADRUPED, 1), threads=1) <= calibration.MAX_ERROR
+
+
+@pytest.mark.search
+def test_the_estimated_steps_are_within_a_factor_of_two(monkeypatch: pytest.MonkeyPatch):
+    steps = 0
+
+    def counted(*arguments: object, stats: SimulationStats, **options: object) -> SimulationResult:
+        nonlocal steps
+        before = stats.steps
+        found = predict(*arguments, stats=stats, **options)
+        steps += stats.steps - before
+        return found
+
+    monkeypatch.setattr(calibration, "predict", counted)
+    two = trials(with_parameters(QUADRUPED, TRUE))
+    estimate = calibration.simulated_steps(QUADRUPED, two)
+    assert steps == 0
+    calibrate(QUADRUPED, two, threads=1)
+
+    assert 0.5 < estimate / steps < 2

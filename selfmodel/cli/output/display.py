@@ -12,7 +12,8 @@ from contextlib import contextmanager
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn
 
-from selfmodel.cli.output.plain import counted
+from selfmodel.cli.output.console import text_console
+from selfmodel.cli.output.plain import counted, plain
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
 from selfmodel.evolution import Generation
 from selfmodel.recovery.events import DiscriminatingTrial, Event, SearchBegins
@@ -23,7 +24,7 @@ from selfmodel.trials.trial import Trial
 @contextmanager
 def display() -> Iterator[Callable[[Event], None]]:
     """Yields a function that displays events on standard error."""
-    console = Console(stderr=True, highlight=False, markup=False, emoji=False)
+    console = text_console(stderr=True)
     if not sys.stderr.isatty():
         yield _Lines(console)
         return
@@ -75,7 +76,7 @@ class _Lines:
                 )
 
     def _print_line(self, line: str) -> None:
-        self._console.print(line, soft_wrap=True)
+        self._console.print(plain(line), soft_wrap=True)
 
 
 class _Bar:

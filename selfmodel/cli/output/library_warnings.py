@@ -6,9 +6,8 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
-import typer
-
-from selfmodel.cli.output.plain import counted, plain
+from selfmodel.cli.output.plain import counted
+from selfmodel.cli.output.printing import print_notes
 
 MUJOCO_LOG = "selfmodel.robot.mujoco_log"
 """Module that counts MuJoCo's warnings; it is not imported by a command without MuJoCo."""
@@ -34,7 +33,7 @@ def counted_warnings() -> Iterator[None]:
                 found[f"MuJoCo warned {{}}: {text}"] = number - before.get(text, 0)
         for text, number in found.items():
             sentence = text.replace("{}", counted(number, "time"), 1)
-            typer.echo(plain(f"note: {' '.join(sentence.split())}"), err=True)
+            print_notes(f"note: {' '.join(sentence.split())}")
 
 
 def _mujoco_warnings() -> Mapping[str, int]:

@@ -5,12 +5,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import typer
 from numpy.typing import NDArray
-from rich.console import Console
 from rich.progress import track
 
-from selfmodel.cli.output.plain import counted
+from selfmodel.cli.output.console import text_console
+from selfmodel.cli.output.plain import counted, plain
+from selfmodel.cli.output.printing import print_notes
 from selfmodel.cli.rendering import camera, video
 from selfmodel.cli.rendering.film import Film, evenly, film_of
 from selfmodel.cli.rendering.filmstrip import stick_frames, strip
@@ -63,8 +63,7 @@ def draw_trial(
     robot = trial_logs.robot_of_logs([log], model, budget)
     assumed = HypothesisSpace(robot.anatomy, plugins.kinds(kinds)).parse(hypothesis)
     film, facts = _filmed(log, robot, assumed, pictures, thread_count(threads))
-    for note in facts["notes"]:
-        typer.echo(f"note: {note}", err=True)
+    print_notes(*(f"note: {note}" for note in facts["notes"]))
     data = _drawn(film, out.suffix.lower().removeprefix("."), pictures, sticks=sticks)
     try:
         replace_file(out, data)
@@ -98,7 +97,10 @@ def _filmed(
     film = film_of(
         robot,
         assumed,
-        [(f"logged: {log.trial.plan.name}", logged), (f"model: {assumed}", found.simulated)],
+        [
+            (plain(f"logged: {log.trial.plan.name}"), logged),
+            (plain(f"model: {assumed}"), found.simulated),
+        ],
         moments,
     )
     held = int(film.shots[0].held.sum())
@@ -135,7 +137,7 @@ def _drawn(film: Film, kind: str, pictures: int | None, *, sticks: bool) -> byte
 
 def _shown(frames: Iterable[NDArray[np.uint8]], total: int) -> Iterator[NDArray[np.uint8]]:
     """Yields the frames; shows a progress bar on a terminal."""
-    console = Console(stderr=True)
+    console = text_console(stderr=True)
     yield from track(
         frames, "drawing", total, console=console, disable=not console.is_terminal, transient=True
     )

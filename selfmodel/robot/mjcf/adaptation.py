@@ -11,7 +11,7 @@ from pathlib import Path
 from xml.etree import ElementTree as ET  # of checked texts
 
 from selfmodel.errors import InputError
-from selfmodel.files import read_file
+from selfmodel.files import encodable, read_file
 from selfmodel.robot.mjcf.command_ranges import add_command_ranges
 from selfmodel.robot.mjcf.document import Document, read_document
 from selfmodel.robot.mjcf.expand import check_loggable, expand
@@ -72,7 +72,7 @@ def adapt(path: Path, settings: MjcfSettings, budget: Budget = DEFAULT_BUDGET) -
     try:
         document = read_document(data, Folder(path.parent), path.name, budget=budget)
         request = Message(
-            {"name": path.stem, "mjcf": document.text, "settings": asdict(settings)},
+            {"name": encodable(path.stem), "mjcf": document.text, "settings": asdict(settings)},
             document.assets,
         )
         found = run_on_model("selfmodel.robot.mjcf.adaptation:adapt_message", request, budget)
