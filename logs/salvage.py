@@ -34,8 +34,18 @@ from selfmodel.logs.records import (
     sha256,
 )
 from selfmodel.logs.rescue import rescue
+from selfmodel.logs.schemas import schema_text
 from selfmodel.logs.signals import read_behaviour, read_names
-from selfmodel.logs.topics import DESCRIPTION, TIMING, TRANSFORMS, Topic, frames_stride, topics
+from selfmodel.logs.topics import (
+    DESCRIPTION,
+    DESCRIPTION_TYPE,
+    TIMING,
+    TRANSFORMS,
+    TRANSFORMS_TYPE,
+    Topic,
+    frames_stride,
+    topics,
+)
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import forward_displacement
@@ -109,6 +119,7 @@ def _saved(path: Path, budget: Budget) -> tuple[Contents, Salvaged]:
     """Contents of the new log, checked as a reader would check them."""
     rescued = rescue(path, budget)
     contents = rescued.contents
+    _drop_foreign_displays(contents)
     record, lost = _with_what_is_left(path, contents)
     controller = read_controller(path, contents, record)
     every, whole = _complete(path, contents, record, rescued.discarded, budget)
@@ -224,6 +235,14 @@ def _fill(contents: Contents, topic: Topic, steps: int, record: TrialRecord) -> 
     return len(set(times) - set(known))
 
 
+def _drop_foreign_displays(contents: Contents) -> None:
+    """Removes topics for viewers whose messages are not of the type that selfmodel writes."""
+    for name, kind in ((TRANSFORMS, TRANSFORMS_TYPE), (DESCRIPTION, DESCRIPTION_TYPE)):
+        held = contents.topics.get(name)
+        if held and (held.type, held.schema) != (kind, schema_text(kind).encode()):
+            del contents.topics[name]
+
+
 def _cut(contents: Contents, names: set[str], end: int) -> None:
     """Removes messages after the last complete step, and topics that selfmodel does not write."""
     for name in set(contents.topics) - names - {TRANSFORMS, DESCRIPTION}:
@@ -261,12 +280,11 @@ def _write(out: Path, contents: Contents, result: Result) -> None:
 
 
 def _write_messages(log: LogFile, every: dict[str, Messages]) -> None:
-    rows = []
-    for topic, messages in every.items():
-        channel = log.channel(topic, messages.type)
-        rows += [
-            (time, channel, payload)
-            for payload, (time, _) in zip(messages.payloads, messages.times, strict=True)
-        ]
-    rows.sort(key=lambda row: row[:2])
-    log.messages((channel, time, payload, 0) for time, channel, payload in rows)
+    channels = [log.channel(topic, messages.type) for topic, messages in every.items()]
+    rows = [
+        (0, index, time, payload)
+        for index, messages in enumerate(every.values())
+        for payload, (time, _) in zip(messages.payloads, messages.times, strict=True)
+    ]
+    rows.sort(key=lambda row: (row[2], row[1]))
+    log.messages(channels, rows)

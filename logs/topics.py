@@ -15,6 +15,7 @@ WORLD = "world"
 DESCRIPTION = "/robot_description"
 TRANSFORMS = "/tf"
 DESCRIPTION_TYPE = "std_msgs/msg/String"
+TRANSFORMS_TYPE = "tf2_msgs/msg/TFMessage"
 
 FRAMES_PERIOD = 0.05
 """Period of ``/tf``, s: at every step, this topic for display would be a fifth of a log."""
@@ -131,7 +132,7 @@ def transforms(bodies: Sequence[str], parents: Sequence[str]) -> Topic:
         layout.string(body)
         layout.floats(7)
     parts: tuple[tuple[Part, int], ...] = (("transforms", 7 * len(bodies)),)
-    return Topic(TRANSFORMS, "tf2_msgs/msg/TFMessage", layout.template(), parts)
+    return Topic(TRANSFORMS, TRANSFORMS_TYPE, layout.template(), parts)
 
 
 def frames_stride(control_timestep: float) -> int:

@@ -156,6 +156,14 @@ def test_a_part_of_another_run_is_refused(grid: Path):
     refused(grid, PART, "expected the part result of the run run-00, with its digest, got another")
 
 
+def test_a_part_whose_files_are_no_object_is_refused_with_its_right_digest(grid: Path):
+    path = grid / PART
+    content = result_files.verified(json.loads(path.read_bytes())).content
+    path.write_bytes(result_files.result_bytes({**content, "files": ["trial.mcap"]}))
+
+    refused(grid, PART, "got other keys or values")
+
+
 @pytest.mark.parametrize(("name", "part"), [("better", "better"), ("%72esult", "result")])
 def test_a_part_is_not_counted_twice_under_another_name(grid: Path, name: str, part: str):
     shutil.copy(grid / PART, grid / "run-00" / "parts" / f"{name}.json")

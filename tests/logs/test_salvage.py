@@ -1,6 +1,7 @@
 """Promises of salvage: what is whole is saved, nothing is made up, the original is left alone."""
 
 import contextlib
+import dataclasses
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -17,10 +18,13 @@ from selfmodel.errors import InputError
 from selfmodel.logs import LogError, LogWriteError, read_log, read_truth
 from selfmodel.logs.contents import read_contents
 from selfmodel.logs.framing import FRAME, frames
-from selfmodel.logs.records import HIDDEN, SALVAGE, sha256
+from selfmodel.logs.records import HIDDEN, RESULT, SALVAGE, sha256
 from selfmodel.logs.salvage import salvage, salvageable_steps
+from selfmodel.logs.topics import TRANSFORMS, TRANSFORMS_TYPE
 from selfmodel.settings import Settings
 from selfmodel.trials.signals import SIGNALS
+from tests.fuzz.mcap_file import read_file, written
+from tests.fuzz.seal import seal
 from tests.logs.conftest import STEPS
 
 
@@ -145,6 +149,19 @@ def test_what_viewers_draw_by_is_told_when_it_is_lost(log: Path, saved: Path):
     spoiled(log, Opcode.CHUNK, 0, at=300)  # the description, and what the topics are called
 
     assert salvage(log, saved).lost == ("/robot_description",)
+
+
+def test_frames_of_a_type_that_selfmodel_does_not_write_are_left_out(log: Path, saved: Path):
+    file = read_file(log.read_bytes())
+    number = next(k for k, schema in file.schemas.items() if schema.name == TRANSFORMS_TYPE)
+    file.schemas[number] = dataclasses.replace(file.schemas[number], name="other_msgs/msg/Frames")
+    file.items = [item for item in file.items if getattr(item, "name", "") != RESULT]
+    seal(file)
+    log.write_bytes(written(file))
+    told = salvage(log, saved)
+
+    assert (told.steps, set(told.missing)) == (STEPS, {TRANSFORMS})
+    assert TRANSFORMS not in read_contents(saved).topics
 
 
 def test_without_its_settings_a_trial_has_those_of_the_paper(log: Path, saved: Path):

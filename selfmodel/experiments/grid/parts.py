@@ -160,7 +160,8 @@ def _read(path: Path, definition: Definition, digests: dict[Path, str]) -> Resul
     found = read_result(path, "a part of a run", REMEDY)
     outcome = found.content
     wanted = {"done": "result", "failed": "error"}.get(str(outcome.get("status")))
-    if wanted is None or wanted not in outcome:
+    files = outcome.get("files", {})
+    if wanted is None or wanted not in outcome or not isinstance(files, dict):
         raise InputError(f"{path}: expected a part of a run, got other keys or values; {REMEDY}")
     if definition.made_with is None and found.made_with is None:
         return found
@@ -176,7 +177,7 @@ def _read(path: Path, definition: Definition, digests: dict[Path, str]) -> Resul
             f"{path} was made with {listed(found.made_with)}, its run with "
             f"{listed(definition.made_with)}: a study is of one version of each; {REMEDY}"
         )
-    _check_files(path, outcome.get("files", {}), digests)
+    _check_files(path, files, digests)
     return found
 
 

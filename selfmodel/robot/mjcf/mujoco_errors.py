@@ -37,6 +37,7 @@ def mujoco_errors_as_input_errors(task: str) -> Iterator[None]:
         InputError: MuJoCo raised an exception.
         BudgetError: MuJoCo is out of memory.
     """
+    configure()
     try:
         yield
     except MUJOCO_ERRORS as error:
