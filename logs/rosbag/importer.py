@@ -11,13 +11,13 @@ from selfmodel.arrays import FloatArray, frozen
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
 from selfmodel.logs.records import Imported, TrialHeader
-from selfmodel.logs.rosbag.bag import Source, open_bag
+from selfmodel.logs.rosbag.bag import Source, read_bag
 from selfmodel.logs.rosbag.checks import check_columns, check_names, check_topics
 from selfmodel.logs.rosbag.clock import Clocked, ClocksApartError, clocked
 from selfmodel.logs.rosbag.mapping import BagMapping
 from selfmodel.logs.rosbag.notes import notes
 from selfmodel.logs.rosbag.quality import Quality, quality
-from selfmodel.logs.rosbag.series import Series, read_series
+from selfmodel.logs.rosbag.series import Series
 from selfmodel.logs.rosbag.signals import (
     Steps,
     base_signals,
@@ -28,6 +28,7 @@ from selfmodel.logs.rosbag.signals import (
 from selfmodel.logs.rosbag.tracks import Tracks, read_tracks, required
 from selfmodel.logs.writer import write_trial
 from selfmodel.robot.robot import Robot
+from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Behaviour, Sample
 from selfmodel.trials.signals import SIGNALS, Signal
@@ -79,24 +80,28 @@ class Recording:
         }
 
 
-def import_bag(path: Path, mapping: BagMapping, robot: Robot) -> Recording:
+def import_bag(
+    path: Path, mapping: BagMapping, robot: Robot, budget: Budget = DEFAULT_BUDGET
+) -> Recording:
     """Returns the trial in a bag.
 
     Args:
         path: Folder or file of the bag.
         mapping: Mapping from topics to roles.
         robot: Robot that the mapping names.
+        budget: Memory and time for the bag.
 
     Raises:
         LogError: The bag is damaged.
+        BudgetError: The bag takes more than the budget allows.
         InputError: The bag cannot be read, or the mapping does not fit the bag or the robot.
     """
     anatomy = robot.anatomy
     touches = [sensor.name for sensor in anatomy.sensors if sensor.kind == "touch"]
     check_names(mapping, anatomy.hinges, anatomy.motors, touches)
-    with open_bag(path) as bag:
-        check_topics(mapping, bag)
-        series = read_series(bag, {role.topic for role in mapping.roles})
+    bag = read_bag(path, {role.topic for role in mapping.roles}, budget)
+    check_topics(mapping, bag)
+    series = bag.series
     check_columns(mapping, series)
     clocks = _clocks(mapping, series)
     tracks = read_tracks(mapping, series, clocks)

@@ -16,7 +16,6 @@ from selfmodel.errors import InputError
 from selfmodel.experiments import robots, trial_logs
 from selfmodel.experiments.robots import is_model
 from selfmodel.logs.files import refuse_existing
-from selfmodel.logs.rosbag.bag import open_bag
 from selfmodel.logs.rosbag.importer import Recording, import_bag, write_recording
 from selfmodel.logs.rosbag.mapping import BagMapping
 from selfmodel.logs.rosbag.mapping_file import read_mapping
@@ -69,8 +68,7 @@ def import_(
 def _suggestion(bag: Path, name: str) -> str:
     own = not is_model(name)
     made = robots.robot(name, TIMESTEP if own else _timestep(Path(name)))
-    with open_bag(bag) as opened:
-        return suggest_mapping(opened, made, name, with_timestep=not own)
+    return suggest_mapping(bag, made, name, with_timestep=not own)
 
 
 def _timestep(path: Path) -> float:
