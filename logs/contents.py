@@ -10,7 +10,6 @@ from mcap.exceptions import EndOfFile, InvalidMagic
 from mcap.records import Attachment, Channel, Header, McapRecord, Message, Metadata, Schema
 
 from selfmodel.files import check_regular, read_file
-from selfmodel.logs.budget import ExcessError
 from selfmodel.logs.checksums import verified_records
 from selfmodel.logs.errors import (
     ANOTHER,
@@ -29,10 +28,11 @@ from selfmodel.logs.framing import (
     UncheckedError,
     UnknownCompressionError,
 )
+from selfmodel.logs.meter import ExcessError
 from selfmodel.logs.records import OWN, without_digest
+from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 
-FILE_LIMIT = 128 * 2**20
-"""Maximum size of a log, bytes: ten seconds of a quadruped take 0.52 MB."""
+MORE_MEMORY = "allow more with --budget memory=..., if the file is from a source that you trust"
 
 _Item = TypeVar("_Item")
 
@@ -79,27 +79,30 @@ class Contents:
         return f"{sum(counts)} messages on {len(counts)} topics before that are complete"
 
 
-def read_contents(path: Path, unread: Collection[str] = ()) -> Contents:
+def read_contents(
+    path: Path, unread: Collection[str] = (), budget: Budget = DEFAULT_BUDGET
+) -> Contents:
     """Returns the contents of a file after all its checksums have been verified.
 
     Args:
         path: The file.
         unread: Names of metadata records to ignore.
+        budget: Limits of the file.
 
     Raises:
         LogError: The file is damaged, not MCAP, or contains unsupported records.
         InputError: The file does not exist, or cannot be opened.
     """
     contents = Contents()
-    data = read_bytes(path)
+    data = read_bytes(path, budget)
     try:
-        _gather(verified_records(data), contents, unread)
+        _gather(verified_records(data, budget), contents, unread)
     except FAILURES as failure:
         raise _explain(path, data, failure, contents) from failure
     return contents
 
 
-def read_bytes(path: Path) -> bytes:
+def read_bytes(path: Path, budget: Budget) -> bytes:
     """Returns the bytes of a file.
 
     Raises:
@@ -107,11 +110,10 @@ def read_bytes(path: Path) -> bytes:
         InputError: The file does not exist, or cannot be opened.
     """
     check_regular(path, "a log file")
-    if path.stat().st_size > FILE_LIMIT:
-        raise UnsupportedError(
-            path, f"expected at most {FILE_LIMIT} bytes, got more", advice=ANOTHER
-        )
-    return read_file(path, "a log file", FILE_LIMIT)
+    if path.stat().st_size > budget.file_bytes:
+        what = f"expected at most {budget.file_bytes} bytes, got more"
+        raise UnsupportedError(path, what, advice=MORE_MEMORY)
+    return read_file(path, "a log file", budget.file_bytes)
 
 
 def _add_once(items: dict[str, _Item], name: str, item: _Item) -> None:
@@ -162,7 +164,7 @@ def _explain(path: Path, data: bytes, failure: Exception, contents: Contents) ->
     if isinstance(failure, InvalidMagic):
         return NotMcapError(path, "this is not an MCAP file", advice=ANOTHER)
     if isinstance(failure, (UnknownCompressionError, ExcessError)):
-        advice = ANOTHER if isinstance(failure, ExcessError) else "pack it again with zstd"
+        advice = MORE_MEMORY if isinstance(failure, ExcessError) else "pack it again with zstd"
         return UnsupportedError(path, str(failure), good=good, advice=advice)
     if isinstance(failure, UncheckedError):
         what = f"{failure}: selfmodel did not write this file"

@@ -35,17 +35,13 @@ from mcap.records import (
 )
 from mcap.stream_reader import get_chunk_data_stream
 
-from selfmodel.logs.budget import Budget
 from selfmodel.logs.decompress import unlz4, unzstd
+from selfmodel.logs.meter import Meter
 
 MAGIC = b"\x89MCAP0\r\n"
 
 FRAME = 1 + 8
 """Size of the opcode and the length before a record's content, bytes."""
-
-CHUNK_LIMIT = 16 * 2**20
-"""Maximum decompressed size of a chunk, bytes. Chunks of selfmodel have 64 KiB, and the smallest
-messages take 30 bytes."""
 
 
 class ContradictionError(ValueError):
@@ -130,36 +126,36 @@ def parse(frame: Frame) -> McapRecord | None:
     return read(stream) if read else None
 
 
-def unpack(chunk: Chunk, budget: Budget) -> list[McapRecord]:
+def unpack(chunk: Chunk, meter: Meter) -> list[McapRecord]:
     """Returns the records in a chunk.
 
     Args:
         chunk: Chunk, which is decompressed in place.
-        budget: Counters of the file.
+        meter: Counters of the file.
 
     Raises:
-        Exception: One of ``FAILURES``: the chunk is damaged, has more than ``CHUNK_LIMIT`` bytes
+        Exception: One of ``FAILURES``: the chunk is damaged, has more than ``Budget.chunk_bytes``
             when decompressed, or has no checksum.
     """
-    if chunk.uncompressed_size > CHUNK_LIMIT:
+    if chunk.uncompressed_size > (limit := meter.budget.chunk_bytes):
         raise ContradictionError(
-            f"a chunk claims {chunk.uncompressed_size} bytes, more than {CHUNK_LIMIT}"
+            f"a chunk claims {chunk.uncompressed_size} bytes, more than {limit}"
         )
     if chunk.uncompressed_crc == 0 and chunk.uncompressed_size:
         raise UncheckedError("a chunk has no checksum")
-    budget.chunk(chunk.uncompressed_size)
+    meter.chunk(chunk.uncompressed_size)
     unpack_chunk(chunk)
     get_chunk_data_stream(chunk, validate_crc=True)
-    return _records(chunk.data, budget)
+    return _records(chunk.data, meter)
 
 
-def _records(data: bytes, budget: Budget) -> list[McapRecord]:
+def _records(data: bytes, meter: Meter) -> list[McapRecord]:
     """Splits a chunk as the library does, but raises if there are too many records."""
     found: list[McapRecord] = []
     offset = 0
     while offset < len(data):
         opcode, length = struct.unpack_from("<BQ", data, offset)
-        budget.record(opcode, length)
+        meter.record(opcode, length)
         start = offset + FRAME
         if length > len(data) - start:
             raise EndOfFile

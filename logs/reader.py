@@ -47,6 +47,7 @@ from selfmodel.logs.records import (
 )
 from selfmodel.logs.signals import read_behaviour
 from selfmodel.logs.timing import Timing, read_timing
+from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.trial import Trial, TrialPlan
@@ -85,7 +86,7 @@ class TrialLog:
     imported: bool
 
 
-def read_log(path: str | Path) -> TrialLog:
+def read_log(path: str | Path, budget: Budget = DEFAULT_BUDGET) -> TrialLog:
     """Returns the content of a log.
 
     Verified are the checksums and counts of the file, the digests of its records, of the model and
@@ -98,12 +99,16 @@ def read_log(path: str | Path) -> TrialLog:
         >>> print(log.trial.plan.stage, log.trial.behaviour.steps, log.status)
         before 60 finished
 
+    Args:
+        path: The log.
+        budget: Memory that the file may take.
+
     Raises:
         LogError: A check failed.
         InputError: The file does not exist.
     """
     path = Path(path)
-    return interpret(path, read_contents(path, unread=(HIDDEN,)))
+    return interpret(path, read_contents(path, (HIDDEN,), budget))
 
 
 def interpret(path: Path, contents: Contents) -> TrialLog:

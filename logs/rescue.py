@@ -8,8 +8,7 @@ from pathlib import Path
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Metadata, Schema
 
-from selfmodel.logs.budget import Budget, ExcessError
-from selfmodel.logs.contents import FILE_LIMIT, Contents, Messages, messages_of, read_bytes
+from selfmodel.logs.contents import MORE_MEMORY, Contents, Messages, messages_of, read_bytes
 from selfmodel.logs.errors import ANOTHER, CorruptError, NotMcapError, UnsupportedError
 from selfmodel.logs.framing import (
     FAILURES,
@@ -21,10 +20,12 @@ from selfmodel.logs.framing import (
     parse,
     unpack,
 )
+from selfmodel.logs.meter import ExcessError, Meter
 from selfmodel.logs.records import OWN, without_digest
+from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 
 
-def rescue(path: Path) -> Contents:
+def rescue(path: Path, budget: Budget = DEFAULT_BUDGET) -> Contents:
     """Returns the intact contents of a damaged log.
 
     Intact are the chunks and attachments with a correct checksum, and the metadata records of
@@ -33,6 +34,7 @@ def rescue(path: Path) -> Contents:
 
     Args:
         path: The file; it is only read.
+        budget: Limits of the file.
 
     Raises:
         LogError: The file is too large, has no record of a log, or has two different messages of
@@ -41,14 +43,14 @@ def rescue(path: Path) -> Contents:
     """
     found = _Found()
     try:
-        for record in _intact_records(read_bytes(path)):
+        for record in _intact_records(read_bytes(path, budget), budget):
             found.add(record)
         contents = found.contents()
     except ContradictionError as error:
         raise CorruptError(path, f"nothing can be salvaged: {error}") from error
     except ExcessError as error:
         what = f"nothing can be salvaged: {error}"
-        raise UnsupportedError(path, what, advice=ANOTHER) from error
+        raise UnsupportedError(path, what, advice=MORE_MEMORY) from error
     if not contents.metadata:
         raise NotMcapError(path, "no record of a trial log is intact in this file", advice=ANOTHER)
     return contents
@@ -97,10 +99,10 @@ class _Found:
         return Contents("ros2", self.metadata, self.attachments, topics)
 
 
-def _intact_records(data: bytes) -> Iterator[McapRecord]:
+def _intact_records(data: bytes, budget: Budget) -> Iterator[McapRecord]:
     """Yields intact records; schemas and channels without a checksum come last."""
     unprotected: list[McapRecord] = []
-    work = _Work()
+    work = _Work(budget)
     offset = len(MAGIC)
     while offset < len(data):
         try:
@@ -127,18 +129,18 @@ _PROTECTED = (Opcode.CHUNK, Opcode.ATTACHMENT, Opcode.METADATA)
 class _Work:
     """Limits of the search: in hostile bytes, every byte may begin a record."""
 
-    def __init__(self) -> None:
-        self.budget = Budget()
+    def __init__(self, budget: Budget) -> None:
+        self.meter = Meter(budget)
+        self._most = 4 * budget.file_bytes
         self._tried = 0
 
     def attempt(self, frame: Frame) -> None:
-        self.budget.frame(frame.opcode, len(frame.body))
+        self.meter.frame(frame.opcode, len(frame.body))
         self._tried += len(frame.body)
-        if self._tried > _MAX_TRIED_BYTES:
+        if self._tried > self._most:
             raise ExcessError("too many of its bytes could begin a damaged record")
 
 
-_MAX_TRIED_BYTES = 4 * FILE_LIMIT
 _BEGINNING = re.compile(rb"[\x06\x09\x0c](?=.{3}[\x00-\x10]\x00{4})", re.DOTALL)
 """First bytes of a chunk, an attachment or a metadata record: the opcode, and a length that a file
 may have."""
@@ -153,7 +155,7 @@ def _verified(frame: Frame, work: _Work) -> list[McapRecord]:
     work.attempt(frame)
     record = parse(frame)
     if isinstance(record, Chunk):
-        return unpack(record, work.budget)
+        return unpack(record, work.meter)
     if isinstance(record, Attachment) and not any(frame.body[-4:]):
         raise UncheckedError("an attachment has no checksum")
     if isinstance(record, Metadata):

@@ -11,15 +11,20 @@ from selfmodel.logs.reader import TrialLog
 from selfmodel.robot.mjcf.adaptation import MAX_SUBSTEPS
 from selfmodel.robot.mjcf.untrusted import checked_model
 from selfmodel.robot.robot import Robot
+from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.trials.signals import Names
 
 GOOD = "its observations are intact"
 
 
-def robot_of(log: TrialLog) -> Robot:
+def robot_of(log: TrialLog, budget: Budget = DEFAULT_BUDGET) -> Robot:
     """Returns the robot of the model in a log.
 
     MuJoCo can read no files but the log's attachments.
+
+    Args:
+        log: The log.
+        budget: Memory and time that the model may take.
 
     Raises:
         LogError: The model is invalid, names other files, exceeds a limit, or is of another robot
@@ -89,8 +94,12 @@ def describe_difference(names: Names, logged: Names) -> str:
     return "; ".join(differences) or "their parts have the same names"
 
 
-def common_robot(logs: Sequence[TrialLog]) -> Robot:
+def common_robot(logs: Sequence[TrialLog], budget: Budget = DEFAULT_BUDGET) -> Robot:
     """Returns the common robot of logs.
+
+    Args:
+        logs: The logs.
+        budget: Memory and time that the model may take.
 
     Raises:
         InputError: There is no log, or two logs are of different robots.
@@ -110,7 +119,7 @@ def common_robot(logs: Sequence[TrialLog]) -> Robot:
                 f"the logs are {what}: {first.trial.path} is of {first.trial.robot!r}, "
                 f"{other.trial.path} of {other.trial.robot!r}; give logs of one robot"
             )
-    return robot_of(first)
+    return robot_of(first, budget)
 
 
 def _identity(log: TrialLog) -> tuple[object, ...]:

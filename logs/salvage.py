@@ -9,7 +9,6 @@ import numpy as np
 
 from selfmodel.errors import InputError
 from selfmodel.logs.atomic import partial_path
-from selfmodel.logs.budget import RECORD_LIMIT, UNPACKED_LIMIT
 from selfmodel.logs.contents import Contents, Messages
 from selfmodel.logs.errors import CorruptError, LogError, SchemaMismatchError
 from selfmodel.logs.files import as_write_error, refuse_existing
@@ -31,6 +30,7 @@ from selfmodel.logs.records import (
 from selfmodel.logs.rescue import rescue
 from selfmodel.logs.signals import read_behaviour, read_names
 from selfmodel.logs.topics import DESCRIPTION, TIMING, TRANSFORMS, Topic, frames_stride, topics
+from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import forward_displacement
 
@@ -58,12 +58,13 @@ class Salvaged:
     lost: tuple[str, ...]
 
 
-def salvage(path: Path, out: Path) -> Salvaged:
+def salvage(path: Path, out: Path, budget: Budget = DEFAULT_BUDGET) -> Salvaged:
     """Writes all complete data of a damaged or unfinished log into a new, valid one.
 
     Args:
         path: The log; it is only read.
         out: The new log, whose status is ``interrupted``.
+        budget: Limits of the file.
 
     Raises:
         LogError: The first records, the model, or every step is lost.
@@ -71,30 +72,34 @@ def salvage(path: Path, out: Path) -> Salvaged:
         LogWriteError: The disk is full, or failed.
     """
     refuse_existing(out)
-    _refuse_sound(path)
-    contents, saved = _saved(path)
+    _refuse_sound(path, budget)
+    contents, saved = _saved(path, budget)
     _write(out, contents)
     return dataclasses.replace(saved, log=str(out))
 
 
-def salvageable_steps(path: Path) -> int:
+def salvageable_steps(path: Path, budget: Budget = DEFAULT_BUDGET) -> int:
     """Returns the number of complete steps that ``salvage`` would write.
+
+    Args:
+        path: The log; it is only read.
+        budget: Limits of the file.
 
     Raises:
         InputError: The file does not exist.
     """
     try:
-        return _saved(path)[1].steps
+        return _saved(path, budget)[1].steps
     except LogError:
         return 0
 
 
-def _saved(path: Path) -> tuple[Contents, Salvaged]:
+def _saved(path: Path, budget: Budget) -> tuple[Contents, Salvaged]:
     """Contents of the new log, checked as a reader would check them."""
-    contents = rescue(path)
+    contents = rescue(path, budget)
     record, lost = _with_what_is_left(path, contents)
     controller = read_controller(path, contents, record)
-    every, whole = _complete(path, contents, record)
+    every, whole = _complete(path, contents, record, budget)
     span = max(whole) + 1
     missing = {topic.name: _fill(contents, topic, span, record) for topic in every}
     _cut(contents, {topic.name for topic in every}, _time_of(span, record))
@@ -108,9 +113,9 @@ def _saved(path: Path) -> tuple[Contents, Salvaged]:
     return contents, Salvaged("", len(whole), span, record.steps, lost_messages, lost)
 
 
-def _refuse_sound(path: Path) -> None:
+def _refuse_sound(path: Path, budget: Budget) -> None:
     try:
-        status = read_log(path).status
+        status = read_log(path, budget).status
     except LogError:
         return
     raise InputError(
@@ -137,7 +142,7 @@ def _with_what_is_left(path: Path, contents: Contents) -> tuple[TrialRecord, tup
 
 
 def _complete(
-    path: Path, contents: Contents, record: TrialRecord
+    path: Path, contents: Contents, record: TrialRecord, budget: Budget
 ) -> tuple[tuple[Topic, ...], set[int]]:
     """Topics, and the steps for which every topic has a message."""
     try:
@@ -146,7 +151,7 @@ def _complete(
             every = (*every, TIMING)
     except SchemaMismatchError as error:
         raise _nothing(path) from error
-    if record.steps > RECORD_LIMIT // len(every):
+    if record.steps > budget.records // len(every):
         raise CorruptError(path, f"it claims {record.steps} steps, more than a log may have")
     whole = set(range(record.steps))
     for topic in every:
@@ -157,7 +162,7 @@ def _complete(
         raise _nothing(path)
     span = max(whole) + 1
     # Missing messages are filled in, and may take many times the size of the file.
-    if span * sum(len(topic.template.payload) for topic in every) > UNPACKED_LIMIT:
+    if span * sum(len(topic.template.payload) for topic in every) > budget.unpacked_bytes:
         raise CorruptError(path, f"{span} steps of it have more bytes than a log may")
     return every, whole
 

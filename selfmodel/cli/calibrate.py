@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from selfmodel.cli.inputs import check_folder
-from selfmodel.cli.options import Json, LogFiles, SelfModel, Threads
+from selfmodel.cli.options import DEFAULT_BUDGET, FileBudget, Json, LogFiles, SelfModel, Threads
 from selfmodel.cli.output.plain import counted, plain
 from selfmodel.cli.output.tables import show
 from selfmodel.errors import InputError
@@ -16,6 +16,7 @@ from selfmodel.experiments import trial_logs
 from selfmodel.logs.files import as_write_error, create_partial, publish, refuse_existing
 from selfmodel.robot.parameters import factor_names
 from selfmodel.robot.robot import Robot
+from selfmodel.sandbox.budget import Budget
 from selfmodel.simulation.calibration import calibrate as fit_to
 from selfmodel.simulation.threads import thread_count
 
@@ -31,6 +32,7 @@ def calibrate(
     ],
     robot: SelfModel = None,
     threads: Threads = 0,
+    budget: FileBudget = DEFAULT_BUDGET,
     as_json: Json = False,
 ) -> None:
     """Fit masses, friction, damping, motors and delay of the self-model to logged trials.
@@ -43,8 +45,9 @@ def calibrate(
         raise InputError(f"--out needs a name that ends in .xml, got {str(out)!r}")
     check_folder(out)
     refuse_existing(out)
-    logs = trial_logs.logs(files)
-    before = trial_logs.robot_of_logs(logs, robot)
+    allowed = Budget.parse(budget)
+    logs = trial_logs.logs(files, allowed)
+    before = trial_logs.robot_of_logs(logs, robot, allowed)
     _refuse_assets(before, robot or str(files[0]))
     fit = fit_to(before, [log.trial for log in logs], thread_count(threads))
     with create_partial(out) as file, as_write_error(out):

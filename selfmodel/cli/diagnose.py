@@ -10,9 +10,11 @@ import typer
 from rich.console import Console
 
 from selfmodel.cli.options import (
+    DEFAULT_BUDGET,
     DEFAULT_KINDS,
     Calibrated,
     ComparatorName,
+    FileBudget,
     Json,
     KindNames,
     LogFiles,
@@ -32,6 +34,7 @@ from selfmodel.experiments import plugins, trial_logs
 from selfmodel.experiments.log_diagnosis import by_stage, set_up_diagnosis
 from selfmodel.logs import TrialLog
 from selfmodel.recovery.sequential_diagnosis import diagnose_trials
+from selfmodel.sandbox.budget import Budget
 from selfmodel.settings import Settings
 
 
@@ -46,6 +49,7 @@ def diagnose(
     generations: LoggedGenerations = None,
     seed: LoggedSeed = None,
     threads: Threads = 0,
+    budget: FileBudget = DEFAULT_BUDGET,
     as_json: Json = False,
 ) -> None:
     """Rank hypotheses by how well they predict logged trials, without a robot.
@@ -56,8 +60,9 @@ def diagnose(
     start = perf_counter()
     judge = plugins.comparator(comparator)
     considered = plugins.kinds(kinds)
-    logs = trial_logs.logs(files)
-    model = trial_logs.robot_of_logs(logs, robot)
+    allowed = Budget.parse(budget)
+    logs = trial_logs.logs(files, allowed)
+    model = trial_logs.robot_of_logs(logs, robot, allowed)
     failed, healthy = by_stage([log.trial for log in logs])
     used = [log for log in logs if log.trial in failed]
     first = used[0]

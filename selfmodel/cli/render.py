@@ -7,12 +7,21 @@ from typing import Annotated, Any
 import typer
 
 from selfmodel.cli.inputs import check_folder
-from selfmodel.cli.options import Json, LogFile, NamedKinds, SelfModel, Threads
+from selfmodel.cli.options import (
+    DEFAULT_BUDGET,
+    FileBudget,
+    Json,
+    LogFile,
+    NamedKinds,
+    SelfModel,
+    Threads,
+)
 from selfmodel.cli.output.plain import counted, plain
 from selfmodel.cli.rendering import gl, video
 from selfmodel.cli.rendering.diagnosed import diagnosed
 from selfmodel.errors import InputError
 from selfmodel.logs.files import refuse_existing
+from selfmodel.sandbox.budget import Budget
 
 STRIPS = (".png", ".svg", ".pdf")
 """File extensions of a strip of pictures."""
@@ -59,6 +68,7 @@ def render(
         int, typer.Option(min=2, max=50, metavar="N", help="Pictures of a strip.")
     ] = 6,
     threads: Threads = 0,
+    budget: FileBudget = DEFAULT_BUDGET,
     as_json: Json = False,
 ) -> None:
     """Draw a logged trial beside a simulation of the same controller.
@@ -87,6 +97,7 @@ def render(
         pictures=None if out.suffix.lower() in FILMS else pictures,
         sticks=library is None,
         threads=threads,
+        budget=Budget.parse(budget),
     )
     result |= {"drawn_by": "matplotlib" if library is None else "mujoco", "gl": library}
     if as_json:

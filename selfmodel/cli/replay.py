@@ -8,13 +8,23 @@ from typing import Annotated, Any
 import mujoco
 import typer
 
-from selfmodel.cli.options import HypothesisText, Json, LogFile, NamedKinds, SelfModel, Threads
+from selfmodel.cli.options import (
+    DEFAULT_BUDGET,
+    FileBudget,
+    HypothesisText,
+    Json,
+    LogFile,
+    NamedKinds,
+    SelfModel,
+    Threads,
+)
 from selfmodel.cli.output.plain import counted, plain
 from selfmodel.cli.output.replay_figure import check_figure, draw
 from selfmodel.cli.output.tables import show
 from selfmodel.experiments import plugins, trial_logs
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.logs import TrialLog
+from selfmodel.sandbox.budget import Budget
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.threads import thread_count
 from selfmodel.simulation.trial_replay import Replay, replay as simulate
@@ -49,13 +59,15 @@ def replay(
         ),
     ] = None,
     threads: Threads = 0,
+    budget: FileBudget = DEFAULT_BUDGET,
     as_json: Json = False,
 ) -> None:
     """Simulate a logged trial again from its log, and compare the two bit by bit."""
     if out is not None:
         check_figure(out)
-    (log,) = trial_logs.logs([file])
-    robot = trial_logs.robot_of_logs([log], model)
+    allowed = Budget.parse(budget)
+    (log,) = trial_logs.logs([file], allowed)
+    robot = trial_logs.robot_of_logs([log], model, allowed)
     assumed = HypothesisSpace(robot.anatomy, plugins.kinds(kinds)).parse(hypothesis)
     logged = log.software.get("mujoco", "unknown")
     exact = logged == mujoco.__version__ and not log.imported

@@ -14,16 +14,21 @@ from selfmodel.robot.designs import DESIGNS
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import read_settings
 from selfmodel.robot.robot import Robot
+from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 
 
-def logs(paths: Sequence[Path]) -> list[TrialLog]:
+def logs(paths: Sequence[Path], budget: Budget = DEFAULT_BUDGET) -> list[TrialLog]:
     """Returns the trials in log files.
+
+    Args:
+        paths: The logs.
+        budget: Memory that each file may take.
 
     Raises:
         InputError: A log is unusable, or is given twice.
     """
     try:
-        found = [read_log(path) for path in paths]
+        found = [read_log(path, budget) for path in paths]
     except LogError as error:
         raise InputError(str(error)) from error
     digests: dict[bytes, Path] = {}
@@ -35,19 +40,22 @@ def logs(paths: Sequence[Path]) -> list[TrialLog]:
     return found
 
 
-def robot_of_logs(found: Sequence[TrialLog], override: str | None) -> Robot:
+def robot_of_logs(
+    found: Sequence[TrialLog], override: str | None, budget: Budget = DEFAULT_BUDGET
+) -> Robot:
     """Returns the robot of logs.
 
     Args:
         found: At least one log.
         override: Name of a robot, or an MJCF file, that replaces the model in the logs.
+        budget: Memory and time that each model may take.
 
     Raises:
         InputError: The logs have different robots, their model is unusable, or the replacement has
             other sensors, motors or hinges.
     """
     try:
-        own = common_robot(found)
+        own = common_robot(found, budget)
     except LogError as error:
         raise InputError(str(error)) from error
     if override is None:

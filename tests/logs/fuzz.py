@@ -23,13 +23,14 @@ from mcap.writer import CompressionType, Writer
 
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError, TrialLog, read_log
-from selfmodel.logs.budget import Budget
 from selfmodel.logs.checksums import verified_records
 from selfmodel.logs.framing import Frame, frames, parse, unpack
+from selfmodel.logs.meter import Meter
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.salvage import salvage
 from selfmodel.logs.writer import write_trial
 from selfmodel.robot.robot import Robot
+from selfmodel.sandbox.budget import DEFAULT_BUDGET
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Sample
 from selfmodel.trials.signals import SIGNALS
@@ -174,7 +175,7 @@ class Form:
         self._needed = [first[0], *models]
         self._steps: list[tuple[bytes, Counter[int]]] = []
         for frame, text in chunks:
-            records = unpack(cast("Chunk", parse(frame)), Budget())
+            records = unpack(cast("Chunk", parse(frame)), Meter(DEFAULT_BUDGET))
             if any(isinstance(record, Channel) for record in records):
                 self._needed.append(text)
             times = [r.log_time for r in records if isinstance(r, Message)]

@@ -8,7 +8,7 @@ import mujoco
 import typer
 
 from selfmodel.cli.inputs import check_log_name
-from selfmodel.cli.options import Json
+from selfmodel.cli.options import DEFAULT_BUDGET, FileBudget, Json
 from selfmodel.cli.output.plain import counted, plain
 from selfmodel.cli.output.tables import show
 from selfmodel.controllers.controller import Controller
@@ -44,6 +44,7 @@ def import_(
         str | None,
         typer.Option(metavar="ROBOT", help="Robot of --suggest: a robot's name, or MODEL.xml."),
     ] = None,
+    budget: FileBudget = DEFAULT_BUDGET,
     as_json: Json = False,
 ) -> None:
     """Import a rosbag2 recording of a robot as a trial log, without ROS."""

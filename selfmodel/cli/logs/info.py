@@ -8,21 +8,23 @@ from typing import Any
 
 import typer
 
-from selfmodel.cli.options import Json, LogFiles
+from selfmodel.cli.options import DEFAULT_BUDGET, FileBudget, Json, LogFiles
 from selfmodel.cli.output.plain import counted, plain
 from selfmodel.cli.output.tables import show
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError, TrialLog
 from selfmodel.logs.info import Info, has_truth, read_info
 from selfmodel.logs.salvage import salvageable_steps
+from selfmodel.sandbox.budget import Budget
 
 
-def info(files: LogFiles, *, as_json: Json = False) -> None:
+def info(files: LogFiles, *, budget: FileBudget = DEFAULT_BUDGET, as_json: Json = False) -> None:
     """Show what logs contain, and how to open them in a viewer.
 
     The exit status is 1 if a log is damaged.
     """
-    found = [_facts(path) for path in files]
+    allowed = Budget.parse(budget)
+    found = [_facts(path, allowed) for path in files]
     if as_json:
         typer.echo(json.dumps({"files": found}, indent=2, allow_nan=False))
     else:
@@ -42,11 +44,11 @@ def _viewers() -> str:
     )
 
 
-def _facts(path: Path) -> dict[str, Any]:
+def _facts(path: Path, budget: Budget) -> dict[str, Any]:
     try:
-        return _as_object(path, read_info(path))
+        return _as_object(path, read_info(path, budget))
     except LogError as error:
-        return _damage(path, error, salvageable_steps(path))
+        return _damage(path, error, salvageable_steps(path, budget))
     except InputError as error:
         return _damage(path, error, 0)
 

@@ -8,20 +8,22 @@ from typing import Annotated
 import typer
 
 from selfmodel.cli.inputs import check_log_name
-from selfmodel.cli.options import Json, NewLog
+from selfmodel.cli.options import DEFAULT_BUDGET, FileBudget, Json, NewLog
 from selfmodel.cli.output.plain import counted
 from selfmodel.logs.salvage import salvage as save
+from selfmodel.sandbox.budget import Budget
 
 
 def salvage(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Damaged log, or NAME.mcap.part.")],
     *,
     out: NewLog,
+    budget: FileBudget = DEFAULT_BUDGET,
     as_json: Json = False,
 ) -> None:
     """Save all complete data of a truncated or damaged log in a new, valid one."""
     check_log_name(out)
-    saved = save(file, out)
+    saved = save(file, out, Budget.parse(budget))
     if as_json:
         typer.echo(json.dumps({"source": str(file), **dataclasses.asdict(saved)}))
         return

@@ -6,19 +6,21 @@ from typing import Any
 
 import typer
 
-from selfmodel.cli.options import Json, LogFiles
+from selfmodel.cli.options import DEFAULT_BUDGET, FileBudget, Json, LogFiles
 from selfmodel.cli.output.plain import counted, plain
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError
 from selfmodel.logs.verify import verify as check
+from selfmodel.sandbox.budget import Budget
 
 
-def verify(files: LogFiles, *, as_json: Json = False) -> None:
+def verify(files: LogFiles, *, budget: FileBudget = DEFAULT_BUDGET, as_json: Json = False) -> None:
     """Verify checksums, counts, digests, layout, times, names and the model of logs.
 
     The exit status is 0 if every log is good, otherwise 1.
     """
-    checked = [_checked(path) for path in files]
+    allowed = Budget.parse(budget)
+    checked = [_checked(path, allowed) for path in files]
     if as_json:
         typer.echo(json.dumps({"ok": all(one["ok"] for one in checked), "files": checked}))
     else:
@@ -27,9 +29,9 @@ def verify(files: LogFiles, *, as_json: Json = False) -> None:
     raise typer.Exit(0 if all(one["ok"] for one in checked) else 1)
 
 
-def _checked(path: Path) -> dict[str, Any]:
+def _checked(path: Path, budget: Budget) -> dict[str, Any]:
     try:
-        log, loaded = check(path)
+        log, loaded = check(path, budget)
     except (LogError, InputError) as error:
         return {"file": str(path), "ok": False, "error": str(error), "kind": type(error).__name__}
     return {

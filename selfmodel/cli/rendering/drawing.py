@@ -22,6 +22,7 @@ from selfmodel.logs import TrialLog
 from selfmodel.logs.errors import LogWriteError
 from selfmodel.logs.files import replace_file
 from selfmodel.robot.robot import Robot
+from selfmodel.sandbox.budget import Budget
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.threads import thread_count
 from selfmodel.simulation.trial_replay import replay
@@ -37,6 +38,7 @@ def draw_trial(
     pictures: int | None,
     sticks: bool,
     threads: int,
+    budget: Budget,
 ) -> dict[str, Any]:
     """Draws a logged trial beside its simulation; returns the facts of the drawing as JSON values.
 
@@ -49,13 +51,14 @@ def draw_trial(
         pictures: Pictures of a strip; None for a film.
         sticks: Draws with matplotlib instead of MuJoCo.
         threads: Threads of the physics; 0 for one per processor.
+        budget: Memory that the log may take.
 
     Raises:
         InputError: The log, the hypothesis or the model cannot be used.
         WorkError: The file could not be written.
     """
-    (log,) = trial_logs.logs([file])
-    robot = trial_logs.robot_of_logs([log], model)
+    (log,) = trial_logs.logs([file], budget)
+    robot = trial_logs.robot_of_logs([log], model, budget)
     assumed = HypothesisSpace(robot.anatomy, plugins.kinds(kinds)).parse(hypothesis)
     film, facts = _filmed(log, robot, assumed, pictures, thread_count(threads))
     for note in facts["notes"]:
