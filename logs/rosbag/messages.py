@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +14,6 @@ from rosbags.typesys import Stores, get_typestore
 from selfmodel.arrays import FloatArray
 from selfmodel.logs.rosbag.message_types import (
     ARRAY,
-    CDR,
     IMU,
     JOINT_STATE,
     NUMBERS,
@@ -25,6 +25,7 @@ from selfmodel.logs.rosbag.message_types import (
 )
 
 if TYPE_CHECKING:
+    from rosbags.typesys.store import Typestore
     from rosbags.typesys.stores import ros2_humble as ros
 
 Rows = tuple[tuple[str, ...], FloatArray]
@@ -65,7 +66,11 @@ def read_message(payload: bytes, kind: str, encoding: str) -> tuple[int, Rows]:
         UndecodableError: The message is damaged.
     """
     try:
-        message: Any = _DECODERS[encoding](payload, kind)
+        message: Any = (
+            _ros1().deserialize_ros1(payload, kind)
+            if encoding == ROS1
+            else _ROS2.deserialize_cdr(payload, kind)
+        )
     except (SerdeError, IndexError, OverflowError) as failure:
         raise UndecodableError(str(failure)) from failure
     stamp = 0
@@ -76,13 +81,13 @@ def read_message(payload: bytes, kind: str, encoding: str) -> tuple[int, Rows]:
     return stamp, KINDS[kind].rows(message)
 
 
-_DECODERS: Mapping[str, Callable[[bytes, str], object]] = MappingProxyType(
-    {
-        CDR: get_typestore(Stores.ROS2_HUMBLE).deserialize_cdr,
-        ROS1: get_typestore(Stores.ROS1_NOETIC).deserialize_ros1,
-    }
-)
-"""Decoders by encoding. The types in ``KINDS`` are the same in every distribution of ROS."""
+_ROS2 = get_typestore(Stores.ROS2_HUMBLE)
+"""Standard message types. Those in ``KINDS`` are the same in every distribution of ROS 1 or 2."""
+
+
+@cache
+def _ros1() -> "Typestore":
+    return get_typestore(Stores.ROS1_NOETIC)
 
 
 def _joint_state(message: "ros.sensor_msgs__msg__JointState") -> Rows:
@@ -175,3 +180,7 @@ Widths: JointState 3 (position, velocity, effort), those of commands 1, Odometry
 (orientation w x y z, angular velocity), touch 1. Missing numbers are NaN. The columns of a
 Float64MultiArray are named by their index.
 """
+
+# The library generates code per type on first use: once here, not in each child process.
+for _kind in KINDS:
+    _ROS2.get_msgdef(_kind)

@@ -78,9 +78,7 @@ def series_bytes(series: Series) -> bytes:
     return data.getvalue()
 
 
-def parse_series(
-    topic: Topic, names: list[str], refused: Mapping[str, int], data: bytes
-) -> Series:
+def parse_series(topic: Topic, names: list[str], refused: Mapping[str, int], data: bytes) -> Series:
     """Returns the series of ``series_bytes``.
 
     Args:
