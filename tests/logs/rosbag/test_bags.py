@@ -27,8 +27,8 @@ from selfmodel.logs.rosbag.checks import TYPES
 from selfmodel.logs.rosbag.messages import KINDS
 from selfmodel.logs.rosbag.suggest import suggest
 from selfmodel.robot.robot import Robot
-from tests.logs.rosbag.bags import FORMS, ROS, T0, array, storage, write_bag
-from tests.logs.rosbag.conftest import imported, recorded
+from tests.logs.rosbag.bags import FORMS, ROS, T0, array, spoilt, storage, write_bag
+from tests.logs.rosbag.conftest import decoded, imported, recorded
 
 SAMPLES = Path(__file__).parents[4] / "shared" / "samples"
 GENUINE = sorted((SAMPLES / "rosbag2").glob("*.mcap"))
@@ -150,35 +150,24 @@ def test_a_foreign_encoding_is_refused_only_where_it_is_wanted(tmp_path: Path):
 
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("damage", ["flip", "cut", "garbage"])
-def test_no_damage_crashes(form: str, damage: str, biped: Robot, tmp_path: Path):
+def test_no_damage_crashes(form: str, damage: str, tmp_path: Path):
     path = storage(write_bag(tmp_path / "bag", recorded(0.1), form))
     data = path.read_bytes()
     rng = np.random.default_rng(list(FORMS).index(form))
     for _ in range(25):
-        spoilt = bytearray(data)
-        at = int(rng.integers(len(data)))
-        match damage:
-            case "flip":
-                spoilt[at] ^= 1 << int(rng.integers(8))
-            case "cut":
-                del spoilt[at:]
-            case "garbage":
-                spoilt[at : at + 64] = rng.bytes(64)[: len(data) - at]
-        path.write_bytes(spoilt)
+        path.write_bytes(spoilt(data, damage, rng))
         with suppress(LogError, InputError):
-            assert imported(path, biped).behaviour.steps >= 2
+            decoded(path, tmp_path)
 
 
-def test_damaged_lists_of_files_do_not_crash(biped: Robot, bag: Path):
+def test_damaged_lists_of_files_do_not_crash(bag: Path, tmp_path: Path):
     listing = bag / "metadata.yaml"
     data = listing.read_bytes()
     rng = np.random.default_rng(0)
     for _ in range(50):
-        spoilt = bytearray(data)
-        spoilt[rng.integers(len(data))] ^= 1 << int(rng.integers(8))
-        listing.write_bytes(spoilt)
+        listing.write_bytes(spoilt(data, "flip", rng))
         with suppress(LogError, InputError):
-            assert imported(bag, biped).behaviour.steps == 99
+            assert decoded(bag, tmp_path).facts["topics"]
 
 
 def test_damage_is_called_by_its_name(bag: Path, tmp_path: Path):
