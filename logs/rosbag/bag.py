@@ -14,25 +14,13 @@ from selfmodel.logs.errors import (
     TruncatedError,
     UnsupportedError,
 )
-from selfmodel.logs.rosbag.series import Series, Topic, parse_series
+from selfmodel.logs.rosbag.answer import Source, parse_answer
+from selfmodel.logs.rosbag.series import Series, Topic
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.sandbox.isolation import run_isolated
 from selfmodel.sandbox.message import Message
 
 _ERRORS = (CorruptError, IncompleteError, NotMcapError, TruncatedError, UnsupportedError)
-
-
-@dataclass(frozen=True)
-class Source:
-    """File of a bag.
-
-    Attributes:
-        name: Name within the bag.
-        sha256: SHA-256 of the file, in hexadecimal: recorders write no checksums.
-    """
-
-    name: str
-    sha256: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,21 +55,11 @@ def read_bag(path: Path, wanted: Collection[str], budget: Budget = DEFAULT_BUDGE
         InputError: The bag does not exist, or cannot be read.
     """
     request = {"path": str(path), "folder": str(Path.cwd()), "wanted": sorted(wanted)}
-    answer = run_isolated(
+    found = run_isolated(
         "selfmodel.logs.rosbag.child:read",
         Message(request),
         what=str(path),
         budget=budget,
         errors=_ERRORS,
     )
-    facts = answer.facts
-    topics = {name: Topic(name, *rest) for name, *rest in facts["topics"]}
-    return Bag(
-        path,
-        topics,
-        tuple(Source(*source) for source in facts["sources"]),
-        {
-            name: parse_series(topics[name], names, facts["refused"][name], answer.blobs[name])
-            for name, names in facts["columns"].items()
-        },
-    )
+    return Bag(path, *parse_answer(found.facts, found.blobs))

@@ -3,16 +3,16 @@
 import os
 from pathlib import Path
 
+from selfmodel.logs.rosbag.answer import Source, answer
 from selfmodel.logs.rosbag.files import bag_files, explained
 from selfmodel.logs.rosbag.gathering import Gathering
-from selfmodel.logs.rosbag.series import series_bytes
 from selfmodel.logs.rosbag.storage import read_storage, sha256
 from selfmodel.sandbox.budget import Budget
 from selfmodel.sandbox.message import Message
 
 
 def read(request: Message, budget: Budget, scratch: Path) -> Message:
-    """Reads a bag; see ``selfmodel.logs.rosbag.bag.read_bag`` for both messages.
+    """Reads a bag.
 
     Args:
         request: ``path`` of the bag, ``folder`` that a relative path begins in, and ``wanted``
@@ -21,7 +21,12 @@ def read(request: Message, budget: Budget, scratch: Path) -> Message:
         scratch: Folder for decompressed files.
 
     Returns:
-        Topics, sources, and names and reasons of each series; a blob per series has its arrays.
+        Topics, sources and decoded messages; see ``selfmodel.logs.rosbag.answer``.
+
+    Raises:
+        LogError: The bag is damaged.
+        BudgetError: The answer would be too large.
+        InputError: The bag cannot be read.
     """
     os.chdir(request.facts["folder"])
     path = Path(request.facts["path"])
@@ -31,14 +36,5 @@ def read(request: Message, budget: Budget, scratch: Path) -> Message:
         for name in names:
             for item in read_storage(name, scratch, budget):
                 gathering.add(item)
-        sources = [(name.name, sha256(name)) for name in names]
-    topics, series = gathering.topics().values(), gathering.series()
-    return Message(
-        {
-            "topics": [(topic.name, topic.type, topic.encoding, topic.count) for topic in topics],
-            "sources": sources,
-            "columns": {found.topic.name: list(found.columns) for found in series},
-            "refused": {found.topic.name: found.refused for found in series},
-        },
-        {found.topic.name: series_bytes(found) for found in series},
-    )
+        sources = [Source(name.name, sha256(name)) for name in names]
+    return answer(gathering.topics().values(), sources, gathering.decoded())

@@ -1,23 +1,19 @@
 """Gathering of a bag's records into arrays, up to the limits of the budget."""
 
 from collections import Counter
-from collections.abc import Collection, Iterable
-from dataclasses import dataclass, field
+from collections.abc import Collection
 from pathlib import Path
 
-import numpy as np
-
-from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.logs.errors import CorruptError, UnsupportedError
+from selfmodel.logs.rosbag.answer import Decoded
 from selfmodel.logs.rosbag.message_types import CDR, ENCODINGS, full_type
 from selfmodel.logs.rosbag.messages import (
     KINDS,
     RefusedError,
-    Rows,
     UndecodableError,
     read_message,
 )
-from selfmodel.logs.rosbag.series import Column, Series, Topic
+from selfmodel.logs.rosbag.series import Topic
 from selfmodel.logs.rosbag.storage import unpacked
 from selfmodel.logs.rosbag.stored import Announced, Stored
 from selfmodel.sandbox.budget import Budget, BudgetError
@@ -30,8 +26,8 @@ class Gathering:
     """Topics of a bag, and the decoded messages of some of them.
 
     The limits bound the answer of the child process, and so the memory of the process that
-    receives it: ``Budget.names`` topics and names in messages, and ``Budget.file_bytes`` of
-    numbers.
+    receives it: ``Budget.names`` topics and distinct names in messages, and ``Budget.file_bytes``
+    of numbers.
 
     Args:
         path: Path of the bag from the user.
@@ -45,8 +41,8 @@ class Gathering:
         self._budget = budget
         self._announced: dict[str, dict[Announced, None]] = {}
         self._counts: Counter[str] = Counter()
-        self._messages: dict[str, _Messages] = {}
-        self._names: set[tuple[str, ...]] = set()
+        self._decoded: dict[str, Decoded] = {}
+        self._names = 0
         self._numbers = 0
 
     def add(self, item: Announced | Stored) -> None:
@@ -60,7 +56,7 @@ class Gathering:
             known = self._announced.setdefault(item.topic, {})
             if item not in known:
                 known[item] = None
-                self._count_names([(item.topic, item.type, item.encoding)], "of topics")
+                self._count_names(1, [item.topic, item.type, item.encoding], "of topics")
             return
         name = item.announced.topic
         self._counts[name] += 1
@@ -79,15 +75,15 @@ class Gathering:
             for name, found in self._announced.items()
         }
 
-    def series(self) -> list[Series]:
-        """Returns the messages of the wanted topics of supported types.
+    def decoded(self) -> dict[str, Decoded]:
+        """Returns the messages of the wanted topics of supported types, by topic.
 
         Raises:
             UnsupportedError: The messages of such a topic have an unknown encoding.
         """
         topics = self.topics()
-        found = [topics[name] for name in sorted(self._wanted & set(topics))]
-        found = [topic for topic in found if topic.type in KINDS]
+        wanted = [topics[name] for name in sorted(self._wanted & set(topics))]
+        found = [topic for topic in wanted if topic.type in KINDS]
         for topic in found:
             if topic.encoding not in ENCODINGS:
                 raise UnsupportedError(
@@ -96,7 +92,7 @@ class Gathering:
                     f"{topic.encoding!r}",
                     advice="record it with an RMW that uses DDS",
                 )
-        return [self._messages.get(topic.name, _Messages()).series(topic) for topic in found]
+        return {topic.name: self._decoded.get(topic.name, Decoded()) for topic in found}
 
     def _decode(self, item: Stored) -> None:
         name, kind = item.announced.topic, full_type(item.announced.type)
@@ -105,7 +101,7 @@ class Gathering:
             return
         if encoding == CDR:
             payload = unpacked(payload, self._path, name)
-        messages = self._messages.setdefault(name, _Messages())
+        messages = self._decoded.setdefault(name, Decoded())
         try:
             stamp, rows = read_message(payload, kind, encoding)
         except RefusedError as refused:
@@ -117,21 +113,20 @@ class Gathering:
         else:
             names, values = rows
             if names not in messages.layouts:
-                self._count_names(((name, part) for part in names), f"in the messages on {name}")
+                self._count_names(len(names), names, f"in the messages on {name}")
             self._count_numbers(values.size)
             messages.add(stamp, item.time, rows)
 
-    def _count_names(self, names: Iterable[tuple[str, ...]], where: str) -> None:
-        for name in names:
-            self._names.add(name)
-            if len(self._names) > self._budget.names:
-                raise self._beyond(f"{self._budget.names} names, those {where} included")
-            if any(len(text) > LONGEST_NAME for text in name):
-                raise CorruptError(
-                    self._path,
-                    f"a name {where} has more than {LONGEST_NAME} characters",
-                    advice="record it again",
-                )
+    def _count_names(self, count: int, texts: Collection[str], where: str) -> None:
+        self._names += count
+        if self._names > self._budget.names:
+            raise self._beyond(f"{self._budget.names} names, those {where} included")
+        if any(len(text) > LONGEST_NAME for text in texts):
+            raise CorruptError(
+                self._path,
+                f"a name {where} has more than {LONGEST_NAME} characters",
+                advice="record it again",
+            )
 
     def _count_numbers(self, count: int) -> None:
         self._numbers += count
@@ -144,42 +139,3 @@ class Gathering:
             f"{self._path} has more than {what}: to go on, raise the memory with "
             f"--budget memory=..., from {self._budget.memory / 1e9:g}GB"
         )
-
-
-@dataclass
-class _Messages:
-    """Decoded messages of one topic."""
-
-    stamps: list[int] = field(default_factory=list)
-    logged: list[int] = field(default_factory=list)
-    # By the names in a message, nearly always the names of the message before.
-    layouts: dict[tuple[str, ...], tuple[list[int], list[FloatArray]]] = field(default_factory=dict)
-    refused: Counter[str] = field(default_factory=Counter)
-
-    def add(self, stamp: int, time: int, rows: Rows) -> None:
-        names, values = rows
-        indices, blocks = self.layouts.setdefault(names, ([], []))
-        indices.append(len(self.stamps))
-        blocks.append(values)
-        self.stamps.append(stamp)
-        self.logged.append(time)
-
-    def series(self, topic: Topic) -> Series:
-        parts: dict[str, list[tuple[IndexArray, FloatArray]]] = {}
-        for names, (indices, blocks) in self.layouts.items():
-            index, stacked = np.array(indices, dtype=np.intp), np.stack(blocks)
-            for k, name in enumerate(names):
-                parts.setdefault(name, []).append((index, stacked[:, k]))
-        return Series(
-            topic,
-            np.array(self.stamps, dtype=np.int64),
-            np.array(self.logged, dtype=np.int64),
-            {name: _joined(found) for name, found in parts.items()},
-            dict(self.refused),
-        )
-
-
-def _joined(parts: list[tuple[IndexArray, FloatArray]]) -> Column:
-    index = np.concatenate([index for index, _ in parts])
-    order = np.argsort(index)
-    return Column(index[order], np.concatenate([values for _, values in parts])[order])

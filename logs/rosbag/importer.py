@@ -11,7 +11,8 @@ from selfmodel.arrays import FloatArray, frozen
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
 from selfmodel.logs.records import Imported, TrialHeader
-from selfmodel.logs.rosbag.bag import Source, read_bag
+from selfmodel.logs.rosbag.answer import Source
+from selfmodel.logs.rosbag.bag import read_bag
 from selfmodel.logs.rosbag.checks import check_columns, check_names, check_topics
 from selfmodel.logs.rosbag.clock import Clocked, ClocksApartError, clocked
 from selfmodel.logs.rosbag.mapping import BagMapping

@@ -11,7 +11,7 @@ import numpy as np
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
-from selfmodel.arrays import FloatArray
+from selfmodel.logs.rosbag.answer import Rows
 from selfmodel.logs.rosbag.message_types import (
     ARRAY,
     IMU,
@@ -27,9 +27,6 @@ from selfmodel.logs.rosbag.message_types import (
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
     from rosbags.typesys.stores import ros2_humble as ros
-
-Rows = tuple[tuple[str, ...], FloatArray]
-"""Names in a message, and a row of numbers for each, ``(names, width)``."""
 
 
 @dataclass(frozen=True)

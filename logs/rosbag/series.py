@@ -1,7 +1,6 @@
-"""Messages of topics as columns of numbers by name, and as bytes between processes."""
+"""Messages of topics as columns of numbers by name."""
 
-import io
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,40 +60,33 @@ class Series:
     refused: Mapping[str, int]
 
 
-def series_bytes(series: Series) -> bytes:
-    """Returns the arrays of a series as ``.npz``; those of the columns one after another."""
-    columns = list(series.columns.values())
-    data = io.BytesIO()
-    np.savez(
-        data,
-        stamps=series.stamps,
-        logged=series.logged,
-        lengths=np.array([len(column.index) for column in columns], dtype=np.int64),
-        index=np.concatenate([np.zeros(0, dtype=np.intp), *[column.index for column in columns]]),
-        values=np.concatenate([column.values for column in columns])
-        if columns
-        else np.zeros((0, 1)),
-    )
-    return data.getvalue()
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Messages of a topic with the same names, nearly always all of them.
 
-
-def parse_series(topic: Topic, names: list[str], refused: Mapping[str, int], data: bytes) -> Series:
-    """Returns the series of ``series_bytes``.
-
-    Args:
-        topic: The topic.
-        names: Names of the columns.
-        refused: Numbers of messages left out, by reason.
-        data: The arrays.
+    Attributes:
+        names: Names in each message.
+        index: Indices of the messages, ``(m,)``.
+        values: Numbers, ``(m, names, width)``; see ``KINDS``.
     """
-    with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-        ends = np.cumsum(arrays["lengths"])[:-1]
-        index, values = np.split(arrays["index"], ends), np.split(arrays["values"], ends)
-        columns = [Column(*pair) for pair in zip(index, values, strict=True)]
-        return Series(
-            topic,
-            arrays["stamps"],
-            arrays["logged"],
-            dict(zip(names, columns, strict=False)),  # without names, split returns one part
-            refused,
-        )
+
+    names: tuple[str, ...]
+    index: IndexArray
+    values: FloatArray
+
+
+def columns_of(layouts: Iterable[Layout]) -> dict[str, Column]:
+    """Returns the columns of a topic by name, each in the order of the messages."""
+    parts: dict[str, list[Column]] = {}
+    for layout in layouts:
+        for k, name in enumerate(layout.names):
+            parts.setdefault(name, []).append(Column(layout.index, layout.values[:, k]))
+    return {name: _joined(found) for name, found in parts.items()}
+
+
+def _joined(parts: list[Column]) -> Column:
+    if len(parts) == 1:
+        return parts[0]
+    index = np.concatenate([part.index for part in parts])
+    order = np.argsort(index)
+    return Column(index[order], np.concatenate([part.values for part in parts])[order])

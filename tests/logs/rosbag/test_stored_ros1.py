@@ -46,7 +46,7 @@ def test_a_recording_that_was_not_closed_is_refused_with_the_remedy(recording: P
     active = recording.with_suffix(".bag.active")
     active.write_bytes(data)
 
-    with pytest.raises(IncompleteError, match="no index; add one with `rosbag reindex walk.bag"):
+    with pytest.raises(IncompleteError, match=r"no index; add one with `rosbag reindex walk\.bag"):
         read_bag(active, ())
 
 
@@ -54,7 +54,7 @@ def test_a_cut_recording_is_refused_with_the_remedy(recording: Path):
     data = recording.read_bytes()
     for end in (len(data) - 1, len(data) // 2, 4100, 20):
         recording.write_bytes(data[:end])
-        with pytest.raises(CorruptError, match="ends too early: .*`rosbag reindex walk.bag`"):
+        with pytest.raises(CorruptError, match=r"ends too early: .*`rosbag reindex walk\.bag`"):
             read_bag(recording, ())
 
 
@@ -82,7 +82,7 @@ def test_messages_that_the_index_lacks_are_missed(recording: Path):
         data[:count] + fewer + data[begin + 4 : end] + bytes(12) + data[end + 12 :]
     )
 
-    with pytest.raises(CorruptError, match="its chunks have .* messages, its index"):
+    with pytest.raises(CorruptError, match=r"its chunks have .* messages, its index"):
         read_bag(recording, ())
 
 
