@@ -14,8 +14,8 @@ import numpy as np
 from mcap.reader import make_reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-CLOCK = "/timing"
-"""Topic of a robot's own clock."""
+LEFT_OUT = ("/timing", "/provenance")
+"""Topics of a robot's own clock, and of digests."""
 
 RECORDS = ("selfmodel.trial", "selfmodel.hidden", "selfmodel.result", "selfmodel.import")
 """Metadata records with results; ``selfmodel.software`` has versions."""
@@ -41,7 +41,7 @@ def log_digests(path: Path) -> dict[str, str]:
     with path.open("rb") as file:
         reader = make_reader(file)
         for schema, channel, message in reader.iter_messages(log_time_order=False):
-            if channel.topic == CLOCK or schema is None:
+            if channel.topic in LEFT_OUT or schema is None:
                 continue
             if channel.topic not in hashes:
                 hashes[channel.topic] = hashlib.sha256()
@@ -58,7 +58,9 @@ def log_digests(path: Path) -> dict[str, str]:
         for record in reader.iter_metadata():
             if record.name in RECORDS:
                 fields = sorted(
-                    item for item in record.metadata.items() if not item[0].endswith("sha256")
+                    item
+                    for item in record.metadata.items()
+                    if not item[0].endswith(("sha256", "nonce"))
                 )
                 records[record.name] = bytes_digest(repr(fields).encode())
         found["metadata"] = bytes_digest(repr(sorted(records.items())).encode())

@@ -1,6 +1,7 @@
 """Atomic writes: a file holds its old content or all of its new content."""
 
 import os
+from contextlib import suppress
 from pathlib import Path
 from typing import IO
 
@@ -17,10 +18,15 @@ def write_atomic(path: Path, data: bytes) -> None:
         OSError: Writing failed; the file keeps its old content.
     """
     part = partial_path(path)
-    with part.open("wb") as file:
-        file.write(data)
-        sync(file)
-    part.replace(path)
+    try:
+        with part.open("wb") as file:
+            file.write(data)
+            sync(file)
+        part.replace(path)
+    except OSError:
+        with suppress(OSError):  # the first error is the reason
+            part.unlink(missing_ok=True)  # on a full disk, half a file takes space
+        raise
     sync_folder(path.parent)
 
 

@@ -57,6 +57,7 @@ def verified_records(data: bytes, budget: Budget = DEFAULT_BUDGET) -> Iterator[M
         elif isinstance(outer, Footer):
             _check_summary(data, frame, outer)
         for record in _opened(outer, meter):
+            meter.name(record)
             counts.add(record)
             yield record
         end = frame.end

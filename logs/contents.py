@@ -10,6 +10,7 @@ from mcap.exceptions import EndOfFile, InvalidMagic
 from mcap.records import Attachment, Channel, Header, McapRecord, Message, Metadata, Schema
 
 from selfmodel.files import check_regular, read_file
+from selfmodel.logs.chain import Chain
 from selfmodel.logs.checksums import verified_records
 from selfmodel.logs.errors import (
     ANOTHER,
@@ -29,7 +30,8 @@ from selfmodel.logs.framing import (
     UnknownCompressionError,
 )
 from selfmodel.logs.meter import ExcessError
-from selfmodel.logs.records import OWN, without_digest
+from selfmodel.logs.provenance import PROVENANCE, SEAL_TYPE, topic_key
+from selfmodel.logs.records import DIGEST, OWN, without_digest
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 
 MORE_MEMORY = "allow more with --budget memory=..., if the file is from a source that you trust"
@@ -55,6 +57,10 @@ class Messages:
     payloads: list[bytes] = field(default_factory=list)
     times: list[tuple[int, int]] = field(default_factory=list)
 
+    def key(self, topic: str) -> bytes:
+        """Returns the ``topic_key`` of these messages."""
+        return topic_key(topic, self.type, self.encoding, self.schema)
+
 
 @dataclass
 class Contents:
@@ -64,13 +70,16 @@ class Contents:
         profile: Profile of the file, such as ``ros2``.
         metadata: Metadata records by name; those of selfmodel without their verified digest.
         attachments: Attached files by name.
-        topics: Messages by topic.
+        topics: Messages by topic, without the verified seals.
+        digest: Digest of the log: SHA-256 over records, files and messages; "" in a log of an
+            earlier version.
     """
 
     profile: str = ""
     metadata: dict[str, Mapping[str, str]] = field(default_factory=dict)
     attachments: dict[str, bytes] = field(default_factory=dict)
     topics: dict[str, Messages] = field(default_factory=dict)
+    digest: str = ""
 
     @property
     def good(self) -> str:
@@ -130,23 +139,38 @@ def _add_once(items: dict[str, _Item], name: str, item: _Item) -> None:
 def _gather(records: Iterator[McapRecord], contents: Contents, unread: Collection[str]) -> None:
     schemas: dict[int, Schema] = {}
     channels: dict[int, Messages] = {}
+    digests: dict[str, str] = {}
+    chain = Chain()
     for record in records:
         if isinstance(record, Message):
             channels[record.channel_id].payloads.append(record.data)
             channels[record.channel_id].times.append((record.log_time, record.publish_time))
+            chain.add(record)
         elif isinstance(record, Schema):
             schemas[record.id] = record
         elif isinstance(record, Channel) and record.id not in channels:
-            channels[record.id] = messages_of(record, schemas)
-            _add_once(contents.topics, record.topic, channels[record.id])
+            messages = channels[record.id] = messages_of(record, schemas)
+            chain.keys[record.id] = messages.key(record.topic)
+            if is_seals(record.topic, messages):
+                chain.seals = record.id
+            else:
+                _add_once(contents.topics, record.topic, messages)
         elif isinstance(record, Metadata) and record.name not in unread:
-            ours = record.name.startswith(OWN)
-            texts = without_digest(record.name, record.metadata) if ours else record.metadata
+            texts = record.metadata
+            if record.name.startswith(OWN):
+                texts = without_digest(record.name, record.metadata)
+                digests[record.name] = record.metadata[DIGEST]
             _add_once(contents.metadata, record.name, texts)
         elif isinstance(record, Attachment):
             _add_once(contents.attachments, record.name, record.data)
         elif isinstance(record, Header):
             contents.profile = record.profile
+    contents.digest = chain.digest(contents.metadata, digests, contents.attachments)
+
+
+def is_seals(topic: str, messages: Messages) -> bool:
+    """Returns whether the messages of a topic are the seals of batches."""
+    return topic == PROVENANCE and messages.type == SEAL_TYPE
 
 
 def messages_of(channel: Channel, schemas: Mapping[int, Schema]) -> Messages:

@@ -76,11 +76,20 @@ class LogWriteError(OSError):
     Args:
         path: The file.
         cause: Error of the operating system.
+        again: Remedy after some space is free.
+        kept: Description of the data that are kept.
     """
 
-    def __init__(self, path: str | PathLike[str], cause: OSError) -> None:
+    def __init__(
+        self,
+        path: str | PathLike[str],
+        cause: OSError,
+        *,
+        again: str = AGAIN,
+        kept: str = "what was written before stays in that file",
+    ) -> None:
         self.reason = cause.strerror or str(cause)
-        super().__init__(f"{path}: {_reason(cause)}; what was written before stays in that file")
+        super().__init__(f"{path}: {_reason(cause, again)}; {kept}")
         self.errno = cause.errno
         self.filename = str(path)
 
@@ -88,11 +97,14 @@ class LogWriteError(OSError):
         return str(self.args[0])
 
 
-def _reason(cause: OSError) -> str:
-    if cause.errno in (errno.ENOSPC, errno.EDQUOT):
-        return (
-            "the disk is full: free some space, or choose another folder, and make the trial again"
-        )
+def is_full(cause: OSError) -> bool:
+    """Returns whether the reason of an error is a full disk, or an exceeded quota."""
+    return cause.errno in (errno.ENOSPC, errno.EDQUOT)
+
+
+def _reason(cause: OSError, again: str) -> str:
+    if is_full(cause):
+        return f"the disk is full: free some space, or choose another folder, and {again}"
     if cause.errno == errno.EFBIG:
         return "the file has reached the size that this system allows (see ulimit -f)"
     return f"cannot be written: {cause.strerror or cause}"

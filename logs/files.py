@@ -4,6 +4,7 @@ import errno
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from os import PathLike
 from pathlib import Path
 from typing import IO
 
@@ -79,8 +80,29 @@ def replace_file(path: Path, data: bytes) -> None:
     Raises:
         LogWriteError: Writing failed; the file keeps its old content.
     """
-    with as_write_error(partial_path(path)):
+    try:
         write_atomic(path, data)
+    except OSError as error:
+        raise not_written(path, error) from error
+
+
+def make_folder(path: Path) -> None:
+    """Makes a folder with its parents, unless it exists.
+
+    Raises:
+        LogWriteError: The folder cannot be made.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise not_written(path, error) from error
+
+
+def not_written(path: str | PathLike[str], cause: OSError) -> LogWriteError:
+    """Returns the error of a file that is written as a whole."""
+    return LogWriteError(
+        path, cause, again="run the command again", kept="files that were finished before are kept"
+    )
 
 
 @contextmanager

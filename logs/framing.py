@@ -26,7 +26,6 @@ from mcap.records import (
     Header,
     McapRecord,
     Message,
-    MessageIndex,
     Metadata,
     MetadataIndex,
     Schema,
@@ -109,7 +108,7 @@ def frames(data: bytes, offset: int = len(MAGIC)) -> Iterator[Frame]:
 
 
 def parse(frame: Frame) -> McapRecord | None:
-    """Returns the decoded record; None for a type that the format does not define.
+    """Returns the decoded record; None for an index of messages, or an undefined type.
 
     Raises:
         Exception: One of ``FAILURES``: the content is invalid for the type.
@@ -208,7 +207,6 @@ _READERS: Mapping[int, Callable[[ReadDataStream], McapRecord]] = MappingProxyTyp
         Opcode.DATA_END: DataEnd.read,
         Opcode.FOOTER: Footer.read,
         Opcode.HEADER: Header.read,
-        Opcode.MESSAGE_INDEX: MessageIndex.read,
         Opcode.METADATA: Metadata.read,
         Opcode.METADATA_INDEX: MetadataIndex.read,
         Opcode.SCHEMA: Schema.read,

@@ -41,6 +41,7 @@ class Info:
         observed: Fraction of observed numbers by signal, in [0, 1].
         driver: Description of the controller, or of its replacement by recorded commands.
         source: Origin of an imported or salvaged trial; empty for other trials.
+        digest: SHA-256 over records, files and messages; "" in a log of an earlier version.
     """
 
     log: TrialLog
@@ -51,6 +52,7 @@ class Info:
     observed: Mapping[Signal, float]
     driver: str
     source: Mapping[str, str]
+    digest: str
 
 
 def read_info(path: Path, budget: Budget = DEFAULT_BUDGET) -> Info:
@@ -79,6 +81,7 @@ def read_info(path: Path, budget: Budget = DEFAULT_BUDGET) -> Info:
         },
         driver=driver.summary,
         source=contents.metadata.get(SALVAGE) or contents.metadata.get(IMPORT) or {},
+        digest=contents.digest,
     )
 
 

@@ -11,9 +11,11 @@ from selfmodel.diagnosis.serialization import diagnosis_from_dict
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
+from selfmodel.files import read_file
 from selfmodel.logs.errors import CorruptError, SchemaMismatchError
 from selfmodel.logs.files import replace_file
 from selfmodel.logs.reader import read_log
+from selfmodel.logs.result_files import MAX_BYTES, parse_json
 from selfmodel.recovery.database import Database
 from selfmodel.robot.anatomy import Anatomy
 
@@ -117,12 +119,12 @@ def _trial_order(path: Path) -> tuple[int, str]:
 
 def _read_diagnoses(folder: Path, space: HypothesisSpace) -> tuple[Diagnosis, ...]:
     path = folder / DIAGNOSES
-    try:
-        items: Any = json.loads(path.read_bytes())
-        return tuple(diagnosis_from_dict(item, space.parse) for item in items)
-    except FileNotFoundError:
+    if not path.exists():
         return ()
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+    try:
+        items: Any = parse_json(read_file(path, "diagnoses", MAX_BYTES))
+        return tuple(diagnosis_from_dict(item, space.parse) for item in items)
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise CorruptError(
             path,
             f"expected the diagnoses of a run: {error or type(error).__name__}",

@@ -1,14 +1,32 @@
 """MCAP file under construction: a ``.part`` until it is finished, flushed on request."""
 
 import contextlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from mcap.writer import CompressionType, Writer
 
 from selfmodel.logs.atomic import partial_path, sync
 from selfmodel.logs.files import as_write_error, create_partial, publish
-from selfmodel.logs.records import MEDIA_TYPES, with_digest
+from selfmodel.logs.provenance import (
+    PROVENANCE,
+    SEAL_TYPE,
+    Batch,
+    identity_of,
+    manifest,
+    seal_of,
+    topic_key,
+)
+from selfmodel.logs.records import (
+    DIGEST,
+    LAST_BATCH,
+    MANIFEST,
+    MEDIA_TYPES,
+    RESULT,
+    Result,
+    sha256,
+    with_digest,
+)
 from selfmodel.logs.schemas import schema_text
 from selfmodel.version import __version__
 
@@ -16,9 +34,14 @@ CHUNK = 256 * 2**10
 """Size of a chunk before compression, bytes: with the library's 1 MiB, a kill would lose a whole
 trial."""
 
+_NEVER = 2**62
+"""Size at which the library ends a chunk by itself, bytes: a chunk is one batch with its seal."""
+
 
 class LogFile:
     """Writer of the records of a log; the constructor creates the file.
+
+    The order is: metadata and attachments, ``begin``, channels and messages, ``finish``.
 
     Args:
         path: Name of the finished file.
@@ -32,9 +55,16 @@ class LogFile:
         self.path = path
         self._file = create_partial(path)
         self._schemas: dict[str, int] = {}
+        self._records: dict[str, str] = {}
+        self._files: dict[str, str] = {}
+        self._keys: dict[int, bytes] = {}
+        self._batch: list[tuple[int, int, bytes]] = []
+        self._bytes = self._batches = 0
+        self._trial, self._seals = "", -1
+        self._identity = self._last = b""
         self._mcap = Writer(
             self._file,
-            chunk_size=CHUNK,
+            chunk_size=_NEVER,
             compression=CompressionType.ZSTD,
             # No other checksum covers attachments and metadata.
             enable_data_crcs=True,
@@ -44,31 +74,61 @@ class LogFile:
 
     def metadata(self, name: str, texts: Mapping[str, str]) -> None:
         """Writes a metadata record, with its digest."""
+        record = with_digest(name, texts)
+        self._records[name] = record[DIGEST]
         with as_write_error(partial_path(self.path)):
-            self._mcap.add_metadata(name, with_digest(name, texts))
+            self._mcap.add_metadata(name, record)
 
     def attach(self, name: str, data: bytes) -> None:
         """Writes an attachment."""
+        self._files[name] = sha256(data)
         media_type = MEDIA_TYPES.get(name, "application/octet-stream")
         with as_write_error(partial_path(self.path)):
             # Times of 0: the bytes do not depend on the date.
             self._mcap.add_attachment(0, 0, name, media_type, data)
 
+    def begin(self, trial: str) -> None:
+        """Ends the preamble with its manifest.
+
+        Args:
+            trial: Name of the trial.
+        """
+        texts = manifest(self._records, self._files)
+        self.metadata(MANIFEST, texts)
+        self._trial, self._identity = trial, identity_of(texts)
+        self._last = self._identity
+
     def channel(self, topic: str, kind: str) -> int:
         """Registers a topic of messages of one type, and returns its channel number."""
+        text = schema_text(kind).encode()
         schema = self._schemas.get(kind)
         if schema is None:
-            schema = self._mcap.register_schema(kind, "ros2msg", schema_text(kind).encode())
+            schema = self._mcap.register_schema(kind, "ros2msg", text)
             self._schemas[kind] = schema
-        return self._mcap.register_channel(topic, "cdr", schema)
+        channel = self._mcap.register_channel(topic, "cdr", schema)
+        self._keys[channel] = topic_key(topic, kind, "cdr", text)
+        return channel
 
-    def message(self, channel: int, nanoseconds: int, payload: bytes, sequence: int) -> None:
-        """Writes a message; wrap calls in ``as_write_error``: a full chunk is written to disk."""
-        self._mcap.add_message(channel, nanoseconds, payload, nanoseconds, sequence)
+    def messages(self, rows: Iterable[tuple[int, int, bytes, int]]) -> None:
+        """Writes messages.
+
+        Args:
+            rows: Channel number, time in ns, payload and sequence number of each message.
+        """
+        write, batch = self._mcap.add_message, self._batch
+        with as_write_error(partial_path(self.path)):
+            for channel, nanoseconds, payload, sequence in rows:
+                write(channel, nanoseconds, payload, nanoseconds, sequence)
+                batch.append((channel, nanoseconds, payload))
+                self._bytes += len(payload)
+                if self._bytes > CHUNK:
+                    self.flush()
 
     def flush(self) -> None:
         """Flushes to the operating system; a kill of the process then loses no data."""
         with as_write_error(partial_path(self.path)):
+            if self._batch:
+                self._seal()
             self._mcap.flush()
 
     def sync(self) -> None:
@@ -77,15 +137,29 @@ class LogFile:
         with as_write_error(partial_path(self.path)):
             sync(self._file)
 
-    def finish(self) -> None:
-        """Writes the end of the file, and renames the ``.part``.
+    def finish(self, result: Result) -> None:
+        """Writes the result and the end of the file, and renames the ``.part``.
 
         Raises:
             InputError: A file of that name was created meanwhile; the ``.part`` remains.
         """
+        self.flush()
+        self.metadata(RESULT, {**result.texts(), LAST_BATCH: self._last.hex()})
         with as_write_error(partial_path(self.path)):
             self._mcap.finish()
             publish(self._file, self.path)
+
+    def _seal(self) -> None:
+        """Writes the seal of the messages since the last flush."""
+        channels, times, payloads = zip(*self._batch, strict=True)
+        batch = Batch([self._keys[channel] for channel in channels], times, times, payloads)
+        seal = seal_of(self._trial, self._identity, self._batches, self._last, batch)
+        if self._seals < 0:
+            self._seals = self.channel(PROVENANCE, SEAL_TYPE)
+        time = times[-1]
+        self._mcap.add_message(self._seals, time, seal.payload(time), time, seal.index)
+        self._batch.clear()
+        self._bytes, self._batches, self._last = 0, self._batches + 1, seal.digest
 
     def abandon(self) -> None:
         """Closes and deletes the unfinished file."""

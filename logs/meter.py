@@ -1,6 +1,7 @@
 """Counters of the records and bytes of one trial log, with the limits of a budget."""
 
 from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, McapRecord, Metadata, Schema
 
 from selfmodel.sandbox.budget import Budget
 
@@ -18,7 +19,10 @@ class Meter:
 
     def __init__(self, budget: Budget) -> None:
         self.budget = budget
-        self._frames = self._records = self._unpacked = self._attached = self._other = 0
+        self._frames = self._records = self._unpacked = self._attached = self._other = (
+            self._names
+        ) = 0
+        self._ids: set[tuple[type[McapRecord], int]] = set()
 
     def frame(self, opcode: int, size: int) -> None:
         """Counts a record outside a chunk, or one within a chunk that is not a message.
@@ -69,6 +73,20 @@ class Meter:
         self._check(self._records, self.budget.records, "messages")
         if opcode != Opcode.MESSAGE:
             self.frame(opcode, size)
+
+    def name(self, record: McapRecord) -> None:
+        """Counts the names in a record: a channel or a schema once, and keys of metadata.
+
+        Raises:
+            ExcessError: The file exceeds the limit.
+        """
+        if isinstance(record, (Channel, Schema)):
+            self._ids.add((type(record), record.id))
+        elif isinstance(record, Metadata):
+            self._names += 1 + len(record.metadata)
+        elif isinstance(record, Attachment):
+            self._names += 1
+        self._check(len(self._ids) + self._names, self.budget.names, "names")
 
     def _check(self, count: int, limit: int, unit: str) -> None:
         if count > limit:

@@ -1,6 +1,7 @@
 """Preamble of a log, written before the robot moves."""
 
 import platform
+import secrets
 
 import mcap
 import mujoco
@@ -60,11 +61,12 @@ def write_preamble(log: LogFile, robot: Robot, plan: TrialPlan, header: TrialHea
         seed=plan.seed,
         controller_sha256=sha256(controller) if controller else "",
         model_sha256=sha256(model),
+        nonce="" if _is_repeatable(header) else secrets.token_hex(16),
     )
     log.metadata(TRIAL, record.texts())
     log.metadata(SOFTWARE, _software())
-    secrets = {TRUTH: header.hidden, GAP: header.gap}
-    if known := {name: text for name, text in secrets.items() if text is not None}:
+    truths = {TRUTH: header.hidden, GAP: header.gap}
+    if known := {name: text for name, text in truths.items() if text is not None}:
         log.metadata(HIDDEN, known)
     log.attach(MODEL_FILE, model)
     for name, data in robot.assets.items():
@@ -75,7 +77,14 @@ def write_preamble(log: LogFile, robot: Robot, plan: TrialPlan, header: TrialHea
     if header.imported is not None:
         log.metadata(IMPORT, header.imported.facts)
         log.attach(MAPPING_FILE, header.imported.mapping.encode())
-    log.message(log.channel(DESCRIPTION, DESCRIPTION_TYPE), 0, description(urdf(robot)), 0)
+    log.begin(plan.name)
+    channel = log.channel(DESCRIPTION, DESCRIPTION_TYPE)
+    log.messages([(channel, 0, description(urdf(robot)), 0)])
+
+
+def _is_repeatable(header: TrialHeader) -> bool:
+    """Returns whether a second trial with the same preamble has the same messages."""
+    return not header.timed and (header.hidden is not None or header.imported is not None)
 
 
 def _software() -> dict[str, str]:

@@ -45,6 +45,7 @@ from selfmodel.logs.records import (
     sha256,
     trial_record,
 )
+from selfmodel.logs.schemas import is_known, schema_text
 from selfmodel.logs.signals import read_behaviour
 from selfmodel.logs.timing import Timing, read_timing
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
@@ -123,6 +124,7 @@ def interpret(path: Path, contents: Contents) -> TrialLog:
     """
     record = read_record(path, contents)
     result = _result(path, contents, record)
+    _check_definitions(path, contents)
     mjcf = read_attachment(path, contents, MODEL_FILE, record.model_sha256)
     controller = read_controller(path, contents, record)
     behaviour = read_behaviour(path, contents, record, result.steps, controller)
@@ -270,6 +272,13 @@ def read_controller(path: Path, contents: Contents, record: TrialRecord) -> Cont
         return parse_controller(data, CONTROLLER_FILE)
     except InputError as error:
         raise SchemaMismatchError(path, str(error), good=contents.good) from error
+
+
+def _check_definitions(path: Path, contents: Contents) -> None:
+    for topic, messages in contents.topics.items():
+        if is_known(messages.type) and messages.schema != schema_text(messages.type).encode():
+            what = f"on {topic}: its definition of {messages.type} is not that of selfmodel"
+            raise SchemaMismatchError(path, what, good=contents.good)
 
 
 def _result(path: Path, contents: Contents, record: TrialRecord) -> Result:

@@ -11,7 +11,7 @@ from typing import Any
 
 from selfmodel.errors import InputError
 from selfmodel.settings import Settings
-from selfmodel.trials.trial import STAGES, Stage, stage_of
+from selfmodel.trials.trial import STAGES, Stage, checked_seed, stage_of
 
 FORMAT = "1"
 """Version of the format of a log; a reader refuses unknown versions."""
@@ -29,11 +29,19 @@ IMPORT = "selfmodel.import"
 """Origin of an imported trial, and the quality of the recording."""
 SALVAGE = "selfmodel.salvage"
 """Origin of a salvaged trial."""
+TIED = "tied"
+"""Field of the salvage record: ``no`` for a log of an earlier version, otherwise ``yes``."""
 RESULT = "selfmodel.result"
+MANIFEST = "selfmodel.manifest"
+"""Digests of the preamble's records and files; see ``selfmodel.logs.provenance``."""
 
 OWN = "selfmodel."
 """Prefix of the names of selfmodel's records; each contains a digest of itself."""
 DIGEST = "sha256"
+NONCE = "nonce"
+"""Field of the trial record that a log of an earlier version does not have."""
+LAST_BATCH = "messages_sha256"
+"""Field of the result record with the digest of the last batch of messages."""
 
 MODEL_FILE = "model.xml"
 CONTROLLER_FILE = "controller.npz"
@@ -76,10 +84,13 @@ class TrialRecord:
         root: Name of the root body, whose motion is on ``/odom``.
         control_timestep: Control time step, s; step k is at k times this value.
         steps: Planned number of control steps.
-        seed: Seed of all random choices.
+        seed: Seed of all random choices, from 0 to ``trial.MAX_SEED``.
         controller_sha256: SHA-256 of the attached controller, or "" without one: then only the
             commands are known.
         model_sha256: SHA-256 of the attached model.
+        nonce: Random text that distinguishes trials with equal plans, or "" for a trial that is
+            repeated exactly: simulated, or imported. None in a log of an earlier version, whose
+            messages are not tied to their trial.
     """
 
     format: str
@@ -92,12 +103,14 @@ class TrialRecord:
     seed: int
     controller_sha256: str
     model_sha256: str
+    nonce: str | None = None
 
     def texts(self) -> dict[str, str]:
         """Returns the record as texts, the form of MCAP metadata."""
         return {
             name: value if isinstance(value, str) else repr(value)
             for name, value in dataclasses.asdict(self).items()
+            if value is not None
         }
 
 
@@ -166,13 +179,13 @@ def trial_record(texts: Mapping[str, str]) -> TrialRecord:
         ValueError: A field is missing or invalid; the message names the field.
     """
     fields = [field.name for field in dataclasses.fields(TrialRecord)]
-    missing = [name for name in fields if name not in texts]
+    missing = [name for name in fields if name not in texts and name != NONCE]
     if missing:
         raise ValueError(f"it lacks {', '.join(missing)}")
     stage = stage_of(texts["stage"])
     if stage is None:
         raise ValueError(f"stage must be one of {', '.join(STAGES)}, got {texts['stage']!r}")
-    long = [name for name in fields if len(texts[name]) > MAX_TEXT]
+    long = [name for name in fields if len(texts.get(name, "")) > MAX_TEXT]
     if long:
         raise ValueError(f"expected at most {MAX_TEXT} characters in {', '.join(long)}")
     timestep = float(texts["control_timestep"])
@@ -189,9 +202,10 @@ def trial_record(texts: Mapping[str, str]) -> TrialRecord:
         root=texts["root"],
         control_timestep=timestep,
         steps=int(texts["steps"]),
-        seed=int(texts["seed"]),
+        seed=checked_seed(int(texts["seed"])),
         controller_sha256=texts["controller_sha256"],
         model_sha256=texts["model_sha256"],
+        nonce=texts.get(NONCE),
     )
 
 

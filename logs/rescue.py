@@ -1,15 +1,16 @@
 """Search of a damaged file for intact records: records whose own checksum is correct."""
 
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator
 from pathlib import Path
 
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Metadata, Schema
+from mcap.records import Attachment, Channel, Chunk, McapRecord, Metadata, Schema
 
-from selfmodel.logs.contents import MORE_MEMORY, Contents, Messages, messages_of, read_bytes
+from selfmodel.logs.belonging import Rescued, own_contents
+from selfmodel.logs.contents import MORE_MEMORY, read_bytes
 from selfmodel.logs.errors import ANOTHER, CorruptError, NotMcapError, UnsupportedError
+from selfmodel.logs.findings import Findings
 from selfmodel.logs.framing import (
     FAILURES,
     MAGIC,
@@ -25,12 +26,12 @@ from selfmodel.logs.records import OWN, without_digest
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 
 
-def rescue(path: Path, budget: Budget = DEFAULT_BUDGET) -> Contents:
+def rescue(path: Path, budget: Budget = DEFAULT_BUDGET) -> Rescued:
     """Returns the intact contents of a damaged log.
 
     Intact are the chunks and attachments with a correct checksum, and the metadata records of
     selfmodel with a correct digest. After damaged bytes, the search continues at the next intact
-    record. Of duplicates, the first counts.
+    record. Contents of other trials are left out.
 
     Args:
         path: The file; it is only read.
@@ -41,62 +42,20 @@ def rescue(path: Path, budget: Budget = DEFAULT_BUDGET) -> Contents:
             one time.
         InputError: The file does not exist, or cannot be opened.
     """
-    found = _Found()
+    found, meter = Findings(), Meter(budget)
     try:
         for record in _intact_records(read_bytes(path, budget), budget):
+            meter.name(record)
             found.add(record)
-        contents = found.contents()
+        rescued = own_contents(found)
     except ContradictionError as error:
         raise CorruptError(path, f"nothing can be salvaged: {error}") from error
     except ExcessError as error:
         what = f"nothing can be salvaged: {error}"
         raise UnsupportedError(path, what, advice=MORE_MEMORY) from error
-    if not contents.metadata:
+    if not found.records:
         raise NotMcapError(path, "no record of a trial log is intact in this file", advice=ANOTHER)
-    return contents
-
-
-@dataclass
-class _Found:
-    """Intact records found so far; the first of each name."""
-
-    metadata: dict[str, Mapping[str, str]] = field(default_factory=dict)
-    attachments: dict[str, bytes] = field(default_factory=dict)
-    schemas: dict[int, Schema] = field(default_factory=dict)
-    channels: dict[int, Channel] = field(default_factory=dict)
-    messages: dict[tuple[int, int], Message] = field(default_factory=dict)
-
-    def add(self, record: McapRecord) -> None:
-        if isinstance(record, Metadata):
-            texts = without_digest(record.name, record.metadata)
-            self.metadata.setdefault(record.name, texts)
-        elif isinstance(record, Attachment):
-            self.attachments.setdefault(record.name, record.data)
-        elif isinstance(record, Schema):
-            self.schemas.setdefault(record.id, record)
-        elif isinstance(record, Channel):
-            self.channels.setdefault(record.id, record)
-        elif isinstance(record, Message):
-            self._add_message(record)
-
-    def _add_message(self, message: Message) -> None:
-        first = self.messages.setdefault((message.channel_id, message.log_time), message)
-        if first.data != message.data:
-            raise ContradictionError(f"it has two different messages of time {message.log_time} ns")
-
-    def contents(self) -> Contents:
-        """Returns the records as the contents of an undamaged file."""
-        topics: dict[str, Messages] = {}
-        by_channel: dict[int, Messages] = {}
-        for number, channel in self.channels.items():
-            if channel.schema_id in self.schemas and channel.topic not in topics:
-                by_channel[number] = messages_of(channel, self.schemas)
-                topics[channel.topic] = by_channel[number]
-        for (number, time), message in sorted(self.messages.items(), key=lambda item: item[0]):
-            if number in by_channel:
-                by_channel[number].payloads.append(message.data)
-                by_channel[number].times.append((time, message.publish_time))
-        return Contents("ros2", self.metadata, self.attachments, topics)
+    return rescued
 
 
 def _intact_records(data: bytes, budget: Budget) -> Iterator[McapRecord]:

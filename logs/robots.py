@@ -1,15 +1,14 @@
 """Robot of a log, built from the untrusted model in the log."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-
-import mujoco
+from collections.abc import Sequence
 
 from selfmodel.errors import InputError
 from selfmodel.logs.errors import SchemaMismatchError
 from selfmodel.logs.reader import TrialLog
 from selfmodel.robot.mjcf.adaptation import MAX_SUBSTEPS
+from selfmodel.robot.mjcf.mujoco_errors import MUJOCO_ERRORS
 from selfmodel.robot.mjcf.untrusted import checked_model
+from selfmodel.robot.mujoco_log import uncounted_warnings
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.trials.signals import Names
@@ -33,9 +32,9 @@ def robot_of(log: TrialLog, budget: Budget = DEFAULT_BUDGET) -> Robot:
     path = log.trial.path
     try:
         checked = checked_model(log.mjcf, log.assets)
-        with _silent():
+        with uncounted_warnings():
             robot = Robot(log.trial.robot, checked.mjcf, log.control_timestep, checked.files)
-    except _FAILURES as error:
+    except MUJOCO_ERRORS as error:
         raise SchemaMismatchError(
             path, f"its model cannot be loaded: {_line(error)}", good=GOOD
         ) from error
@@ -56,28 +55,6 @@ def robot_of(log: TrialLog, budget: Budget = DEFAULT_BUDGET) -> Robot:
             good=GOOD,
         )
     return robot
-
-
-_FAILURES = (
-    ValueError,
-    KeyError,  # a part without a name
-    OverflowError,  # more physics steps than there are numbers
-    MemoryError,
-    RuntimeError,  # "unknown exception": MuJoCo is out of memory
-    mujoco.FatalError,
-)
-"""Exceptions that MuJoCo and a robot's parts raise for an invalid model."""
-
-
-@contextmanager
-def _silent() -> Iterator[None]:
-    """Context manager that keeps MuJoCo from writing warnings to a file in the working folder."""
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda _: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(before)
 
 
 def describe_difference(names: Names, logged: Names) -> str:

@@ -1,6 +1,7 @@
 """Salvage of a damaged or unfinished log: its complete steps in a new log."""
 
 import dataclasses
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,22 +9,27 @@ from pathlib import Path
 import numpy as np
 
 from selfmodel.errors import InputError
-from selfmodel.logs.atomic import partial_path
-from selfmodel.logs.contents import Contents, Messages
+from selfmodel.files import encodable
+from selfmodel.logs.belonging import Discarded
+from selfmodel.logs.contents import Contents, Messages, read_bytes
 from selfmodel.logs.errors import CorruptError, LogError, SchemaMismatchError
-from selfmodel.logs.files import as_write_error, refuse_existing
+from selfmodel.logs.files import refuse_existing
 from selfmodel.logs.logfile import LogFile
 from selfmodel.logs.reader import interpret, read_controller, read_log, read_record
 from selfmodel.logs.records import (
     CONTROLLER_FILE,
     INTERRUPTED,
+    MANIFEST,
+    NONCE,
     RESULT,
     SALVAGE,
     SETTINGS_FILE,
+    TIED,
     TIMED_FORMAT,
     TRIAL,
     Result,
     TrialRecord,
+    result_record,
     settings_json,
     sha256,
 )
@@ -48,6 +54,9 @@ class Salvaged:
             on ``/tf``, where they are left out.
         lost: Other lost parts. A lost controller is replaced by a playback of the commands, lost
             settings by those of the paper.
+        tied: Whether every saved message is proven to be of this trial. False for a log of an
+            earlier version, in which a mixture of two trials cannot be noticed.
+        discarded: Intact messages that are of other trials or lack that proof; they are left out.
     """
 
     log: str
@@ -56,6 +65,8 @@ class Salvaged:
     planned: int
     missing: dict[str, int]
     lost: tuple[str, ...]
+    tied: bool
+    discarded: tuple[Discarded, ...]
 
 
 def salvage(path: Path, out: Path, budget: Budget = DEFAULT_BUDGET) -> Salvaged:
@@ -74,7 +85,7 @@ def salvage(path: Path, out: Path, budget: Budget = DEFAULT_BUDGET) -> Salvaged:
     refuse_existing(out)
     _refuse_sound(path, budget)
     contents, saved = _saved(path, budget)
-    _write(out, contents)
+    _write(out, contents, result_record(contents.metadata[RESULT]))
     return dataclasses.replace(saved, log=str(out))
 
 
@@ -96,21 +107,39 @@ def salvageable_steps(path: Path, budget: Budget = DEFAULT_BUDGET) -> int:
 
 def _saved(path: Path, budget: Budget) -> tuple[Contents, Salvaged]:
     """Contents of the new log, checked as a reader would check them."""
-    contents = rescue(path, budget)
+    rescued = rescue(path, budget)
+    contents = rescued.contents
     record, lost = _with_what_is_left(path, contents)
     controller = read_controller(path, contents, record)
-    every, whole = _complete(path, contents, record, budget)
+    every, whole = _complete(path, contents, record, rescued.discarded, budget)
     span = max(whole) + 1
     missing = {topic.name: _fill(contents, topic, span, record) for topic in every}
     _cut(contents, {topic.name for topic in every}, _time_of(span, record))
     missing[TRANSFORMS] = _missing_frames(contents, span, record)
     behaviour = read_behaviour(path, contents, record, span, controller)
+    earlier = contents.metadata.get(SALVAGE, {})
+    tied = bool(rescued.identity) and earlier.get(TIED) != "no"
     result = Result(INTERRUPTED, span, float(forward_displacement(behaviour)))
     contents.metadata[RESULT] = result.texts()
-    contents.metadata[SALVAGE] = {"source": path.name, "complete_steps": str(len(whole))}
+    contents.metadata[SALVAGE] = {
+        "source": encodable(path.name),
+        "source_sha256": sha256(read_bytes(path, budget)),
+        "complete_steps": str(len(whole)),
+        TIED: "yes" if tied else "no",
+    }
     interpret(path, contents)
     lost_messages = {name: count for name, count in missing.items() if count}
-    return contents, Salvaged("", len(whole), span, record.steps, lost_messages, lost)
+    saved = Salvaged(
+        log="",
+        steps=len(whole),
+        span=span,
+        planned=record.steps,
+        missing=lost_messages,
+        lost=lost,
+        tied=tied,
+        discarded=rescued.discarded,
+    )
+    return contents, saved
 
 
 def _refuse_sound(path: Path, budget: Budget) -> None:
@@ -133,6 +162,7 @@ def _with_what_is_left(path: Path, contents: Contents) -> tuple[TrialRecord, tup
         contents.attachments.pop(CONTROLLER_FILE, None)
         contents.metadata[TRIAL] = record.texts()
         lost.append(CONTROLLER_FILE)
+    contents.metadata[TRIAL] = {NONCE: "", **contents.metadata[TRIAL]}
     if SETTINGS_FILE not in contents.attachments:
         contents.attachments[SETTINGS_FILE] = settings_json(Settings())
         lost.append(SETTINGS_FILE)
@@ -142,7 +172,11 @@ def _with_what_is_left(path: Path, contents: Contents) -> tuple[TrialRecord, tup
 
 
 def _complete(
-    path: Path, contents: Contents, record: TrialRecord, budget: Budget
+    path: Path,
+    contents: Contents,
+    record: TrialRecord,
+    discarded: Sequence[Discarded],
+    budget: Budget,
 ) -> tuple[tuple[Topic, ...], set[int]]:
     """Topics, and the steps for which every topic has a message."""
     try:
@@ -150,7 +184,7 @@ def _complete(
         if record.format == TIMED_FORMAT:
             every = (*every, TIMING)
     except SchemaMismatchError as error:
-        raise _nothing(path) from error
+        raise _nothing(path, discarded) from error
     if record.steps > budget.records // len(every):
         raise CorruptError(path, f"it claims {record.steps} steps, more than a log may have")
     whole = set(range(record.steps))
@@ -159,7 +193,7 @@ def _complete(
         times = {log for log, _ in messages.times} if messages else set()
         whole = {k for k in whole if _time_of(k, record) in times}
     if not whole:
-        raise _nothing(path)
+        raise _nothing(path, discarded)
     span = max(whole) + 1
     # Missing messages are filled in, and may take many times the size of the file.
     if span * sum(len(topic.template.payload) for topic in every) > budget.unpacked_bytes:
@@ -167,8 +201,11 @@ def _complete(
     return every, whole
 
 
-def _nothing(path: Path) -> CorruptError:
-    return CorruptError(path, "nothing can be salvaged: not one step of the trial is complete")
+def _nothing(path: Path, discarded: Sequence[Discarded]) -> CorruptError:
+    what = "nothing can be salvaged: not one step of the trial is complete"
+    if steps := sum(other.steps for other in discarded):
+        what += f", and {steps} other steps in the file are not proven to be of the trial"
+    return CorruptError(path, what)
 
 
 def _fill(contents: Contents, topic: Topic, steps: int, record: TrialRecord) -> int:
@@ -208,18 +245,18 @@ def _time_of(step: int, record: TrialRecord) -> int:
     return round(step * record.control_timestep * 1e9)
 
 
-def _write(out: Path, contents: Contents) -> None:
+def _write(out: Path, contents: Contents, result: Result) -> None:
     log = LogFile(out)
     with ExitStack() as undo:
         undo.callback(log.abandon)  # on any error; the damaged file is unchanged
         for name, texts in contents.metadata.items():
-            if name != RESULT:
+            if name not in (RESULT, MANIFEST):
                 log.metadata(name, texts)
         for name, data in contents.attachments.items():
             log.attach(name, data)
+        log.begin(contents.metadata[TRIAL]["name"])
         _write_messages(log, contents.topics)
-        log.metadata(RESULT, contents.metadata[RESULT])
-        log.finish()
+        log.finish(result)
         undo.pop_all()
 
 
@@ -232,6 +269,4 @@ def _write_messages(log: LogFile, every: dict[str, Messages]) -> None:
             for payload, (time, _) in zip(messages.payloads, messages.times, strict=True)
         ]
     rows.sort(key=lambda row: row[:2])
-    with as_write_error(partial_path(log.path)):
-        for time, channel, payload in rows:
-            log.message(channel, time, payload, 0)
+    log.messages((channel, time, payload, 0) for time, channel, payload in rows)

@@ -1,7 +1,7 @@
 """Definitions of the ROS 2 messages in a trial log, as embedded text (``ros2msg``).
 
 The definitions are those of ROS 2's common interfaces, as rosbags prints them; a test compares
-both. Only ``selfmodel_msgs/msg/SensorReadings`` is a definition of selfmodel.
+both. Only those of ``selfmodel_msgs`` are definitions of selfmodel.
 """
 
 from collections.abc import Mapping
@@ -35,6 +35,10 @@ _DEFINITIONS: Mapping[str, str] = MappingProxyType(
         "selfmodel_msgs/SensorReadings": (
             "std_msgs/Header header\nstring[] name\nfloat64[] value\n"
         ),
+        "selfmodel_msgs/Seal": (
+            "std_msgs/Header header\nstring trial\nuint32 index\nuint32 messages\n"
+            "uint8[32] identity\nuint8[32] previous\nuint8[32] digest\n"
+        ),
         "sensor_msgs/JointState": (
             "std_msgs/Header header\nstring[] name\n"
             "float64[] position\nfloat64[] velocity\nfloat64[] effort\n"
@@ -42,6 +46,11 @@ _DEFINITIONS: Mapping[str, str] = MappingProxyType(
         "tf2_msgs/TFMessage": "geometry_msgs/TransformStamped[] transforms\n",
     }
 )
+
+
+def is_known(name: str) -> bool:
+    """Returns whether a message type is one of those in a trial log."""
+    return name.replace("/msg/", "/") in _DEFINITIONS
 
 
 def schema_text(name: str) -> str:

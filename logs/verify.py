@@ -1,33 +1,59 @@
 """Verification of a log: checksums, format and model, without simulation."""
 
+from dataclasses import dataclass
 from pathlib import Path
 
-from selfmodel.logs.errors import SchemaMismatchError
-from selfmodel.logs.reader import TrialLog, read_log
+from selfmodel.logs.contents import read_contents
+from selfmodel.logs.errors import CorruptError, SchemaMismatchError
+from selfmodel.logs.provenance import UNTIED
+from selfmodel.logs.reader import TrialLog, interpret
 from selfmodel.robot.mjcf.untrusted import checked_model
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 
 
-def verify(path: Path, budget: Budget = DEFAULT_BUDGET) -> tuple[TrialLog, bool]:
-    """Returns the trial of a verified log, and whether its model was loaded.
+@dataclass(frozen=True, eq=False)
+class Verified:
+    """Result of a verification.
 
-    Verified are the checks of ``read_log``; that the model names no other files and has bounded
-    sizes; and, if MuJoCo is installed, that the model loads and is of the robot of the messages.
+    Attributes:
+        log: Content of the log.
+        model_loaded: Whether MuJoCo is installed and has loaded the model.
+        digest: SHA-256 over records, files and messages; "" in a log of an earlier version, whose
+            messages are not tied to their trial.
+    """
+
+    log: TrialLog
+    model_loaded: bool
+    digest: str
+
+
+def verify(path: Path, expected: str = "", budget: Budget = DEFAULT_BUDGET) -> Verified:
+    """Verifies a log.
+
+    Verified are the checks of ``read_log``; that the hidden faults of a simulated robot are those
+    of the trial; that the model names no other files and has bounded sizes; and, if MuJoCo is
+    installed, that the model loads and is of the robot of the messages.
 
     Args:
         path: The log.
+        expected: Digest that the log must have, or "".
         budget: Memory that the file may take.
 
     Raises:
         LogError: A check failed.
         InputError: The file does not exist.
     """
-    log = read_log(path, budget)
+    contents = read_contents(path, budget=budget)
+    log = interpret(path, contents)
+    if expected and contents.digest != expected:
+        has = f"the digest {contents.digest}" if contents.digest else f"no digest: {UNTIED}"
+        what = f"expected the log with the digest {expected}; this log has {has}"
+        raise CorruptError(path, what, advice="get the expected log from its origin again")
     try:
         checked_model(log.mjcf, log.assets)
     except ValueError as error:
         raise SchemaMismatchError(path, str(error), good="its observations are intact") from error
-    return log, _load(log)
+    return Verified(log, _load(log), contents.digest)
 
 
 def _load(log: TrialLog) -> bool:

@@ -1,7 +1,7 @@
 """Writer of a trial's log, while the trial runs."""
 
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
@@ -13,11 +13,15 @@ from selfmodel.errors import InputError, describe
 from selfmodel.logs.atomic import partial_path
 from selfmodel.logs.encoder import Encoder, empty_rows, sample_rows
 from selfmodel.logs.errors import IncompleteError, salvage_it
-from selfmodel.logs.files import as_write_error
 from selfmodel.logs.logfile import LogFile
 from selfmodel.logs.preamble import write_preamble
-from selfmodel.logs.records import FINISHED, RESULT, STOPPED, Result, TrialHeader, checked_name
+from selfmodel.logs.records import FINISHED, STOPPED, Result, TrialHeader, checked_name
 from selfmodel.physical.cleanup import Cleanup
+from selfmodel.physical.stop_signals import (
+    handle_stop_signals,
+    hold_stop_signals,
+    release_stop_signals,
+)
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Sample
 from selfmodel.trials.signals import Names
@@ -54,14 +58,22 @@ def write_trial(
         IncompleteError: There were fewer samples than planned; the ``.part`` contains them.
         LogWriteError: The disk is full, or failed.
     """
-    # The robot is stopped in any case.
+    iterator = itertools.islice(samples, plan.steps)
+    # The robot is stopped in any case, and a signal interrupts nothing but the robot.
     with (
+        handle_stop_signals(),
+        hold_stop_signals(),
         TrialWriter(path, robot, plan, header) as writer,
         Cleanup(getattr(samples, "close", lambda: None)),
     ):
-        for sample in itertools.islice(samples, plan.steps):
+        while (sample := _next(iterator)) is not None:
             writer.add(sample)
     return path
+
+
+def _next(samples: Iterator[Sample]) -> Sample | None:
+    with release_stop_signals():
+        return next(samples, None)
 
 
 class TrialWriter:
@@ -185,17 +197,18 @@ class TrialWriter:
             return
         self._sound = False
         rows = {part: rows[:count] for part, rows in self._rows.items()}
-        with as_write_error(partial_path(self.path)):
-            for step, topic, stamp, payload in self._encoder.encode(self._written, rows):
-                self._log.message(self._channels[topic], stamp, payload, step)
+        channels = self._channels
+        self._log.messages(
+            (channels[topic], stamp, payload, step)
+            for step, topic, stamp, payload in self._encoder.encode(self._written, rows)
+        )
         self._log.flush()
         self._written = self.steps
         self._sound = True
 
     def _finish(self, status: str, reason: str = "") -> None:
         result = Result(status, self.steps, self._end - self._start, reason)
-        self._log.metadata(RESULT, result.texts())
-        self._log.finish()
+        self._log.finish(result)
 
 
 def _stop_reason(error: BaseException) -> str:

@@ -34,10 +34,23 @@ def unknown_name(what: str, name: str, known: Iterable[str]) -> InputError:
         known: Every valid name.
     """
     names = [str(item) for item in known]
-    nearest = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
+    nearest = _nearest(name, names)
     hint = f"did you mean {_listed(nearest)}? " if nearest else ""
     return InputError(f"unknown {what} {name!r}: {hint}the known ones are {_listed(names)}")
 
 
+_MOST_COMPARED, _LONGEST_COMPARED, _MOST_LISTED = 1000, 200, 200
+
+
+def _nearest(name: str, names: list[str]) -> list[str]:
+    """Returns the most similar names; a file may have too many or too long ones to compare."""
+    if len(name) > _LONGEST_COMPARED or len(names) > _MOST_COMPARED:
+        return []
+    short = [one for one in names if len(one) <= _LONGEST_COMPARED]
+    return difflib.get_close_matches(name, short, n=3, cutoff=0.5)
+
+
 def _listed(names: list[str]) -> str:
+    if len(names) > _MOST_LISTED:
+        return f"{', '.join(names[:_MOST_LISTED])} and {len(names) - _MOST_LISTED} more"
     return ", ".join(names) if names else "none"

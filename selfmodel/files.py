@@ -52,3 +52,8 @@ def check_regular(path: Path, what: str) -> None:
 def _unreadable(path: Path, what: str, error: OSError | ValueError) -> InputError:
     reason = getattr(error, "strerror", None) or error
     return InputError(f"{path}: expected {what} that can be read, got: {reason}")
+
+
+def encodable(name: str) -> str:
+    """Returns the name of a file with bytes that are not UTF-8 escaped: logs are in UTF-8."""
+    return name.encode(errors="backslashreplace").decode()

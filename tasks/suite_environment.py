@@ -17,7 +17,7 @@ from selfmodel.physical.environment_robot import EnvironmentRobot
 from selfmodel.physical.simulated_robot import OWN_SEED
 from selfmodel.recovery.fitness import Score
 from selfmodel.robot.embodiment import Embodiment
-from selfmodel.robot.mjcf.mujoco_errors import mujoco_errors_as_input_errors
+from selfmodel.robot.mjcf.mujoco_errors import loading_a_model
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
 from selfmodel.robot.state_access import current_value, signal_fields, state_writer
@@ -122,7 +122,7 @@ def episode_parts(domain: str, task: str) -> tuple[Callable[[mujoco.MjModel], An
     # Imported here, because dm_control's physics initialises a display when imported.
     suite = importlib.import_module("dm_control.suite")
     wrapper = importlib.import_module("dm_control.mujoco.wrapper.core")
-    with mujoco_errors_as_input_errors():  # MuJoCo warns about the cheetah
+    with loading_a_model():  # MuJoCo warns about the cheetah
         env = suite.load(domain, task, task_kwargs={"random": 0})
     env.reset()
     own = type(env.physics)

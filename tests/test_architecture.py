@@ -178,6 +178,7 @@ def test_no_file_is_longer_than_four_hundred_lines():
 BY_THEME = {
     "cli/rendering/test_render": "the command of cli/render with all that it draws",
     "cli/test_controllers": "one option of many commands",
+    "cli/test_hostile_logs": "many commands, given hostile logs",
     "cli/test_kinds": "one option of many commands",
     "faults/test_graded": "all kinds with a severity, each a file of its own",
     "faults/test_kinds": "the contract of every kind, each a file of its own",

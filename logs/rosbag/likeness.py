@@ -15,6 +15,9 @@ MIN_SIMILARITY = 0.3
 CERTAIN_LEAD = 0.1
 """Minimum lead over the second most similar name of a certain match."""
 
+LONGEST = 200
+"""Length of the longest name that is compared, characters."""
+
 _WORDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         **dict.fromkeys(("fl", "lf"), ("front", "left")),
@@ -74,9 +77,8 @@ def matched(wanted: Sequence[str], offered: Sequence[str]) -> dict[str, NameMatc
     for (ours, theirs), score in sorted(scores.items(), key=lambda item: -item[1]):
         if score < MIN_SIMILARITY or ours in found or theirs in used:
             continue
-        competing = [
-            other for pair, other in scores.items() if (pair[0] == ours) != (pair[1] == theirs)
-        ]
+        competing = [scores[ours, other] for other in offered if other != theirs]
+        competing += [scores[other, theirs] for other in wanted if other != ours]
         found[ours] = NameMatch(
             theirs,
             score >= CERTAIN_SIMILARITY and score - max(competing, default=0.0) >= CERTAIN_LEAD,
@@ -86,7 +88,12 @@ def matched(wanted: Sequence[str], offered: Sequence[str]) -> dict[str, NameMatc
 
 
 def likeness(ours: str, theirs: str) -> float:
-    """Returns the similarity of two names, 0 to 1, which is 1 for the same words or initials."""
+    """Returns the similarity of two names, 0 to 1, which is 1 for the same words or initials.
+
+    It is 0 for names longer than ``LONGEST``: its time is the square of their length.
+    """
+    if max(len(ours), len(theirs)) > LONGEST:
+        return 0.0
     if "".join(word[0] for word in _parts(ours)) == theirs.lower():
         return 1.0
     first, second = _words(ours), _words(theirs)

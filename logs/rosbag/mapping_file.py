@@ -18,7 +18,7 @@ from selfmodel.logs.rosbag.mapping import (
     Link,
     Touch,
 )
-from selfmodel.logs.rosbag.tables import Table, parse_document
+from selfmodel.logs.rosbag.tables import Table, parse_document, shortened
 from selfmodel.trials.trial import STAGES
 
 MAX_MAPPING_BYTES = 2**20
@@ -94,6 +94,7 @@ def _angles(table: Table, role: Literal["joints", "commands"]) -> Angles:
     names = table.table("names")
     links = {name: _link(names, name, scale) for name in names.keys}
     parts: dict[str, str] = {}
+    ordered = frozenset(order)
     for name, link in links.items():
         if link.name == UNKNOWN:
             raise table.document.error(
@@ -106,7 +107,7 @@ def _angles(table: Table, role: Literal["joints", "commands"]) -> Angles:
                 f"each joint of the bag once",
             )
         parts[link.name] = name
-        if order and link.name not in order:
+        if order and link.name not in ordered:
             raise table.document.unknown((*names.path, name), "name in order", link.name, order)
     table.done()
     return Angles(role, topic, scale, links, order)
@@ -119,7 +120,7 @@ def _link(names: Table, name: str, scale: float) -> Link:
         return Link(value)
     if not isinstance(value, dict):
         raise names.document.error(
-            path, f'{name} must be "a name in the bag" or {{ name = ... }}, got {value!r}'
+            path, f'{name} must be "a name in the bag" or {{ name = ... }}, got {shortened(value)}'
         )
     table = Table(names.document, path, value)
     recorded, sign = table.text("name"), table.number("sign", 1.0)

@@ -79,10 +79,11 @@ def _gaps(behaviour: Behaviour, qualities: Mapping[str, Quality]) -> Iterator[st
         ]
         if len(within) > MAX_LISTED_GAPS:
             listed.append(f"{len(within) - MAX_LISTED_GAPS} more")
-        rows = sum(
-            int(np.sum((behaviour.time > gap.start) & (behaviour.time < gap.start + gap.length)))
-            for gap in within
-        )
+        starts = np.array([gap.start for gap in within])
+        ends = np.array([gap.start + gap.length for gap in within])
+        first = np.searchsorted(behaviour.time, starts, side="right")
+        last = np.searchsorted(behaviour.time, ends, side="left")
+        rows = int(np.sum(np.maximum(last - first, 0)))
         yield f"{topic}: silent for {', '.join(listed)}; rows marked as not observed: {rows}"
 
 

@@ -139,7 +139,7 @@ def _order(width: int, order: tuple[str, ...]) -> tuple[str, ...]:
 
 def _link(guess: NameMatch | None, offered: Sequence[str]) -> str:
     if guess is None:
-        known = ", ".join("".join(map(_escaped, name)) for name in offered) or "nothing"
+        known = ", ".join(map(_escaped, offered)) or "nothing"
         return f'"{UNKNOWN}"  # CHANGE: the bag has {known}'
     return _quoted(guess.name) + ("" if guess.sure else "  # CHECK: not sure")
 
@@ -147,7 +147,7 @@ def _link(guess: NameMatch | None, offered: Sequence[str]) -> str:
 def _topic(topics: Sequence[Topic]) -> str:
     if not topics:
         return f'topic = "{UNKNOWN}"  # CHANGE: the bag has none of a type that fits'
-    others = ", ".join("".join(map(_escaped, topic.name)) for topic in topics[1:])
+    others = ", ".join(_escaped(topic.name) for topic in topics[1:])
     return f"topic = {_quoted(topics[0].name)}" + (f"  # CHECK: or {others}" if others else "")
 
 
@@ -180,7 +180,7 @@ def _touches(bag: Bag, sensors: Sequence[str]) -> Iterator[str]:
     found = matched(sensors, list(topics))
     for sensor in sensors:
         if sensor not in found:
-            yield f"# No topic is similar to {sensor}: it is not observed."
+            yield f"# No topic is similar to {_escaped(sensor)}: it is not observed."
             continue
         topic = topics[found[sensor].name]
         unsure = "" if found[sensor].sure else "  # CHECK: not sure"
@@ -192,12 +192,15 @@ def _touches(bag: Bag, sensors: Sequence[str]) -> Iterator[str]:
 
 
 def _quoted(text: str) -> str:
-    """TOML string of a text; names in a bag may contain any character."""
-    return f'"{"".join(map(_escaped, text))}"'
+    """TOML string of a text."""
+    return f'"{_escaped(text)}"'
 
 
-def _escaped(char: str) -> str:
-    return char if char.isprintable() and char not in '"\\' else f"\\U{ord(char):08X}"
+def _escaped(text: str) -> str:
+    """Text in a TOML string or comment; names in a bag or a model may contain any character."""
+    return "".join(
+        char if char.isprintable() and char not in '"\\' else f"\\U{ord(char):08X}" for char in text
+    )
 
 
 def _key(name: str) -> str:

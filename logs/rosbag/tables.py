@@ -2,6 +2,7 @@
 
 import re
 import tomllib
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -15,8 +16,18 @@ Keys = tuple[str, ...]
 
 _KEY = r"""(?:[A-Za-z0-9_-]+|"(?:[^"\\]|\\.)*"|'[^']*')"""
 _KEYS = rf"{_KEY}(?:\s*\.\s*{_KEY})*"
+_LONG_NUMBER = re.compile(r"[0-9_]{4300}")
+_RUN = re.compile(_KEYS)
 _TABLE = re.compile(rf"\s*\[\s*({_KEYS})\s*\]")
 _ENTRY = re.compile(rf"\s*({_KEYS})\s*=")
+
+
+MAX_DEPTH = 16
+"""Maximum keys joined by dots; a mapping has at most four."""
+
+
+MAX_SHOWN = 100
+"""Maximum length of a wrong value in an error, characters."""
 
 
 @dataclass(frozen=True)
@@ -61,15 +72,33 @@ def parse_document(text: str, name: str) -> tuple[Document, dict[str, Any]]:
     Raises:
         InputError: The text is not TOML, or has a duplicate entry.
     """
+    _check_depth(text, name)
     document = Document(name, text, _lines(text))
     try:
         return document, tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as failure:
+    except (ValueError, RecursionError) as failure:
         reason = str(failure)
+        digits = _LONG_NUMBER.search(text)
+        if digits and not isinstance(failure, tomllib.TOMLDecodeError):
+            reason = f"a number has too many digits (at line {_line(text, digits)}, column 1)"
         found = re.search(r" \(at line (\d+), column \d+\)", reason)
         line = int(found[1]) if found else max(1, text.count("\n"))
         reason = reason.replace(found[0] if found else "", "")
         raise InputError(f"{name}:{line}: {_explained(reason, text, line)}") from failure
+
+
+def _check_depth(text: str, name: str) -> None:
+    """Checks the depth of dotted keys: the time of a key is the square of its depth."""
+    for run in _RUN.finditer(text):
+        if len(re.findall(_KEY, run[0])) > MAX_DEPTH:
+            raise InputError(
+                f"{name}:{_line(text, run)}: expected at most {MAX_DEPTH} keys joined by dots, "
+                f"got more: remove them"
+            )
+
+
+def _line(text: str, found: re.Match[str]) -> int:
+    return text.count("\n", 0, found.start()) + 1
 
 
 def _explained(reason: str, text: str, line: int) -> str:
@@ -99,6 +128,15 @@ def _names(keys: str) -> Keys:
     return tuple(key.strip("\"'") for key in re.findall(_KEY, keys))
 
 
+def shortened(value: object) -> str:
+    """Returns the ``repr`` of an entry, or its beginning: a file may have any value."""
+    try:
+        text = repr(value)
+    except ValueError:  # 0xfff... is read, but Python prints at most 4300 digits
+        return "a number with too many digits"
+    return text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}..."
+
+
 class Table:
     """Table whose entries are taken one by one; an entry that is not taken is an error.
 
@@ -112,7 +150,7 @@ class Table:
         self.document = document
         self.path = path
         self._entries = dict(entries)
-        self._known: list[str] = []
+        self._known: dict[str, None] = {}
 
     def text(self, key: str, default: str | None = None) -> str:
         """Takes a text.
@@ -146,8 +184,8 @@ class Table:
         value = self._take(key, None)
         if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
             raise self._wrong(key, "a list of texts", value)
-        for item in value:
-            if value.count(item) > 1:
+        for item, count in Counter(value).items():
+            if count > 1:
                 sentence = f"{item} is listed twice in {key}: expected each name once"
                 raise self.document.error((*self.path, key), sentence, item)
         return tuple(value)
@@ -165,8 +203,7 @@ class Table:
 
     def has(self, key: str) -> bool:
         """Returns whether there is an entry that has not been taken."""
-        if key not in self._known:
-            self._known.append(key)
+        self._known[key] = None
         return key in self._entries
 
     @property
@@ -195,5 +232,5 @@ class Table:
 
     def _wrong(self, key: str, expected: str, value: object) -> InputError:
         return self.document.error(
-            (*self.path, key), f"{key} must be {expected}, got {value!r}: change it"
+            (*self.path, key), f"{key} must be {expected}, got {shortened(value)}: change it"
         )

@@ -2,13 +2,17 @@
 
 import sys
 from importlib.metadata import version
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from selfmodel.cli.lazy import group
+from selfmodel.cli.output.library_warnings import counted_warnings
 from selfmodel.cli.output.plain import plain
+from selfmodel.cli.output.printing import print_lines, print_notes
+from selfmodel.cli.output.streams import flush_output, open_streams
 from selfmodel.errors import InputError, WorkError, describe
+from selfmodel.physical.stop_signals import handle_stop_signals, status_of
 
 COMMANDS = {
     "robots": ("selfmodel.cli.robots:robots", "List the robots, or the parts of one."),
@@ -34,7 +38,7 @@ app = group(
 
 def _print_version(wanted: bool) -> None:  # noqa: FBT001  # typer passes the value by position
     if wanted:
-        typer.echo(f"selfmodel {version('selfmodel')}")
+        print_lines(f"selfmodel {version('selfmodel')}")
         raise typer.Exit
 
 
@@ -51,25 +55,58 @@ def selfmodel(
     """Parses the options that come before the command."""
 
 
+UsageError: Any = typer.BadParameter.__base__
+"""Error of unknown commands, options and values; typer has no public name for it."""
+
+
 def main() -> None:
     """Runs the command line.
 
-    Exit status: 0 done; 1 the work failed; 2 wrong usage or bad input; 130 interrupted.
+    Exit status: 0 done; 1 the work failed; 2 wrong usage or bad input; 130, 143 or 129 after
+    SIGINT, SIGTERM or SIGHUP.
     """
+    open_streams()
+    with handle_stop_signals():
+        try:
+            _run()
+        except InputError as error:
+            _fail(describe(error), 2)
+        except BrokenPipeError:
+            sys.exit(1)  # the reader has read enough
+        except (OSError, WorkError) as error:
+            # A full disk, a folder without write permission: the message contains the file's name.
+            _fail(describe(error), 1)
+        except MemoryError as error:
+            _fail(f"there is not enough memory ({error or 'for this'}): request less at once", 1)
+        except KeyboardInterrupt as interruption:
+            notes = "; ".join(getattr(interruption, "__notes__", ()))
+            _fail(f"interrupted: {notes}" if notes else "interrupted", status_of(interruption))
+
+
+def _run() -> None:
     try:
-        # The same usage line for `python -m selfmodel` as for the installed command.
-        app(prog_name="selfmodel")
-    except InputError as error:
-        _fail(describe(error), 2)
-    except (OSError, WorkError) as error:
-        # A full disk, a folder without write permission: the message contains the file's name.
-        _fail(describe(error), 1)
-    except MemoryError as error:
-        _fail(f"there is not enough memory ({error or 'for this'}): request less at once", 1)
-    except KeyboardInterrupt:
-        _fail("interrupted", 130)
+        with counted_warnings():
+            # The same usage line for `python -m selfmodel` as for the installed command.
+            status = app(prog_name="selfmodel", standalone_mode=False)
+    except typer.Abort as end:
+        # typer replaces every KeyboardInterrupt.
+        raise end.__cause__ or KeyboardInterrupt from None
+    except UsageError as error:
+        status = _print_usage(error)
+    finally:
+        flush_output()
+    sys.exit(status)
+
+
+def _print_usage(error: Any) -> int:  # noqa: ANN401  # typer hides the type
+    """Prints a usage error with the usage line, and returns the exit status."""
+    # Without arguments, the message is the help page: lines of ours.
+    if error.ctx is None or error.message != error.ctx.get_help():
+        error.message = plain(error.message)
+    error.show()
+    return int(error.exit_code)
 
 
 def _fail(message: str, status: int) -> None:
-    typer.echo(f"error: {plain(message)}", err=True)
+    print_notes(f"error: {message}")
     sys.exit(status)

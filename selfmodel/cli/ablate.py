@@ -1,6 +1,5 @@
 """``selfmodel ablate``: rates of correct diagnoses per comparator and reality gap."""
 
-import json
 import math
 from pathlib import Path
 from typing import Annotated
@@ -29,6 +28,7 @@ from selfmodel.cli.options import (
     Workers,
 )
 from selfmodel.cli.output import grid_display
+from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.tables import show
 from selfmodel.comparators import COMPARATORS
 from selfmodel.experiments.ablation import Ablation, AblationResults, ablate as run, write_results
@@ -118,12 +118,13 @@ def ablate(
         out,
     )
     results = write_results(out)
+    grid_display.note_unverified(results.unverified, out)
     if as_json:
         found = {
             **as_dict(results.rows, results.scores),
             "failures": grid_display.as_objects(failed),
         }
-        typer.echo(json.dumps(found, indent=1, allow_nan=False))
+        print_json(found, indent=1)
     else:
         _print(results)
     grid_display.end(failed)
@@ -137,9 +138,8 @@ def _print(results: AblationResults) -> None:
         columns.append("recovered ÷ before")
     if rows:
         show(columns, [row[: len(columns)] for row in rows], texts=3)
-        typer.echo("With 95 % intervals; time as a multiple of the paper's comparator's.")
-    for path in results.files:
-        typer.echo(str(path))
+        print_lines("With 95 % intervals; time as a multiple of the paper's comparator's.")
+    print_lines(*map(str, results.files))
 
 
 def _texts(score: ComparatorScore) -> list[str]:

@@ -1,6 +1,5 @@
 """``selfmodel calibrate``: the self-model fitted to logs of the healthy robot."""
 
-import json
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any
@@ -9,7 +8,8 @@ import typer
 
 from selfmodel.cli.inputs import check_folder
 from selfmodel.cli.options import DEFAULT_BUDGET, FileBudget, Json, LogFiles, SelfModel, Threads
-from selfmodel.cli.output.plain import counted, plain
+from selfmodel.cli.output.plain import counted
+from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.tables import show
 from selfmodel.errors import InputError
 from selfmodel.experiments import trial_logs
@@ -71,7 +71,7 @@ def calibrate(
         "seconds": perf_counter() - start,
     }
     if as_json:
-        typer.echo(json.dumps(result, indent=2, allow_nan=False))
+        print_json(result)
     else:
         _print(result)
 
@@ -87,20 +87,18 @@ def _refuse_assets(robot: Robot, where: str) -> None:
 
 def _print(result: dict[str, Any]) -> None:
     rows = [
-        (plain(one["name"]), "1", f"{one['factor']:.3f}", f"± {100 * one['deviation']:.1f} %")
+        (one["name"], "1", f"{one['factor']:.3f}", f"± {100 * one['deviation']:.1f} %")
         for one in result["parameters"]
     ]
     show(("factor of", "before", "fitted", "uncertainty"), rows)
-    typer.echo(f"delay, control steps: {result['delay']} ({result['delay_before']} before)")
-    typer.echo(
+    print_lines(f"delay, control steps: {result['delay']} ({result['delay_before']} before)")
+    print_lines(
         f"error of predicted motion: {result['error']:.3f} ({result['error_before']:.3f} before), "
         f"the root mean square over predictions of 10 steps, each signal in its own scale"
     )
     if result["as_it_was"]:
-        typer.echo("The model already predicts the logs exactly: it is written unchanged.")
-    typer.echo(
-        plain(
-            f"{result['model']}: {result['robot']} as fitted to "
-            f"{counted(len(result['logs']), 'log')} in {result['seconds']:.1f} s"
-        )
+        print_lines("The model already predicts the logs exactly: it is written unchanged.")
+    print_lines(
+        f"{result['model']}: {result['robot']} as fitted to "
+        f"{counted(len(result['logs']), 'log')} in {result['seconds']:.1f} s"
     )

@@ -1,13 +1,9 @@
 """``selfmodel diagnose``: hypotheses ranked by how well they predict logged trials."""
 
 import dataclasses
-import json
 from pathlib import Path
 from time import perf_counter
 from typing import Any
-
-import typer
-from rich.console import Console
 
 from selfmodel.cli.options import (
     DEFAULT_BUDGET,
@@ -25,8 +21,10 @@ from selfmodel.cli.options import (
     Threads,
 )
 from selfmodel.cli.output.display import display
-from selfmodel.cli.output.plain import counted, plain
+from selfmodel.cli.output.plain import counted
+from selfmodel.cli.output.printing import print_json, print_lines, print_notes
 from selfmodel.cli.output.ranking import confidence_sentence, ranking_table
+from selfmodel.cli.output.tables import print_tables
 from selfmodel.comparators import DEFAULT
 from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
@@ -77,8 +75,7 @@ def diagnose(
         calibrate=calibrate,
         threads=threads,
     )
-    for note in _notes(used):
-        typer.echo(f"note: {note}", err=True)
+    print_notes(*(f"note: {note}" for note in _notes(used)))
     with display() as on_event:
         if found.calibration is not None:
             on_event(found.calibration)
@@ -100,7 +97,7 @@ def diagnose(
         "seconds": perf_counter() - start,
     }
     if as_json:
-        typer.echo(json.dumps(result, indent=2, allow_nan=False))
+        print_json(result)
     else:
         _print(result)
 
@@ -142,12 +139,11 @@ def _notes(logs: list[TrialLog]) -> list[str]:
 
 
 def _print(result: dict[str, Any]) -> None:
-    Console(markup=False).print(ranking_table(result["diagnosis"]))
-    typer.echo(
-        f"{plain(result['robot'])}, {counted(len(result['logs']), 'log')}, "
+    print_tables(ranking_table(result["diagnosis"]))
+    print_lines(
+        f"{result['robot']}, {counted(len(result['logs']), 'log')}, "
         f"{result['comparator']}: {result['evaluations']} evaluations by the EA, "
-        f"{result['distinct_hypotheses']} distinct hypotheses, {result['seconds']:.1f} s."
+        f"{result['distinct_hypotheses']} distinct hypotheses, {result['seconds']:.1f} s.",
+        confidence_sentence(result),
+        *(f"from before the failure, not explained: {Path(path)}" for path in result["intact"]),
     )
-    typer.echo(confidence_sentence(result))
-    for path in result["intact"]:
-        typer.echo(f"from before the failure, not explained: {Path(path)}")

@@ -103,7 +103,14 @@ def share(option: str, given: str) -> tuple[int, int]:
         InputError: The text has another form, or i is not between 1 and n.
     """
     first, slash, count = given.partition("/")
-    if not (slash and first.isdecimal() and count.isdecimal() and 1 <= int(first) <= int(count)):
+    short = len(given) <= 20
+    if not (
+        slash
+        and short
+        and first.isdecimal()
+        and count.isdecimal()
+        and 1 <= int(first) <= int(count)
+    ):
         raise InputError(
             f"{option} needs i/n, the i-th of every n runs with i from 1 to n, such as 2/8, "
             f"got {given!r}"

@@ -30,7 +30,8 @@ from selfmodel.cli.options import (
     Trials,
 )
 from selfmodel.cli.output.display import display
-from selfmodel.cli.output.report import as_object, print_report
+from selfmodel.cli.output.printing import print_json
+from selfmodel.cli.output.report import facts, print_report, result_file
 from selfmodel.comparators import DEFAULT
 from selfmodel.controllers.controller import check_silent_neurons
 from selfmodel.experiments import plugins, robots
@@ -105,17 +106,18 @@ def recover(
     try:
         with display() as on_event:
             outcome = run(experiment, on_event)
-    except KeyboardInterrupt:
-        typer.echo(f"interrupted: the finished trials are in {experiment.folder}", err=True)
-        raise typer.Exit(130) from None
-    result = as_object(experiment, outcome)
+    except KeyboardInterrupt as interruption:
+        interruption.add_note(f"the finished trials are in {experiment.folder}")
+        raise
+    found = facts(experiment, outcome)
     try:
-        replace_file(experiment.folder / "result.json", f"{result}\n".encode())
+        logs = [Path(trial.path) for trial in outcome.recovery.trials]
+        replace_file(experiment.folder / "result.json", result_file(experiment, found, logs))
     finally:  # the result is printed even if the disk is full
         if as_json:
-            typer.echo(result)
+            print_json(found)
         else:
-            print_report(experiment, outcome)
+            print_report(found, experiment.folder)
 
 
 def _new_folder(robot: str) -> Path:

@@ -1,6 +1,5 @@
 """``selfmodel render``: a trial as a film or a strip of pictures, from its log."""
 
-import json
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,7 +15,8 @@ from selfmodel.cli.options import (
     SelfModel,
     Threads,
 )
-from selfmodel.cli.output.plain import counted, plain
+from selfmodel.cli.output.plain import counted
+from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.rendering import gl, video
 from selfmodel.cli.rendering.diagnosed import diagnosed
 from selfmodel.errors import InputError
@@ -101,7 +101,7 @@ def render(
     )
     result |= {"drawn_by": "matplotlib" if library is None else "mujoco", "gl": library}
     if as_json:
-        typer.echo(json.dumps(result, indent=2, allow_nan=False))
+        print_json(result)
     else:
         _print(result)
 
@@ -129,11 +129,8 @@ def _choose_gl(out: Path, *, stick: bool) -> str | None:
 
 
 def _print(result: dict[str, Any]) -> None:
-    typer.echo(
-        plain(
-            f"{result['out']}: {counted(result['frames'], 'picture')} of {result['robot']}, as "
-            f"logged and as "
-        )
-        + f"{result['hypothesis']}, drawn by {result['drawn_by']}"
+    print_lines(
+        f"{result['out']}: {counted(result['frames'], 'picture')} of {result['robot']}, as "
+        f"logged and as {result['hypothesis']}, drawn by {result['drawn_by']}"
         + (f" ({result['gl']})" if result["gl"] else "")
     )

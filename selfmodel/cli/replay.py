@@ -1,6 +1,5 @@
 """``selfmodel replay``: a logged trial simulated again, and compared with its log."""
 
-import json
 import math
 from pathlib import Path
 from typing import Annotated, Any
@@ -18,9 +17,11 @@ from selfmodel.cli.options import (
     SelfModel,
     Threads,
 )
-from selfmodel.cli.output.plain import counted, plain
+from selfmodel.cli.output.plain import counted
+from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.replay_figure import check_figure, draw
 from selfmodel.cli.output.tables import show
+from selfmodel.errors import InputError
 from selfmodel.experiments import plugins, trial_logs
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.logs import TrialLog
@@ -74,6 +75,11 @@ def replay(
     tolerance = 0.0 if exact else TOLERANCE
     simulator = Simulator(robot, thread_count(threads))
     found = simulate(log.trial, assumed, simulator, tolerance)
+    if not found.observed:
+        raise InputError(
+            f"{file}: nothing was observed: every number of the log is NaN, so there is nothing to "
+            f"compare a simulation with: give a log with observations"
+        )
     result = {
         "log": str(file),
         "robot": robot.name,
@@ -91,7 +97,7 @@ def replay(
         draw(out, log, found, str(assumed))
         result["figure"] = str(out)
     if as_json:
-        typer.echo(json.dumps(result, indent=2, allow_nan=False))
+        print_json(result)
     else:
         _print(result, log, found)
 
@@ -101,32 +107,31 @@ def _finite(value: float) -> float | None:
 
 
 def _print(result: dict[str, Any], log: TrialLog, found: Replay) -> None:
-    typer.echo(
-        plain(f"{result['log']}: {counted(result['steps'], 'step')} of {result['robot']}")
-        + ", replayed as "
-        + result["hypothesis"]
+    print_lines(
+        f"{result['log']}: {counted(result['steps'], 'step')} of {result['robot']}, replayed as "
+        f"{result['hypothesis']}"
     )
     versions = result["mujoco"]
     if versions["logged"] != versions["running"]:
-        typer.echo(
-            f"The log was made with MuJoCo {plain(versions['logged'])}, this is "
+        print_lines(
+            f"The log was made with MuJoCo {versions['logged']}, this is "
             f"{versions['running']}: differences below {TOLERANCE:g} count as equal."
         )
     if log.imported:
-        typer.echo(
+        print_lines(
             f"The log was imported, and resampled: differences below {TOLERANCE:g} count as equal."
         )
     if found.diverged:
-        typer.echo("The simulation diverged: with this hypothesis the model is unstable.")
+        print_lines("The simulation diverged: with this hypothesis the model is unstable.")
     if found.identical:
-        typer.echo("identical: every observed number equals the simulated one, to the bit.")
+        print_lines("identical: every observed number equals the simulated one, to the bit.")
         return
     step = found.first_divergence_step
     if step is None:
-        typer.echo(f"equal at every step, within {result['tolerance']:g}.")
+        print_lines(f"equal at every step, within {result['tolerance']:g}.")
     else:
         time = step * log.control_timestep
-        typer.echo(f"They differ from step {step} ({time:g} s). Root mean square difference:")
+        print_lines(f"They differ from step {step} ({time:g} s). Root mean square difference:")
     show(("time, s", *(title for _, title in COLUMNS)), _rows(log, found), texts=0)
 
 

@@ -1,15 +1,13 @@
 """``selfmodel robots``: the robots of selfmodel, and the parts of a robot or an MJCF file."""
 
-import json
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 
 from selfmodel.cli.options import Json, ModelSettings
-from selfmodel.cli.output.plain import plain
+from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.robot_parts import parts, print_parts
-from selfmodel.cli.output.tables import folding
+from selfmodel.cli.output.tables import folding, print_tables
 from selfmodel.experiments.robots import is_model, notes_on, robot_entry
 from selfmodel.robot.designs import network_for
 from selfmodel.tasks import ROBOTS, Entry
@@ -30,7 +28,7 @@ def robots(
     if robot is None:
         every = [_facts(robot_entry(name)) for name in ROBOTS]
         if as_json:
-            typer.echo(json.dumps({"robots": every}, indent=2))
+            print_json({"robots": every})
         else:
             _print_all(every)
         return
@@ -38,11 +36,10 @@ def robots(
     notes = notes_on(robot, model_settings or ()) if is_model(robot) else ()
     facts = {**_facts(entry), **parts(entry.robot()), "notes": list(notes)}
     if as_json:
-        typer.echo(json.dumps(facts, indent=2, allow_nan=False))
+        print_json(facts)
         return
     print_parts(facts)
-    for note in notes:
-        typer.echo(plain(f"note: {note}"))
+    print_lines(*(f"note: {note}" for note in notes))
 
 
 def _facts(entry: Entry) -> dict[str, Any]:
@@ -74,8 +71,8 @@ def _print_all(facts: list[dict[str, Any]]) -> None:
         for one in facts
     ]
     columns = ("robot", "joints", "hinges", "sensors", "weights", "tasks", "cases")
-    Console(markup=False).print(folding(columns, rows))
-    typer.echo(
+    print_tables(folding(columns, rows))
+    print_lines(
         "`selfmodel robots ROBOT` lists its parts and cases; `selfmodel suite list` the bodies of "
         "dm_control's suite."
     )

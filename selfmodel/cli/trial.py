@@ -1,10 +1,9 @@
 """``selfmodel trial``: one logged trial of the simulated physical robot."""
 
-import json
+import math
 from pathlib import Path
 
 import numpy as np
-import typer
 
 from selfmodel.cli import inputs
 from selfmodel.cli.options import (
@@ -22,11 +21,13 @@ from selfmodel.cli.options import (
     Steps,
     Structural,
 )
+from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.controllers.controller import Controller, check_silent_neurons, draw_genomes
 from selfmodel.experiments import plugins, robots, trial_logs
 from selfmodel.experiments.reality import draw_reality
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.neuron import silent_neurons
+from selfmodel.logs.atomic import partial_path
 from selfmodel.logs.physical_trial import run_trial
 from selfmodel.logs.records import TrialHeader
 from selfmodel.robot.designs import DESIGNS
@@ -69,9 +70,10 @@ def trial(
     header = TrialHeader(settings, hidden=str(hidden), gap=reality.text)
     try:
         logged = run_trial(reality.robot(made, hidden), plan, out, made, header)
-    except KeyboardInterrupt:
-        typer.echo(f"interrupted: the steps so far are in {out}.part", err=True)
-        raise typer.Exit(130) from None
+    except KeyboardInterrupt as interruption:
+        if (part := partial_path(out)).exists():
+            interruption.add_note(f"the steps so far are in {part}")
+        raise
     facts = {
         "log": str(out),
         "robot": made.name,
@@ -80,9 +82,9 @@ def trial(
         "structure": structure,
         "seed": seed,
         "steps": logged.behaviour.steps,
-        "displacement": logged.displacement,
+        "displacement": logged.displacement if math.isfinite(logged.displacement) else None,
     }
     if as_json:
-        typer.echo(json.dumps(facts, indent=2))
+        print_json(facts)
     else:
-        typer.echo(f"{made.name} ({hidden}) went {logged.displacement:.3f} m forward: {out}")
+        print_lines(f"{made.name} ({hidden}) went {logged.displacement:.3f} m forward: {out}")

@@ -1,5 +1,6 @@
 """The diagnostic search: an EA over hypotheses, local refinement, and the verdict."""
 
+import math
 from collections.abc import Callable, Sequence
 from functools import partial
 
@@ -12,11 +13,12 @@ from selfmodel.diagnosis.evidence import Evidence
 from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
 from selfmodel.diagnosis.model_error import any_fault_is_model_error
 from selfmodel.diagnosis.refine import refined
+from selfmodel.diagnosis.search_cost import SearchSize
 from selfmodel.diagnosis.significance import TEST, is_better
 from selfmodel.diagnosis.surrogate import Surrogate, own_surrogate, surrogate_of
 from selfmodel.diagnosis.undetectable import undetectable_faults
 from selfmodel.diagnosis.unsearched import best_unsearched_fault
-from selfmodel.diagnosis.verdict import verdict_of
+from selfmodel.diagnosis.verdict import all_diverged, verdict_of
 from selfmodel.evolution import Evolution, GenerationCallback, evolve
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import GENE_VALUES, HypothesisSpace
@@ -96,6 +98,10 @@ class DiagnosticSearch:
         self._proposed |= ranked
         judged = list(ranked)
         totals = dict(zip(judged, map(float, self.evidence.distances(judged, trials)), strict=True))
+        if not math.isfinite(totals[best]):
+            best = _ranked(totals)[0]
+        if not math.isfinite(totals[best]):
+            return all_diverged(_ranked(totals)[: self._settings.kept], trials)
         others = [one for one in _ranked(totals) if one != best]
         indistinguishable = self._indistinguishable(best, others, losses, is_piecewise=is_piecewise)
         unsearched = best_unsearched_fault(best, self._space, losses)
@@ -127,6 +133,22 @@ class DiagnosticSearch:
         self.evidence.check([*self._intact, *trials])
         surrogate = surrogate_of(self.evidence, self._own_surrogate, trials)
         surrogate.evidence.check(surrogate.trials)
+
+    def simulated_steps(self, trials: Sequence[Trial]) -> int:
+        """Returns the estimated number of control steps that a diagnosis of some trials simulates.
+
+        Args:
+            trials: Trials that the comparator accepts; see ``check``.
+        """
+        surrogate = surrogate_of(self.evidence, self._own_surrogate, trials)
+        return SearchSize(
+            settings=self._settings,
+            candidates=len(self._space.coarse_candidates),
+            surrogate_steps=surrogate.evidence.steps_per_hypothesis(surrogate.trials),
+            is_refined=self.evidence.is_piecewise(trials),
+            uses_segments=self.evidence.uses_segments(trials),
+            has_healthy=bool(self._intact),
+        ).simulated_steps
 
     @property
     def distinct_hypotheses(self) -> int:

@@ -12,7 +12,8 @@ Verdict = Literal["explained", "ambiguous", "unexplained"]
 the healthy robot, and no other hypothesis except ``undetectable`` ones does. ``ambiguous``: other
 hypotheses are indistinguishable from the best. ``unexplained``: the best hypothesis predicts
 significantly worse than the self-model predicts the healthy robot, or significantly worse than with
-a fault of an unsearched kind, so a fault is missing; requires a trial of the healthy robot."""
+a fault of an unsearched kind, so a fault is missing; requires a trial of the healthy robot. A
+diagnosis is also ``unexplained`` if the simulation of every hypothesis diverged."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,7 @@ class Diagnosis:
         undetectable: The best hypothesis with one more fault, for each undetectable fault,
             smallest distance first, at most as many as are ranked; see
             ``undetectable.undetectable_faults``.
+        reason: Cause of the verdict and remedy, if every simulation diverged; else empty.
     """
 
     ranked: tuple[Candidate, ...]
@@ -79,6 +81,7 @@ class Diagnosis:
     test: str
     unsearched: UnsearchedFault | None = None
     undetectable: tuple[Hypothesis, ...] = ()
+    reason: str = ""
 
     @property
     def best(self) -> Hypothesis:
@@ -94,6 +97,7 @@ class Diagnosis:
             lines += [f"  {name}: {others}"] if others else []
         if self.unsearched is not None:
             lines.append(f"  unsearched: {self.unsearched.hypothesis} ({self.unsearched.kind})")
+        lines += [f"  reason: {self.reason}"] if self.reason else []
         return "\n".join(lines) + ">"
 
     def to_dict(self) -> dict[str, Any]:
@@ -111,6 +115,7 @@ class Diagnosis:
             "test": self.test,
             "outside": self.unsearched.to_dict() if self.unsearched else None,
             "ranked": [candidate.to_dict() for candidate in self.ranked],
+            **({"reason": self.reason} if self.reason else {}),
         }
 
     def to_pandas(self) -> Any:  # noqa: ANN401  # pandas is optional

@@ -8,6 +8,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis.comparator import Comparator, PiecewiseTrial, PreparedTrial, as_comparator
+from selfmodel.diagnosis.search_cost import steps_of
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.simulation.cache import Cache
@@ -15,6 +16,8 @@ from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments, recordable
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.magnitudes import check_magnitudes
+from selfmodel.trials.signals import Signal
 from selfmodel.trials.trial import Trial
 
 TrialKey = tuple[str, int]
@@ -76,6 +79,14 @@ class Evidence:
         if problems:
             raise InputError("; ".join(problems))
 
+    def steps_per_hypothesis(self, trials: Sequence[Trial]) -> int:
+        """Returns the control steps that a comparison of one hypothesis with all trials simulates.
+
+        Raises:
+            InputError: The comparator cannot judge one of the trials.
+        """
+        return sum(steps_of(self._prepare(one).request, one.behaviour.steps) for one in trials)
+
     def distances(self, hypotheses: Sequence[Hypothesis], trials: Sequence[Trial]) -> FloatArray:
         """Returns the distance of each hypothesis from all trials together, ``(n,)``.
 
@@ -97,7 +108,9 @@ class Evidence:
     def _prepare(self, trial: Trial) -> PreparedTrial:
         key = _key(trial)
         if key not in self._prepared:
-            self._prepared[key] = self._checked(self._comparator.prepare(trial))
+            prepared = self._checked(self._comparator.prepare(trial))
+            check_magnitudes(trial, _compared_signals(prepared.request))
+            self._prepared[key] = prepared
         return self._prepared[key]
 
     def _checked(self, prepared: PreparedTrial) -> PreparedTrial:
@@ -150,6 +163,12 @@ class Evidence:
             f"the comparator {self._comparator.name!r} {problem}: run "
             f"selfmodel.diagnosis.comparator_contract.check_comparator on it"
         )
+
+
+def _compared_signals(request: Request) -> tuple[Signal, ...]:
+    """Returns the signals of a trial that a comparison depends on, each once."""
+    states = (*request.states, "commands") if isinstance(request, Segments) else ()
+    return tuple(dict.fromkeys((*states, *request.record)))
 
 
 def simulate(

@@ -18,7 +18,8 @@ def confidence_to_dict(diagnosis: Diagnosis) -> dict[str, Any]:
     values = diagnosis.to_dict()
     extra = [_extra(hypothesis, diagnosis.best) for hypothesis in diagnosis.undetectable]
     keys = ("verdict", "rivals", "unseen", "test", "outside", "intact_distance")
-    return {key: extra if key == "unseen" else values[key] for key in keys}
+    found = {key: extra if key == "unseen" else values[key] for key in keys}
+    return {**found, "reason": diagnosis.reason or None}
 
 
 def ranking_to_list(ranked: Sequence[Candidate]) -> list[dict[str, Any]]:
@@ -31,6 +32,7 @@ def diagnosis_from_dict(values: Mapping[str, Any], parse: Callable[[str], Hypoth
 
     Args:
         values: JSON values. ``outside`` and ``unseen`` are optional: earlier files lack them.
+            ``reason`` is there only for a diagnosis with a reason.
         parse: Reads the notation of a hypothesis.
 
     Raises:
@@ -54,6 +56,7 @@ def diagnosis_from_dict(values: Mapping[str, Any], parse: Callable[[str], Hypoth
         if outside is None
         else UnsearchedFault(parse(outside["hypothesis"]), str(outside["kind"])),
         undetectable=tuple(parse(text) for text in values.get("unseen", ())),
+        reason=str(values.get("reason", "")),
     )
 
 

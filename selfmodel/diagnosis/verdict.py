@@ -1,11 +1,16 @@
 """The verdict of a diagnosis: ``explained``, ``ambiguous`` or ``unexplained``."""
 
+import math
 from collections.abc import Callable, Sequence
 
 from selfmodel.arrays import FloatArray
-from selfmodel.diagnosis.diagnosis import UnsearchedFault, Verdict
+from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, UnsearchedFault, Verdict
 from selfmodel.diagnosis.significance import exceeds_healthy_loss
 from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.trials.trial import Trial
+
+NO_TEST = "none: every simulation diverged"
+"""Name of the test of a diagnosis without a finite distance."""
 
 
 def verdict_of(
@@ -34,3 +39,27 @@ def verdict_of(
     if healthy is not None and exceeds_healthy_loss(losses()[0], healthy()[0]):
         return "unexplained"
     return "ambiguous" if indistinguishable else "explained"
+
+
+def all_diverged(ranked: Sequence[Hypothesis], trials: Sequence[Trial]) -> Diagnosis:
+    """Returns the diagnosis of trials on which the simulation of every hypothesis diverged.
+
+    The verdict is ``unexplained``: the trials do not support any of the hypotheses.
+
+    Args:
+        ranked: Hypotheses that were compared with the trials, at least one.
+        trials: The trials to explain.
+    """
+    logs = ", ".join(trial.path for trial in trials)
+    return Diagnosis(
+        ranked=tuple(Candidate(hypothesis, math.inf) for hypothesis in ranked),
+        trials=len(trials),
+        intact_distance=math.inf,
+        indistinguishable=(),
+        verdict="unexplained",
+        test=NO_TEST,
+        reason=(
+            f"no simulation of the trials remained finite: check the model, and the units and the "
+            f"odometry of {logs}"
+        ),
+    )

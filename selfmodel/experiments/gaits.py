@@ -5,9 +5,11 @@ from pathlib import Path
 from typing import Any
 
 from selfmodel.controllers.controller import Design
+from selfmodel.errors import InputError
+from selfmodel.experiments.grid import PartResult, finished
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.logs.atomic import write_atomic
 from selfmodel.logs.controllers import controller_bytes
+from selfmodel.logs.files import replace_file
 from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.random_streams import repair_stream
 from selfmodel.recovery.repair import RepairSearch
@@ -25,6 +27,22 @@ def gait_settings(settings: Settings) -> dict[str, Any]:
     return {name: values[name] for name in values if name not in DIAGNOSIS_SETTINGS}
 
 
+def check_not_evolved(path: Path) -> None:
+    """Checks that the grid of a missing gait has not finished it.
+
+    Args:
+        path: File of the gait, in the folder of its grid.
+
+    Raises:
+        InputError: The gait was evolved, and its file is missing.
+    """
+    if any(part.key == path.stem for part in finished(path.parent)):
+        raise InputError(
+            f"{path} is missing, a gait of the study: restore the file, or delete "
+            f"{path.with_suffix('')} to evolve the gait again"
+        )
+
+
 def evolve_gait(
     path: Path,
     robot: Robot,
@@ -33,7 +51,7 @@ def evolve_gait(
     *,
     design: Design | None = None,
     score: Score = DISPLACEMENT,
-) -> dict[str, Any]:
+) -> PartResult:
     """Evolves the first gait of a recovery with the same seed, and writes it.
 
     Args:
@@ -45,9 +63,9 @@ def evolve_gait(
         score: Fitness of the repair EA.
 
     Returns:
-        Number of evaluations, as JSON.
+        Number of evaluations, as JSON, and the file.
     """
     repair = RepairSearch(Simulator(robot, threads=1), settings, design, score=score)
     gait = repair(INTACT, (), repair_stream(seed, 0), lambda _generation: None)
-    write_atomic(path, controller_bytes(gait))
-    return {"evaluations": repair.evaluations}
+    replace_file(path, controller_bytes(gait))
+    return PartResult({"evaluations": repair.evaluations}, [path])

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from selfmodel.errors import InputError
-from selfmodel.files import read_file
+from selfmodel.files import encodable, read_file
 from selfmodel.robot.mjcf.adaptation import adapt
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings, parse_setting, read_settings
@@ -69,7 +69,7 @@ def robot(name: str, control_timestep: float) -> Robot:
         return robot_entry(name).robot()
     data = read_file(path, "an MJCF file", LARGEST_MODEL)
     try:
-        return Robot(path.stem, data.decode(), control_timestep)
+        return Robot(encodable(path.stem), data.decode(), control_timestep)
     except (ValueError, KeyError) as error:
         reason = " ".join(str(error).split())
         raise InputError(

@@ -3,17 +3,21 @@
 import csv
 import dataclasses
 import io
+import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_type_hints
 
 from selfmodel.errors import InputError
 from selfmodel.experiments import robots
-from selfmodel.logs.atomic import write_atomic
+from selfmodel.experiments.grid import FinishedPart
+from selfmodel.logs.files import make_folder, replace_file
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
+
+Row = TypeVar("Row", bound="DataclassInstance")
 
 
 def key_of(robot: str) -> str:
@@ -54,6 +58,35 @@ def as_csv(record: "type[DataclassInstance]", rows: Sequence["DataclassInstance"
     return text.getvalue()
 
 
+def as_rows(record: "type[Row]", part: FinishedPart) -> list["Row"]:
+    """Returns the rows in the result of a part.
+
+    Args:
+        record: Class of the rows; its annotations are the types of the columns.
+        part: The part.
+
+    Raises:
+        InputError: A row has other columns, or a value of another type.
+    """
+    types = {name: get_args(hint) or (hint,) for name, hint in get_type_hints(record).items()}
+    rows = part.result if isinstance(part.result, list) else [part.result]
+    for row in rows:
+        if not isinstance(row, dict) or row.keys() != types.keys():
+            raise _no_row(part, f"a row without the columns {', '.join(types)}")
+        for name, value in row.items():
+            known = (*types[name], int) if float in types[name] else types[name]
+            if type(value) not in known:
+                raise _no_row(part, f"{name} = {json.dumps(value)[:80]}")
+    return [record(**row) for row in rows]
+
+
+def _no_row(part: FinishedPart, got: str) -> InputError:
+    return InputError(
+        f"{part.path}: expected the rows of a part, got {got}; delete the file, and the same "
+        f"command runs its part again"
+    )
+
+
 def as_dicts(rows: Iterable["DataclassInstance"]) -> list[dict[str, Any]]:
     """Returns rows as JSON."""
     return [dataclasses.asdict(row) for row in rows]
@@ -67,9 +100,9 @@ def write_files(folder: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
         files: Content by path relative to the folder.
 
     Raises:
-        OSError: A file cannot be written.
+        LogWriteError: A file cannot be written.
     """
     for name, data in files.items():
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        write_atomic(folder / name, data)
+        make_folder((folder / name).parent)
+        replace_file(folder / name, data)
     return tuple(folder / name for name in files)

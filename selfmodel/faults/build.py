@@ -8,6 +8,7 @@ from mujoco import MjModel, MjSpec
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.mjcf.mujoco_errors import mujoco_errors_as_input_errors
 from selfmodel.robot.robot import Robot
 
 SpecEdit = Callable[[MjSpec], None]
@@ -34,7 +35,8 @@ def build(
             default.
 
     Raises:
-        InputError: A fault does not apply to the model, such as roughness without a ground plane.
+        InputError: A fault does not apply to the model, such as roughness without a ground plane,
+            or MuJoCo cannot simulate the model.
     """
     model = compile_model(robot, hypothesis, seed, edits)
     if perturb is not None:
@@ -64,7 +66,8 @@ def compile_model(
             fault.kind.edit_spec(spec, fault, seed)
     for edit in edits:
         edit(spec)
-    return spec.compile()
+    with mujoco_errors_as_input_errors(f"compile the model of {hypothesis}"):
+        return spec.compile()
 
 
 def apply_faults(
@@ -83,15 +86,16 @@ def apply_faults(
         return embodiment
     for fault in hypothesis.faults:
         fault.kind.apply(embodiment, anatomy, fault)
-    # One MjData for both models, which have one layout: its allocation takes the most time here.
-    data = mujoco.MjData(model)
-    nominal = _mean_inertia(model, data)
-    mujoco.mj_setConst(embodiment.model, data)
-    # Tendons keep their length, although a welded joint's angle has become its reference.
-    embodiment.model.tendon_length0[:] = model.tendon_length0
-    # The solver's tolerance is relative to the mean inertia, and a welded hinge's armature would
-    # make any solution converged. The absolute tolerance is kept.
-    embodiment.model.opt.tolerance *= nominal / _mean_inertia(embodiment.model, data)
+    with mujoco_errors_as_input_errors(f"simulate the model of {hypothesis}"):
+        # One MjData for both models, which have one layout: its allocation takes the most time.
+        data = mujoco.MjData(model)
+        nominal = _mean_inertia(model, data)
+        mujoco.mj_setConst(embodiment.model, data)
+        # Tendons keep their length, although a welded joint's angle has become its reference.
+        embodiment.model.tendon_length0[:] = model.tendon_length0
+        # The solver's tolerance is relative to the mean inertia, and a welded hinge's armature
+        # would make any solution converged. The absolute tolerance is kept.
+        embodiment.model.opt.tolerance *= nominal / _mean_inertia(embodiment.model, data)
     return embodiment
 
 

@@ -12,6 +12,9 @@ from selfmodel.faults.kind import ENVIRONMENT, Fault, FaultKind
 from selfmodel.faults.registry import KINDS
 from selfmodel.robot.anatomy import Anatomy
 
+MAX_LENGTH = 20_000
+"""Maximum length of a notation, characters: some 500 faults."""
+
 
 def parse(
     text: str, anatomy: Anatomy, kinds: Iterable[FaultKind] = tuple(KINDS.values())
@@ -31,15 +34,21 @@ def parse(
     if text.strip() == str(INTACT):
         return INTACT
     accepted = tuple(kinds)
+    if len(text) > MAX_LENGTH:
+        raise InputError(
+            f"expected a hypothesis of at most {MAX_LENGTH} characters, got {len(text)}: a robot "
+            f"has fewer parts"
+        )
     faults = [_fault(term.strip(), text, anatomy, accepted) for term in text.split("+")]
-    for index, fault in enumerate(faults):
-        for earlier in faults[:index]:
-            if _key(earlier) == _key(fault) and earlier.severity != fault.severity:
-                raise InputError(
-                    f"{text!r} gives {fault.kind.keyword}{':' if fault.part else ''}{fault.part} "
-                    f"two severities, {earlier.severity!r} and {fault.severity!r}: keep one of "
-                    f"the terms"
-                )
+    first: dict[tuple[str, str, str], Fault] = {}
+    for fault in faults:
+        earlier = first.setdefault(_key(fault), fault)
+        if earlier.severity != fault.severity:
+            raise InputError(
+                f"{text!r} gives {fault.kind.keyword}{':' if fault.part else ''}{fault.part} "
+                f"two severities, {earlier.severity!r} and {fault.severity!r}: keep one of "
+                f"the terms"
+            )
     return canonical(faults, anatomy)
 
 

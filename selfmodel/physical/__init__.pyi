@@ -3,3 +3,4 @@ from .interface import PhysicalRobot as PhysicalRobot, TimedRobot as TimedRobot
 from .reality_gap import draw_gap as draw_gap
 from .safety_limits import Limit as Limit, joint_limits as joint_limits, tilt_limit as tilt_limit
 from .simulated_robot import SimulatedRobot as SimulatedRobot
+from .stop_signals import Terminated as Terminated, handle_stop_signals as handle_stop_signals

@@ -1,8 +1,8 @@
 """Physical robot behind a ``dm_env.Environment``, such as real hardware."""
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from functools import partial
 from typing import Any
 
@@ -16,6 +16,8 @@ from selfmodel.errors import InputError, TrialError
 from selfmodel.physical.cleanup import Cleanup
 from selfmodel.physical.safety_limits import Limit
 from selfmodel.physical.step_timing import TIMESTAMP, StepTimer
+from selfmodel.physical.stop_signals import HeldIterator, release_stop_signals
+from selfmodel.physical.watchdog import HangError, Watchdog
 from selfmodel.robot.actuator_ranges import command_ranges
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Sample
@@ -24,6 +26,9 @@ from selfmodel.trials.signals import SIGNALS, Names, Signal
 Observe = Callable[[Any], Mapping[str, Any] | None]
 """Function from an observation of the environment to signals by name, each ``(width,)``, with an
 optional ``time``. Absent signals and NaN count as not observed; None if there is no observation."""
+
+Call = Callable[[str, Callable[[], Any]], Any]
+"""Function that calls a named function of the driver, and returns its result."""
 
 
 def signals_by_name(
@@ -63,7 +68,8 @@ class EnvironmentRobot:
 
     The safe command is sent before ``reset`` and at the end. It is the first action after an early
     end of a trial: an exception in the environment, an exceeded limit, missing observations,
-    Ctrl-C, or a caller that stops iterating.
+    a caller that stops iterating, or a signal: Ctrl-C, and within ``handle_stop_signals``, as in
+    ``run_trial`` and ``recover``, SIGTERM and SIGHUP. A signal does not interrupt the safe command.
 
     Args:
         env: The environment. Its actions are the motor targets, in the order of the model's motors.
@@ -77,13 +83,19 @@ class EnvironmentRobot:
             required, as the controller's readings are.
         critical: Signals that must not be NaN in an observation that arrived.
         patience: Consecutive steps for which a required signal may be missing.
+        watchdog: Time limit of each ``reset`` and ``step``, s, after which the trial ends and the
+            safe command is sent although the driver has not returned. It is sent once more when the
+            driver returns. The trial waits for that for at most the same time. With a watchdog, a
+            thread of its own calls the driver, and ``stop`` is called from another thread while a
+            step hangs; so ``stop`` is required. None, the default, is no limit: the driver is
+            called from the thread of the trial.
         tolerance: Largest deviation of a punctual step, as a fraction of the control time step.
         silent_neurons: Indices of the silent hidden neurons of the controller.
         clock: Monotonic clock, s. Timestamps of observations, as ``time``, take precedence.
 
     Raises:
         InputError: The number of actions of the environment, or of safe targets, is not the number
-            of motors.
+            of motors, or a watchdog has no ``stop`` or no positive time.
     """
 
     def __init__(
@@ -97,6 +109,7 @@ class EnvironmentRobot:
         limits: Sequence[Limit] = (),
         critical: Sequence[Signal] = (),
         patience: int = 5,
+        watchdog: float | None = None,
         tolerance: float = 0.25,
         silent_neurons: Iterable[int] = (),
         clock: Callable[[], float] = time.monotonic,
@@ -112,10 +125,18 @@ class EnvironmentRobot:
                     f"{what} must be targets of the {motors[0]} motors of {robot.name} "
                     f"({', '.join(robot.anatomy.motors)}), got the shape {shape}"
                 )
+        if watchdog is not None and (stop is None or not 0 < watchdog < float("inf")):
+            raise InputError(
+                f"a watchdog needs a time of more than 0 s, and stop=, a function that stops the "
+                f"robot while the environment hangs; got {watchdog!r} and "
+                f"{'no function' if stop is None else 'a function'}"
+            )
         self._env, self._robot, self._observe = env, robot, observe
         self._halt = stop or partial(_step_to, env, targets)
         self._limits, self._critical = tuple(limits), tuple(critical)
         self._patience, self._tolerance = patience, tolerance
+        self._watchdog_seconds = watchdog
+        self._watchdog: Watchdog | None = None
         self._silent_neurons = frozenset(silent_neurons)
         self.clock = clock
 
@@ -123,7 +144,8 @@ class EnvironmentRobot:
         """Runs a controller; see ``PhysicalRobot``.
 
         The caller must close the returned iterator, as ``write_trial`` does: closing it stops the
-        robot.
+        robot. Between two samples, only ``handle_stop_signals`` makes SIGTERM and SIGHUP an
+        exception in the caller.
 
         Raises:
             TrialError: The environment failed, ended its episode or returned no observations, or a
@@ -131,15 +153,34 @@ class EnvironmentRobot:
                 failed stop.
             InputError: The observations do not have the shapes of the robot's signals.
         """
-        with Cleanup(self._make_safe):  # after Ctrl-C and programming errors too
+        return HeldIterator(self._run(controller, steps))
+
+    def _run(self, controller: CommandSource, steps: int) -> Generator[Sample, None, None]:
+        # The safe command comes before the watchdog waits for a driver that hangs.
+        with self._driver() as call, Cleanup(self._make_safe):  # after programming errors too
             self._make_safe()
-            yield from self._steps(controller, steps)
+            yield from self._steps(call, controller, steps)
+
+    @contextmanager
+    def _driver(self) -> Iterator[Call]:
+        """Yields a function that calls the driver, with or without a time limit.
+
+        Raises:
+            TrialError: The driver still hangs in a call of an earlier trial.
+        """
+        if self._watchdog_seconds is None:
+            yield lambda _, function: function()
+            return
+        if self._watchdog is not None and self._watchdog.hangs:
+            raise TrialError("the driver has not returned from a call of an earlier trial")
+        with Watchdog(self._watchdog_seconds, self._send_safe) as self._watchdog:
+            yield self._watchdog.call
 
     def _make_safe(self) -> None:
         try:
             self._send_safe()
-        except KeyboardInterrupt:
-            # A second Ctrl-C must not prevent the safe command of the first.
+        except (KeyboardInterrupt, SystemExit):
+            # From the caller's own handler of a signal: it must not prevent the safe command.
             with Cleanup(self._send_safe):
                 raise
 
@@ -151,7 +192,7 @@ class EnvironmentRobot:
                 f"the safe command could not be sent: {_type_and_message(error)}"
             ) from error
 
-    def _steps(self, controller: CommandSource, steps: int) -> Iterator[Sample]:
+    def _steps(self, call: Call, controller: CommandSource, steps: int) -> Iterator[Sample]:
         robot = self._robot
         names, timestep = robot.anatomy.names, robot.control_timestep
         controllers = make_batch([controller], [self._silent_neurons], len(names.sensors))
@@ -172,7 +213,7 @@ class EnvironmentRobot:
                     f"the environment ended its episode after {k} of {steps} steps: give it a "
                     f"longer time limit, or the trial fewer steps"
                 )
-            result = self._step_environment(commands[0] if k else None)
+            result = self._step_environment(call, commands[0] if k else None)
             ended = result is not None and result.last()
             observation = self._observe(result.observation) if result is not None else None
             timing = timer.update(self.clock(), observation)
@@ -187,12 +228,17 @@ class EnvironmentRobot:
             values["commands"] = commands[0].copy()
             yield Sample(k * timestep, values, timing)
 
-    def _step_environment(self, targets: FloatArray | None) -> dm_env.TimeStep | None:
+    def _step_environment(self, call: Call, targets: FloatArray | None) -> dm_env.TimeStep | None:
         """Returns the result of a step, or of a reset without targets; None after a timeout."""
         try:
-            return self._env.reset() if targets is None else self._env.step(targets.copy())
+            with release_stop_signals():
+                if targets is None:
+                    return call("reset", self._env.reset)
+                return call("step", partial(self._env.step, targets.copy()))
         except TimeoutError:
             return None
+        except HangError:
+            raise
         except Exception as error:  # the caller's environment may raise any exception
             raise TrialError(f"the environment failed: {_type_and_message(error)}") from error
 

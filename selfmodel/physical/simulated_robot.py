@@ -18,6 +18,7 @@ from selfmodel.physical.measurement_noise import ExactMeasurement, Measurement, 
 from selfmodel.physical.reality_gap import RealityGap, perturbed_model
 from selfmodel.physical.structural_mismatch import StructuralMismatch, add_structural_mismatch
 from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.mjcf.mujoco_errors import mujoco_errors_as_input_errors
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
 from selfmodel.robot.state_access import bind_data, signal_fields
@@ -78,6 +79,7 @@ class SimulatedRobot:
 
         Raises:
             TrialError: The simulation diverged.
+            InputError: MuJoCo cannot simulate the model.
         """
         (child,) = self._noise.spawn(1)
         embodiment = self._embodiment
@@ -105,7 +107,8 @@ class SimulatedRobot:
             delay += self._gap.delay
             randomize_initial_pose(robot, model, data, self._gap.level, rng)
             place_debris(model, data, self._limbs)
-        mujoco.mj_forward(model, data)
+        with mujoco_errors_as_input_errors("simulate the physical robot"):
+            mujoco.mj_forward(model, data)
         reader = SensorReader(model, robot.anatomy, [embodiment])
         controllers = make_batch(
             [controller], [embodiment.silent_neurons], len(robot.anatomy.sensors)
@@ -129,10 +132,17 @@ class SimulatedRobot:
                     for signal in SIGNALS
                 },
             )
-            if k + 1 < steps:
-                mujoco.mj_step(model, data, substeps)
-                if data.warning.number.any():
-                    raise TrialError(
-                        f"the simulation of the physical robot diverged after step {k}: its model "
-                        f"is unstable under this controller; try a smaller physics time step"
-                    )
+            if k + 1 < steps and not _advanced(model, data, substeps):
+                raise TrialError(
+                    f"the simulation of the physical robot diverged after step {k}: its model "
+                    f"is unstable under this controller; try a smaller physics time step"
+                )
+
+
+def _advanced(model: mujoco.MjModel, data: mujoco.MjData, substeps: int) -> bool:
+    """Advances by a number of physics steps; returns whether the state is valid afterwards."""
+    try:
+        mujoco.mj_step(model, data, substeps)
+    except mujoco.FatalError:  # such as a lack of memory for contacts
+        return False
+    return not data.warning.number.any()

@@ -6,6 +6,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Controller, Design, draw_genomes
+from selfmodel.errors import WorkError
 from selfmodel.evolution import Evolution, GenerationCallback, evolve
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.recovery.fitness import DISPLACEMENT, Score
@@ -61,6 +62,9 @@ class RepairSearch:
                 are ignored.
             rng: Random number generator of all random choices.
             on_generation: Callback, called after each generation.
+
+        Raises:
+            WorkError: The simulation diverged with every controller.
         """
         design = self._design
 
@@ -77,6 +81,12 @@ class RepairSearch:
         )
         evolve(search, fitness, on_generation)
         self.evaluations += search.evaluations
+        if search.best_fitness == -np.inf:
+            raise WorkError(
+                f"no simulation of {self._simulator.robot.name} as {hypothesis} remained finite, "
+                f"with {search.evaluations} controllers: check the model, such as its physics time "
+                f"step, masses and motors"
+            )
         return Controller(design, search.best)
 
     def _simulate(self, runs: list[Run]) -> FloatArray:

@@ -11,6 +11,20 @@ from selfmodel.recovery.random_streams import diagnosis_stream
 from selfmodel.trials.trial import Trial
 
 
+def simulated_steps(trials: Sequence[Trial], diagnose: DiagnosticSearch) -> int:
+    """Returns the estimated number of control steps that ``diagnose_trials`` simulates.
+
+    Args:
+        trials: Trials since the failure, as for ``diagnose_trials``.
+        diagnose: Diagnostic EA.
+
+    Raises:
+        InputError: A trial lacks signals that the comparator needs.
+    """
+    diagnose.check(trials)
+    return sum(diagnose.simulated_steps(trials[:n]) for n in range(1, len(trials) + 1))
+
+
 def diagnose_trials(
     trials: Sequence[Trial],
     diagnose: DiagnosticSearch,

@@ -1,6 +1,7 @@
-"""Rejects models with state that a log does not record or that cannot be restored mid-trial."""
+"""Rejects models that cannot be simulated, or whose state a log does not record or restore."""
 
 import mujoco
+import numpy as np
 
 from selfmodel.robot.floating_base import joints_of_body
 from selfmodel.robot.transmission import SUPPORTED_TRANSMISSIONS
@@ -22,6 +23,18 @@ _SUPPORTED_DYNAMICS = tuple(
 _SUPPORTED_GAINS = (int(mujoco.mjtGain.mjGAIN_FIXED), int(mujoco.mjtGain.mjGAIN_AFFINE))
 _SUPPORTED_BIASES = (int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_AFFINE))
 
+MAX_NUMBER = float(mujoco.mjMAXVAL)
+"""Largest number of a model: MuJoCo resets a simulation whose state or acceleration exceeds it."""
+
+_OPTIONS = ("timestep", "gravity", "wind", "magnetic", "density", "viscosity")
+_NUMBERS = (
+    *("qpos0", "body_pos", "body_quat", "body_ipos", "body_mass", "body_inertia"),
+    *("geom_pos", "geom_size", "geom_friction", "jnt_pos", "jnt_range", "jnt_stiffness"),
+    *("dof_armature", "dof_damping", "dof_frictionloss", "tendon_stiffness", "tendon_damping"),
+    *("actuator_gear", "actuator_gainprm", "actuator_biasprm", "actuator_dynprm"),
+)
+"""Attributes of a model that determine its motion."""
+
 
 def check_model(model: mujoco.MjModel, root: int) -> None:
     """Checks that a robot of this model can be logged, damaged and predicted from its logs.
@@ -31,8 +44,10 @@ def check_model(model: mujoco.MjModel, root: int) -> None:
         root: Id of the root body.
 
     Raises:
-        ValueError: The model has an unsupported part; the message contains the name of the part.
+        ValueError: The model has an unsupported part, or a number that is not finite or absurdly
+            large; the message contains the name of the part.
     """
+    _check_numbers(model)
     base_joints = joints_of_body(model, root)
     for j in range(model.njnt):
         kind = int(model.jnt_type[j])
@@ -49,6 +64,18 @@ def check_model(model: mujoco.MjModel, root: int) -> None:
     for m in range(model.nu):
         _check_motor(model, m)
     _check_names(model)
+
+
+def _check_numbers(model: mujoco.MjModel) -> None:
+    numbers = [(f"option {name}", getattr(model.opt, name)) for name in _OPTIONS]
+    numbers += [(name.replace("_", " "), getattr(model, name)) for name in _NUMBERS]
+    for name, values in numbers:
+        wrong = np.ravel(values)[~(np.abs(np.ravel(values)) <= MAX_NUMBER)]
+        if len(wrong):
+            raise ValueError(
+                f"expected finite numbers of at most {MAX_NUMBER:g} in the model's {name}, got "
+                f"{wrong[0]:g}"
+            )
 
 
 def _check_motor(model: mujoco.MjModel, motor: int) -> None:

@@ -11,6 +11,9 @@ from selfmodel.robot.anatomy_reader import driven_joints, read_anatomy
 from selfmodel.robot.control_delay import control_delay, has_control_delay
 from selfmodel.robot.floating_base import find_root_body
 from selfmodel.robot.model_checks import check_model
+from selfmodel.robot.mujoco_log import configure
+
+configure()
 
 
 @dataclass(frozen=True, eq=False)

@@ -87,6 +87,11 @@ class Budget:
         return self.memory // 30
 
     @property
+    def json_bytes(self) -> int:
+        """Largest JSON file, bytes: parsed and verified, it takes up to thirty times its size."""
+        return self.memory // 60
+
+    @property
     def records(self) -> int:
         """Largest number of messages of one file: each takes up to 1 kB."""
         return self.memory // 1000

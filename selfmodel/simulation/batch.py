@@ -9,6 +9,8 @@ from mujoco.batch import Batch, SimulationError
 
 from selfmodel.arrays import BoolArray, IndexArray
 from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.mjcf.mujoco_errors import mujoco_errors_as_input_errors
+from selfmodel.robot.mujoco_log import uncounted_warnings
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state_access import signal_fields
 from selfmodel.robot.state_fields import Reader
@@ -16,9 +18,14 @@ from selfmodel.trials.signals import Signal
 
 
 def new_batch(model: mujoco.MjModel, embodiments: Sequence[Embodiment], threads: int) -> Batch:
-    """Returns a batch with one simulation per embodiment."""
-    batch = Batch(model, len(embodiments), nthread=threads)
-    batch.set_models([embodiment.model for embodiment in embodiments])
+    """Returns a batch with one simulation per embodiment.
+
+    Raises:
+        InputError: MuJoCo cannot simulate the models, such as for lack of memory.
+    """
+    with mujoco_errors_as_input_errors("simulate the model"):
+        batch = Batch(model, len(embodiments), nthread=threads)
+        batch.set_models([embodiment.model for embodiment in embodiments])
     return batch
 
 
@@ -41,6 +48,8 @@ def live_signals(
 class LiveBatch:
     """Batch that steps only the simulations without a MuJoCo error, and records divergence.
 
+    MuJoCo's warnings are not counted: a simulation with a warning is recorded as diverged.
+
     MuJoCo resets a simulation with a warning, which continues to be stepped: its values are
     invalid, but the simulations of a batch are independent.
     """
@@ -49,6 +58,15 @@ class LiveBatch:
         self._batch = batch
         self._ids: IndexArray | None = None
         self._failed = np.zeros(batch.nsim, dtype=bool)
+
+    def reset(self, stage: mujoco.mjtStage) -> None:
+        """Resets all simulations to the reference pose.
+
+        Args:
+            stage: Stage up to which the quantities that depend on the state are computed.
+        """
+        with self._failures():
+            self._batch.reset(stage=stage)
 
     def forward(self) -> None:
         """Computes all quantities that depend on the state (``mj_forward``)."""
@@ -63,7 +81,8 @@ class LiveBatch:
     @contextmanager
     def _failures(self) -> Iterator[None]:
         try:
-            yield
+            with uncounted_warnings():
+                yield
         except SimulationError as error:
             self._failed[error.ids] = True
             self._ids = np.flatnonzero(~self._failed)
@@ -72,15 +91,3 @@ class LiveBatch:
         """Returns a mask of the simulations that diverged or had a warning, ``(n,)``."""
         warned: BoolArray = self._batch.warning[:, :, 1].any(axis=1)
         return np.asarray(self._failed | warned)
-
-
-@contextmanager
-def silence_mujoco_warnings() -> Iterator[None]:
-    """Suppresses MuJoCo's warnings on the terminal and in its log file; each run counts its own."""
-    before, quiet = mujoco.MjLogConfig.get(), mujoco.MjLogConfig.get()
-    quiet.logto_console = quiet.logto_file = False
-    mujoco.MjLogConfig.set(quiet)
-    try:
-        yield
-    finally:
-        mujoco.MjLogConfig.set(before)

@@ -59,6 +59,10 @@ changes the time at which a foot makes contact."""
 CANDIDATE_DELAYS = range(MAX_CONTROL_DELAY + 1)
 """Control delays of the exhaustive search, control steps."""
 
+MAX_ERROR = 1e6
+"""Bound on the absolute error of a prediction, in ``CALIBRATION_ERROR_SCALES``: the error of a
+simulation that is no longer finite. The solver does not end on numbers that are not finite."""
+
 MAX_ITERATIONS = 3
 """Largest number of iterations of the least-squares solver."""
 
@@ -142,13 +146,15 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
         threads: Threads of MuJoCo's steps.
 
     Raises:
-        InputError: There are no trials, or too little of a trial was observed.
+        InputError: There are no trials, too little of a trial was observed, or every simulation
+            diverged.
     """
     if not trials:
         raise InputError("expected at least one trial of the healthy robot, got none")
     data = [calibration_segments_of(trial) for trial in trials]
     start = nominal(robot)
-    before = _error(robot, start, data, threads)
+    stats = SimulationStats()
+    before = _error(robot, start, data, threads, stats)
     deviations = np.full(len(start.factors), PRIOR_DEVIATION)
     if before < EXACT_ERROR:
         return Calibration(robot, start, deviations, before, before)
@@ -171,6 +177,12 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
         verbose=mujoco.minimize.Verbosity.SILENT,
     )
     fitted_parameters = from_factors(np.exp(fitted.ravel()), delay)
+    error = _error(robot, fitted_parameters, data, threads, stats)
+    if stats.diverged == stats.runs:
+        raise InputError(
+            f"{', '.join(trial.path for trial in trials)}: no simulation of the healthy robot "
+            f"remained finite, before and after the fit: check the model and the units of the log"
+        )
     # Independent segments: long simulations are chaotic, so their derivatives are meaningless.
     independent = _with_estimated_base(robot, fitted_parameters, data, threads)
     slopes = _slopes(residuals_at(delay, independent), fitted)
@@ -181,8 +193,27 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
         parameters=fitted_parameters,
         deviations=np.sqrt(np.diag(spread)),
         error_before=before,
-        error=_error(robot, fitted_parameters, data, threads),
+        error=error,
     )
+
+
+def simulated_steps(robot: Robot, trials: Sequence[Trial]) -> int:
+    """Returns the number of control steps that ``calibrate`` simulates at most, but for retries.
+
+    A model that predicts the trials exactly takes one prediction of each.
+
+    Args:
+        robot: The robot as its model describes it.
+        trials: The trials, as for ``calibrate``.
+
+    Raises:
+        InputError: Too little of a trial was observed.
+    """
+    cut = [calibration_segments_of(trial).segments for trial in trials]
+    slopes = 2 * len(nominal(robot).factors)
+    # Errors before and after, each delay, then slopes and a new point per iteration.
+    models = 3 + len(CANDIDATE_DELAYS) + MAX_ITERATIONS * (slopes + 1) + slopes
+    return models * sum(len(segments.commands) * segments.horizon for segments in cut)
 
 
 def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> float:
@@ -201,7 +232,7 @@ def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> flo
         InputError: Too little of a trial was observed.
     """
     data = [calibration_segments_of(trial) for trial in trials]
-    return _error(robot, nominal(robot), data, threads)
+    return _error(robot, nominal(robot), data, threads, SimulationStats())
 
 
 Residual = Callable[[FloatArray], FloatArray]
@@ -225,22 +256,26 @@ def _residuals(
     """Returns the residuals of the data, then those of the prior; see ``Residual``."""
     logarithms = np.reshape(logarithms, (len(logarithms), -1))
     models = [from_factors(np.exp(row), delay) for row in logarithms.T]
-    errors = _errors(robot, models, data, threads)
+    errors = _errors(robot, models, data, threads, SimulationStats())
     weight = np.sqrt(len(errors)) * PRIOR_WEIGHT / PRIOR_DEVIATION
     return np.concatenate([_damped(errors), weight * logarithms])
 
 
 def _error(
-    robot: Robot, parameters: Parameters, data: Sequence[CalibrationSegments], threads: int
+    robot: Robot,
+    parameters: Parameters,
+    data: Sequence[CalibrationSegments],
+    threads: int,
+    stats: SimulationStats,
 ) -> float:
-    return float(np.sqrt(np.mean(_errors(robot, [parameters], data, threads) ** 2)))
+    return float(np.sqrt(np.mean(_errors(robot, [parameters], data, threads, stats) ** 2)))
 
 
 def _with_estimated_base(
     robot: Robot, fitted_parameters: Parameters, data: Sequence[CalibrationSegments], threads: int
 ) -> list[CalibrationSegments]:
     """Returns independent segments; an unobserved base begins in its predicted state."""
-    predict_with = _predictor(robot, [fitted_parameters], threads)
+    predict_with = _predictor(robot, [fitted_parameters], threads, SimulationStats())
 
     def independent(own: CalibrationSegments) -> CalibrationSegments:
         segments = own.segments
@@ -254,22 +289,28 @@ def _with_estimated_base(
 
 
 def _errors(
-    robot: Robot, models: Sequence[Parameters], data: Sequence[CalibrationSegments], threads: int
+    robot: Robot,
+    models: Sequence[Parameters],
+    data: Sequence[CalibrationSegments],
+    threads: int,
+    stats: SimulationStats,
 ) -> FloatArray:
-    """Returns prediction errors divided by their scales, ``(errors, models)``."""
-    predict_with = _predictor(robot, models, threads)
+    """Returns prediction errors divided by their scales, ``(errors, models)``, all finite."""
+    predict_with = _predictor(robot, models, threads, stats)
     rows = []
     for own in data:
         predicted = predict_with(own.segments)
         for signal, scale in CALIBRATION_ERROR_SCALES.items():
             if signal in own.observed:
-                error = difference(signal, predicted[signal][:, :, 1:], own.observed[signal])
-                rows.append((error / scale)[:, own.judged].reshape(len(models), -1))
-    return np.concatenate(rows, axis=1).T
+                with np.errstate(over="ignore", invalid="ignore"):  # bounded below
+                    error = difference(signal, predicted[signal][:, :, 1:], own.observed[signal])
+                    rows.append((error / scale)[:, own.judged].reshape(len(models), -1))
+    errors = np.nan_to_num(np.concatenate(rows, axis=1).T, nan=MAX_ERROR)
+    return np.clip(errors, -MAX_ERROR, MAX_ERROR)
 
 
 def _predictor(
-    robot: Robot, models: Sequence[Parameters], threads: int
+    robot: Robot, models: Sequence[Parameters], threads: int, stats: SimulationStats
 ) -> Callable[[Segments], Behaviour]:
     """Returns a function that predicts segments with models of equal delay.
 
@@ -282,9 +323,7 @@ def _predictor(
     ]
 
     def predict_with(segments: Segments) -> Behaviour:
-        outcome = predict(
-            robot, embodiments, segments, threads=threads, stats=SimulationStats(), delay=delay
-        )
+        outcome = predict(robot, embodiments, segments, threads=threads, stats=stats, delay=delay)
         return outcome.behaviour
 
     return predict_with

@@ -9,6 +9,7 @@ from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.errors import InputError
 from selfmodel.simulation.requests import LEAD, Segments, command_steps, cut_segments
 from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.magnitudes import check_magnitudes
 from selfmodel.trials.signals import Signal
 from selfmodel.trials.state_estimation import ONBOARD, STATE, estimated_states
 from selfmodel.trials.trial import Trial
@@ -48,7 +49,8 @@ def calibration_segments_of(trial: Trial) -> CalibrationSegments:
     pose: each begins with the base in the predicted state at the end of the segment before.
 
     Raises:
-        InputError: Too few states and commands are known for any segments.
+        InputError: Too few states and commands are known for any segments, or a value is infinite
+            or absurdly large.
     """
     if trial.behaviour.steps <= LEAD + HORIZON:
         raise _unusable(trial, f"the trial has {trial.behaviour.steps}")
@@ -58,6 +60,7 @@ def calibration_segments_of(trial: Trial) -> CalibrationSegments:
         raise _unusable(
             trial, f"the log never has {never}" if never else "the log has no such segment"
         )
+    check_magnitudes(trial, (*segments.observed, "commands"))
     return segments
 
 

@@ -14,7 +14,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
 from selfmodel.robot.state_access import state_writer
 from selfmodel.simulation.activations import initial_activations
-from selfmodel.simulation.batch import LiveBatch, live_signals, new_batch, silence_mujoco_warnings
+from selfmodel.simulation.batch import LiveBatch, live_signals, new_batch
 from selfmodel.simulation.outcome import SimulationResult, SimulationStats
 from selfmodel.simulation.requests import Segments
 from selfmodel.trials.behaviour import Behaviour
@@ -89,26 +89,25 @@ def predict(
     }
     inputs = _BatchInputs(robot, batch, moving, segments)
     activations = initial_activations(robot, segments, delay_steps)
-    batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE)
     alive = LiveBatch(batch)
+    alive.reset(mujoco.mjtStage.mjSTAGE_NONE)
     first = segments.lead - delay_steps
-    with silence_mujoco_warnings():
-        for stage in stages:
-            inputs.write_states(activations, stage)
-            clock = perf_counter()
-            alive.forward()
-            stats.physics_seconds += perf_counter() - clock
-            for k in range(horizon + 1):
-                if "sensors" in kept:
-                    reader.read(sensordata[batch_rows], qpos[batch_rows], readings)
-                    kept["sensors"][:, stage, k] = readings.reshape(n, together, -1)
-                for signal, read in live.items():
-                    kept[signal][:, stage, k] = read()[batch_rows].reshape(n, together, -1)
-                if k < horizon:
-                    inputs.write_commands(segments.commands[stage, first + k])
-                    clock = perf_counter()
-                    alive.step(robot.substeps)
-                    stats.physics_seconds += perf_counter() - clock
+    for stage in stages:
+        inputs.write_states(activations, stage)
+        clock = perf_counter()
+        alive.forward()
+        stats.physics_seconds += perf_counter() - clock
+        for k in range(horizon + 1):
+            if "sensors" in kept:
+                reader.read(sensordata[batch_rows], qpos[batch_rows], readings)
+                kept["sensors"][:, stage, k] = readings.reshape(n, together, -1)
+            for signal, read in live.items():
+                kept[signal][:, stage, k] = read()[batch_rows].reshape(n, together, -1)
+            if k < horizon:
+                inputs.write_commands(segments.commands[stage, first + k])
+                clock = perf_counter()
+                alive.step(robot.substeps)
+                stats.physics_seconds += perf_counter() - clock
     diverged: BoolArray = np.any(alive.diverged()[batch_rows].reshape(n, together), axis=1)
     stats.runs += n
     stats.steps += len(moving) * count * horizon

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from functools import lru_cache, partial
 from time import perf_counter
 
+import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray
@@ -15,7 +16,7 @@ from selfmodel.physical.reality_gap import perturbed_models
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
-from selfmodel.simulation.batch import LiveBatch, live_signals, new_batch, silence_mujoco_warnings
+from selfmodel.simulation.batch import LiveBatch, live_signals, new_batch
 from selfmodel.simulation.ground_contacts import ground_contact_points
 from selfmodel.simulation.outcome import SimulationResult, SimulationStats
 from selfmodel.simulation.prediction import predict
@@ -184,19 +185,18 @@ class Simulator:
             signal: np.empty((steps, n, robot.anatomy.names.width(signal))) for signal in record
         }
         # After all bindings: a field that is bound later remains zero until the next step.
-        batch.reset()
         alive = LiveBatch(batch)
-        with silence_mujoco_warnings():
-            for k in range(steps):
-                reader.read(sensordata, qpos, controllers.readings)
-                controllers.step(motors.inlet)
-                motors.advance()
-                for signal, rows in kept.items():
-                    rows[k] = live[signal]()
-                if k + 1 < steps:
-                    start = perf_counter()
-                    alive.step(robot.substeps)
-                    self.stats.physics_seconds += perf_counter() - start
+        alive.reset(mujoco.mjtStage.mjSTAGE_ACC)
+        for k in range(steps):
+            reader.read(sensordata, qpos, controllers.readings)
+            controllers.step(motors.inlet)
+            motors.advance()
+            for signal, rows in kept.items():
+                rows[k] = live[signal]()
+            if k + 1 < steps:
+                start = perf_counter()
+                alive.step(robot.substeps)
+                self.stats.physics_seconds += perf_counter() - start
         diverged = alive.diverged()
         self.stats.runs += n
         self.stats.steps += n * steps

@@ -21,7 +21,9 @@ class Replay:
 
     Attributes:
         simulated: Simulated signals, ``(steps, width)`` each.
-        identical: Whether all observed numbers are bit-identical to the simulated ones.
+        observed: Whether the log has an observed number at all.
+        identical: Whether all observed numbers are bit-identical to the simulated ones; False if
+            nothing was observed.
         first_divergence_step: First step at which a signal differs by more than the tolerance;
             None without such a step.
         errors: Root mean square error of each signal over its columns, ``(steps,)`` in the signal's
@@ -30,6 +32,7 @@ class Replay:
     """
 
     simulated: Behaviour
+    observed: bool
     identical: bool
     first_divergence_step: int | None
     errors: Mapping[Signal, FloatArray]
@@ -37,14 +40,16 @@ class Replay:
 
     def rms(self, signal: Signal, steps: slice = slice(None)) -> float:
         """Returns the root mean square error of a signal over some steps; NaN if not observed."""
-        squares = self.errors[signal][steps] ** 2
-        observed = squares[~np.isnan(squares)]
-        return float(np.sqrt(observed.mean())) if len(observed) else np.nan
+        with np.errstate(over="ignore"):  # values of a diverged simulation
+            squares = self.errors[signal][steps] ** 2
+            observed = squares[~np.isnan(squares)]
+            return float(np.sqrt(observed.mean())) if len(observed) else np.nan
 
     def __repr__(self) -> str:
         step = self.first_divergence_step
         compared = "no divergence" if step is None else f"first divergence at step {step}"
         state = "identical" if self.identical else compared
+        state = state if self.observed else "nothing was observed"
         broken = ", the simulation diverged" if self.diverged else ""
         lines = [f"<Replay of {self.simulated.steps} steps: {state}{broken}"]
         if not self.identical:
@@ -54,6 +59,7 @@ class Replay:
     def to_dict(self) -> dict[str, Any]:
         """Returns the JSON values; a signal's rms is None if not observed, or not finite."""
         return {
+            "observed": self.observed,
             "identical": self.identical,
             "first_divergence_step": self.first_divergence_step,
             "diverged": self.diverged,
@@ -91,7 +97,7 @@ def replay(
     batch = outcome.behaviour
     simulated = Behaviour(batch.names, batch.time, {signal: batch[signal][0] for signal in SIGNALS})
     differs = np.zeros(logged.steps, dtype=bool)
-    identical = True
+    some, identical = False, True
     errors: dict[Signal, FloatArray] = {}
     for signal in SIGNALS:
         recorded, predicted = logged[signal], simulated[signal]
@@ -100,11 +106,13 @@ def replay(
             difference = np.where(observed, predicted - recorded, 0.0)
             differs |= (~(np.abs(difference) <= tolerance) & observed).any(axis=1)
             errors[signal] = _rms_of_rows(difference, observed)
+        some |= bool(observed.any())
         identical &= bool(np.all((_bits(predicted) == _bits(recorded)) | ~observed))
     steps = np.flatnonzero(differs)
     return Replay(
         simulated=simulated,
-        identical=identical,
+        observed=some,
+        identical=some and identical,
         first_divergence_step=int(steps[0]) if len(steps) else None,
         errors=errors,
         diverged=bool(outcome.diverged[0]),

@@ -173,4 +173,5 @@ def forward_displacement(behaviour: Behaviour) -> FloatArray:
         Displacement of each run, m, ``(...)``; ``()`` for a single run.
     """
     x = behaviour["base_position"][..., 0]
-    return np.asarray(x[..., -1] - x[..., 0])
+    with np.errstate(invalid="ignore"):  # a log may contain infinity: the displacement is NaN
+        return np.asarray(x[..., -1] - x[..., 0])

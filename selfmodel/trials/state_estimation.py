@@ -39,6 +39,7 @@ _SMOOTHED: tuple[tuple[Signal, Signal, int, float], ...] = (
 that is smoothed, in the position's unit."""
 
 
+@np.errstate(invalid="ignore", over="ignore")  # infinite values are handled as not observed
 def estimated_states(
     behaviour: Behaviour, signals: tuple[Signal, ...] = STATE
 ) -> Mapping[Signal, FloatArray]:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from selfmodel.controllers.command_source import CommandSource
+from selfmodel.errors import InputError
 from selfmodel.trials.behaviour import Behaviour, forward_displacement
 
 Stage = Literal["before", "after", "recovery", "single"]
@@ -13,10 +14,24 @@ diagnosis explains all trials but those of the stage ``before``, which calibrate
 
 STAGES: tuple[Stage, ...] = get_args(Stage)
 
+MAX_SEED = 2**63 - 1
+"""Largest seed of a trial: the largest integer of most other programs that read logs."""
+
 
 def stage_of(name: str) -> Stage | None:
     """Returns the stage with a name; None if there is no such stage."""
     return next((stage for stage in STAGES if stage == name), None)
+
+
+def checked_seed(seed: int) -> int:
+    """Returns a valid seed of a trial.
+
+    Raises:
+        InputError: The seed is negative, or above ``MAX_SEED``.
+    """
+    if not 0 <= seed <= MAX_SEED:
+        raise InputError(f"seed must be a whole number from 0 to {MAX_SEED}, got {seed}")
+    return seed
 
 
 @dataclass(frozen=True)
@@ -28,7 +43,10 @@ class TrialPlan:
         stage: Stage of the recovery.
         controller: Command source of the robot.
         steps: Planned control steps.
-        seed: Seed of all random numbers of the trial.
+        seed: Seed of all random numbers of the trial, from 0 to ``MAX_SEED``.
+
+    Raises:
+        InputError: The seed is out of range.
     """
 
     name: str
@@ -36,6 +54,9 @@ class TrialPlan:
     controller: CommandSource
     steps: int
     seed: int
+
+    def __post_init__(self) -> None:
+        checked_seed(self.seed)
 
 
 @dataclass(frozen=True, eq=False)

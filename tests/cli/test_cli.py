@@ -16,6 +16,7 @@ from selfmodel.errors import TrialError
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.logs import read_log, save_controller
 from selfmodel.logs.journal import FolderJournal
+from selfmodel.logs.result_files import file_digest, read_result, versions
 from selfmodel.robot.robot import Robot
 from tests.helpers.command import DIAGNOSIS, SMALL, Done, selfmodel, selfmodel_process
 from tests.helpers.drivers import random_controllers
@@ -104,7 +105,23 @@ def test_the_database_is_read_back_from_the_folder(
     assert [t.displacement for t in database.trials] == [t["displacement"] for t in told["trials"]]
     assert [t.plan.stage for t in database.evidence] == ["after", *["recovery"] * TRIALS[run]]
     assert [str(h) for h in database.hypotheses] == [d["hypothesis"] for d in told["diagnosis"]]
-    assert json.loads((folder / "run" / "result.json").read_text(encoding="utf-8")) == told
+
+
+@RUNS
+def test_the_result_file_has_the_printed_object_and_what_it_was_made_with(
+    run: str, request: pytest.FixtureRequest
+):
+    folder, told = request.getfixturevalue(run)
+    found = read_result(folder / "run" / "result.json", "a result", "")
+
+    assert {key: found.content[key] for key in told} == told
+    assert found.content.keys() - told.keys() == {"settings", "files"}
+    assert found.made_with == versions()
+    assert found.content["files"] == {
+        f"trials/{Path(trial['log']).name}": file_digest(folder / trial["log"])
+        for trial in told["trials"]
+    }
+    assert found.content["settings"]["population"] == 8
 
 
 @pytest.mark.process

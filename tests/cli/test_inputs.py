@@ -26,6 +26,7 @@ from selfmodel.errors import InputError
         ("--next-trial", "repairs", "did you mean repair?"),
         ("--only", "3/2", "--only needs i/n"),
         ("--only", "0/2", "--only needs i/n"),
+        ("--only", "1/" + "9" * 5000, "--only needs i/n"),
         ("--damage", "break:nose", "unknown part in the term 'break:nose'"),
         ("--damages", "brek:front_left_knee", "did you mean break?"),
         (

@@ -11,6 +11,7 @@ import mujoco
 import pytest
 
 from selfmodel.logs import read_log
+from selfmodel.logs.info import read_info
 from tests.helpers.command import DIAGNOSIS, SMALL, selfmodel
 
 PAPERS = ("--comparator", "forward-displacement", "--no-calibrate")
@@ -143,11 +144,30 @@ def test_verify_says_ok_or_what_is_wrong_a_line_a_file(folder: Path):
     bad = selfmodel("logs", "verify", "cut.mcap.part", "a.mcap", "no.mcap", cwd=folder)
 
     assert (good.returncode, bad.returncode) == (0, 1)
-    assert good.stdout.splitlines() == [f"ok: {n}.mcap: 1000 steps, finished" for n in "ab"]
+    digests = [read_info(folder / f"{n}.mcap").digest for n in "ab"]
+    assert good.stdout.splitlines() == [
+        f"ok: {n}.mcap: 1000 steps, finished; digest {digest}"
+        for n, digest in zip("ab", digests, strict=True)
+    ]
     lines = bad.stdout.splitlines()
     assert [line.partition(":")[0] for line in lines] == ["error", "ok", "error"]
     assert "ends too early" in lines[0]
     assert "no.mcap: expected a log file that can be read" in lines[2]
+
+
+def test_verify_expects_the_digest_that_info_and_verify_print(folder: Path):
+    told = json.loads(selfmodel("logs", "verify", "a.mcap", "--json", cwd=folder).stdout)
+    digest = told["files"][0]["digest"]
+    expected = ("logs", "verify", "--expect", digest)
+
+    assert f"digest: {digest}" in selfmodel("logs", "info", "a.mcap", cwd=folder).stdout
+    assert selfmodel(*expected, "copy.mcap", cwd=folder).returncode == 0
+    other = selfmodel(*expected, "b.mcap", cwd=folder)
+    assert other.returncode == 1
+    assert f"expected the log with the digest {digest}; this log has the digest" in other.stdout
+    two = selfmodel(*expected, "a.mcap", "b.mcap", cwd=folder)
+    assert two.returncode not in (0, 1)
+    assert "give one log, got 2" in two.stderr
 
 
 @pytest.mark.process

@@ -6,11 +6,24 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from selfmodel.comparators import FORWARD_DISPLACEMENT
+from selfmodel.cli.output.ranking import confidence_sentence
+from selfmodel.comparators import (
+    FORWARD_DISPLACEMENT,
+    SEGMENT_PREDICTION,
+    SEGMENT_PREDICTION_ONBOARD,
+)
 from selfmodel.controllers.controller import Controller
+from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
+from selfmodel.diagnosis.serialization import (
+    confidence_to_dict,
+    diagnosis_from_dict,
+    ranking_to_list,
+)
 from selfmodel.errors import InputError
+from selfmodel.faults.broken import BROKEN
 from selfmodel.faults.hypothesis import INTACT
+from selfmodel.faults.jammed import JAMMED
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.recovery.repair import RepairSearch
@@ -21,7 +34,7 @@ from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.comparators import Prepared
 from tests.helpers.drivers import random_controllers
-from tests.helpers.hostile import exploding
+from tests.helpers.hostile import exploding, unstable, with_value
 from tests.helpers.memory import in_memory
 
 SMALL = dataclasses.replace(Settings().scaled(20), generations=5, steps=200)
@@ -134,3 +147,59 @@ def test_a_comparator_that_breaks_its_contract_is_named(
 
     with pytest.raises(InputError, match=f"the comparator 'indifferent' {said}"):
         diagnose.evidence.distances(both, [trial])
+
+
+@pytest.mark.parametrize(
+    ("comparator", "healthy"), [(FORWARD_DISPLACEMENT, False), (SEGMENT_PREDICTION, True)]
+)
+def test_what_no_simulation_survives_is_unexplained_and_says_why(
+    quadruped: Robot, comparator: Comparator, *, healthy: bool
+):
+    (controller,) = random_controllers(quadruped, 1)
+    trial = logged(quadruped, "intact", controller, steps=100)
+    simulator = Simulator(unstable(quadruped), 2)
+    few = dataclasses.replace(Settings().scaled(4), generations=1)
+    diagnose = DiagnosticSearch(
+        simulator, comparator, few, (BROKEN,), intact=[trial] if healthy else []
+    )
+    found = diagnose([trial], [], np.random.default_rng(0), lambda _: None)
+
+    assert simulator.stats.diverged == simulator.stats.runs
+    assert found.verdict == "unexplained"
+    assert "no simulation of the trials remained finite: check the model" in found.reason
+    assert trial.path in found.reason
+    assert not found.indistinguishable
+    assert found.unsearched is None
+    assert found.to_dict()["reason"] == confidence_to_dict(found)["reason"] == found.reason
+    again = diagnosis_from_dict(found.to_dict(), lambda text: parse(text, quadruped.anatomy))
+    assert again == found
+    said = {"diagnosis": ranking_to_list(found.ranked), **confidence_to_dict(found)}
+    assert confidence_sentence(said) == f"Unexplained: {found.reason}."
+
+
+def test_a_hypothesis_that_survives_is_better_than_one_that_diverges(quadruped: Robot):
+    simulator = Simulator(quadruped, 2)
+    bad = exploding(simulator, "jam:front_left_knee")
+    (controller,) = random_controllers(quadruped, 1)
+    trial = logged(quadruped, "intact", controller, steps=100)
+    one = dataclasses.replace(Settings().scaled(2), generations=1, genes=1)
+    diagnose = DiagnosticSearch(simulator, FORWARD_DISPLACEMENT, one, (JAMMED,))
+    diagnose._evolved = lambda *_: [bad]
+    found = diagnose([trial], [], np.random.default_rng(0), lambda _: None)
+
+    assert (found.best, found.verdict, found.reason) == (INTACT, "explained", "")
+
+
+@pytest.mark.parametrize("value", [np.inf, -np.inf, 1e9, 1e308])
+def test_an_absurd_number_is_refused_before_the_search_and_named(quadruped: Robot, value: float):
+    (controller,) = random_controllers(quadruped, 1)
+    sound = logged(quadruped, "intact", controller, steps=100)
+    trial = with_value(sound, "base_position", 7, 1, value)
+    simulator = Simulator(quadruped, 2)
+    diagnose = DiagnosticSearch(simulator, SEGMENT_PREDICTION, Settings())
+    with pytest.raises(InputError, match=r"base_position y is .* at step 7, expected at"):
+        diagnose.check([trial])
+    assert simulator.stats.runs == 0
+
+    # A comparator that does not use the position compares the rest.
+    DiagnosticSearch(simulator, SEGMENT_PREDICTION_ONBOARD, Settings()).check([trial])

@@ -130,20 +130,23 @@ def test_a_run_is_extended_by_a_part_and_keeps_the_others(tmp_path: Path):
     ("fails", "sentence"),
     [
         ("foreseen", "the cause and the cure"),
-        ("bug", "its process ended with status 1; standard error may have the reason"),
+        (
+            "bug",
+            "an unexpected error, ZeroDivisionError; its traceback is in {traceback}",
+        ),
         ("crash", "its process ended with status 7; standard error may have the reason"),
     ],
 )
 def test_a_failure_is_kept_and_stops_no_other(tmp_path: Path, fails: str, sentence: str):
     bad = Job("bad", {"factor": 1, "fails": fails}, 0, ("a", "b"))
+    texts = tmp_path / "bad" / "tracebacks"
     failed = run_grid(tmp_path, [bad, *jobs(2)], work, workers=1, on_progress=silent)
 
     assert [(each.key, each.part, each.error) for each in failed] == [
-        ("bad", "a", sentence),
-        ("bad", "b", sentence),
+        ("bad", part, sentence.format(traceback=texts / f"{part}.txt")) for part in ("a", "b")
     ]
     kept = json.loads((tmp_path / "bad" / "parts" / "a.json").read_text())
-    assert (kept["status"], kept["error"]) == ("failed", sentence)
+    assert (kept["status"], kept["error"]) == ("failed", failed[0].error)
     assert [each.key for each in finished(tmp_path)] == ["run-00", "run-01"]
 
 

@@ -92,3 +92,12 @@ def test_any_text_is_either_a_hypothesis_or_an_input_error(text: str):
     except InputError:
         return
     assert parse(str(hypothesis), ANATOMIES["quadruped"]) == hypothesis
+
+
+def test_a_long_notation_is_refused_and_a_repeated_term_is_one():
+    anatomy = ROBOTS["quadruped"].robot().anatomy
+
+    assert str(parse("+".join(["friction=0.4"] * 1000), anatomy)) == "friction=0.4"
+    with pytest.raises(InputError, match="of at most 20000 characters, got 1299999") as caught:
+        parse("+".join(["friction=0.4"] * 100_000), anatomy)
+    assert len(str(caught.value)) < 200

@@ -1,4 +1,4 @@
-"""Inputs that are hard to judge: a model that diverges, and trials with missing signals."""
+"""Inputs that are hard to judge: models that diverge, and trials with missing signals."""
 
 from dataclasses import replace
 
@@ -6,6 +6,7 @@ import numpy as np
 
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.notation import parse
+from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.signals import Signal
 from selfmodel.trials.trial import Trial
@@ -26,3 +27,17 @@ def lacking(trial: Trial, signals: tuple[Signal, ...], steps: slice = slice(None
     for values in lost.values():
         values[steps] = np.nan
     return replace(trial, behaviour=replace(run, signals={**run.signals, **lost}))
+
+
+def with_value(trial: Trial, signal: Signal, step: int, column: int, value: float) -> Trial:
+    """Returns the trial with another number at one step in one column of a signal."""
+    run = trial.behaviour
+    values = run[signal].copy()
+    values[step, column] = value
+    return replace(trial, behaviour=replace(run, signals={**run.signals, signal: values}))
+
+
+def unstable(robot: Robot) -> Robot:
+    """Returns the robot in an impossible storm: every simulation diverges, whatever the fault."""
+    mjcf = robot.mjcf.replace("<option ", '<option wind="0 0 1e9" density="1e9" ', 1)
+    return replace(robot, mjcf=mjcf)

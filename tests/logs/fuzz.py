@@ -11,14 +11,14 @@ import json
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from time import perf_counter
 from typing import cast
 
 import numpy as np
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Chunk, Message, Metadata, Schema
+from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Metadata, Schema
 from mcap.writer import CompressionType, Writer
 
 from selfmodel.errors import InputError
@@ -26,6 +26,7 @@ from selfmodel.logs import LogError, TrialLog, read_log
 from selfmodel.logs.checksums import verified_records
 from selfmodel.logs.framing import Frame, frames, parse, unpack
 from selfmodel.logs.meter import Meter
+from selfmodel.logs.provenance import PROVENANCE
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.salvage import salvage
 from selfmodel.logs.writer import write_trial
@@ -88,6 +89,13 @@ DAMAGES: tuple[Damage, ...] = (flipped, cut, garbage, zeroed, record_dropped, re
 
 def packed(data: bytes, compression: CompressionType, chunk_size: int | None) -> bytes:
     """Writes a log anew in other packing; without a chunk size, without chunks."""
+    return written(verified_records(data), compression, chunk_size)
+
+
+def written(
+    records: Iterable[McapRecord], compression: CompressionType, chunk_size: int | None
+) -> bytes:
+    """Writes records as a file; without a chunk size, without chunks."""
     output = io.BytesIO()
     writer = Writer(
         output,
@@ -99,7 +107,7 @@ def packed(data: bytes, compression: CompressionType, chunk_size: int | None) ->
     writer.start("ros2")
     schemas: dict[int, int] = {}
     channels: dict[int, int] = {}
-    for record in verified_records(data):
+    for record in records:
         match record:
             case Schema(id=number) if number not in schemas:
                 schemas[number] = writer.register_schema(record.name, record.encoding, record.data)
@@ -158,7 +166,7 @@ def check_salvage(path: Path, form: "Form") -> str:
 
 
 class Form:
-    """A log in one packing, and which steps each of its chunks tells of.
+    """A log in one packing, and the steps and chunks of each of its batches.
 
     Args:
         data: The file.
@@ -173,23 +181,31 @@ class Form:
         chunks = [(frame, text) for frame, text in every if frame.opcode == Opcode.CHUNK]
         # The trial's record, its model, and the chunks that announce the topics.
         self._needed = [first[0], *models]
-        self._steps: list[tuple[bytes, Counter[int]]] = []
+        self._batches: list[tuple[set[bytes], Counter[int]]] = []
+        texts: set[bytes] = set()
+        times: Counter[int] = Counter()
+        seals = -1
         for frame, text in chunks:
-            records = unpack(cast("Chunk", parse(frame)), Meter(DEFAULT_BUDGET))
-            if any(isinstance(record, Channel) for record in records):
-                self._needed.append(text)
-            times = [r.log_time for r in records if isinstance(r, Message)]
-            self._steps.append((text, Counter(times)))
+            for record in unpack(cast("Chunk", parse(frame)), Meter(DEFAULT_BUDGET)):
+                if isinstance(record, Channel):
+                    self._needed.append(text)
+                    seals = record.id if record.topic == PROVENANCE else seals
+                elif isinstance(record, Message):
+                    texts.add(text)
+                    times[record.log_time] += 1
+                    if record.channel_id == seals:
+                        self._batches.append((texts, times))
+                        texts, times = set(), Counter()
 
     def surviving_steps(self, damaged: bytes) -> int:
-        """Returns how many steps have all their messages in chunks that are still there."""
-        if not self._steps or any(text not in damaged for text in self._needed):
+        """Returns how many steps have all their messages in batches that are still there."""
+        if not self._batches or any(text not in damaged for text in self._needed):
             return 0
         full: Counter[int] = Counter()
         left: Counter[int] = Counter()
-        for text, times in self._steps:
+        for texts, times in self._batches:
             full += times
-            if text in damaged:
+            if all(text in damaged for text in texts):
                 left += times
         return sum(left[time] == count for time, count in full.items())
 

@@ -1,10 +1,19 @@
 import io
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 
 import pytest
 from mcap.data_stream import RecordBuilder
-from mcap.records import Attachment, Chunk, McapRecord, Message, Metadata, Statistics
+from mcap.records import (
+    Attachment,
+    Channel,
+    Chunk,
+    McapRecord,
+    Message,
+    Metadata,
+    Schema,
+    Statistics,
+)
 from mcap.writer import Writer
 
 from selfmodel.errors import InputError
@@ -19,9 +28,28 @@ from selfmodel.logs import (
     read_log,
     reader as reader_module,
 )
+from selfmodel.logs.chain import batch_of
 from selfmodel.logs.checksums import verified_records
 from selfmodel.logs.contents import Contents, read_contents
-from selfmodel.logs.records import HIDDEN, RESULT, TRIAL, with_digest, without_digest
+from selfmodel.logs.provenance import (
+    PROVENANCE,
+    identity_of,
+    manifest,
+    seal_of,
+    topic_key,
+)
+from selfmodel.logs.records import (
+    DIGEST,
+    HIDDEN,
+    LAST_BATCH,
+    MANIFEST,
+    OWN,
+    RESULT,
+    TRIAL,
+    sha256,
+    with_digest,
+    without_digest,
+)
 
 CASES = Path(__file__).parents[3] / "shared" / "samples" / "mcap-conformance"
 Change = Callable[[McapRecord], McapRecord | None]
@@ -54,34 +82,93 @@ def test_a_file_that_is_not_there_is_said_so(tmp_path: Path):
         read_log(tmp_path)
 
 
-def rewritten(path: Path, change: Change) -> None:
-    """Writes a sound file of what ``change`` makes of each record, None for nothing."""
-    records = list(verified_records(path.read_bytes()))
+def rewritten(path: Path, change: Change, *, more: Sequence[McapRecord] = ()) -> None:
+    """Writes a sound file, with new seals, of what ``change`` makes of each record.
+
+    Args:
+        path: The file.
+        change: Returns the record in the place of another, or None for nothing.
+        more: Records before the others.
+    """
+    records = [*more, *verified_records(path.read_bytes())]
+    records.sort(key=lambda record: isinstance(record, Metadata) and record.name == RESULT)
     output = io.BytesIO()
     writer = Writer(output, enable_data_crcs=True)
     writer.start("ros2")
     schemas: dict[int, int] = {}
     channels: dict[int, int] = {}
+    tie = Tie()
     for original in records:
         record: McapRecord | None = change(original)
         match type(record).__name__, record:
             case "Schema", schema if schema.id not in schemas:
                 number = writer.register_schema(schema.name, schema.encoding, schema.data)
                 schemas[schema.id] = number
+                tie.schemas[number] = schema
             case "Channel", channel if channel.id not in channels:
+                number = schemas[channel.schema_id]
                 channels[channel.id] = writer.register_channel(
-                    channel.topic, channel.message_encoding, schemas[channel.schema_id]
+                    channel.topic, channel.message_encoding, number
                 )
+                tie.channel(channel, tie.schemas[number])
             case "Metadata", metadata:
-                writer.add_metadata(metadata.name, metadata.metadata)
+                writer.add_metadata(metadata.name, tie.record(metadata))
             case "Attachment", attached:
+                tie.files[attached.name] = sha256(attached.data)
                 writer.add_attachment(0, 0, attached.name, attached.media_type, attached.data)
             case "Message", told:
+                data = tie.message(told)
                 writer.add_message(
-                    channels[told.channel_id], told.log_time, told.data, told.publish_time
+                    channels[told.channel_id], told.log_time, data, told.publish_time
                 )
     writer.finish()
     path.write_bytes(output.getvalue())
+
+
+class Tie:
+    """What ties the records of a file to its trial, computed anew."""
+
+    def __init__(self) -> None:
+        self.schemas: dict[int, Schema] = {}
+        self.files: dict[str, str] = {}
+        self._records: dict[str, str] = {}
+        self._keys: dict[int, bytes] = {}
+        self._seals = -1
+        self._batch: list[Message] = []
+        self._index = 0
+        self._identity = self._last = b""
+
+    def channel(self, channel: Channel, schema: Schema) -> None:
+        """Adds a channel."""
+        self._keys[channel.id] = topic_key(
+            channel.topic, schema.name, channel.message_encoding, schema.data
+        )
+        if channel.topic == PROVENANCE:
+            self._seals = channel.id
+
+    def record(self, record: Metadata) -> Mapping[str, str]:
+        """Adds a metadata record, and returns its texts."""
+        texts = record.metadata
+        if record.name == MANIFEST:
+            listed = manifest(self._records, self.files)
+            self._identity = self._last = identity_of(listed)
+            return with_digest(MANIFEST, listed)
+        if record.name == RESULT:
+            bare = {key: text for key, text in texts.items() if key != DIGEST}
+            return with_digest(RESULT, {**bare, LAST_BATCH: self._last.hex()})
+        if record.name.startswith(OWN):
+            self._records[record.name] = texts[DIGEST]
+        return texts
+
+    def message(self, message: Message) -> bytes:
+        """Adds a message, and returns its content."""
+        if message.channel_id != self._seals:
+            self._batch.append(message)
+            return message.data
+        batch = batch_of(self._batch, self._keys)
+        seal = seal_of("00-before", self._identity, self._index, self._last, batch)
+        self._batch, self._index, self._last = [], self._index + 1, seal.digest
+        return seal.payload(message.log_time)
 
 
 def metadata(name: str, **texts: str):
@@ -243,11 +330,11 @@ def test_a_file_without_checksums_is_refused(log: Path):
 @pytest.mark.parametrize(
     ("count", "match"),
     [
-        ("message_count", "624 messages, its records 625"),
+        ("message_count", "629 messages, its records 630"),
         ("attachment_count", "2 attachments, its records 3"),
-        ("metadata_count", "3 metadata records, its records 4"),
-        ("schema_count", "5 schemas, its records 6"),
-        ("channel_count", "6 channels, its records 7"),
+        ("metadata_count", "4 metadata records, its records 5"),
+        ("schema_count", "6 schemas, its records 7"),
+        ("channel_count", "7 channels, its records 8"),
     ],
 )
 def test_counts_that_do_not_agree_are_refused(

@@ -125,6 +125,10 @@ def message(data: bytes = b"") -> bytes:
             (TRIAL, {"control_timestep": step}, "control_timestep must be above 0 s")
             for step in ("1e-300", "5e-324", "1e300", "-0.01", "0", "nan", "inf", "1e-10")
         ],
+        *[
+            (TRIAL, {"seed": seed}, "its record selfmodel.trial is wrong")
+            for seed in ("-1", str(2**63), "1.5", "nan", "9" * 900)
+        ],
         (TRIAL, {"steps": str(10**15)}, "after 120 of 1000000000000000 steps"),
         (TRIAL, {"steps": "9" * 900}, "after 120 of 99999"),
         (TRIAL, {"steps": "9" * 5000}, "at most 1000 characters in steps"),
@@ -242,7 +246,7 @@ UNSIZED = zstandard.ZstdCompressor(write_content_size=False)
         ([chunk(message(bytes(16_000_000)))] * 30, "bytes, unpacked"),
         pytest.param(
             [note(f"n{k}") for k in range(210_000)],
-            "200000 records and chunks",
+            "10000 names",
             marks=pytest.mark.fuzz,
         ),
         ([note("n", bytes(33 * 2**20))], "33333333 bytes outside its messages"),
@@ -264,8 +268,18 @@ def test_a_bomb_gets_an_error_and_not_the_memory(log: Path, more: list[bytes], m
     outcome(lambda: salvageable_steps(log))
 
 
+def test_thousands_of_channels_are_refused_and_not_listed(log: Path):
+    put(log, *(channel(k, f"/t{k}") for k in range(100, 10_100)))
+
+    done = CliRunner().invoke(app, ["info", str(log)])
+
+    assert done.exit_code == 1
+    assert "more than the 10000 names that a budget of 1 GB allows" in done.output
+    assert salvageable_steps(log) == 0
+
+
 def test_a_log_that_is_put_together_again_is_sound(log: Path):
-    put(log, note("n"), attachment("a", b"x"), chunk(b""))
+    put(log, note("n"), chunk(b""))
     assert read_log(log).trial.behaviour.steps == 120
 
 
@@ -289,8 +303,9 @@ def test_a_search_for_what_is_whole_ends(log: Path, data: bytes):
 def test_names_are_harmless_in_a_terminal_and_as_paths(log: Path):
     evil = "../../etc/\x1b[2J\x1b]0;owned\x07\x9b31m\u202e"
     rewritten(log, says(TRIAL, robot=evil, name=evil))
-    rewritten(log, says(SOFTWARE, **{evil: evil}))
-    put(log, attachment(evil, b"x"), note(evil), channel(90, evil))
+    attached = Attachment(0, 0, evil, "x", b"x")
+    rewritten(log, says(SOFTWARE, **{evil: evil}), more=[attached])
+    put(log, note(evil), channel(90, evil))
     assert read_log(log).trial.robot == evil
     for command in ("info", "verify"):
         result = CliRunner().invoke(app, [command, str(log)])
@@ -299,3 +314,10 @@ def test_names_are_harmless_in_a_terminal_and_as_paths(log: Path):
     with pytest.raises(InputError, match="is valid"):
         salvage(log, log.with_name("new.mcap"))
     assert [path.name for path in log.parent.iterdir()] == ["trial.mcap"]
+
+
+def test_a_seed_that_no_trial_can_have_is_refused_by_verify(log: Path):
+    rewritten(log, says(TRIAL, seed="-5"))
+    result = CliRunner().invoke(app, ["verify", str(log)])
+    assert result.exit_code != 0
+    assert "seed must be a whole number from 0 to" in result.output

@@ -48,7 +48,7 @@ def steps_kept(part: Path, robot: Robot) -> int:
     """How many steps an unfinished file holds whole, having checked that they are the true ones."""
     with pytest.raises(TruncatedError, match="selfmodel logs salvage"):
         read_log(part)
-    contents = rescue(part)
+    contents = rescue(part).contents
     assert set(contents.attachments) == {"model.xml", "controller.npz", "settings.json"}
     for topic in topics(robot.anatomy.names, robot.root):
         messages = contents.topics[topic.name]
@@ -92,7 +92,7 @@ def test_a_trial_that_ends_before_its_first_step_leaves_what_was_planned(
             stopping(biped, 0, RuntimeError("gone")),
             TrialHeader(Settings()),
         )
-    contents = rescue(tmp_path / "a.mcap.part")
+    contents = rescue(tmp_path / "a.mcap.part").contents
     assert contents.metadata["selfmodel.trial"]["name"] == "00-before"
 
 
@@ -229,7 +229,7 @@ def test_a_disk_that_fills_while_a_trial_is_interrupted_does_not_hide_why(
 
     def samples() -> Iterator[Sample]:
         yield from made_up(biped, 20)
-        monkeypatch.setattr(logfile.LogFile, "message", fail)
+        monkeypatch.setattr(logfile.Writer, "add_message", fail)
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt) as caught:

@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 from selfmodel.cli import app
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.logs.journal import FolderJournal
+from selfmodel.logs.provenance import PROVENANCE
 from selfmodel.tasks import ROBOTS
 
 DATA = Path(__file__).parents[1] / "data" / "logs-0.1"
@@ -64,10 +65,14 @@ def of_0_1(found: object, expected: object) -> object:
 
 
 def messages(log: str) -> list[tuple[str, int, bytes]]:
-    """Returns the topic, time and content of all messages of a log."""
+    """Returns the topic, time and content of all messages of a log, without the seals."""
     with Path(log).open("rb") as file:
         read = make_reader(file).iter_messages()
-        return [(channel.topic, message.log_time, message.data) for _, channel, message in read]
+        return [
+            (channel.topic, message.log_time, message.data)
+            for _, channel, message in read
+            if channel.topic != PROVENANCE
+        ]
 
 
 def is_slow(entry: dict) -> bool:

@@ -12,7 +12,7 @@ from mcap.opcode import Opcode
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError, SchemaMismatchError, UnsupportedError, logfile, read_log
 from selfmodel.logs.contents import read_contents
-from selfmodel.logs.records import MAX_TEXT, RESULT, TRIAL, TrialHeader
+from selfmodel.logs.records import LAST_BATCH, MAX_TEXT, RESULT, TRIAL, TrialHeader
 from selfmodel.logs.salvage import salvage
 from selfmodel.logs.topics import TIMING
 from selfmodel.logs.writer import write_trial
@@ -57,7 +57,7 @@ def test_without_a_clock_a_log_is_what_it_was(log: Path):
     contents = read_contents(log)
     assert contents.metadata[TRIAL]["format"] == "1"
     assert TIMING.name not in contents.topics
-    assert set(contents.metadata[RESULT]) == {"status", "steps", "displacement"}
+    assert set(contents.metadata[RESULT]) == {"status", "steps", "displacement", LAST_BATCH}
 
 
 @pytest.mark.parametrize("has", [True, False])
@@ -183,7 +183,7 @@ def test_ctrl_c_while_steps_are_written_leaves_what_can_be_salvaged(
     def samples() -> Iterator[Sample]:
         for k, sample in enumerate(timed(made_up(biped, STEPS))):
             if k == 50:  # the next one is written with the 49 before
-                monkeypatch.setattr(logfile.LogFile, "message", interrupt)
+                monkeypatch.setattr(logfile.LogFile, "messages", interrupt)
             yield sample
 
     with pytest.raises(KeyboardInterrupt):

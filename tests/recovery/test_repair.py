@@ -3,7 +3,9 @@
 import dataclasses
 
 import numpy as np
+import pytest
 
+from selfmodel.errors import WorkError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.recovery.repair import RepairSearch
 from selfmodel.robot.robot import Robot
@@ -11,6 +13,7 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import forward_displacement
 from tests.helpers.drivers import random_controllers
+from tests.helpers.hostile import unstable
 
 SMALL = dataclasses.replace(Settings().scaled(20), generations=1, steps=200)
 
@@ -23,3 +26,10 @@ def test_a_repair_starts_from_the_controllers_it_is_given(quadruped: Robot):
     behaviour = simulator.run(runs, SMALL.steps, ["base_position"]).behaviour
 
     assert best == seeds[int(np.argmax(forward_displacement(behaviour)))]
+
+
+def test_a_repair_that_no_simulation_survives_is_an_error(quadruped: Robot):
+    few = dataclasses.replace(Settings().scaled(4), generations=1, steps=20)
+    search = RepairSearch(Simulator(unstable(quadruped), 2), few)
+    with pytest.raises(WorkError, match="no simulation of quadruped as intact remained finite, wi"):
+        search(INTACT, (), np.random.default_rng(0), lambda _: None)

@@ -12,6 +12,7 @@ from selfmodel.physical.reality_gap import draw_gap
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.parameters import Parameters, factor_names, nominal, with_parameters
 from selfmodel.robot.robot import Robot
+from selfmodel.simulation import calibration
 from selfmodel.simulation.calibration import (
     MAX_LOG_FACTOR,
     PRIOR_DEVIATION,
@@ -19,13 +20,15 @@ from selfmodel.simulation.calibration import (
     calibrate,
     prediction_error,
 )
+from selfmodel.simulation.outcome import SimulationResult, SimulationStats
+from selfmodel.simulation.prediction import predict
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import collect
 from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.state_estimation import BASE
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_motion
-from tests.helpers.hostile import lacking
+from tests.helpers.hostile import lacking, unstable
 
 STEPS = 400
 QUADRUPED = ROBOTS["quadruped"].robot()
@@ -218,3 +221,46 @@ def test_moments_that_were_not_observed_lead_no_unseen_robot_astray_if_no_stretc
     blinks = lacking(lacking(whole, BASE), ("joint_velocities",), slice(102, 108))
 
     assert prediction_error(QUADRUPED, [blinks], 1) < 1e-4
+
+
+@pytest.mark.search
+def test_a_calibration_that_no_simulation_survives_ends_with_a_sentence(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    monkeypatch.setattr(calibration, "CANDIDATE_DELAYS", range(1))
+    storm = unstable(QUADRUPED)
+    with pytest.raises(InputError, match="no simulation of the healthy robot remained finite"):
+        calibrate(storm, trials(QUADRUPED, 1), threads=1)
+
+
+def test_errors_of_a_calibration_are_finite_whatever_the_simulation(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    def lost(*arguments: object, **options: object) -> SimulationResult:
+        found = predict(*arguments, **options)
+        found.behaviour["joint_velocities"][:] = np.nan
+        found.behaviour["base_position"][:] = 1e300
+        return found
+
+    monkeypatch.setattr(calibration, "predict", lost)
+    assert 0 < prediction_error(QUADRUPED, trials(QUADRUPED, 1), threads=1) <= calibration.MAX_ERROR
+
+
+@pytest.mark.search
+def test_the_estimated_steps_are_within_a_factor_of_two(monkeypatch: pytest.MonkeyPatch):
+    steps = 0
+
+    def counted(*arguments: object, stats: SimulationStats, **options: object) -> SimulationResult:
+        nonlocal steps
+        before = stats.steps
+        found = predict(*arguments, stats=stats, **options)
+        steps += stats.steps - before
+        return found
+
+    monkeypatch.setattr(calibration, "predict", counted)
+    two = trials(with_parameters(QUADRUPED, TRUE))
+    estimate = calibration.simulated_steps(QUADRUPED, two)
+    assert steps == 0
+    calibrate(QUADRUPED, two, threads=1)
+
+    assert 0.5 < estimate / steps < 2

@@ -1,5 +1,6 @@
 """Promises of replay: the same bits where it is the same, and an honest word where it is not."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trial import Trial, TrialPlan
+from tests.helpers.command import selfmodel
 from tests.helpers.drivers import random_controllers, random_cpgs, random_of
 
 STEPS = 1000
@@ -158,3 +160,23 @@ def test_recorded_commands_move_the_robot_as_its_controller_did(
         assert log.trial.behaviour[signal].tobytes() == trial.behaviour[signal].tobytes()
     truth = parse("jam:back_left_knee", quadruped.anatomy)
     assert replay(log.trial, truth, Simulator(robot_of(log), 2)).identical
+
+
+def test_nothing_observed_is_not_identical(quadruped: Robot, tmp_path: Path):
+    (controller,) = random_controllers(quadruped, 1)
+    plan = TrialPlan("trial", "single", controller, 20, 0)
+    samples = SimulatedRobot(quadruped).run(controller, 20)
+    nothing = (
+        replace(sample, values={s: np.full_like(v, np.nan) for s, v in sample.values.items()})
+        for sample in samples
+    )
+    path = write_trial(tmp_path / "t.mcap", quadruped, plan, nothing, TrialHeader(Settings()))
+    found = replay(read_log(path).trial, INTACT, Simulator(quadruped, 1))
+
+    assert not found.observed
+    assert not found.identical
+    assert "nothing was observed" in repr(found)
+    done = selfmodel("replay", str(path), cwd=tmp_path)
+    assert done.returncode == 2
+    assert "nothing was observed: every number of the log is NaN" in done.stderr
+    assert not done.stdout

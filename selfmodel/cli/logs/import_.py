@@ -1,6 +1,5 @@
 """``selfmodel logs import``: a ROS 1 or ROS 2 recording of a robot as a trial log."""
 
-import json
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,12 +8,14 @@ import typer
 
 from selfmodel.cli.inputs import check_log_name
 from selfmodel.cli.options import DEFAULT_BUDGET, FileBudget, Json
-from selfmodel.cli.output.plain import counted, plain
+from selfmodel.cli.output.plain import counted
+from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.tables import show
 from selfmodel.controllers.controller import Controller
 from selfmodel.errors import InputError
 from selfmodel.experiments import robots, trial_logs
-from selfmodel.experiments.robots import is_model
+from selfmodel.experiments.robots import LARGEST_MODEL, is_model
+from selfmodel.files import read_file
 from selfmodel.logs.files import refuse_existing
 from selfmodel.logs.rosbag.importer import Recording, import_bag, write_recording
 from selfmodel.logs.rosbag.mapping import BagMapping
@@ -57,7 +58,8 @@ def import_(
             raise InputError(
                 "--suggest needs --robot NAME|MODEL.xml, and excludes --out, --mapping and --json"
             )
-        typer.echo(_suggestion(bag, robot, allowed), nl=False)
+        lines = _suggestion(bag, robot, allowed).removesuffix("\n").split("\n")
+        print_lines(*lines)
         return
     if robot is not None:
         raise InputError("--robot is for --suggest: the robot of an import is in its mapping")
@@ -78,8 +80,9 @@ def _suggestion(bag: Path, name: str, budget: Budget) -> str:
 
 def _timestep(path: Path) -> float:
     """Returns the multiple of a model's physics time step nearest to ``TIMESTEP``, s."""
+    data = read_file(path, "an MJCF file", LARGEST_MODEL)
     try:
-        physics = float(mujoco.MjModel.from_xml_path(str(path)).opt.timestep)
+        physics = float(mujoco.MjModel.from_xml_string(data.decode()).opt.timestep)
     except ValueError as error:
         what = " ".join(str(error).split())
         raise InputError(f"{path}: expected an MJCF file of a robot: {what}") from error
@@ -94,7 +97,7 @@ def _import(bag: Path, out: Path, path: Path, budget: Budget, *, as_json: bool) 
     recording = import_bag(bag, mapping, made, budget)
     write_recording(out, made, recording, mapping, controller)
     if as_json:
-        typer.echo(json.dumps(_facts(out, mapping, recording), indent=2, allow_nan=False))
+        print_json(_facts(out, mapping, recording))
     else:
         _print(out, recording)
 
@@ -141,7 +144,7 @@ def _facts(out: Path, mapping: BagMapping, recording: Recording) -> dict[str, An
 def _print(out: Path, recording: Recording) -> None:
     rows = [
         (
-            plain(topic),
+            topic,
             str(found.messages),
             _number(found.rate),
             _number(found.jitter, 1e3),
@@ -153,9 +156,11 @@ def _print(out: Path, recording: Recording) -> None:
     ]
     show(("topic", "msgs", "Hz", "jitter, ms", "gaps", "longest, ms", "late, ms"), rows)
     valid = ", ".join(f"{signal} {share:.0%}" for signal, share in recording.valid.items())
-    for note in recording.notes:
-        typer.echo(f"note: {plain(note)}")
-    typer.echo(f"observed: {valid}\n{counted(recording.behaviour.steps, 'step')}: {out}")
+    print_lines(
+        *(f"note: {note}" for note in recording.notes),
+        f"observed: {valid}",
+        f"{counted(recording.behaviour.steps, 'step')}: {out}",
+    )
 
 
 def _number(value: float | None, scale: float = 1.0) -> str:

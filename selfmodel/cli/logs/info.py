@@ -1,6 +1,5 @@
 """``selfmodel logs info``: the contents of logs."""
 
-import json
 import math
 from importlib.resources import files as package_files
 from pathlib import Path
@@ -9,11 +8,13 @@ from typing import Any
 import typer
 
 from selfmodel.cli.options import DEFAULT_BUDGET, FileBudget, Json, LogFiles
-from selfmodel.cli.output.plain import counted, plain
+from selfmodel.cli.output.plain import counted
+from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.tables import show
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError, TrialLog
 from selfmodel.logs.info import Info, has_truth, read_info
+from selfmodel.logs.provenance import UNTIED
 from selfmodel.logs.salvage import salvageable_steps
 from selfmodel.sandbox.budget import Budget
 
@@ -26,21 +27,21 @@ def info(files: LogFiles, *, budget: FileBudget = DEFAULT_BUDGET, as_json: Json 
     allowed = Budget.parse(budget)
     found = [_facts(path, allowed) for path in files]
     if as_json:
-        typer.echo(json.dumps({"files": found}, indent=2, allow_nan=False))
+        print_json({"files": found})
     else:
         for one in found:
             _print(one)
         if any("error" not in one for one in found):
-            typer.echo(_viewers())
+            print_lines(*_viewers())
     raise typer.Exit(1 if any("error" in one for one in found) else 0)
 
 
-def _viewers() -> str:
+def _viewers() -> tuple[str, ...]:
     layout = package_files("selfmodel.cli.logs") / "foxglove-layout.json"
     return (
-        "To view a log:\n"
-        f"  Foxglove  Open local file; import the layout {layout}\n"
-        "  Rerun     rerun FILE.mcap   (pip install rerun-sdk)"
+        "To view a log:",
+        f"  Foxglove  Open local file; import the layout {layout}",
+        "  Rerun     rerun FILE.mcap   (pip install rerun-sdk)",
     )
 
 
@@ -90,6 +91,7 @@ def _as_object(path: Path, found: Info) -> dict[str, Any]:
         "clock": _clock(found.log),
         "truth": "hidden" if has_truth(found) else "unknown",
         "source": dict(found.source),
+        "digest": found.digest,
     }
 
 
@@ -101,45 +103,48 @@ def _clock(log: TrialLog) -> dict[str, int] | None:
 
 def _print(one: dict[str, Any]) -> None:
     if "error" in one:
-        typer.echo(plain(f"error: {one['error']}"))
-        typer.echo(f"complete steps that can be salvaged: {one['salvageable_steps']}\n")
+        print_lines(
+            f"error: {one['error']}",
+            f"complete steps that can be salvaged: {one['salvageable_steps']}",
+            "",
+        )
         return
     seconds = one["steps"] * one["control_timestep"]
     dx = one["displacement"]
-    text = (
-        f"{one['file']} ({one['bytes'] / 1000:.0f} kB)\n"
+    print_lines(
+        f"{one['file']} ({one['bytes'] / 1000:.0f} kB)",
         f"trial {one['trial']} ({one['stage']}) of {one['robot']}, {one['status']}"
-        f"{': ' + one['reason'] if one['reason'] else ''}\n"
+        f"{': ' + one['reason'] if one['reason'] else ''}",
         f"{one['steps']} of {one['planned_steps']} steps of {one['control_timestep']:g} s = "
         f"{seconds:.2f} s; {'displacement unknown' if dx is None else f'{dx:.3f} m forward'}; "
-        f"seed {one['seed']}\n"
-        f"driven by {one['driver']}\n"
-        f"written with {', '.join(f'{name} {text}' for name, text in one['software'].items())}\n"
-        f"true hypothesis: {_TRUTH[one['truth']]}"
+        f"seed {one['seed']}",
+        f"driven by {one['driver']}",
+        f"written with {', '.join(f'{name} {text}' for name, text in one['software'].items())}",
+        f"true hypothesis: {_TRUTH[one['truth']]}",
+        f"digest: {one['digest'] or f'none: {UNTIED}'}",
     )
-    typer.echo(plain(text))
     if clock := one["clock"]:
         late, missing = (
             counted(clock["late"], "step"),
             counted(clock["missing"], "observation"),
         )
-        typer.echo(f"clock: {late} late, {missing} missing")
+        print_lines(f"clock: {late} late, {missing} missing")
     for name, text in one["source"].items():
-        typer.echo(plain(f"{name}: {text if len(text) <= 100 else text[:97] + '...'}"))
+        print_lines(f"{name}: {text if len(text) <= 100 else text[:97] + '...'}")
     rows = [
-        (plain(name), plain(topic["type"]), str(topic["messages"]), f"{topic['rate']:.1f}")
+        (name, topic["type"], str(topic["messages"]), f"{topic['rate']:.1f}")
         for name, topic in one["topics"].items()
     ]
     show(("topic", "type", "messages", "Hz"), rows, texts=2)
     partly = {signal: share for signal, share in one["observed"].items() if share < 1}
-    typer.echo(
+    print_lines(
         "observed: everything"
         if not partly
         else "partly observed: "
         + ", ".join(f"{signal} {share:.1%}" for signal, share in partly.items())
     )
     sizes = ", ".join(f"{name} {size / 1000:.1f} kB" for name, size in one["attachments"].items())
-    typer.echo(plain(f"attachments: {sizes}\n"))
+    print_lines(f"attachments: {sizes}", "")
 
 
 _TRUTH = {

@@ -1,7 +1,6 @@
 """``selfmodel logs salvage``: the complete data of a damaged log in a new log."""
 
 import dataclasses
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +9,9 @@ import typer
 from selfmodel.cli.inputs import check_log_name
 from selfmodel.cli.options import DEFAULT_BUDGET, FileBudget, Json, NewLog
 from selfmodel.cli.output.plain import counted
+from selfmodel.cli.output.printing import print_json, print_lines
+from selfmodel.logs.belonging import Discarded
+from selfmodel.logs.provenance import UNTIED
 from selfmodel.logs.salvage import salvage as save
 from selfmodel.sandbox.budget import Budget
 
@@ -25,18 +27,33 @@ def salvage(
     check_log_name(out)
     saved = save(file, out, Budget.parse(budget))
     if as_json:
-        typer.echo(json.dumps({"source": str(file), **dataclasses.asdict(saved)}))
+        print_json({"source": str(file), **dataclasses.asdict(saved)}, indent=None)
         return
-    typer.echo(f"saved {saved.steps} of {counted(saved.planned, 'step')} in {saved.log}")
+    print_lines(f"saved {saved.steps} of {counted(saved.planned, 'step')} in {saved.log}")
     if saved.span > saved.steps:
-        typer.echo(
+        print_lines(
             f"it spans {counted(saved.span, 'step')}; lost data of the others is marked as not "
             f"observed"
         )
     for topic, count in saved.missing.items():
-        typer.echo(f"{topic}: {counted(count, 'message')} lost")
+        print_lines(f"{topic}: {counted(count, 'message')} lost")
     for name in saved.lost:
-        typer.echo(f"{name} is lost: {_CONSEQUENCES[name]}")
+        print_lines(f"{name} is lost: {_CONSEQUENCES[name]}")
+    print_lines(*map(_left_out, saved.discarded))
+    if not saved.tied:
+        print_lines(
+            f"not tied to its trial: {UNTIED}; if this file is a mixture of two trials, so is the "
+            f"new log"
+        )
+
+
+def _left_out(other: Discarded) -> str:
+    if not other.trial:
+        return f"left out: {counted(other.steps, 'step')} without a seal"
+    return (
+        f"left out: {counted(other.steps, 'step')} in {counted(other.batches, 'chunk')} sealed for "
+        f"the trial {other.trial} ({other.identity[:12]})"
+    )
 
 
 _CONSEQUENCES = {

@@ -1,46 +1,60 @@
 """``selfmodel logs verify``: every check on every log."""
 
-import json
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 
 from selfmodel.cli.options import DEFAULT_BUDGET, FileBudget, Json, LogFiles
-from selfmodel.cli.output.plain import counted, plain
+from selfmodel.cli.output.plain import counted
+from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError
+from selfmodel.logs.provenance import UNTIED
 from selfmodel.logs.verify import verify as check
 from selfmodel.sandbox.budget import Budget
 
+Expect = Annotated[
+    str,
+    typer.Option(metavar="DIGEST", help="Digest that the one log must have, from `logs verify`."),
+]
 
-def verify(files: LogFiles, *, budget: FileBudget = DEFAULT_BUDGET, as_json: Json = False) -> None:
+
+def verify(
+    files: LogFiles,
+    *,
+    expect: Expect = "",
+    budget: FileBudget = DEFAULT_BUDGET,
+    as_json: Json = False,
+) -> None:
     """Verify checksums, counts, digests, layout, times, names and the model of logs.
 
     The exit status is 0 if every log is good, otherwise 1.
     """
+    if expect and len(files) > 1:
+        raise InputError(f"--expect is the digest of one log: give one log, got {len(files)}")
     allowed = Budget.parse(budget)
-    checked = [_checked(path, allowed) for path in files]
+    checked = [_checked(path, expect.lower(), allowed) for path in files]
     if as_json:
-        typer.echo(json.dumps({"ok": all(one["ok"] for one in checked), "files": checked}))
+        print_json({"ok": all(one["ok"] for one in checked), "files": checked}, indent=None)
     else:
-        for one in checked:
-            typer.echo(plain(_line(one)))
+        print_lines(*map(_line, checked))
     raise typer.Exit(0 if all(one["ok"] for one in checked) else 1)
 
 
-def _checked(path: Path, budget: Budget) -> dict[str, Any]:
+def _checked(path: Path, expected: str, budget: Budget) -> dict[str, Any]:
     try:
-        log, loaded = check(path, budget)
+        found = check(path, expected, budget)
     except (LogError, InputError) as error:
         return {"file": str(path), "ok": False, "error": str(error), "kind": type(error).__name__}
     return {
         "file": str(path),
         "ok": True,
-        "status": log.status,
-        "reason": log.reason,
-        "steps": log.trial.behaviour.steps,
-        "model_loaded": loaded,
+        "status": found.log.status,
+        "reason": found.log.reason,
+        "steps": found.log.trial.behaviour.steps,
+        "model_loaded": found.model_loaded,
+        "digest": found.digest,
     }
 
 
@@ -49,5 +63,6 @@ def _line(one: dict[str, Any]) -> str:
         unloaded = "" if one["model_loaded"] else " (without MuJoCo, its model was not loaded)"
         why = f" ({one['reason']})" if one["reason"] else ""
         steps = counted(one["steps"], "step")
-        return f"ok: {one['file']}: {steps}, {one['status']}{why}{unloaded}"
+        tied = f"digest {one['digest']}" if one["digest"] else f"not tied to its trial: {UNTIED}"
+        return f"ok: {one['file']}: {steps}, {one['status']}{why}{unloaded}; {tied}"
     return f"error: {one['error']}"

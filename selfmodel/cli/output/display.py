@@ -4,6 +4,7 @@ The hypothesis of a search is in the line after the search, not in the bar: the 
 narrow terminal.
 """
 
+import math
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -11,8 +12,9 @@ from contextlib import contextmanager
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn
 
-from selfmodel.cli.output.plain import counted
-from selfmodel.diagnosis.diagnosis import Diagnosis
+from selfmodel.cli.output.console import text_console
+from selfmodel.cli.output.plain import counted, plain
+from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
 from selfmodel.evolution import Generation
 from selfmodel.recovery.events import DiscriminatingTrial, Event, SearchBegins
 from selfmodel.simulation.calibration import Calibration
@@ -22,7 +24,7 @@ from selfmodel.trials.trial import Trial
 @contextmanager
 def display() -> Iterator[Callable[[Event], None]]:
     """Yields a function that displays events on standard error."""
-    console = Console(stderr=True, highlight=False, markup=False, emoji=False)
+    console = text_console(stderr=True)
     if not sys.stderr.isatty():
         yield _Lines(console)
         return
@@ -54,7 +56,7 @@ class _Lines:
                 self._print_line(
                     f"{self._search}: {counted(event.number, 'generation')}, "
                     f"{counted(event.evaluations, 'evaluation')}, {_rate(event)}/s, "
-                    f"best {event.best:.4f}"
+                    f"{_best(event)}"
                 )
             case Calibration():
                 self._print_line(
@@ -70,11 +72,11 @@ class _Lines:
                 best = event.ranked[0]
                 self._print_line(
                     f"diagnosis from {counted(event.trials, 'trial')}: "
-                    f"{best.hypothesis} (distance {best.distance:.4f}), {event.verdict}"
+                    f"{best.hypothesis} ({_distance(best)}), {event.verdict}"
                 )
 
     def _print_line(self, line: str) -> None:
-        self._console.print(line, soft_wrap=True)
+        self._console.print(plain(line), soft_wrap=True)
 
 
 class _Bar:
@@ -102,6 +104,18 @@ class _Bar:
                 if event.number == event.total:
                     self._progress.remove_task(self._task)
         self._lines(event)
+
+
+def _best(generation: Generation) -> str:
+    """Returns the best fitness as text; every simulation diverged where it is minus infinity."""
+    if generation.best == -math.inf:
+        return "every simulation diverged"
+    return f"best {generation.best:.4f}"
+
+
+def _distance(candidate: Candidate) -> str:
+    finite = math.isfinite(candidate.distance)
+    return f"distance {candidate.distance:.4f}" if finite else "diverged"
 
 
 def _rate(generation: Generation) -> str:

@@ -17,6 +17,9 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from selfmodel.cli.output.console import text_console
+from selfmodel.cli.output.plain import counted, plain
+from selfmodel.cli.output.printing import print_notes
 from selfmodel.experiments.grid import GridBegins, PartEnds
 
 
@@ -59,13 +62,13 @@ class Watch:
                     self._print_line(_line(event))
 
     def _print_line(self, line: str) -> None:
-        self._console.print(line, soft_wrap=True)
+        self._console.print(plain(line), soft_wrap=True)
 
 
 @contextmanager
 def grid_display() -> Iterator[Watch]:
     """Yields a display of grid events on standard error."""
-    console = Console(stderr=True, highlight=False, markup=False, emoji=False)
+    console = text_console(stderr=True)
     if not sys.stderr.isatty():
         yield Watch(console, None)
         return
@@ -90,7 +93,7 @@ def _line(event: PartEnds) -> str:
 def run_shown(run: Callable[[Watch], Sequence[PartEnds]], out: Path) -> Sequence[PartEnds]:
     """Runs a grid with a progress display; returns the failed parts.
 
-    Ctrl-C ends the command with status 130, and a line with the command to continue.
+    Ctrl-C and the other stop signals end the command with a line that tells how to continue.
 
     Args:
         run: Runs the grid; calls its argument with each event.
@@ -99,13 +102,26 @@ def run_shown(run: Callable[[Watch], Sequence[PartEnds]], out: Path) -> Sequence
     with grid_display() as on_event:
         try:
             return run(on_event)
-        except KeyboardInterrupt:
-            typer.echo(
-                f"interrupted: {on_event.done} of {on_event.total} are done and kept in {out}; the "
-                f"same command continues with the rest",
-                err=True,
+        except KeyboardInterrupt as interruption:
+            interruption.add_note(
+                f"{on_event.done} of {on_event.total} are done and kept in {out}; the same command "
+                f"continues with the rest"
             )
-            raise typer.Exit(130) from None
+            raise
+
+
+def note_unverified(count: int, out: Path) -> None:
+    """Prints a line if a table has parts without digests.
+
+    Args:
+        count: Number of the parts.
+        out: Folder of the grid.
+    """
+    if count:
+        print_notes(
+            f"note: version 0.1 wrote {counted(count, 'part')} in {out}, without digests: their "
+            f"content was not verified"
+        )
 
 
 def as_objects(failed: Sequence[PartEnds]) -> list[dict[str, str | None]]:
@@ -116,9 +132,8 @@ def as_objects(failed: Sequence[PartEnds]) -> list[dict[str, str | None]]:
 def end(failed: Sequence[PartEnds]) -> None:
     """Ends the command with status 1 and a line if a part failed."""
     if failed:
-        typer.echo(
+        print_notes(
             f"{len(failed)} failed, the first of them {failed[0].key} {failed[0].part}: "
-            f"{failed[0].error}; the same command tries them again",
-            err=True,
+            f"{failed[0].error}; the same command tries them again"
         )
         raise typer.Exit(1)

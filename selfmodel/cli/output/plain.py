@@ -1,12 +1,26 @@
-"""Text for terminals: harmless characters, and nouns that agree with their number."""
+"""Text for people: harmless characters, and nouns that agree with their number."""
 
 
 def plain(text: str) -> str:
-    """Returns text with every control character escaped: names in a log may contain any."""
+    r"""Returns text as one line: every character that is not printable is escaped as by ``repr``.
+
+    Names in files may contain any character: a line feed would begin a forged line, and control
+    characters command a terminal.
+
+    Examples:
+        >>> plain("quadruped\nok: other.mcap")
+        'quadruped\\nok: other.mcap'
+    """
+    if text.isprintable():
+        return text
     return "".join(
-        char if char.isprintable() or char == "\n" else char.encode("unicode_escape").decode()
-        for char in text
+        char if char.isprintable() else char.encode("unicode_escape").decode() for char in text
     )
+
+
+def figure_text(text: str) -> str:
+    """Returns ``plain`` text for matplotlib, which reads a formula between two ``$``."""
+    return plain(text).replace("$", r"\$")
 
 
 def counted(number: int, noun: str) -> str:

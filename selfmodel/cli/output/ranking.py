@@ -5,6 +5,8 @@ from typing import Any
 
 from rich.table import Table
 
+from selfmodel.cli.output.plain import plain
+
 
 def confidence_sentence(found: Mapping[str, Any]) -> str:
     """Returns the verdict and the alternatives to the best hypothesis, in one or two sentences.
@@ -28,6 +30,8 @@ def _verdict(found: Mapping[str, Any]) -> str:
             return (
                 f"Ambiguous: the trials do not distinguish {best} from {others} ({found['test']})."
             )
+    if found["reason"] is not None:
+        return f"Unexplained: {found['reason']}."
     if found["outside"] is not None:
         better, kind = found["outside"]["hypothesis"], found["outside"]["kind"]
         return (
@@ -51,7 +55,7 @@ def ranking_table(values: Sequence[dict[str, Any]], truth: str | None = None) ->
         distance = one["distance"]
         table.add_row(
             str(rank),
-            one["hypothesis"] + mark,
+            plain(one["hypothesis"]) + mark,
             "diverged" if distance is None else f"{distance:.4f}",
         )
     return table

@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from selfmodel.cli.inputs import check_folder
+from selfmodel.cli.output.plain import figure_text
 from selfmodel.errors import InputError, WorkError
 from selfmodel.logs.errors import LogWriteError
 from selfmodel.logs.files import refuse_existing, replace_file
@@ -54,7 +55,10 @@ def draw(path: Path, log: TrialLog, found: Replay, hypothesis: str) -> None:
     path_axes, error = figure.subplots(2, 1, sharex=True)
     path_axes.plot(logged.time, logged["base_position"][:, 0], label="logged")
     path_axes.plot(
-        logged.time, found.simulated["base_position"][:, 0], "--", label=f"simulated: {hypothesis}"
+        logged.time,
+        found.simulated["base_position"][:, 0],
+        "--",
+        label=figure_text(f"simulated: {hypothesis}"),
     )
     path_axes.set_ylabel("base, forward, m")
     path_axes.legend()
@@ -82,7 +86,7 @@ def draw(path: Path, log: TrialLog, found: Replay, hypothesis: str) -> None:
 
 
 def _title(log: TrialLog, found: Replay) -> str:
-    name = f"{log.trial.robot}, {log.trial.plan.name}".replace("$", r"\$")
+    name = figure_text(f"{log.trial.robot}, {log.trial.plan.name}")
     if found.first_divergence_step is None:
         return f"{name}: equal at every step"
     return f"{name}: they differ from step {found.first_divergence_step}"

@@ -1,28 +1,28 @@
 """Outcome of ``selfmodel recover``, as text and as JSON."""
 
-import json
+import dataclasses
+import os
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
-import typer
-from rich.console import Console
-
 from selfmodel.cli.output.plain import counted
+from selfmodel.cli.output.printing import print_lines
 from selfmodel.cli.output.ranking import confidence_sentence, ranking_table
-from selfmodel.cli.output.tables import folding
+from selfmodel.cli.output.tables import folding, print_tables
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
 from selfmodel.experiments.experiment import Experiment, Outcome
+from selfmodel.logs.result_files import file_digest, result_bytes
 from selfmodel.robot.designs import network_for
 
 
-def as_object(experiment: Experiment, outcome: Outcome) -> str:
-    """Returns the outcome as one JSON object."""
-    return json.dumps(facts(experiment, outcome), indent=2, allow_nan=False)
+def print_report(found: dict[str, Any], folder: Path) -> None:
+    """Prints the trials, the diagnosis, and the true hypothesis.
 
-
-def print_report(experiment: Experiment, outcome: Outcome) -> None:
-    """Prints the trials, the diagnosis, and the true hypothesis."""
-    found = facts(experiment, outcome)
-    console = Console()
+    Args:
+        found: Result of ``facts``.
+        folder: Folder of the recovery.
+    """
     trials = folding(
         ("trial", "best hypothesis so far", "forward, m"),
         [
@@ -32,20 +32,19 @@ def print_report(experiment: Experiment, outcome: Outcome) -> None:
         title="physical trials",
         texts=2,
     )
-    console.print(trials, ranking_table(found["diagnosis"], found["truth"]))
+    print_tables(trials, ranking_table(found["diagnosis"], found["truth"]))
     evaluations, trials_since = found["evaluations"], found["physical_trials"]
     verdict = "right" if found["correct"] else "wrong"
-    # Not through rich, which reads markup in a folder's name and folds it.
-    typer.echo(
-        f"truth: {found['truth']}{_reality(found)}; the diagnosis is {verdict}.\n"
-        f"{confidence_sentence(found)}\n"
+    print_lines(
+        f"truth: {found['truth']}{_reality(found)}; the diagnosis is {verdict}.",
+        confidence_sentence(found),
         f"The robot went {found['displacement']['before']:.2f} m before, "
         f"{found['displacement']['after']:.2f} m after the failure, and "
         f"{found['displacement']['recovered']:.2f} m at best in "
-        f"{counted(trials_since, 'trial')} since.\n"
+        f"{counted(trials_since, 'trial')} since.",
         f"{evaluations['repair']} controllers and {evaluations['distinct_hypotheses']} distinct "
-        f"hypotheses in {found['seconds']:.0f} s; diverged: {evaluations['diverged']}.\n"
-        f"Logs: {experiment.folder}"
+        f"hypotheses in {found['seconds']:.0f} s; diverged: {evaluations['diverged']}.",
+        f"Logs: {folder}",
     )
 
 
@@ -53,6 +52,26 @@ def _reality(found: dict[str, Any]) -> str:
     """Returns the reality gap of the physical robot as a clause."""
     gap = f", at a reality gap of {found['gap']:g}" if found["gap"] else ""
     return gap + (", with structural mismatch" if found["structure"] else "")
+
+
+def result_file(experiment: Experiment, found: dict[str, Any], logs: Sequence[Path]) -> bytes:
+    """Returns the ``result.json`` of a run: the outcome with its settings, and its logs' digests.
+
+    Args:
+        experiment: The run.
+        found: Result of ``facts``.
+        logs: Logs of the run's trials.
+
+    Raises:
+        OSError: A log cannot be read.
+    """
+    return result_bytes(
+        {
+            **found,
+            "settings": dataclasses.asdict(experiment.settings),
+            "files": {os.path.relpath(log, experiment.folder): file_digest(log) for log in logs},
+        }
+    )
 
 
 def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:

@@ -3,9 +3,8 @@
 from typing import Any
 
 import mujoco
-from rich.console import Console
 
-from selfmodel.cli.output.tables import folding
+from selfmodel.cli.output.tables import folding, print_tables
 from selfmodel.faults.registry import ALL_KINDS
 from selfmodel.robot.actuator_ranges import command_ranges
 from selfmodel.robot.robot import Robot
@@ -106,7 +105,7 @@ def print_parts(facts: dict[str, Any]) -> None:
         tables.append(
             folding(("case", "damage"), facts["cases"].items(), title="failures of Table I")
         )
-    Console(markup=False).print(*tables)
+    print_tables(*tables)
 
 
 def _limits(joint: dict[str, Any]) -> str:

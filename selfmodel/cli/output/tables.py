@@ -1,13 +1,14 @@
 """Tables that keep every character on a narrow terminal."""
 
 from collections.abc import Iterable, Sequence
+from typing import Literal
 
-import typer
-from rich.console import Console, JustifyMethod
 from rich.measure import Measurement
 from rich.table import Table
 
+from selfmodel.cli.output.console import text_console
 from selfmodel.cli.output.plain import plain
+from selfmodel.cli.output.printing import print_lines
 
 
 def show(columns: Sequence[str], rows: Sequence[Sequence[str]], *, texts: int = 1) -> None:
@@ -22,16 +23,17 @@ def show(columns: Sequence[str], rows: Sequence[Sequence[str]], *, texts: int = 
     for place, title in enumerate(columns):
         table.add_column(title, justify="left" if place < texts else "right", no_wrap=True)
     for row in rows:
-        table.add_row(*row)
-    console = Console(markup=False, highlight=False)
+        table.add_row(*map(plain, row))
+    console = text_console()
     unbounded = console.options.update(width=10_000)
     if Measurement.get(console, unbounded, table).maximum <= console.width:
         console.print(table)
         return
     for row in rows:
-        typer.echo(f"{columns[0]}: {row[0]}")
-        for title, cell in zip(columns[1:], row[1:], strict=True):
-            typer.echo(f"  {title}: {cell}")
+        print_lines(
+            f"{columns[0]}: {row[0]}",
+            *(f"  {title}: {cell}" for title, cell in zip(columns[1:], row[1:], strict=True)),
+        )
 
 
 def folding(
@@ -51,8 +53,13 @@ def folding(
     """
     table = Table(title=plain(title) if title else None)
     for place, name in enumerate(columns):
-        justify: JustifyMethod = "left" if texts is None or place < texts else "right"
+        justify: Literal["left", "right"] = "left" if texts is None or place < texts else "right"
         table.add_column(name, overflow="fold", justify=justify)
     for row in rows:
         table.add_row(*map(plain, row))
     return table
+
+
+def print_tables(*tables: Table) -> None:
+    """Prints tables on standard output."""
+    text_console().print(*tables)

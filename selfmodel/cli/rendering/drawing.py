@@ -5,16 +5,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import typer
 from numpy.typing import NDArray
-from rich.console import Console
 from rich.progress import track
 
-from selfmodel.cli.output.plain import counted
+from selfmodel.cli.output.console import text_console
+from selfmodel.cli.output.plain import counted, plain
+from selfmodel.cli.output.printing import print_notes
 from selfmodel.cli.rendering import camera, video
 from selfmodel.cli.rendering.film import Film, evenly, film_of
 from selfmodel.cli.rendering.filmstrip import stick_frames, strip
-from selfmodel.errors import WorkError
+from selfmodel.cli.rendering.poses import POSE
+from selfmodel.errors import InputError, WorkError
 from selfmodel.experiments import plugins, trial_logs
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
@@ -26,6 +27,7 @@ from selfmodel.sandbox.budget import Budget
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.threads import thread_count
 from selfmodel.simulation.trial_replay import replay
+from selfmodel.trials.magnitudes import check_magnitudes
 
 
 def draw_trial(
@@ -61,8 +63,7 @@ def draw_trial(
     robot = trial_logs.robot_of_logs([log], model, budget)
     assumed = HypothesisSpace(robot.anatomy, plugins.kinds(kinds)).parse(hypothesis)
     film, facts = _filmed(log, robot, assumed, pictures, thread_count(threads))
-    for note in facts["notes"]:
-        typer.echo(f"note: {note}", err=True)
+    print_notes(*(f"note: {note}" for note in facts["notes"]))
     data = _drawn(film, out.suffix.lower().removeprefix("."), pictures, sticks=sticks)
     try:
         replace_file(out, data)
@@ -84,13 +85,22 @@ def _filmed(
 ) -> tuple[Film, dict[str, Any]]:
     """Returns the film of a trial and its simulation, and the facts of the simulation."""
     logged = log.trial.behaviour
+    check_magnitudes(log.trial, POSE)
+    if pictures is None and not logged.time[-1] * video.RATE < video.MAX_FRAMES:
+        raise InputError(
+            f"{log.trial.path}: the trial takes {logged.time[-1]:g} s, and a film takes at most "
+            f"{video.MAX_FRAMES / video.RATE:g} s: write a strip of pictures, such as trial.png"
+        )
     found = replay(log.trial, assumed, Simulator(robot, threads))
     whole = np.arange(int(float(logged.time[-1]) * video.RATE) + 1) / video.RATE
     moments = whole if pictures is None else evenly(logged.time, pictures)
     film = film_of(
         robot,
         assumed,
-        [(f"logged: {log.trial.plan.name}", logged), (f"model: {assumed}", found.simulated)],
+        [
+            (plain(f"logged: {log.trial.plan.name}"), logged),
+            (plain(f"model: {assumed}"), found.simulated),
+        ],
         moments,
     )
     held = int(film.shots[0].held.sum())
@@ -127,7 +137,7 @@ def _drawn(film: Film, kind: str, pictures: int | None, *, sticks: bool) -> byte
 
 def _shown(frames: Iterable[NDArray[np.uint8]], total: int) -> Iterator[NDArray[np.uint8]]:
     """Yields the frames; shows a progress bar on a terminal."""
-    console = Console(stderr=True)
+    console = text_console(stderr=True)
     yield from track(
         frames, "drawing", total, console=console, disable=not console.is_terminal, transient=True
     )

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from selfmodel.cli.output.plain import figure_text
 from selfmodel.cli.rendering.captions import caption
 from selfmodel.cli.rendering.film import Film, Shot
 from selfmodel.cli.rendering.sticks import draw, draw_ground, lines_of, plane_of
@@ -33,7 +34,7 @@ def strip(film: Film, kind: str) -> bytes:
         artist = _Artist(film, shot)
         for frame, axes in enumerate(row):
             artist.draw(axes, frame)
-        row[0].set_title(_plain(shot.title), loc="left", fontsize=9, fontweight="bold")
+        row[0].set_title(figure_text(shot.title), loc="left", fontsize=9, fontweight="bold")
     file = io.BytesIO()
     figure.savefig(file, format=kind, dpi=110)
     return file.getvalue()
@@ -49,7 +50,9 @@ def stick_frames(film: Film) -> Iterator[NDArray[np.uint8]]:
         figure.subplots_adjust(left=0.01, right=0.99, bottom=0.07, top=0.93, wspace=0.03)
         for axes, artist in zip(row, artists, strict=True):
             artist.draw(axes, frame)
-            axes.set_title(_plain("\n".join(textwrap.wrap(artist.shot.title, 54))), fontsize=10)
+            axes.set_title(
+                "\n".join(map(figure_text, textwrap.wrap(artist.shot.title, 54))), fontsize=10
+            )
         file = io.BytesIO()
         figure.savefig(file, format="rgba")
         pixels = np.frombuffer(file.getvalue(), dtype=np.uint8)
@@ -88,8 +91,3 @@ class _Artist:
             fontsize=8,
             color="#b01818" if held else "black",
         )
-
-
-def _plain(text: str) -> str:
-    """Returns text with every ``$`` escaped: between two, matplotlib reads a formula."""
-    return text.replace("$", r"\$")

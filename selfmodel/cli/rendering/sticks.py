@@ -23,6 +23,9 @@ CIRCLE = np.stack([np.cos(TURNS), np.sin(TURNS)], axis=1)
 GRID = 0.5
 """Distance between the lines on the ground, m."""
 
+MAX_LINES = 1000
+"""Largest number of lines on the ground in each direction; a huge robot has a wider grid."""
+
 
 @dataclass(frozen=True, eq=False)
 class Lines:
@@ -105,12 +108,13 @@ def draw_ground(
     axes: Axes, normal: FloatArray, centre: FloatArray, plane: FloatArray, reach: float
 ) -> None:
     """Draws a grid on the ground around a point."""
-    low = np.floor((centre[:2] - 3 * reach) / GRID) * GRID
+    grid = GRID * max(1.0, np.ceil(6 * reach / (GRID * MAX_LINES)))
+    low = np.floor((centre[:2] - 3 * reach) / grid) * grid
     high = centre[:2] + 3 * reach
     across = [
-        [(x, low[1], 0.0), (x, high[1], 0.0)] for x in np.arange(low[0], high[0] + GRID, GRID)
+        [(x, low[1], 0.0), (x, high[1], 0.0)] for x in np.arange(low[0], high[0] + grid, grid)
     ]
-    along = [[(low[0], y, 0.0), (high[0], y, 0.0)] for y in np.arange(low[1], high[1] + GRID, GRID)]
+    along = [[(low[0], y, 0.0), (high[0], y, 0.0)] for y in np.arange(low[1], high[1] + grid, grid)]
     lines = np.array(across + along)
     lines[..., 2] = -(lines[..., :2] @ normal[:2]) / normal[2]
     axes.add_collection(

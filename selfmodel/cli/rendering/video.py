@@ -18,6 +18,9 @@ from selfmodel.errors import WorkError
 RATE = 25
 """Frames per second of real time; the unit of a GIF is a hundredth of a second."""
 
+MAX_FRAMES = 50_000
+"""Largest number of frames of a film, over half an hour: a GIF of these has some 500 MB."""
+
 Frames = Iterator[NDArray[np.uint8]]
 
 

@@ -13,6 +13,10 @@ from behind and above."""
 SMOOTHING = 0.5
 """Time over which the camera's path is averaged, s, so that it does not sway at each step."""
 
+MAX_SMOOTHED_FRAMES = 1000
+"""Largest number of frames before and after a frame that its average includes: the frames of a
+strip may be less than a nanosecond apart."""
+
 
 def gaze(film: Film, shot: Shot) -> FloatArray:
     """Returns the target point of the camera in each frame, ``(frames, 3)``, m.
@@ -26,7 +30,7 @@ def gaze(film: Film, shot: Shot) -> FloatArray:
         mujoco.mj_kinematics(film.model, data)
         point[:] = data.xpos[film.root]
     step = np.median(np.diff(film.time)) if len(film.time) > 1 else SMOOTHING
-    reach = round(SMOOTHING / step / 2)
+    reach = min(round(SMOOTHING / step / 2), MAX_SMOOTHED_FRAMES)
     padded = np.pad(path, ((reach, reach), (0, 0)), mode="edge")
     window = np.ones(2 * reach + 1) / (2 * reach + 1)
     smooth = [np.convolve(padded[:, axis], window, mode="valid") for axis in range(3)]

@@ -1,11 +1,9 @@
 """``selfmodel suite list``: the bodies of selfmodel and of dm_control's suite."""
 
-import json
 from typing import Any
 
-import typer
-
 from selfmodel.cli.options import Json
+from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.tables import show
 from selfmodel.experiments.robots import robot_entry
 from selfmodel.experiments.suite.bodies import DOMAINS, bodies
@@ -16,7 +14,7 @@ def list_bodies(*, as_json: Json = False) -> None:
     """List the domains with their tasks, cases, joints, sensors, motors and time steps."""
     found = [_facts(domain) for domain in DOMAINS]
     if as_json:
-        typer.echo(json.dumps({"domains": found}, indent=2, allow_nan=False))
+        print_json({"domains": found})
         return
     columns = ("domain", "tasks", "cases", "joints", "sensors", "motors", "weights", "step, s")
     rows = [
@@ -30,7 +28,7 @@ def list_bodies(*, as_json: Json = False) -> None:
         for one in found
     ]
     show(columns, rows, texts=3)
-    typer.echo(
+    print_lines(
         "Robots of the suite are called DOMAIN-TASK: `selfmodel robots NAME` lists the parts."
     )
 

@@ -1,6 +1,5 @@
 """``selfmodel suite run``: a study in which many bodies fail as in Table I, and recover."""
 
-import json
 from typing import Annotated
 
 import typer
@@ -28,6 +27,7 @@ from selfmodel.cli.options import (
     Workers,
 )
 from selfmodel.cli.output import grid_display
+from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.tables import show
 from selfmodel.comparators import DEFAULT
 from selfmodel.experiments.suite.bodies import DOMAINS, bodies, tasks_of
@@ -130,20 +130,20 @@ def run(
         out,
     )
     results = write_results(out)
+    grid_display.note_unverified(results.unverified, out)
     if as_json:
         found = {**results.as_dict(), "failures": grid_display.as_objects(failed)}
-        typer.echo(json.dumps(found, indent=1, allow_nan=False))
+        print_json(found, indent=1)
     else:
         _print(results.summaries)
-        for path in results.files:
-            typer.echo(str(path))
+        print_lines(*map(str, results.files))
     grid_display.end(failed)
 
 
 def _print(summaries: tuple[Summary, ...]) -> None:
     if summaries:
         show(COLUMNS, [_texts(summary) for summary in summaries], texts=3)
-        typer.echo("Medians over the runs; right with its 95 % interval, %.")
+        print_lines("Medians over the runs; right with its 95 % interval, %.")
 
 
 def _texts(summary: Summary) -> list[str]:

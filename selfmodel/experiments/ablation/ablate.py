@@ -3,12 +3,11 @@
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from selfmodel.experiments.ablation import bank
 from selfmodel.experiments.ablation.plan import Ablation, cells, check, job, spec
-from selfmodel.experiments.ablation.run_one import run_one
-from selfmodel.experiments.grid import GridBegins, Job, PartEnds, run_grid
+from selfmodel.experiments.ablation.run_one import files_of, run_one
+from selfmodel.experiments.grid import GridBegins, Job, PartEnds, PartResult, run_grid
 from selfmodel.experiments.study_files import as_dicts
 
 
@@ -49,5 +48,6 @@ def ablate(
     return no_gait + failed
 
 
-def _rows(gaits: Path, of: Job, comparator: str, folder: Path) -> Any:  # noqa: ANN401  # JSON
-    return as_dicts(run_one(spec(of), comparator, folder, gaits))
+def _rows(gaits: Path, of: Job, comparator: str, folder: Path) -> PartResult:
+    rows = as_dicts(run_one(spec(of), comparator, folder, gaits))
+    return PartResult(rows, files_of(spec(of), comparator, folder))

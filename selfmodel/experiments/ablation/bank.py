@@ -3,13 +3,12 @@
 import hashlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 from selfmodel.controllers.controller import Controller
 from selfmodel.experiments import robots, trial_logs
 from selfmodel.experiments.ablation.plan import Ablation, Cell, model_digest
-from selfmodel.experiments.gaits import evolve_gait, gait_settings
-from selfmodel.experiments.grid import GridBegins, Job, PartEnds, run_grid
+from selfmodel.experiments.gaits import check_not_evolved, evolve_gait, gait_settings
+from selfmodel.experiments.grid import GridBegins, Job, PartEnds, PartResult, run_grid
 from selfmodel.experiments.study_files import key_of
 from selfmodel.settings import Settings
 from selfmodel.version import __version__
@@ -69,14 +68,20 @@ def gait(bank: Path, robot: str, number: int) -> Controller:
 
 
 def digests(bank: Path, cell: Cell, settings: Settings) -> list[str] | None:
-    """Returns the SHA-256 of each gait of a run; None if a gait is missing."""
+    """Returns the SHA-256 of each gait of a run; None if the evolution of a gait failed.
+
+    Raises:
+        InputError: The file of an evolved gait is missing.
+    """
     paths = [_path(bank, cell.robot, number) for number in cell.gaits(settings)]
-    if not all(path.exists() for path in paths):
-        return None
+    for path in paths:
+        if not path.exists():
+            check_not_evolved(path)
+            return None
     return [hashlib.sha256(path.read_bytes()).hexdigest() for path in paths]
 
 
-def _evolve(job: Job, _part: str, run: Path) -> Any:  # noqa: ANN401  # JSON
+def _evolve(job: Job, _part: str, run: Path) -> PartResult:
     robot = job.parameters["robot"]
     return evolve_gait(
         _path(run.parent, robot, job.seed),

@@ -11,8 +11,8 @@ from typing import Any
 from selfmodel.experiments.ablation.figures import draw
 from selfmodel.experiments.ablation.rows import AblationRow
 from selfmodel.experiments.ablation.scores import ComparatorScore, summarise
-from selfmodel.experiments.grid import finished
-from selfmodel.experiments.study_files import as_csv, as_dicts, write_files
+from selfmodel.experiments.grid import FinishedPart, finished
+from selfmodel.experiments.study_files import as_csv, as_dicts, as_rows, write_files
 
 
 @dataclass(frozen=True)
@@ -23,11 +23,13 @@ class AblationResults:
         rows: All diagnoses in the folder.
         scores: Scores of the comparators.
         files: Paths of the CSV, the JSON and the figures.
+        unverified: Number of parts of version 0.1, which have no digest.
     """
 
     rows: tuple[AblationRow, ...]
     scores: tuple[ComparatorScore, ...]
     files: tuple[Path, ...]
+    unverified: int
 
 
 def collect(folder: Path) -> tuple[AblationRow, ...]:
@@ -36,7 +38,11 @@ def collect(folder: Path) -> tuple[AblationRow, ...]:
     Raises:
         InputError: A file in the folder is damaged.
     """
-    rows = [AblationRow(**row) for part in finished(folder / "runs") for row in part.result]
+    return _rows(finished(folder / "runs"))
+
+
+def _rows(parts: Iterable[FinishedPart]) -> tuple[AblationRow, ...]:
+    rows = [row for part in parts for row in as_rows(AblationRow, part)]
     return tuple(sorted(rows, key=lambda row: (*row.run, row.comparator, row.trials)))
 
 
@@ -47,7 +53,8 @@ def write_results(folder: Path) -> AblationResults:
         InputError: A file in the folder is damaged.
         OSError: The results cannot be written.
     """
-    rows = collect(folder)
+    parts = [*finished(folder / "runs")]
+    rows = _rows(parts)
     scores = summarise(rows)
     text = json.dumps(as_dict(rows, scores), indent=1, allow_nan=False)
     files = {
@@ -55,7 +62,8 @@ def write_results(folder: Path) -> AblationResults:
         "results.json": f"{text}\n".encode(),
         **{f"figures/{name}": data for name, data in draw(rows, scores)},
     }
-    return AblationResults(rows, scores, write_files(folder, files))
+    unverified = sum(part.made_with is None for part in parts)
+    return AblationResults(rows, scores, write_files(folder, files), unverified)
 
 
 def as_dict(rows: Iterable[AblationRow], scores: Iterable[ComparatorScore]) -> dict[str, Any]:

@@ -49,6 +49,19 @@ def run_one(spec: Spec, comparator: str, folder: Path, gaits: Path) -> list[Abla
     return _TRIAL_CHOICES[spec.next_trial](setting)
 
 
+def files_of(spec: Spec, comparator: str, folder: Path) -> list[Path]:
+    """Returns the files that a finished part of a run has read: trial logs and self-model.
+
+    Args:
+        spec: Specification of the run.
+        comparator: Name of the comparator.
+        folder: Folder of the run.
+    """
+    if spec.next_trial == "bank":
+        return [*sorted((folder / "trials").glob("*.mcap")), folder / "calibrated.xml"]
+    return sorted((_own_folder(folder, comparator) / "trials").glob("*.mcap"))
+
+
 def setting_of(
     spec: Spec, comparator: str, folder: Path, gaits: tuple[Controller, ...] = ()
 ) -> Setting:
@@ -123,7 +136,7 @@ def _from_the_bank(setting: Setting) -> list[AblationRow]:
 
 def _in_a_recovery(setting: Setting) -> list[AblationRow]:
     """Returns the rows of a recovery, whose later trials depend on the comparator."""
-    folder = setting.folder / quote(setting.name, safe="")
+    folder = _own_folder(setting.folder, setting.name)
     shutil.rmtree(folder, ignore_errors=True)  # files of a killed run
     settings, cell = setting.spec.settings, setting.spec.cell
     rows: list[AblationRow] = []
@@ -166,6 +179,11 @@ def _in_a_recovery(setting: Setting) -> list[AblationRow]:
         rows[-1], distinct_hypotheses=outcome.recovery.distinct_hypotheses
     )
     return rows
+
+
+def _own_folder(run: Path, comparator: str) -> Path:
+    """Returns the folder of the recovery with a comparator, whose trials are its own."""
+    return run / quote(comparator, safe="")
 
 
 _TRIAL_CHOICES: Mapping[str, Callable[[Setting], list[AblationRow]]] = {

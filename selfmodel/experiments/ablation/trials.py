@@ -10,7 +10,8 @@ from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.experiments.ablation.plan import HEALTHY_TRIALS, Spec
 from selfmodel.experiments.reality import draw_reality
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
-from selfmodel.logs.atomic import partial_path, write_atomic
+from selfmodel.logs.atomic import partial_path
+from selfmodel.logs.files import make_folder, replace_file
 from selfmodel.logs.physical_trial import run_trial
 from selfmodel.logs.reader import read_log
 from selfmodel.logs.records import TrialHeader
@@ -63,7 +64,7 @@ def calibrated_robot(setting: Setting, healthy: Sequence[Trial]) -> Robot:
     """
     path, robot = setting.folder / "calibrated.xml", setting.robot
     if not path.exists():
-        write_atomic(path, calibrate(robot, healthy, threads=1).robot.mjcf.encode())
+        replace_file(path, calibrate(robot, healthy, threads=1).robot.mjcf.encode())
     return dataclasses.replace(robot, mjcf=path.read_text(encoding="utf-8"))
 
 
@@ -74,7 +75,7 @@ def _trial(setting: Setting, number: int, stage: Stage, gait: Controller) -> Tri
     path = setting.folder / "trials" / f"{plan.name}.mcap"
     if path.exists():
         return read_log(path).trial
-    path.parent.mkdir(parents=True, exist_ok=True)
+    make_folder(path.parent)
     partial_path(path).unlink(missing_ok=True)  # of a killed run
     hidden = INTACT if stage == "before" else setting.truth
     cell, robot = setting.spec.cell, setting.robot

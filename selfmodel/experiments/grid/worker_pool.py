@@ -8,6 +8,7 @@ import multiprocessing
 import os
 import signal
 import threading
+import warnings
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
@@ -16,6 +17,8 @@ from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from typing import Any, TypeVar
+
+from selfmodel.physical.stop_signals import STOP_SIGNALS, hold_stop_signals
 
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")
@@ -41,7 +44,8 @@ def run_tasks(
     """Runs tasks in worker processes and yields each with its result, in order of completion.
 
     A process that exits fails its current task and is replaced by another process. Workers never
-    receive Ctrl-C; closing the generator terminates all of them.
+    receive Ctrl-C, SIGTERM or SIGHUP, which a terminal or ``timeout`` send to them as well; closing
+    the generator kills all of them.
 
     Args:
         perform: Function that runs one task. It must be importable; an exception ends its process.
@@ -105,35 +109,36 @@ class _Worker:
 
 @contextmanager
 def _pool() -> Iterator[Callable[[Callable[..., Any]], _Worker]]:
-    """Context manager with a function that starts a worker; terminates all workers at its end."""
+    """Context manager with a function that starts a worker; kills all workers at its end."""
     context = multiprocessing.get_context("spawn")
     started: list[_Worker] = []
 
     def spawn(perform: Callable[..., Any]) -> _Worker:
         pipe, worker_end = context.Pipe()
         process = context.Process(target=_serve, args=(perform, worker_end), daemon=True)
-        with _sigint_blocked():
-            process.start()
+        with hold_stop_signals():  # a process that has started is in the list
+            with _stop_signals_blocked():
+                process.start()
+            started.append(_Worker(process, pipe, deque()))
         worker_end.close()  # a pipe with one open end reports EOF when the process exits
-        started.append(_Worker(process, pipe, deque()))
         return started[-1]
 
     try:
         yield spawn
     finally:
         for worker in started:
-            worker.process.terminate()
+            worker.process.kill()  # SIGTERM is blocked
         for worker in started:
             worker.process.join()
             worker.pipe.close()
 
 
 @contextmanager
-def _sigint_blocked() -> Iterator[None]:
-    """Context manager that blocks SIGINT, also in the processes that it starts."""
-    # The first process starts the tracker, which would unblock the signal.
+def _stop_signals_blocked() -> Iterator[None]:
+    """Context manager that blocks the stop signals, also in the processes that it starts."""
+    # The first process starts the tracker, which would unblock the signals.
     resource_tracker.ensure_running()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, STOP_SIGNALS)
     try:
         yield
     finally:
@@ -144,12 +149,18 @@ def _serve(perform: Callable[..., Any], pipe: Connection) -> None:
     """Main function of a worker: runs the tasks from a pipe until the pipe is closed."""
     threading.Thread(target=_exit_with_parent, daemon=True).start()
     os.dup2(2, 1)  # standard output is for the results of the command
+    # A result contains whether a simulation diverged; a worker's raw text does not name the task.
+    warnings.simplefilter("ignore", RuntimeWarning)
     while True:
         try:
             task = pipe.recv()
-        except EOFError:
+        except (EOFError, ConnectionError):
             return
-        pipe.send(perform(task))
+        answer = perform(task)
+        try:
+            pipe.send(answer)
+        except ConnectionError:  # the command was killed meanwhile
+            return
 
 
 def _exit_with_parent() -> None:

@@ -9,8 +9,8 @@ from typing import Any
 
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.experiments import plugins, robots
-from selfmodel.experiments.gaits import gait_settings
-from selfmodel.experiments.grid import Job, check_shared, finished
+from selfmodel.experiments.gaits import check_not_evolved, gait_settings
+from selfmodel.experiments.grid import Job, check_shared
 from selfmodel.experiments.study_files import check_keys, key_of
 from selfmodel.faults.neuron import silent_neurons
 from selfmodel.faults.notation import parse
@@ -25,7 +25,7 @@ GAIT_PARAMETERS = ("selfmodel", "score", "controller", "neurons")
 
 OPTIONAL_PARAMETERS = ("kinds", "gap", "structure", "neurons")
 """Names of the parameters that ``run.json`` contains only if they differ from their defaults, so
-that folders of version 0.1, which has no such parameters, are resumable."""
+that the same command reads a folder of version 0.1, which has no such parameters."""
 
 
 @dataclass(frozen=True)
@@ -129,11 +129,7 @@ def recovery_jobs(study: Study, only: tuple[int, int] = (1, 1)) -> list[Job]:
     for gait in gait_jobs(study, only):
         path = gait_path(study.folder, gait.key)
         if not path.exists():
-            if any(part.key == gait.key for part in finished(study.folder / "gaits")):
-                raise InputError(
-                    f"{path} is missing, the first gait of recoveries: restore the file, or delete "
-                    f"{study.folder / 'gaits' / gait.key} to evolve the gait again"
-                )
+            check_not_evolved(path)
             continue
         body = gait.parameters["body"]
         entry = robots.robot_entry(body)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from selfmodel.experiments.grid import finished
-from selfmodel.experiments.study_files import as_csv, as_dicts, write_files
+from selfmodel.experiments.study_files import as_csv, as_dicts, as_rows, write_files
 from selfmodel.experiments.suite.rows import SuiteRow, Summary, summarise
 
 
@@ -18,11 +18,13 @@ class SuiteResults:
         rows: All recoveries in the folder.
         summaries: Summaries of the rows.
         files: Paths of the CSV and the JSON.
+        unverified: Number of parts of version 0.1, which have no digest.
     """
 
     rows: tuple[SuiteRow, ...]
     summaries: tuple[Summary, ...]
     files: tuple[Path, ...]
+    unverified: int
 
     def as_dict(self) -> dict[str, Any]:
         """Returns rows and summaries as JSON."""
@@ -36,7 +38,8 @@ def write_results(folder: Path) -> SuiteResults:
         InputError: A file in the folder is damaged.
         OSError: The results cannot be written.
     """
-    found = [SuiteRow(**row) for part in finished(folder / "runs") for row in part.result]
+    parts = [*finished(folder / "runs")]
+    found = [row for part in parts for row in as_rows(SuiteRow, part)]
     rows = tuple(sorted(found, key=lambda row: (row.robot, row.case, row.seed)))
     summaries = summarise(rows)
     text = json.dumps(_as_dict(rows, summaries), indent=1, allow_nan=False)
@@ -44,7 +47,8 @@ def write_results(folder: Path) -> SuiteResults:
         "results.csv": as_csv(SuiteRow, rows).encode(),
         "results.json": f"{text}\n".encode(),
     }
-    return SuiteResults(rows, summaries, write_files(folder, files))
+    unverified = sum(part.made_with is None for part in parts)
+    return SuiteResults(rows, summaries, write_files(folder, files), unverified)
 
 
 def _as_dict(rows: tuple[SuiteRow, ...], summaries: tuple[Summary, ...]) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 import shutil
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from selfmodel.controllers.controller import check_silent_neurons
 from selfmodel.experiments import plugins, robots, trial_logs
 from selfmodel.experiments.experiment import Experiment, run as run_experiment
 from selfmodel.experiments.gaits import evolve_gait
-from selfmodel.experiments.grid import GridBegins, Job, PartEnds, run_grid
+from selfmodel.experiments.grid import GridBegins, Job, PartEnds, PartResult, run_grid
 from selfmodel.experiments.study_files import as_dicts
 from selfmodel.experiments.suite.plan import Study, check, gait_jobs, gait_path, recovery_jobs
 from selfmodel.experiments.suite.rows import SuiteRow
@@ -60,7 +59,7 @@ def run_study(
     return no_gait + failed
 
 
-def _evolve(job: Job, _part: str, run: Path) -> Any:  # noqa: ANN401  # JSON
+def _evolve(job: Job, _part: str, run: Path) -> PartResult:
     """Evolves and writes the gait of a body before the failure."""
     parameters = job.parameters
     entry = robots.robot_entry(parameters["body"])
@@ -75,8 +74,8 @@ def _evolve(job: Job, _part: str, run: Path) -> Any:  # noqa: ANN401  # JSON
     )
 
 
-def _recover(job: Job, _part: str, run: Path) -> Any:  # noqa: ANN401  # JSON
-    """Runs the recovery of a body and returns its row."""
+def _recover(job: Job, _part: str, run: Path) -> PartResult:
+    """Runs the recovery of a body and returns its row, with its trial logs."""
     parameters, shared = job.parameters, job.parameters["shared"]
     entry = robots.robot_entry(parameters["body"])
     robot = entry.robot()
@@ -121,7 +120,7 @@ def _recover(job: Job, _part: str, run: Path) -> Any:  # noqa: ANN401  # JSON
         diverged=outcome.stats.diverged,
         seconds=outcome.seconds,
     )
-    return as_dicts([row])
+    return PartResult(as_dicts([row]), sorted((folder / "trials").glob("*.mcap")))
 
 
 def _score_of(score: Score, robot: Robot, hidden: Hypothesis, trial: Trial) -> float:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from selfmodel.errors import InputError
-from selfmodel.files import read_file
+from selfmodel.files import encodable, read_file
 from selfmodel.robot.mjcf.command_ranges import add_command_ranges
 from selfmodel.robot.mjcf.document import Document, read_document
 from selfmodel.robot.mjcf.expand import check_loggable, expand
@@ -66,7 +66,7 @@ def adapt(path: Path, settings: MjcfSettings) -> AdaptedMjcf:
     data = read_file(path, "an MJCF file", MAX_MODEL_SIZE)
     try:
         document = read_document(data, Folder(path.parent), path.name)
-        return _adapted(path.stem, document, settings)
+        return _adapted(encodable(path.stem), document, settings)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.document import MAX_SOURCE_ASSET_BYTES, Document
-from selfmodel.robot.mjcf.mujoco_errors import compile_model, mujoco_errors_as_input_errors
+from selfmodel.robot.mjcf.mujoco_errors import compile_model, loading_a_model
 from selfmodel.robot.mjcf.resource_limits import MAX_ELEMENTS, REFUSED_ELEMENTS
 from selfmodel.robot.mjcf.untrusted import checked_model
 
@@ -46,7 +46,7 @@ def expand(document: Document) -> None:
     tags = {element.tag for element in document.root.iter()}
     used = [tag for tag in (*_COPYING_ELEMENTS, "frame") if tag in tags]
     if used:
-        with mujoco_errors_as_input_errors():
+        with loading_a_model():
             spec = mujoco.MjSpec.from_string(document.text, assets=document.assets)
             spec.compile()
             document.root = ET.fromstring(spec.to_xml())  # noqa: S314  # the text is from MuJoCo

@@ -9,7 +9,7 @@ from selfmodel.robot.frames import turned_by_hinge
 from selfmodel.robot.mjcf.body_frames import BodyFrames, write_frames
 from selfmodel.robot.mjcf.document import Document
 from selfmodel.robot.mjcf.expand import format_numbers
-from selfmodel.robot.mjcf.mujoco_errors import compile_model, mujoco_errors_as_input_errors
+from selfmodel.robot.mjcf.mujoco_errors import compile_model, loading_a_model
 from selfmodel.robot.mjcf.settings import NO_KEYFRAME, MjcfSettings
 
 _POSE_TOLERANCE = 1e-9
@@ -42,7 +42,7 @@ def bake_keyframe(document: Document, model: mujoco.MjModel, settings: MjcfSetti
         return
     qpos = np.array(model.key_qpos[number])
     if not np.array_equal(qpos, model.qpos0):
-        with mujoco_errors_as_input_errors():
+        with loading_a_model():
             before = mujoco.MjData(model)
             before.qpos = qpos
             mujoco.mj_fwdPosition(model, before)

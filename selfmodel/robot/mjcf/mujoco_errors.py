@@ -1,4 +1,4 @@
-"""Compiles an MJCF, and converts MuJoCo's errors to ``InputError``."""
+"""Converts MuJoCo's errors to ``InputError``, and compiles an MJCF."""
 
 import warnings
 from collections.abc import Iterator
@@ -7,6 +7,9 @@ from contextlib import contextmanager
 import mujoco
 
 from selfmodel.errors import InputError
+from selfmodel.robot.mujoco_log import configure, uncounted_warnings
+
+configure()
 
 MUJOCO_ERRORS = (
     ValueError,
@@ -16,29 +19,42 @@ MUJOCO_ERRORS = (
     RuntimeError,  # "unknown exception": MuJoCo is out of memory
     mujoco.FatalError,
 )
-"""Exceptions that MuJoCo raises for an invalid model."""
+"""Exceptions that MuJoCo raises for a model that it cannot compile or simulate."""
 
 
 @contextmanager
-def mujoco_errors_as_input_errors() -> Iterator[None]:
+def mujoco_errors_as_input_errors(task: str) -> Iterator[None]:
+    """Converts MuJoCo's exceptions to ``InputError``.
+
+    Args:
+        task: Task that MuJoCo fails at, such as ``"load the model"``, for the message.
+
+    Raises:
+        InputError: MuJoCo raised an exception.
+    """
+    try:
+        yield
+    except MUJOCO_ERRORS as error:
+        if isinstance(error, InputError):
+            raise
+        message = " ".join(str(error).split()).removeprefix("Error: ")
+        raise InputError(f"MuJoCo cannot {task}: {message}") from error
+
+
+@contextmanager
+def loading_a_model() -> Iterator[None]:
     """Converts MuJoCo's exceptions to ``InputError``, and suppresses its warnings.
 
     Raises:
         InputError: MuJoCo raised an exception.
     """
-    handler = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda _: None)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            yield
-    except MUJOCO_ERRORS as error:
-        if isinstance(error, InputError):
-            raise
-        message = " ".join(str(error).split()).removeprefix("Error: ")
-        raise InputError(f"MuJoCo cannot load the model: {message}") from error
-    finally:
-        mujoco.set_mju_user_warning(handler)
+    with (
+        mujoco_errors_as_input_errors("load the model"),
+        uncounted_warnings(),
+        warnings.catch_warnings(),
+    ):
+        warnings.simplefilter("ignore")
+        yield
 
 
 def compile_model(mjcf: str, assets: dict[str, bytes]) -> mujoco.MjModel:
@@ -47,5 +63,5 @@ def compile_model(mjcf: str, assets: dict[str, bytes]) -> mujoco.MjModel:
     Raises:
         InputError: MuJoCo cannot compile the MJCF.
     """
-    with mujoco_errors_as_input_errors():
+    with loading_a_model():
         return mujoco.MjModel.from_xml_string(mjcf, assets)

@@ -28,13 +28,15 @@ class UniqueNames:
 
     def __init__(self, names: Iterable[str | None]) -> None:
         self._names = {name for name in names if name}
+        self._numbers: dict[str, int] = {}
 
     def new(self, base: str) -> str:
         """Returns the base name, with a number appended if the name is in use."""
-        name, number = base, 2
+        name, number = base, self._numbers.get(base, 2)
         while name in self._names:
             name, number = f"{base}_{number}", number + 1
         self._names.add(name)
+        self._numbers[base] = number
         return name
 
 

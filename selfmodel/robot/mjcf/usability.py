@@ -6,7 +6,7 @@ import numpy as np
 from selfmodel.errors import InputError
 from selfmodel.robot.anatomy_reader import driven_joints
 from selfmodel.robot.floating_base import find_root_body, joints_of_body
-from selfmodel.robot.mjcf.mujoco_errors import mujoco_errors_as_input_errors
+from selfmodel.robot.mjcf.mujoco_errors import loading_a_model
 from selfmodel.robot.model_checks import check_model
 from selfmodel.robot.transmission import motor_joints
 
@@ -25,7 +25,6 @@ def check_usable(model: mujoco.MjModel) -> None:
         raise InputError(
             f"the model's <option timestep> must be above 0 s, got {model.opt.timestep}"
         )
-    _check_finite(model)
     if not model.nu:
         raise InputError(
             "the model has no actuators: give each joint that a motor is to drive an element in "
@@ -45,13 +44,6 @@ def check_usable(model: mujoco.MjModel) -> None:
         raise InputError(str(error)) from error
     _check_passive_base(model, root)
     _check_stable(model)
-
-
-def _check_finite(model: mujoco.MjModel) -> None:
-    for name in ("body_mass", "body_inertia", "body_pos", "geom_size", "jnt_range", "qpos0"):
-        if not np.isfinite(getattr(model, name)).all():
-            quantity = name.replace("_", " ")
-            raise InputError(f"expected finite numbers, got others in the model's {quantity}")
 
 
 def _check_one_tree(model: mujoco.MjModel) -> None:
@@ -79,7 +71,7 @@ def _check_stable(model: mujoco.MjModel) -> None:
     """Checks that a short simulation without commands does not diverge."""
     data = mujoco.MjData(model)
     steps = min(_MAX_PROBE_STEPS, max(1, round(_PROBE_SECONDS / model.opt.timestep)))
-    with mujoco_errors_as_input_errors():
+    with loading_a_model():
         for _ in range(steps):
             mujoco.mj_step(model, data)
     unstable = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL)

@@ -7,10 +7,12 @@ import sys
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import mujoco
 import numpy as np
 import pytest
+from hypothesis import given, strategies as st
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -24,6 +26,7 @@ from selfmodel.errors import InputError, WorkError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.logs.records import TrialHeader
+from selfmodel.logs.result_files import result_bytes
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot
@@ -189,6 +192,20 @@ def test_a_diagnosis_is_read_or_refused(text: str, best: str | None, tmp_path: P
         return
     with pytest.raises(InputError, match=r"expected a diagnosis: the result\.json"):
         diagnosed(path)
+
+
+@given(st.data())
+def test_a_result_with_a_changed_byte_is_refused_or_means_the_same(data: st.DataObject):
+    original = result_bytes({"diagnosis": [{"hypothesis": "break:front_left_knee"}]})
+    altered = bytearray(original)
+    altered[data.draw(st.integers(0, len(original) - 1))] = data.draw(st.integers(0, 255))
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "result.json"
+        path.write_bytes(altered)
+        try:
+            assert diagnosed(path) == "break:front_left_knee"
+        except InputError as error:
+            assert str(path) in str(error)  # noqa: PT017  # most changes are refused, some are none
 
 
 def test_what_is_lost_is_dotted_and_what_is_jammed_red(robot: Robot):

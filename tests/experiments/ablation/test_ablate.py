@@ -5,6 +5,7 @@ import dataclasses
 import itertools
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -273,6 +274,24 @@ def test_a_bank_without_a_gait_is_refused_before_anything_is_run(done: Path, tmp
     with pytest.raises(InputError, match=r"quadruped-1.npz: expected a controller file"):
         run(small(tmp_path / "out", seeds=[0], bank=done / "bank"))
     assert not (tmp_path / "out").exists()
+
+
+def test_a_row_changed_by_hand_is_in_no_table(done: Path, tmp_path: Path):
+    altered = shutil.copytree(done, tmp_path / "altered")
+    path = next(altered.glob("runs/*case01*/parts/*.json"))
+    path.write_text(path.read_text().replace('"correct": false', '"correct": true', 1))
+    (altered / "results.csv").unlink()
+    command = ("ablate", "--robots", "quadruped", "--case", "1,9", "--comparator", PAPERS)
+    command += ("--seed", "5", "--steps", "60", "--generations", "2", "--trials", "2")
+    command += ("--population", "6", "--workers", "1", "--out", "altered")
+    told = selfmodel(*command, cwd=tmp_path)
+
+    assert told.returncode == 2
+    assert f"parts/{path.name}: expected a part of a run: its digest is missing or wrong" in (
+        told.stderr
+    )
+    assert "delete the file, and the same command runs its part again" in told.stderr
+    assert not (altered / "results.csv").exists()
 
 
 @pytest.fixture(scope="module")

@@ -14,19 +14,19 @@ from tests.logs.rosbag.conftest import recorded
 
 MAGIC = b"\x89MCAP0\r\n"
 ARRAY = "std_msgs/msg/Float64MultiArray"
-TOPIC = "/commands"
-"""A topic that the mapping of the tests wants."""
+COMMANDS = 1
+"""Channel of a topic that the mapping of the tests names."""
 
 
 def many_numbers(folder: Path) -> Path:
     """A message of 3 million numbers in 1 kB of zstd."""
     payload = bytes(ROS.serialize_cdr(array(np.zeros(3_000_000)), ARRAY))
-    return _mcap(folder, Message(1, T0, zstandard.compress(payload), T0, 0))
+    return _mcap(folder, Message(COMMANDS, T0, zstandard.compress(payload), T0, 0))
 
 
 def many_messages(folder: Path) -> Path:
     """A chunk of 256 MB of empty messages in 24 kB of zstd."""
-    one = _bytes(Message(1, T0, b"", T0, 0))
+    one = _bytes(Message(COMMANDS, T0, b"", T0, 0))
     data = one * (256 * 10**6 // len(one))
     chunk = Chunk("zstd", zstandard.compress(data), T0, T0, 0, len(data))
     return _mcap(folder, chunk)
@@ -77,15 +77,22 @@ def packed_file(folder: Path) -> Path:
     return path
 
 
-def _mcap(folder: Path, *records: McapRecord) -> Path:
+def _mcap(folder: Path, record: McapRecord) -> Path:
+    """A short honest recording, and then a record."""
+    records: list[McapRecord] = [Header("ros2", "")]
+    channels: dict[str, int] = {}
+    items = sorted(recorded(0.1), key=lambda item: item[0] != "/commands")
+    for topic, time, message in items:
+        kind = message.__msgtype__
+        if topic not in channels:
+            channel = channels.setdefault(topic, COMMANDS + len(channels))
+            records.append(Schema(channel, b"", "ros2msg", kind))
+            records.append(Channel(channel, topic, "cdr", {}, channel))
+        payload = bytes(ROS.serialize_cdr(message, kind))
+        records.append(Message(channels[topic], time, payload, time, 0))
     path = folder / "hostile.mcap"
-    described = [
-        Header("ros2", ""),
-        Schema(1, b"", "ros2msg", ARRAY),
-        Channel(1, TOPIC, "cdr", {}, 1),
-    ]
-    ends = [DataEnd(0), Footer(0, 0, 0)]
-    path.write_bytes(MAGIC + b"".join(map(_bytes, [*described, *records, *ends])) + MAGIC)
+    data = b"".join(map(_bytes, [*records, record, DataEnd(0), Footer(0, 0, 0)]))
+    path.write_bytes(MAGIC + data + MAGIC)
     return path
 
 

@@ -1,5 +1,7 @@
 """Every mistake in a mapping is told with its line, and with what could have been meant."""
 
+import time
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -156,3 +158,48 @@ def test_the_mapping_in_the_guide_is_one():
     mapping = parse_mapping(text, "guide")
     assert mapping.joints.links["front_left_knee"] == Link("FL_knee", -1, 0.1)
     assert mapping.touch["front_left_touch"].threshold == 5
+
+
+@pytest.mark.parametrize(
+    ("value", "match"),
+    [
+        ("9" * 5000, "a number has too many digits"),
+        ("0x" + "f" * 5000, "got a number with too many digits"),
+        ("1e999", "must be a number, got inf"),
+        ("1979-05-27", "must be a number, got datetime"),
+        ("[" * 100_000, "expected TOML"),
+        ("{a=" * 100_000, "expected TOML"),
+        ("[" * 50 + "]" * 50, r"must be a number, got \[\[\["),
+        ('"' + "x" * 10**5 + '"', r"must be a number, got 'x+\.\.\."),
+        ("{" + ".".join("a" * 20) + " = 1}", "at most 16 keys joined by dots"),
+    ],
+    ids=lambda text: text[:8],
+)
+def test_no_value_is_too_strange_for_a_sentence(value: str, match: str):
+    text = MAPPING.replace("control_timestep = 0.01", f"control_timestep = {value}")
+    with pytest.raises(InputError, match=rf"^MAP\.toml:\d+: .*{match}") as caught:
+        parse_mapping(text, "MAP.toml")
+    assert len(str(caught.value)) < 1000
+
+
+def many_names(count: int) -> str:
+    lines = "\n".join(f'a{k} = "b{k}"' for k in range(count))
+    return MAPPING.replace("[commands.names]", f"[commands.names]\n{lines}")
+
+
+def long_order(count: int) -> str:
+    return MAPPING.replace('order = ["RHY"', f"order = {[f'a{k}' for k in range(count)]}"[:-1])
+
+
+@pytest.mark.fuzz
+@pytest.mark.parametrize("text", [many_names, long_order])
+def test_the_time_of_a_mapping_is_linear_in_its_names(text: Callable[[int], str]):
+    def seconds(count: int) -> float:
+        given = text(count)
+        start = time.process_time()
+        with suppress(InputError):
+            parse_mapping(given, "MAP.toml")
+        return time.process_time() - start
+
+    # Four times the names take four times the time; pairs of names, sixteen times.
+    assert min(seconds(40_000) for _ in range(3)) < 8 * min(seconds(10_000) for _ in range(3))

@@ -40,6 +40,10 @@ def test_sides_are_never_confused():
     assert "front_left_knee" not in matched(["front_left_knee"], ["FR_knee", "arm"])
 
 
+def test_a_name_of_a_million_letters_is_not_compared():
+    assert matched(["front_left_knee"], ["front_left_knee" * 10**5]) == {}
+
+
 def test_a_name_that_might_be_either_is_a_guess():
     found = matched(["left_hip_x", "left_hip_y"], ["L_hip"])
     assert [guess.sure for guess in found.values()] == [False]
