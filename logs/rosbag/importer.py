@@ -35,8 +35,8 @@ from selfmodel.trials.behaviour import Behaviour, Sample
 from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.trial import TrialPlan
 
-MAX_STEPS = 1_000_000
-"""Maximum control steps of an import: a wrong stamp must not fill the memory."""
+MESSAGES_PER_STEP = 10
+"""Upper limit of the messages that a control step takes in a log."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +106,7 @@ def import_bag(
     check_columns(mapping, series)
     clocks = _clocks(mapping, series)
     tracks = read_tracks(mapping, series, clocks)
-    steps = _steps(mapping, tracks, robot.control_timestep)
+    steps = _steps(mapping, tracks, robot.control_timestep, budget)
     behaviour = _behaviour(mapping, tracks, robot, steps)
     qualities = _qualities(mapping, series, clocks, steps.origin)
     return Recording(
@@ -162,7 +162,7 @@ def _clocks(mapping: BagMapping, series: Mapping[str, Series]) -> dict[str, Cloc
     return found
 
 
-def _steps(mapping: BagMapping, tracks: Tracks, timestep: float) -> Steps:
+def _steps(mapping: BagMapping, tracks: Tracks, timestep: float, budget: Budget) -> Steps:
     """Control steps at which every role has data."""
     needed = required(mapping, tracks)
     for role, part, track in needed:
@@ -185,9 +185,12 @@ def _steps(mapping: BagMapping, tracks: Tracks, timestep: float) -> Steps:
             f"{mapping.start:g} s after the first of these data and {max(steps, 2)} steps of "
             f"{timestep:g} s: reduce start or duration, or omit the role with the least data",
         )
-    if not 2 <= steps <= MAX_STEPS:
+    most = budget.records // MESSAGES_PER_STEP  # of a log that can be read with the same budget
+    if not 2 <= steps <= most:
         raise mapping.document.error(
-            ("duration",), f"a trial has 2 to {MAX_STEPS} steps, got {steps}: set another duration"
+            ("duration",),
+            f"a trial has 2 to {most} steps, got {steps}: set another duration, or raise the "
+            f"memory with --budget memory=..., from {budget.memory / 1e9:g}GB",
         )
     return Steps(origin, np.rint(np.arange(steps) * period).astype(np.int64))
 

@@ -43,7 +43,7 @@ def generated_column(folder: Path) -> Path:
                 id INTEGER PRIMARY KEY,
                 topic_id INTEGER,
                 timestamp INTEGER,
-                data BLOB GENERATED ALWAYS AS (CAST(hex(zeroblob(100000000)) AS BLOB)) VIRTUAL
+                data BLOB GENERATED ALWAYS AS (CAST(hex(zeroblob(100000000)) AS BLOB))
             );
             INSERT INTO topics VALUES (99, '/other', '', 'cdr', '', '');
             WITH RECURSIVE n(k) AS (SELECT 1 UNION ALL SELECT k + 1 FROM n WHERE k < 1000)
