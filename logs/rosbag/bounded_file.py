@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 class BoundedFile(BufferedReader):
-    """File whose ``read`` allocates no more than the rest of the file, whatever it is asked for.
+    """File whose ``read`` allocates no more than the rest of the file, for any requested size.
 
     ``BufferedReader`` allocates the requested size first, so a damaged length would exhaust the
     memory: the damage would be reported as a lack of budget.

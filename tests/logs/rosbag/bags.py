@@ -61,9 +61,14 @@ def write_ros1(path: Path, items: Iterable[Item], form: str = "none") -> Path:
             kind = message.__msgtype__
             if topic not in known:
                 known[topic] = writer.add_connection(topic, kind, typestore=ROS1)
-            payload = ROS.cdr_to_ros1(ROS.serialize_cdr(message, kind), kind)
-            writer.write(known[topic], time, payload)
+            writer.write(known[topic], time, ros1_payload(message))
     return path
+
+
+def ros1_payload(message: object) -> memoryview:
+    """A message in the encoding of ROS 1."""
+    kind = message.__msgtype__
+    return ROS.cdr_to_ros1(ROS.serialize_cdr(message, kind), kind)
 
 
 def storage(folder: Path) -> Path:

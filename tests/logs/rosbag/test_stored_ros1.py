@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.writer import Writer
 
 from selfmodel.errors import InputError
 from selfmodel.logs.errors import CorruptError, IncompleteError, LogError
 from selfmodel.logs.rosbag.bag import read_bag
 from selfmodel.logs.rosbag.suggest import suggest
 from selfmodel.robot.robot import Robot
-from tests.logs.rosbag.bags import ROS1_FORMS, spoilt, write_bag, write_ros1
+from tests.logs.rosbag.bags import ROS1_FORMS, ros1_payload, spoilt, write_bag, write_ros1
 from tests.logs.rosbag.conftest import decoded, imported, recorded
 
 
@@ -96,3 +97,22 @@ def test_no_damage_of_a_ros_1_bag_crashes(form: str, damage: str, tmp_path: Path
         path.write_bytes(spoilt(data, damage, rng))
         with suppress(LogError, InputError):
             decoded(path, tmp_path)
+
+
+def test_messages_of_ros_1_in_mcap_are_imported_too(biped: Robot, bag: Path, tmp_path: Path):
+    path = tmp_path / "converted.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start("ros1")
+        channels: dict[str, int] = {}
+        for topic, time, message in sorted(recorded(), key=lambda item: item[1]):
+            kind = message.__msgtype__
+            if topic not in channels:
+                schema = writer.register_schema(kind.replace("/msg/", "/"), "ros1msg", b"")
+                channels[topic] = writer.register_channel(topic, "ros1", schema)
+            writer.add_message(channels[topic], time, bytes(ros1_payload(message)), time)
+        writer.finish()
+    found, expected = imported(path, biped).behaviour, imported(bag, biped).behaviour
+
+    for signal, values in expected.signals.items():
+        assert found[signal].tobytes() == values.tobytes(), signal
