@@ -114,7 +114,7 @@ class Gathering:
             names, values = rows
             if names not in messages.layouts:
                 self._count_names(len(names), names, f"in the messages on {name}")
-            self._count_numbers(values.size)
+            self._count_numbers(values.size + 2)  # and the two times
             messages.add(stamp, item.time, rows)
 
     def _count_names(self, count: int, texts: Collection[str], where: str) -> None:

@@ -94,7 +94,8 @@ def test_a_bag_of_many_topics_is_refused(tmp_path: Path):
 def test_a_bag_of_many_numbers_is_refused(tmp_path: Path):
     budget = Budget(memory=5 * 10**7)
     width = budget.names // 2
-    items = [("/x", T0 + k, array([0.0] * width)) for k in range(budget.file_bytes // 8 // width)]
+    messages = budget.file_bytes // 8 // (width + 2)
+    items = [("/x", T0 + k, array([0.0] * width)) for k in range(messages)]
     most = write_bag(tmp_path / "most", items)
     more = write_bag(tmp_path / "more", [*items, *items[:5]])
 
