@@ -1,8 +1,9 @@
 """Example driver: a trial of a robot behind a TCP socket, at 50 control steps a second.
 
-Usage: python examples/drive_a_robot.py HOST PORT TRIAL.mcap
+Usage: python examples/drive_a_robot.py HOST PORT TRIAL.mcap [--watchdog SECONDS]
 """
 
+import argparse
 import dataclasses
 import socket
 import struct
@@ -96,18 +97,22 @@ class SocketRobot(dm_env.Environment):
 # The driver ends here.
 
 
-def main(host: str, port: int, path: Path) -> None:
+def main(host: str, port: int, path: Path, watchdog: float | None) -> None:
     """Logs a trial of five seconds with a random controller."""
     robot = dataclasses.replace(ROBOTS["quadruped"].robot(), control_timestep=0.02)
     network = network_for(robot)
     genome = draw_genomes(np.random.default_rng(0), (network.weights,))
     plan = TrialPlan(path.stem, "single", Controller(network, genome), steps=250, seed=0)
     driver = SocketRobot((host, port), robot)
-    physical = EnvironmentRobot(
-        driver, robot, stop=driver.stop, limits=[joint_limits(robot, 0.2), tilt_limit(1.0)]
-    )
-    samples = physical.run(plan.controller, plan.steps)
     try:
+        physical = EnvironmentRobot(
+            driver,
+            robot,
+            stop=driver.stop,
+            limits=[joint_limits(robot, 0.2), tilt_limit(1.0)],
+            watchdog=watchdog,
+        )
+        samples = physical.run(plan.controller, plan.steps)
         write_trial(path, robot, plan, samples, TrialHeader(Settings(), timed=True))
     except InputError as error:
         sys.exit(describe(error))
@@ -118,6 +123,12 @@ def main(host: str, port: int, path: Path) -> None:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 4:
-        sys.exit(__doc__)
-    main(sys.argv[1], int(sys.argv[2]), Path(sys.argv[3]))
+    parser = argparse.ArgumentParser(description="Logs a trial of a robot behind a socket.")
+    parser.add_argument("host")
+    parser.add_argument("port", type=int)
+    parser.add_argument("path", type=Path, metavar="TRIAL.mcap")
+    parser.add_argument(
+        "--watchdog", type=float, metavar="SECONDS", help="time limit of each reset and step"
+    )
+    given = parser.parse_args()
+    main(given.host, given.port, given.path, given.watchdog)

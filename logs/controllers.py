@@ -9,6 +9,7 @@ design's own arrays (``KINDS``: ``hidden``, a count, of a network; ``timestep``,
 import io
 import struct
 import tokenize
+import warnings
 import zipfile
 import zlib
 from collections.abc import Callable, Mapping
@@ -150,7 +151,9 @@ def parse_controller(data: bytes, source: str) -> Controller:
         InputError: The bytes are not a controller file.
     """
     try:
-        arrays = _arrays(data)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # Python's, for a header that is a damaged literal
+            arrays = _arrays(data)
         return Controller(_design(arrays), arrays["genome"])
     except _FAILURES as failure:
         raise InputError(
@@ -181,6 +184,7 @@ _FAILURES = (
     struct.error,
     zipfile.BadZipFile,
     zlib.error,
+    Warning,
 )
 """Every exception of zipfile and numpy for malformed bytes."""
 

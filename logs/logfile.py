@@ -1,7 +1,7 @@
 """MCAP file under construction: a ``.part`` until it is finished, flushed on request."""
 
 import contextlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from mcap.writer import CompressionType, Writer
@@ -37,6 +37,9 @@ trial."""
 _NEVER = 2**62
 """Size at which the library ends a chunk by itself, bytes: a chunk is one batch with its seal."""
 
+Row = tuple[int, int, int, bytes]
+"""Message: sequence number, index of its channel, time in ns, and payload."""
+
 
 class LogFile:
     """Writer of the records of a log; the constructor creates the file.
@@ -58,8 +61,8 @@ class LogFile:
         self._records: dict[str, str] = {}
         self._files: dict[str, str] = {}
         self._keys: dict[int, bytes] = {}
-        self._batch: list[tuple[int, int, bytes]] = []
-        self._bytes = self._batches = 0
+        self._batch: list[tuple[list[bytes], Sequence[Row]]] = []
+        self._batches = 0
         self._trial, self._seals = "", -1
         self._identity = self._last = b""
         self._mcap = Writer(
@@ -109,20 +112,24 @@ class LogFile:
         self._keys[channel] = topic_key(topic, kind, "cdr", text)
         return channel
 
-    def messages(self, rows: Iterable[tuple[int, int, bytes, int]]) -> None:
-        """Writes messages.
+    def messages(self, channels: Sequence[int], rows: Sequence[Row]) -> None:
+        """Writes messages; those that exceed ``CHUNK`` are flushed in parts.
 
         Args:
-            rows: Channel number, time in ns, payload and sequence number of each message.
+            channels: Channel numbers.
+            rows: Messages.
         """
-        write, batch = self._mcap.add_message, self._batch
+        if len(rows) > 1 and sum(len(row[3]) for row in rows) > CHUNK:
+            middle = len(rows) // 2
+            self.messages(channels, rows[:middle])
+            self.flush()
+            self.messages(channels, rows[middle:])
+            return
+        write = self._mcap.add_message
         with as_write_error(partial_path(self.path)):
-            for channel, nanoseconds, payload, sequence in rows:
-                write(channel, nanoseconds, payload, nanoseconds, sequence)
-                batch.append((channel, nanoseconds, payload))
-                self._bytes += len(payload)
-                if self._bytes > CHUNK:
-                    self.flush()
+            for sequence, index, nanoseconds, payload in rows:
+                write(channels[index], nanoseconds, payload, nanoseconds, sequence)
+        self._batch.append(([self._keys[channel] for channel in channels], rows))
 
     def flush(self) -> None:
         """Flushes to the operating system; a kill of the process then loses no data."""
@@ -151,15 +158,20 @@ class LogFile:
 
     def _seal(self) -> None:
         """Writes the seal of the messages since the last flush."""
-        channels, times, payloads = zip(*self._batch, strict=True)
-        batch = Batch([self._keys[channel] for channel in channels], times, times, payloads)
+        times = [row[2] for _, rows in self._batch for row in rows]
+        batch = Batch(
+            keys=[keys[row[1]] for keys, rows in self._batch for row in rows],
+            log_times=times,
+            publish_times=times,
+            payloads=[row[3] for _, rows in self._batch for row in rows],
+        )
         seal = seal_of(self._trial, self._identity, self._batches, self._last, batch)
         if self._seals < 0:
             self._seals = self.channel(PROVENANCE, SEAL_TYPE)
         time = times[-1]
         self._mcap.add_message(self._seals, time, seal.payload(time), time, seal.index)
         self._batch.clear()
-        self._bytes, self._batches, self._last = 0, self._batches + 1, seal.digest
+        self._batches, self._last = self._batches + 1, seal.digest
 
     def abandon(self) -> None:
         """Closes and deletes the unfinished file."""

@@ -79,7 +79,7 @@ def write_preamble(log: LogFile, robot: Robot, plan: TrialPlan, header: TrialHea
         log.attach(MAPPING_FILE, header.imported.mapping.encode())
     log.begin(plan.name)
     channel = log.channel(DESCRIPTION, DESCRIPTION_TYPE)
-    log.messages([(channel, 0, description(urdf(robot)), 0)])
+    log.messages([channel], [(0, 0, 0, description(urdf(robot)))])
 
 
 def _is_repeatable(header: TrialHeader) -> bool:

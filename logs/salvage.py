@@ -261,12 +261,11 @@ def _write(out: Path, contents: Contents, result: Result) -> None:
 
 
 def _write_messages(log: LogFile, every: dict[str, Messages]) -> None:
-    rows = []
-    for topic, messages in every.items():
-        channel = log.channel(topic, messages.type)
-        rows += [
-            (time, channel, payload)
-            for payload, (time, _) in zip(messages.payloads, messages.times, strict=True)
-        ]
-    rows.sort(key=lambda row: row[:2])
-    log.messages((channel, time, payload, 0) for time, channel, payload in rows)
+    channels = [log.channel(topic, messages.type) for topic, messages in every.items()]
+    rows = [
+        (0, index, time, payload)
+        for index, messages in enumerate(every.values())
+        for payload, (time, _) in zip(messages.payloads, messages.times, strict=True)
+    ]
+    rows.sort(key=lambda row: (row[2], row[1]))
+    log.messages(channels, rows)

@@ -197,11 +197,7 @@ class TrialWriter:
             return
         self._sound = False
         rows = {part: rows[:count] for part, rows in self._rows.items()}
-        channels = self._channels
-        self._log.messages(
-            (channels[topic], stamp, payload, step)
-            for step, topic, stamp, payload in self._encoder.encode(self._written, rows)
-        )
+        self._log.messages(self._channels, self._encoder.encode(self._written, rows))
         self._log.flush()
         self._written = self.steps
         self._sound = True

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from selfmodel.cli.lazy import group
+from selfmodel.cli.lazy import Interrupted, group
 from selfmodel.cli.output.library_warnings import counted_warnings
 from selfmodel.cli.output.plain import plain
 from selfmodel.cli.output.printing import print_lines, print_notes
@@ -88,9 +88,8 @@ def _run() -> None:
         with counted_warnings():
             # The same usage line for `python -m selfmodel` as for the installed command.
             status = app(prog_name="selfmodel", standalone_mode=False)
-    except typer.Abort as end:
-        # typer replaces every KeyboardInterrupt.
-        raise end.__cause__ or KeyboardInterrupt from None
+    except Interrupted as end:
+        raise end.interruption from None
     except UsageError as error:
         status = _print_usage(error)
     finally:

@@ -5,10 +5,33 @@ from importlib import import_module
 from typing import Any
 
 import typer
-from typer.core import TyperCommand
+from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
 from selfmodel.cli.help_page import HelpPageCommand
+
+
+class Interrupted(Exception):  # noqa: N818  # no error: the user ended the command
+    """Interruption of a command; typer replaces a ``KeyboardInterrupt`` by an exit status.
+
+    Args:
+        interruption: The interruption.
+    """
+
+    def __init__(self, interruption: KeyboardInterrupt) -> None:
+        super().__init__()
+        self.interruption = interruption
+
+
+class InterruptibleGroup(TyperGroup):
+    """Command group whose commands end with ``Interrupted``."""
+
+    def invoke(self, ctx: Any) -> Any:  # noqa: ANN401  # as typer declares it
+        """Runs a command."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt as interruption:
+            raise Interrupted(interruption) from interruption
 
 
 class LazyCommand(TyperCommand):
@@ -32,7 +55,13 @@ def group(
         commands: ``module:function`` and one-line help per command, in the order of the help page.
         completion: Adds the options that install shell completion.
     """
-    app = _app(name=name, help=summary, no_args_is_help=True, add_completion=completion)
+    app = _app(
+        cls=InterruptibleGroup,
+        name=name,
+        help=summary,
+        no_args_is_help=True,
+        add_completion=completion,
+    )
     for command, (target, text) in commands.items():
         app.command(command, help=text, cls=LazyCommand)(_importer(command, target))
     return app

@@ -31,6 +31,9 @@ MAX_FEEDBACK = 0.5
 """Largest relative change of the phase speed by all sensors together, each reading 1. The value
 is below 1, so the phase always advances."""
 
+MAX_TIMESTEP = 3600.0
+"""Upper bound of the control time step, s, that of a log: the phase stays finite."""
+
 
 @dataclass(frozen=True)
 class Cpg:
@@ -43,7 +46,7 @@ class Cpg:
         ranges: Command range of each motor; the paper's for all by default.
 
     Raises:
-        ValueError: The time step is not above 0, or the ranges do not fit the motors.
+        ValueError: The time step is out of range, or the ranges do not fit the motors.
     """
 
     name: ClassVar[str] = "cpg"
@@ -55,8 +58,11 @@ class Cpg:
     ranges: Ranges = ()
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.timestep) and self.timestep > 0):
-            raise ValueError(f"the time step must be above 0 s, got {self.timestep}")
+        if not 0 < self.timestep <= MAX_TIMESTEP:
+            raise ValueError(
+                f"the time step must be above 0 s and at most {MAX_TIMESTEP:g} s, "
+                f"got {self.timestep}"
+            )
         object.__setattr__(self, "ranges", checked_ranges(self.motors, self.ranges))
 
     @property

@@ -69,4 +69,5 @@ class SearchSize:
             if self.has_healthy:
                 hypotheses += UNSEARCHED_PER_CANDIDATE * self.candidates
             hypotheses *= SHARE_WITH_OWN_DYNAMICS
-        return round(hypotheses * self.surrogate_steps)
+        steps: int = round(hypotheses * self.surrogate_steps)
+        return steps

@@ -192,8 +192,8 @@ def test_controllers_are_equal_when_their_genome_and_design_are():
         (lambda: Controller(CPG, np.zeros(11)), "has 12 weights, got a genome of shape"),
         (lambda: Controller(CPG, np.full(12, 1.1)), r"must lie in \[-1, 1\]"),
         (lambda: Controller(CPG, np.full(12, np.nan)), r"must lie in \[-1, 1\]"),
-        (lambda: Cpg((), ("hip",), 0.0), "time step must be above 0 s, got 0.0"),
-        (lambda: Cpg((), ("hip",), math.nan), "time step must be above 0 s, got nan"),
+        (lambda: Cpg((), ("hip",), 0.0), "at most 3600 s, got 0.0"),
+        (lambda: Cpg((), ("hip",), math.nan), "at most 3600 s, got nan"),
         (lambda: Cpg((), ("hip",), 0.1, ((0.0, 1.0),) * 2), "1 motors need a command range each"),
     ],
 )

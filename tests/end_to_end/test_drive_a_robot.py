@@ -53,8 +53,8 @@ def robot(folder: Path, **failures: float | str) -> Iterator[str]:
         process.communicate()
 
 
-def driver(folder: Path, port: str) -> subprocess.Popen[str]:
-    command = [sys.executable, EXAMPLE, "127.0.0.1", port, folder / "trial.mcap"]
+def driver(folder: Path, port: str, *options: str) -> subprocess.Popen[str]:
+    command = [sys.executable, EXAMPLE, "127.0.0.1", port, folder / "trial.mcap", *options]
     return subprocess.Popen(
         command,
         cwd=folder,
@@ -78,7 +78,7 @@ def test_delays_and_silence_are_marked_and_the_trial_goes_on(tmp_path: Path):
         told, errors = (process := driver(tmp_path, port)).communicate(timeout=120)
     assert process.returncode == 0, errors
     assert told == f"250 steps: {tmp_path / 'trial.mcap'}\n"
-    log, _ = verify(tmp_path / "trial.mcap")
+    log = verify(tmp_path / "trial.mcap").log
     behaviour, timing = log.trial.behaviour, log.timing
 
     assert (log.status, log.reason, behaviour.steps) == ("finished", "", 250)
@@ -110,8 +110,10 @@ def observed(commands: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
 @pytest.mark.process
 def test_a_dropped_connection_stops_the_robot_and_leaves_a_whole_log(tmp_path: Path):
     with robot(tmp_path, **{"70": "hang up"}) as port:
-        _, errors = (process := driver(tmp_path, port)).communicate(timeout=120)
-    log, _ = verify(tmp_path / "trial.mcap")
+        process = driver(tmp_path, port, "--watchdog", "30")
+        _, errors = process.communicate(timeout=120)
+    verified = verify(tmp_path / "trial.mcap")
+    log = verified.log
 
     assert process.returncode == 1
     assert "the environment failed: ConnectionError: the robot closed the connection" in errors
@@ -123,7 +125,8 @@ def test_a_dropped_connection_stops_the_robot_and_leaves_a_whole_log(tmp_path: P
     late, missing = log.timing.late.sum(), log.timing.missing.sum()
     assert f"clock: {late} steps late, {missing} observations missing" in told.stdout
     told = selfmodel("logs", "verify", "trial.mcap", cwd=tmp_path, PYTHONPATH=str(ROOT))
-    assert told.stdout == f"ok: trial.mcap: 70 steps, stopped ({log.reason})\n"
+    stopped = f"ok: trial.mcap: 70 steps, stopped ({log.reason})"
+    assert told.stdout == f"{stopped}; digest {verified.digest}\n"
 
 
 @pytest.mark.process
@@ -154,17 +157,31 @@ def test_a_robot_that_is_not_there_is_said_so_and_can_be_tried_again(tmp_path: P
     assert "Traceback" not in errors
 
 
-def test_ctrl_c_stops_the_robot_and_leaves_a_whole_log(tmp_path: Path):
+@pytest.mark.parametrize(
+    ("number", "status", "ends", "reason"),
+    [
+        (signal.SIGTERM, 143, "", "Terminated: SIGTERM"),
+        pytest.param(signal.SIGHUP, 129, "", "Terminated: SIGHUP", marks=pytest.mark.process),
+        pytest.param(
+            *(signal.SIGINT, -signal.SIGINT, "KeyboardInterrupt", "KeyboardInterrupt"),
+            marks=pytest.mark.process,
+        ),
+    ],
+)
+def test_a_stop_signal_stops_the_robot_and_leaves_a_whole_log(
+    tmp_path: Path, number: signal.Signals, status: int, ends: str, reason: str
+):
     with robot(tmp_path) as port:
         process = driver(tmp_path, port)
         while len(heard(tmp_path)) < 60 and process.poll() is None:
             time.sleep(0.02)
-        process.send_signal(signal.SIGINT)
+        process.send_signal(number)
         _, errors = process.communicate(timeout=120)
-    log, _ = verify(tmp_path / "trial.mcap")
+    log = verify(tmp_path / "trial.mcap").log
 
-    assert errors.strip().endswith("KeyboardInterrupt")
-    assert (log.status, log.reason) == ("stopped", "KeyboardInterrupt")
+    assert process.returncode == status
+    assert errors.strip().rpartition("\n")[2] == ends
+    assert (log.status, log.reason) == ("stopped", reason)
     first, *commands, last = heard(tmp_path)
     assert (first, last) == (STOP, STOP)
     assert commands == list(range(len(commands)))
@@ -189,7 +206,7 @@ def test_the_trial_of_the_docs_runs(tmp_path: Path):
     (block,) = (block for block in blocks(PAGE) if block.language == "python")
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "MUJOCO_GL": "disable"}
     subprocess.run([sys.executable, "-c", block.text], cwd=tmp_path, env=environment, check=True)
-    log, _ = verify(tmp_path / "walk.mcap")
+    log = verify(tmp_path / "walk.mcap").log
 
     assert (log.status, log.trial.behaviour.steps) == ("finished", 300)
     assert log.timing is not None

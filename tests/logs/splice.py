@@ -65,7 +65,7 @@ def halves(one: Source, other: Source, rng: np.random.Generator) -> bytes:
 
 def halves_between_records(one: Source, other: Source, rng: np.random.Generator) -> bytes:
     """The same, cut between two chunks."""
-    number = int(rng.integers(1, min(len(one.chunks), len(other.chunks))))
+    number = int(rng.integers(min(len(one.chunks), len(other.chunks))))
     return one.data[: one.chunks[number].offset] + other.data[other.chunks[number].offset :]
 
 
@@ -100,7 +100,7 @@ def doubled(one: Source, other: Source, rng: np.random.Generator) -> bytes:
 def with_holes(one: Source, other: Source, rng: np.random.Generator) -> bytes:
     """Chunks of another trial in the holes of one."""
     pieces = [one.bytes_of(chunk) for chunk in one.chunks]
-    for number in rng.integers(1, len(pieces), size=2):
+    for number in rng.integers(len(pieces), size=2):
         pieces[number] = b""
     pieces += [other.bytes_of(chunk) for chunk in other.chunks]
     return _assembled(one, pieces)

@@ -128,6 +128,7 @@ def test_equal_controllers_give_equal_bytes_at_any_time():
         (archive(ranges=np.zeros((2, 2))), "needs a finite command range of positive width"),
         (archive(kind=np.array("cpg")), "it holds genome.npy, hidden.npy"),
         (cpg(timestep=np.array(0.0)), "time step must be above 0 s"),
+        (cpg(timestep=np.array(1e308)), r"at most 3600 s, got 1e\+308"),
         (cpg(timestep=np.array(np.inf)), "time step must be above 0 s"),
         (cpg(timestep=np.array(1)), "its arrays have the types"),
         (cpg(genome=np.zeros(8)), "has 9 weights, got a genome of shape"),
@@ -173,6 +174,14 @@ def test_no_damage_to_a_controller_raises_anything_else(kind: str):
             damaged[rng.integers(len(damaged))] = rng.integers(256)
         with contextlib.suppress(InputError):
             parse_controller(bytes(damaged), "here")
+
+
+def test_a_damaged_header_warns_of_nothing():
+    # "\\h" is an invalid escape, for which Python warns as it reads the header.
+    damaged = controller_bytes(controller()).replace(b"'shape'", b"'\\hape'")
+
+    with pytest.raises(InputError, match="expected a controller"):
+        parse_controller(damaged, "here")
 
 
 def test_a_file_that_is_not_there_is_said_so(tmp_path: Path):

@@ -108,8 +108,9 @@ def test_an_emergency_stops_the_robot_first_and_leaves_a_whole_log(tmp_path: Pat
     assert bench.done.count("stop") == 2
     assert finished == [False, False]
     assert [path.name for path in tmp_path.iterdir()] == ["trial.mcap"]
-    log, loaded = verify(tmp_path / "trial.mcap")
-    assert loaded
+    verified = verify(tmp_path / "trial.mcap")
+    log = verified.log
+    assert verified.model_loaded
     assert (log.status, log.trial.behaviour.steps, log.trial.plan.steps) == ("stopped", 7, STEPS)
     assert log.reason == f"{error.__name__}: {caught.value}".removesuffix(": ")
 

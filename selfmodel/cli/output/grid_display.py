@@ -93,7 +93,7 @@ def _line(event: PartEnds) -> str:
 def run_shown(run: Callable[[Watch], Sequence[PartEnds]], out: Path) -> Sequence[PartEnds]:
     """Runs a grid with a progress display; returns the failed parts.
 
-    Ctrl-C and the other stop signals end the command with a line that tells how to continue.
+    Ctrl-C and the other stop signals end the command with a line on how to continue.
 
     Args:
         run: Runs the grid; calls its argument with each event.

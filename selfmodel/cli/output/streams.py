@@ -54,7 +54,7 @@ def flush_output() -> None:
 class _Results(io.FileIO):
     """Standard output; its errors have its name."""
 
-    def write(self, data: "ReadableBuffer") -> int | None:
+    def write(self, data: "ReadableBuffer", /) -> int:
         try:
             return super().write(data)
         except BrokenPipeError:
@@ -66,7 +66,7 @@ class _Results(io.FileIO):
 class _Messages(io.FileIO):
     """Standard error; text that cannot be written is lost."""
 
-    def write(self, data: "ReadableBuffer") -> int | None:
+    def write(self, data: "ReadableBuffer", /) -> int:
         with suppress(OSError):
             return super().write(data)
         return memoryview(data).nbytes

@@ -22,7 +22,7 @@ from selfmodel.robot.mjcf.mujoco_errors import compile_model
 from selfmodel.robot.mjcf.names import name_parts
 from selfmodel.robot.mjcf.resource_limits import MAX_MODEL_SIZE
 from selfmodel.robot.mjcf.sensors import add_sensors
-from selfmodel.robot.mjcf.settings import MjcfSettings
+from selfmodel.robot.mjcf.settings import MAX_CONTROL_TIMESTEP, MjcfSettings
 from selfmodel.robot.mjcf.untrusted import checked_model
 from selfmodel.robot.mjcf.usability import check_usable
 from selfmodel.robot.mjcf.visuals import drop_visuals
@@ -131,13 +131,18 @@ def _control_timestep(physics: float, wanted: float | None) -> float:
 
     Raises:
         InputError: The control time step has more than ``MAX_SUBSTEPS`` physics steps, or is not a
-            multiple of the physics time step.
+            multiple of the physics time step; or the physics time step is too large.
     """
     control = MIN_CONTROL_TIMESTEP if wanted is None else wanted
     if control / physics > MAX_SUBSTEPS:
         raise InputError(
             f"expected at most {MAX_SUBSTEPS} physics steps in a control step of {control} s, got "
             f"{control / physics:.3g}: give the MJCF a larger <option timestep>"
+        )
+    if physics > MAX_CONTROL_TIMESTEP:
+        raise InputError(
+            f"expected a physics time step of at most {MAX_CONTROL_TIMESTEP:g} s, got "
+            f"{physics:.6g} s: give the MJCF a smaller <option timestep>"
         )
     if wanted is None:
         return max(1, math.ceil(MIN_CONTROL_TIMESTEP / physics - 1e-9)) * physics

@@ -1,20 +1,22 @@
 """Settings of a user for the properties of a robot that its MJCF does not contain."""
 
 import sys
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.files import read_file
+from selfmodel.files import load_toml, read_file
 
 MAX_SETTINGS_BYTES = 2**16
 """Largest settings file, in bytes."""
 
 FORWARD_DIRECTIONS: Mapping[str, float] = {"x": 0.0, "y": 90.0, "-x": 180.0, "-y": 270.0}
 """Angle of each possible forward direction, counterclockwise from x, degrees."""
+
+MAX_CONTROL_TIMESTEP = 10.0
+"""Upper bound of the control time step, s."""
 
 NO_KEYFRAME = "none"
 """Value of ``keyframe`` for the reference pose of the MJCF."""
@@ -58,8 +60,8 @@ def read_settings(path: Path, extra: Mapping[str, Any] | None = None) -> MjcfSet
     if file.exists():
         data = read_file(file, "a file of settings", MAX_SETTINGS_BYTES)
         try:
-            loaded = tomllib.loads(data.decode())
-        except (ValueError, RecursionError) as error:  # also raised by endless digits and brackets
+            loaded = load_toml(data.decode())
+        except ValueError as error:
             raise InputError(f"{file}: expected a file of settings in TOML: {error}") from error
     try:
         return checked_settings({**loaded, **(extra or {})})
@@ -77,8 +79,8 @@ def parse_setting(text: str) -> dict[str, Any]:
     if not equals or not value.strip():
         raise InputError(f"expected a setting such as forward=-x, got {text!r}")
     try:
-        return {key.strip(): tomllib.loads(f"value = {value}")["value"]}
-    except (ValueError, RecursionError):
+        return {key.strip(): load_toml(f"value = {value}")["value"]}
+    except ValueError:
         return {key.strip(): value.strip()}  # an unquoted word
 
 
@@ -100,8 +102,11 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
         if key not in {field.name for field in fields(MjcfSettings)}:
             raise unknown_name("setting", key, [field.name for field in fields(MjcfSettings)])
     step = given.get("control_timestep")
-    if step is not None and not (_is_number(step) and 0 < step <= 10):
-        raise InputError(f"control_timestep needs a number from above 0 to 10 s, got {step!r}")
+    if step is not None and not (_is_number(step) and 0 < step <= MAX_CONTROL_TIMESTEP):
+        raise InputError(
+            f"control_timestep needs a number from above 0 to {MAX_CONTROL_TIMESTEP:g} s, "
+            f"got {step!r}"
+        )
     forward, keyframe = given.get("forward", "x"), given.get("keyframe", "")
     if not isinstance(forward, str) or forward not in FORWARD_DIRECTIONS:
         raise InputError(f"forward needs one of {', '.join(FORWARD_DIRECTIONS)}, got {forward!r}")

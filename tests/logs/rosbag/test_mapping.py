@@ -163,15 +163,15 @@ def test_the_mapping_in_the_guide_is_one():
 @pytest.mark.parametrize(
     ("value", "match"),
     [
-        ("9" * 5000, "a number has too many digits"),
-        ("0x" + "f" * 5000, "got a number with too many digits"),
+        ("9" * 5000, "an integer has more than 64 bits"),
+        ("0x" + "f" * 5000, "an integer has more than 64 bits"),
         ("1e999", "must be a number, got inf"),
         ("1979-05-27", "must be a number, got datetime"),
         ("[" * 100_000, "expected TOML"),
         ("{a=" * 100_000, "expected TOML"),
         ("[" * 50 + "]" * 50, r"must be a number, got \[\[\["),
         ('"' + "x" * 10**5 + '"', r"must be a number, got 'x+\.\.\."),
-        ("{" + ".".join("a" * 20) + " = 1}", "at most 16 keys joined by dots"),
+        ("{" + ".".join("a" * 20) + " = 1}", "more than 16 keys are joined by dots"),
     ],
     ids=lambda text: text[:8],
 )

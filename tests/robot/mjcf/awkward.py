@@ -238,6 +238,9 @@ AWKWARD: dict[str, Awkward] = {
     "zero mass": Awkward(mjcf(torso='<geom size=".1" mass="0"/>', legs=LEGS), "mass"),
     "huge numbers": Awkward(mjcf(torso='<geom size="1e200"/>'), "finite"),
     "a negative time step": Awkward(mjcf(more='<option timestep="-0.01"/>'), "timestep"),
+    "a time step of years": Awkward(
+        mjcf(more='<option timestep="1e10"/>'), "time step of at most 10 s, got 1e+10 s"
+    ),
     "a time step of nothing": Awkward(mjcf(more='<option timestep="1e-9"/>'), "time"),
     "a model that blows up": Awkward(
         mjcf(

@@ -290,7 +290,7 @@ def test_sensors_of_joints_without_a_motor_are_removed(tmp_path: Path):
         ("forwards = 'x'", "unknown setting 'forwards': did you mean forward"),
         ("forward = 'z'", "forward needs one of x, y, -x, -y, got 'z'"),
         ("forward = ['-x']", "got ['-x']"),
-        (f"control_timestep = 1{'0' * 400}", "from above 0 to 10 s, got 1000"),
+        (f"control_timestep = 1{'0' * 400}", "an integer has more than 64 bits"),
         (f"control_timestep = 1{'0' * 5000}", "in TOML"),
         (f"touch = {'[' * 3000}", "in TOML"),
         ("control_timestep = -1", "from above 0 to 10 s, got -1"),

@@ -1,0 +1,138 @@
+"""Promises of the standard streams: results go out, and what is lost elsewhere does no harm."""
+
+import io
+import json
+import os
+import shutil
+import subprocess
+import sys
+from contextlib import redirect_stdout
+from pathlib import Path
+
+import pytest
+
+from selfmodel.cli import main
+from tests.helpers.command import SMALL, selfmodel
+
+ROOT = Path(__file__).parents[3]
+
+
+def shell(line: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    """Runs a shell's line, in which ``selfmodel`` is the command."""
+    return subprocess.run(
+        [
+            "bash",
+            "-o",
+            "pipefail",
+            "-c",
+            f'selfmodel() {{ "{sys.executable}" -m selfmodel "$@"; }}; {line}',
+        ],
+        cwd=cwd,
+        env={**os.environ, "PYTHONPATH": str(ROOT), "MUJOCO_GL": "disable"},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("streams")
+    done = selfmodel("trial", "quadruped", "--steps", "60", "--out", "a.mcap", cwd=folder)
+    assert done.returncode == 0
+    return folder / "a.mcap"
+
+
+DIAGNOSE = ("diagnose", "a.mcap", *SMALL, "--no-calibrate", "--json")
+
+
+def test_a_result_is_printed_where_python_has_no_standard_error(
+    log: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(sys, "stderr", None)  # as after 2>&-
+    monkeypatch.setattr(sys, "__stderr__", None)
+    monkeypatch.setattr(sys, "argv", ["selfmodel", *DIAGNOSE])
+    monkeypatch.chdir(log.parent)
+    with redirect_stdout(io.StringIO()) as stdout, pytest.raises(SystemExit) as end:
+        main()
+
+    assert end.value.code == 0
+    assert json.loads(stdout.getvalue())["diagnosis"]
+
+
+@pytest.mark.process
+@pytest.mark.parametrize("stderr", ["2>&-", "2>/dev/full"])
+@pytest.mark.parametrize(
+    "command",
+    [
+        " ".join(DIAGNOSE),
+        f"recover quadruped --case 1 {' '.join(SMALL)} --steps 60 --trials 1 --out run --json",
+    ],
+)
+def test_a_result_goes_to_standard_output_where_standard_error_is_closed_or_full(
+    log: Path, tmp_path: Path, command: str, stderr: str
+):
+    shutil.copy(log, tmp_path)
+    done = shell(f"selfmodel {command} {stderr}", tmp_path)
+
+    assert done.returncode == 0
+    assert json.loads(done.stdout)["diagnosis"]
+
+
+@pytest.mark.process
+@pytest.mark.search
+def test_a_study_with_workers_ends_with_its_result_where_standard_error_is_full(tmp_path: Path):
+    few = f"{' '.join(SMALL)} --steps 60 --comparator segment-prediction"
+    done = shell(
+        f"selfmodel ablate --robots quadruped --case 1 {few} --json --out run 2>/dev/full", tmp_path
+    )
+
+    assert done.returncode == 0
+    assert len(json.loads(done.stdout)["rows"]) == 1
+
+
+@pytest.mark.process
+@pytest.mark.parametrize(
+    ("stdout", "reason"),
+    [(">/dev/full", "No space left on device"), (">&-", "Bad file descriptor")],
+)
+@pytest.mark.parametrize("command", ["robots", "--help", "--version", "logs info a.mcap", "trial"])
+def test_a_result_that_cannot_be_written_is_an_error_with_one_sentence(
+    log: Path, command: str, stdout: str, reason: str
+):
+    if command == "trial":
+        command = f"trial quadruped --steps 20 --out {reason[:2]}.mcap"
+    done = shell(f"selfmodel {command} {stdout}", log.parent)
+
+    assert done.returncode == 1
+    assert done.stderr == f"error: standard output could not be written: {reason}\n"
+
+
+@pytest.mark.process
+@pytest.mark.parametrize("command", ["robots", "robots quadruped --json", "logs info a.mcap"])
+def test_a_reader_that_has_read_enough_ends_a_command_quietly(log: Path, command: str):
+    done = shell(f"selfmodel {command} | head -1", log.parent)
+
+    assert len(done.stdout.splitlines()) == 1
+    assert done.stderr == ""
+    assert done.returncode in (0, 1)  # 0 if all was written before
+
+
+@pytest.mark.process
+@pytest.mark.parametrize("streams", ["<&-", "2>&-", "<&- 2>&- 3>&-"])
+def test_no_log_is_opened_as_a_standard_stream_that_was_closed(tmp_path: Path, streams: str):
+    done = shell(
+        f"selfmodel trial quadruped --steps 20 --out a.mcap {streams} && "
+        f"selfmodel logs verify a.mcap",
+        tmp_path,
+    )
+
+    assert done.returncode == 0
+    assert "ok: a.mcap: 20 steps" in done.stdout
+
+
+@pytest.mark.process
+def test_a_wrong_usage_keeps_its_exit_status_where_nothing_can_be_told(tmp_path: Path):
+    assert shell("selfmodel trial nosuch --out a.mcap 2>/dev/full", tmp_path).returncode == 2
+    assert shell("selfmodel nosuch >&- 2>&-", tmp_path).returncode == 2

@@ -1,0 +1,87 @@
+"""Drivers and commands that a stop signal ends: in order, completely, and with its exit status.
+
+The drivers are a sample of ``python -m tests.end_to_end.stop_signals``.
+"""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from selfmodel.controllers.command_source import CommandSource
+from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.stop_signals import STOP_SIGNALS
+from selfmodel.trials.behaviour import Sample
+from tests.end_to_end.stop_signals import endings
+from tests.helpers.command import SMALL, selfmodel
+
+ROOT = Path(__file__).parents[2]
+STATUS = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGHUP: 129}
+
+
+@pytest.mark.process
+@pytest.mark.parametrize("watchdog", [None, 5.0])
+def test_whenever_a_signal_comes_the_robot_is_stopped_last_and_the_log_verifies(
+    watchdog: float | None,
+):
+    found = endings(2, seed=3, watchdog=watchdog)
+
+    assert [one for one in found if one.fault] == []
+
+
+@pytest.mark.parametrize("number", STOP_SIGNALS)
+def test_a_stop_signal_ends_a_command_with_its_status_and_one_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
+):
+    run = SimulatedRobot.run
+
+    def signalled(self: SimulatedRobot, controller: CommandSource, steps: int) -> Iterator[Sample]:
+        for k, sample in enumerate(run(self, controller, steps)):
+            if k == 70:
+                signal.raise_signal(number)
+            yield sample
+
+    monkeypatch.setattr(SimulatedRobot, "run", signalled)
+    done = selfmodel("trial", "quadruped", "--steps", "90", "--out", "a.mcap", cwd=tmp_path)
+    monkeypatch.undo()
+    saved = selfmodel("logs", "salvage", "a.mcap.part", "--out", "b.mcap", cwd=tmp_path)
+
+    assert (done.returncode, done.stdout) == (STATUS[number], "")
+    assert done.stderr == "error: interrupted: the steps so far are in a.mcap.part\n"
+    assert "saved 70 of 90 steps" in saved.stdout
+
+
+@pytest.mark.process
+@pytest.mark.search
+@pytest.mark.parametrize("number", STOP_SIGNALS)
+def test_a_stop_signal_to_a_study_and_its_workers_leaves_no_process(
+    tmp_path: Path, number: signal.Signals
+):
+    study = ("ablate", "--robots", "quadruped", "--seeds", "9", *SMALL, "--out", "run")
+    process = subprocess.Popen(
+        [sys.executable, "-m", "selfmodel", *study],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    until = time.monotonic() + 200
+    while not list(tmp_path.glob("run/*/*/parts/*")) + list(tmp_path.glob("run/*/parts/*")):
+        assert process.poll() is None
+        assert time.monotonic() < until
+        time.sleep(0.1)
+    os.killpg(process.pid, number)  # as timeout and a terminal do
+    # Ends when the last process, workers included, has closed the pipes.
+    told, errors = process.communicate(timeout=60)
+
+    assert (process.returncode, told) == (STATUS[number], "")
+    assert "Traceback" not in errors
+    assert "failed" not in errors
+    assert "the same command continues with the rest" in errors.splitlines()[-1]

@@ -1,0 +1,39 @@
+"""Checks of a bag: topics, an import with the mapping of the biped, and a suggested mapping."""
+
+import json
+from pathlib import Path
+
+from selfmodel.errors import InputError, WorkError
+from selfmodel.logs import read_log
+from selfmodel.logs.rosbag.bag import open_bag
+from selfmodel.logs.rosbag.importer import import_bag, write_recording
+from selfmodel.logs.rosbag.mapping import BagMapping
+from selfmodel.logs.rosbag.mapping_file import parse_mapping
+from selfmodel.logs.rosbag.suggest import suggest
+from selfmodel.robot.robot import Robot
+
+
+def check_bag(bag: str, mapping: BagMapping, robot: Robot) -> str:
+    """Reads a bag in every way.
+
+    Args:
+        bag: The file or folder.
+        mapping: Mapping of the bag.
+        robot: Robot of the mapping.
+    """
+    with open_bag(Path(bag)) as opened:
+        proposal = suggest(opened, robot, "biped.xml", with_timestep=True)
+    try:
+        parse_mapping(proposal, "MAP.toml")
+    except (InputError, WorkError) as error:
+        if "?" not in proposal:
+            raise AssertionError(f"its own suggestion is refused: {error}") from error
+    recording = import_bag(Path(bag), mapping, robot)
+    json.dumps(recording.facts(), allow_nan=False)
+    out = Path("imported.mcap")
+    write_recording(out, robot, recording, mapping, None)
+    steps = read_log(out).trial.behaviour.steps
+    out.unlink()
+    if steps != recording.behaviour.steps:
+        raise AssertionError(f"{steps} of {recording.behaviour.steps} steps were logged")
+    return "imported"

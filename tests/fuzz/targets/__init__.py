@@ -1,0 +1,34 @@
+"""The targets of the campaign, one file each."""
+
+from tests.fuzz.target import Target
+from tests.fuzz.targets import (
+    bags_mcap,
+    bags_sqlite,
+    command_line,
+    controllers,
+    damaged_logs,
+    journals,
+    mappings,
+    mjcf_files,
+    sealed_logs,
+    settings,
+    study_folders,
+)
+
+TARGETS: dict[str, Target] = {
+    module.TARGET.name: module.TARGET
+    for module in (
+        damaged_logs,
+        sealed_logs,
+        bags_mcap,
+        bags_sqlite,
+        mappings,
+        mjcf_files,
+        controllers,
+        journals,
+        study_folders,
+        settings,
+        command_line,
+    )
+}
+"""Targets by name."""

@@ -1,0 +1,74 @@
+"""MJCF files of users, with their assets and settings: adapted, simulated and logged."""
+
+from pathlib import Path
+
+import numpy as np
+
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.logs import read_log
+from selfmodel.logs.records import TrialHeader
+from selfmodel.logs.robots import robot_of
+from selfmodel.logs.verify import verify
+from selfmodel.logs.writer import write_trial
+from selfmodel.robot.mjcf.load import load_mjcf
+from selfmodel.robot.mjcf.settings import read_settings
+from selfmodel.robot.robot import Robot
+from selfmodel.simulation.simulator import Simulator
+from tests.fuzz.mutate import data as raw, tomls, xmls
+from tests.fuzz.seeds import DATA, SETTINGS
+from tests.fuzz.target import Case, Make, Target
+from tests.logs.conftest import MJCF, made_up, plan_of
+
+NAME = "robot.xml"
+STEPS = 3
+TOML = b"""\
+forward = "x"
+keyframe = "none"
+control_timestep = 0.02
+touch = ["left_foot"]
+ctrlrange = [-1, 1]
+"""
+
+
+def prepare(folder: Path) -> Make:  # noqa: ARG001  # its seeds are in the repository
+    """Returns the maker of MJCF files."""
+    mesh = (DATA / "mjcf" / "foot.obj").read_bytes()
+    tripod = (DATA / "mjcf" / "tripod.xml").read_bytes()
+    seeds = ((MJCF.encode(), {}), (tripod, {"foot.obj": mesh}))
+
+    def make(rng: np.random.Generator) -> Case:
+        model, assets = seeds[rng.integers(len(seeds))]
+        files = {NAME: model, **assets}
+        kind = rng.random()
+        if kind < 0.1:
+            files["robot.toml"], what = tomls.mutated(TOML, rng)
+        elif kind < 0.2 and assets:
+            files["foot.obj"], what = raw.mutated(mesh, rng)
+        else:
+            files[NAME], what = xmls.mutated(model, rng)
+        return Case(what, files, _check)
+
+    return make
+
+
+def _check() -> str:
+    path = Path(NAME)
+    robot = load_mjcf(path, read_settings(path))
+    return _logged(robot)
+
+
+def _logged(robot: Robot) -> str:
+    """A trial of an adapted robot can be logged, read and simulated."""
+    out = Path("trial.mcap")
+    plan = plan_of(robot, STEPS)
+    write_trial(out, robot, plan, made_up(robot, STEPS), TrialHeader(SETTINGS))
+    log, _ = verify(out)
+    again = robot_of(read_log(out))
+    out.unlink()
+    if again.anatomy != robot.anatomy:
+        raise AssertionError("the robot of the log is another robot")
+    outcome = Simulator(again, 1).run([(INTACT, log.trial.plan.controller)], STEPS, ("sensors",))
+    return "diverged" if outcome.diverged[0] else "simulated"
+
+
+TARGET = Target("mjcf", 10, prepare)
