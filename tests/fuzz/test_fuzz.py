@@ -113,7 +113,7 @@ def _crash() -> str:
         (_print, "printed:\nRuntimeWarning"),
         (_leave, "files left or changed: MUJOCO_LOG.TXT"),
         (_change, "files left or changed: input"),
-        (_fill, "took 40 MB"),
+        (_fill, "took "),
         (_spin, "its process ended with SIGPROF"),
         (_crash, "its process ended with SIGSEGV"),
     ],
