@@ -7,10 +7,11 @@ from selfmodel.logs.errors import SchemaMismatchError
 from selfmodel.logs.reader import TrialLog
 from selfmodel.robot.mjcf.adaptation import MAX_SUBSTEPS
 from selfmodel.robot.mjcf.mujoco_errors import MUJOCO_ERRORS
+from selfmodel.robot.mjcf.rehearsal import rehearse
 from selfmodel.robot.mjcf.untrusted import checked_model
 from selfmodel.robot.mujoco_log import uncounted_warnings
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
+from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget, BudgetError
 from selfmodel.trials.signals import Names
 
 GOOD = "its observations are intact"
@@ -19,21 +20,27 @@ GOOD = "its observations are intact"
 def robot_of(log: TrialLog, budget: Budget = DEFAULT_BUDGET) -> Robot:
     """Returns the robot of the model in a log.
 
-    MuJoCo can read no files but the log's attachments.
+    MuJoCo can read no files but the log's attachments. A child process compiles and steps the model
+    before this process compiles it.
 
     Args:
         log: The log.
         budget: Memory and time that the model may take.
 
     Raises:
-        LogError: The model is invalid, names other files, exceeds a limit, or is of another robot
-            than the messages.
+        LogError: The model is invalid, names other files, exceeds the budget, or is of another
+            robot than the messages.
     """
     path = log.trial.path
     try:
-        checked = checked_model(log.mjcf, log.assets)
+        checked = checked_model(log.mjcf, log.assets, budget)
+        rehearse(checked.mjcf, checked.files, log.control_timestep, budget)
         with uncounted_warnings():
             robot = Robot(log.trial.robot, checked.mjcf, log.control_timestep, checked.files)
+    except BudgetError as error:
+        raise SchemaMismatchError(
+            path, f"its model cannot be loaded: {error}", good=GOOD, advice=""
+        ) from error
     except MUJOCO_ERRORS as error:
         raise SchemaMismatchError(
             path, f"its model cannot be loaded: {_line(error)}", good=GOOD
@@ -72,7 +79,7 @@ def describe_difference(names: Names, logged: Names) -> str:
 
 
 def common_robot(logs: Sequence[TrialLog], budget: Budget = DEFAULT_BUDGET) -> Robot:
-    """Returns the common robot of logs.
+    """Returns the common robot of logs; see ``robot_of``.
 
     Args:
         logs: The logs.

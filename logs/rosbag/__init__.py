@@ -1,1 +1,1 @@
-"""Import of rosbag2 recordings as trial logs, without ROS."""
+"""Import of recordings of ROS 1 and ROS 2 as trial logs, without ROS."""

@@ -5,7 +5,7 @@ from types import MappingProxyType
 
 from selfmodel.logs.rosbag.bag import Bag
 from selfmodel.logs.rosbag.mapping import BagMapping, Role, RoleKind
-from selfmodel.logs.rosbag.messages import (
+from selfmodel.logs.rosbag.message_types import (
     ARRAY,
     IMU,
     JOINT_STATE,

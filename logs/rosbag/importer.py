@@ -11,13 +11,14 @@ from selfmodel.arrays import FloatArray, frozen
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
 from selfmodel.logs.records import Imported, TrialHeader
-from selfmodel.logs.rosbag.bag import Source, open_bag
+from selfmodel.logs.rosbag.answer import Source
+from selfmodel.logs.rosbag.bag import read_bag
 from selfmodel.logs.rosbag.checks import check_columns, check_names, check_topics
 from selfmodel.logs.rosbag.clock import Clocked, ClocksApartError, clocked
 from selfmodel.logs.rosbag.mapping import BagMapping
 from selfmodel.logs.rosbag.notes import notes
 from selfmodel.logs.rosbag.quality import Quality, quality
-from selfmodel.logs.rosbag.series import Series, read_series
+from selfmodel.logs.rosbag.series import Series
 from selfmodel.logs.rosbag.signals import (
     Steps,
     base_signals,
@@ -28,13 +29,14 @@ from selfmodel.logs.rosbag.signals import (
 from selfmodel.logs.rosbag.tracks import Tracks, read_tracks, required
 from selfmodel.logs.writer import write_trial
 from selfmodel.robot.robot import Robot
+from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Behaviour, Sample
 from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.trial import TrialPlan
 
-MAX_STEPS = 1_000_000
-"""Maximum control steps of an import: a wrong stamp must not fill the memory."""
+MESSAGES_PER_STEP = 10
+"""Upper limit of the messages that a control step takes in a log."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,28 +81,32 @@ class Recording:
         }
 
 
-def import_bag(path: Path, mapping: BagMapping, robot: Robot) -> Recording:
+def import_bag(
+    path: Path, mapping: BagMapping, robot: Robot, budget: Budget = DEFAULT_BUDGET
+) -> Recording:
     """Returns the trial in a bag.
 
     Args:
         path: Folder or file of the bag.
         mapping: Mapping from topics to roles.
         robot: Robot that the mapping names.
+        budget: Memory and time for the bag.
 
     Raises:
         LogError: The bag is damaged.
+        BudgetError: The bag takes more than the budget allows.
         InputError: The bag cannot be read, or the mapping does not fit the bag or the robot.
     """
     anatomy = robot.anatomy
     touches = [sensor.name for sensor in anatomy.sensors if sensor.kind == "touch"]
     check_names(mapping, anatomy.hinges, anatomy.motors, touches)
-    with open_bag(path) as bag:
-        check_topics(mapping, bag)
-        series = read_series(bag, {role.topic for role in mapping.roles})
+    bag = read_bag(path, {role.topic for role in mapping.roles}, budget)
+    check_topics(mapping, bag)
+    series = bag.series
     check_columns(mapping, series)
     clocks = _clocks(mapping, series)
     tracks = read_tracks(mapping, series, clocks)
-    steps = _steps(mapping, tracks, robot.control_timestep)
+    steps = _steps(mapping, tracks, robot.control_timestep, budget)
     behaviour = _behaviour(mapping, tracks, robot, steps)
     qualities = _qualities(mapping, series, clocks, steps.origin)
     return Recording(
@@ -156,7 +162,7 @@ def _clocks(mapping: BagMapping, series: Mapping[str, Series]) -> dict[str, Cloc
     return found
 
 
-def _steps(mapping: BagMapping, tracks: Tracks, timestep: float) -> Steps:
+def _steps(mapping: BagMapping, tracks: Tracks, timestep: float, budget: Budget) -> Steps:
     """Control steps at which every role has data."""
     needed = required(mapping, tracks)
     for role, part, track in needed:
@@ -179,9 +185,12 @@ def _steps(mapping: BagMapping, tracks: Tracks, timestep: float) -> Steps:
             f"{mapping.start:g} s after the first of these data and {max(steps, 2)} steps of "
             f"{timestep:g} s: reduce start or duration, or omit the role with the least data",
         )
-    if not 2 <= steps <= MAX_STEPS:
+    most = budget.records // MESSAGES_PER_STEP  # of a log that can be read with the same budget
+    if not 2 <= steps <= most:
         raise mapping.document.error(
-            ("duration",), f"a trial has 2 to {MAX_STEPS} steps, got {steps}: set another duration"
+            ("duration",),
+            f"a trial has 2 to {most} steps, got {steps}: set another duration, or raise the "
+            f"memory with --budget memory=..., from {budget.memory / 1e9:g}GB",
         )
     return Steps(origin, np.rint(np.arange(steps) * period).astype(np.int64))
 

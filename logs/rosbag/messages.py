@@ -8,24 +8,25 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from rosbags.serde import SerdeError
+from rosbags.typesys import Stores, get_typestore
 
-from selfmodel.arrays import FloatArray
+from selfmodel.logs.rosbag.answer import Rows
+from selfmodel.logs.rosbag.message_types import (
+    ARRAY,
+    IMU,
+    JOINT_STATE,
+    NUMBERS,
+    ODOMETRY,
+    POSE,
+    ROS1,
+    TRAJECTORY,
+    WRENCH,
+)
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
     from rosbags.typesys.stores import ros2_humble as ros
-
-JOINT_STATE = "sensor_msgs/msg/JointState"
-TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
-ARRAY = "std_msgs/msg/Float64MultiArray"
-ODOMETRY = "nav_msgs/msg/Odometry"
-POSE = "geometry_msgs/msg/PoseStamped"
-IMU = "sensor_msgs/msg/Imu"
-WRENCH = "geometry_msgs/msg/WrenchStamped"
-NUMBERS = ("std_msgs/msg/Float64", "std_msgs/msg/Float32", "std_msgs/msg/Bool")
-
-Rows = tuple[tuple[str, ...], FloatArray]
-"""Names in a message, and a row of numbers for each, ``(names, width)``."""
 
 
 @dataclass(frozen=True)
@@ -49,22 +50,25 @@ class UndecodableError(ValueError):
     """The bytes of a message do not fit its type."""
 
 
-def read_message(payload: bytes, kind: str) -> tuple[int, Rows]:
+def read_message(payload: bytes, kind: str, encoding: str) -> tuple[int, Rows]:
     """Returns the time stamp of a message, ns (0 if it has none), and its rows.
 
     Args:
-        payload: Message, as CDR.
+        payload: Message.
         kind: Message type, one of ``KINDS``.
+        encoding: Encoding, one of ``ENCODINGS``.
 
     Raises:
         RefusedError: The message contradicts itself.
         UndecodableError: The message is damaged.
     """
-    from rosbags.serde import SerdeError  # noqa: PLC0415 - takes a while
-
     try:
-        message: Any = _types().deserialize_cdr(payload, kind)
-    except (SerdeError, IndexError, OverflowError, MemoryError) as failure:
+        message: Any = (
+            _ros1().deserialize_ros1(payload, kind)
+            if encoding == ROS1
+            else _ROS2.deserialize_cdr(payload, kind)
+        )
+    except (SerdeError, IndexError, OverflowError) as failure:
         raise UndecodableError(str(failure)) from failure
     stamp = 0
     if KINDS[kind].stamped:
@@ -74,12 +78,13 @@ def read_message(payload: bytes, kind: str) -> tuple[int, Rows]:
     return stamp, KINDS[kind].rows(message)
 
 
-@cache
-def _types() -> "Typestore":
-    """Standard message types. Those in KINDS are the same in every ROS 2 distribution."""
-    from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415 - takes a while
+_ROS2 = get_typestore(Stores.ROS2_HUMBLE)
+"""Standard message types. Those in ``KINDS`` are the same in every distribution of ROS 1 or 2."""
 
-    return get_typestore(Stores.ROS2_HUMBLE)
+
+@cache
+def _ros1() -> "Typestore":
+    return get_typestore(Stores.ROS1_NOETIC)
 
 
 def _joint_state(message: "ros.sensor_msgs__msg__JointState") -> Rows:
@@ -172,3 +177,7 @@ Widths: JointState 3 (position, velocity, effort), those of commands 1, Odometry
 (orientation w x y z, angular velocity), touch 1. Missing numbers are NaN. The columns of a
 Float64MultiArray are named by their index.
 """
+
+# The library generates code per type on first use: once here, not in each child process.
+for _kind in KINDS:
+    _ROS2.get_msgdef(_kind)

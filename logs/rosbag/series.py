@@ -1,18 +1,31 @@
 """Messages of topics as columns of numbers by name."""
 
-from collections import Counter
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from selfmodel.arrays import FloatArray, IndexArray
-from selfmodel.logs.errors import CorruptError, UnsupportedError
-from selfmodel.logs.rosbag.bag import Bag, Topic
-from selfmodel.logs.rosbag.messages import RefusedError, Rows, UndecodableError, read_message
 
 IntArray = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Topic:
+    """Topic of a bag.
+
+    Attributes:
+        name: Name, such as ``/joint_states``.
+        type: Message type, such as ``sensor_msgs/msg/JointState``; "" if unknown.
+        encoding: Encoding of the messages; see ``ENCODINGS``.
+        count: Number of messages.
+    """
+
+    name: str
+    type: str
+    encoding: str
+    count: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,70 +60,33 @@ class Series:
     refused: Mapping[str, int]
 
 
-def read_series(bag: Bag, wanted: Collection[str]) -> dict[str, Series]:
-    """Returns the messages of some topics of a bag, in one pass.
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Messages of a topic with the same names, nearly always all of them.
 
-    Args:
-        bag: The bag.
-        wanted: Names of topics of the bag, of types in ``KINDS``.
-
-    Raises:
-        LogError: A message is damaged, or has an unknown encoding.
+    Attributes:
+        names: Names in each message.
+        index: Indices of the messages, ``(m,)``.
+        values: Numbers, ``(m, names, width)``; see ``KINDS``.
     """
-    for name in wanted:
-        if bag.topics[name].encoding != "cdr":
-            raise UnsupportedError(
-                bag.path,
-                f"expected messages in cdr on {name}, got {bag.topics[name].encoding!r}",
-                advice="record it with an RMW that uses DDS",
-            )
-    gathered = {name: _Gathered() for name in wanted}
-    for name, time, payload in bag.messages(wanted):
-        try:
-            stamp, rows = read_message(payload, bag.topics[name].type)
-        except RefusedError as refused:
-            gathered[name].refused[str(refused)] += 1
-        except UndecodableError as failure:
-            raise CorruptError(
-                bag.path, f"a message on {name} is damaged: {failure}", advice="record it again"
-            ) from failure
-        else:
-            gathered[name].add(stamp, time, rows)
-    return {name: found.series(bag.topics[name]) for name, found in gathered.items()}
+
+    names: tuple[str, ...]
+    index: IndexArray
+    values: FloatArray
 
 
-@dataclass
-class _Gathered:
-    stamps: list[int] = field(default_factory=list)
-    logged: list[int] = field(default_factory=list)
-    # By the names in a message, nearly always the names of the message before.
-    layouts: dict[tuple[str, ...], tuple[list[int], list[FloatArray]]] = field(default_factory=dict)
-    refused: Counter[str] = field(default_factory=Counter)
-
-    def add(self, stamp: int, time: int, rows: Rows) -> None:
-        names, values = rows
-        indices, blocks = self.layouts.setdefault(names, ([], []))
-        indices.append(len(self.stamps))
-        blocks.append(values)
-        self.stamps.append(stamp)
-        self.logged.append(time)
-
-    def series(self, topic: Topic) -> Series:
-        parts: dict[str, list[tuple[IndexArray, FloatArray]]] = {}
-        for names, (indices, blocks) in self.layouts.items():
-            index, stacked = np.array(indices, dtype=np.intp), np.stack(blocks)
-            for k, name in enumerate(names):
-                parts.setdefault(name, []).append((index, stacked[:, k]))
-        return Series(
-            topic,
-            np.array(self.stamps, dtype=np.int64),
-            np.array(self.logged, dtype=np.int64),
-            {name: _joined(found) for name, found in parts.items()},
-            dict(self.refused),
-        )
+def columns_of(layouts: Iterable[Layout]) -> dict[str, Column]:
+    """Returns the columns of a topic by name, each in the order of the messages."""
+    parts: dict[str, list[Column]] = {}
+    for layout in layouts:
+        for k, name in enumerate(layout.names):
+            parts.setdefault(name, []).append(Column(layout.index, layout.values[:, k]))
+    return {name: _joined(found) for name, found in parts.items()}
 
 
-def _joined(parts: list[tuple[IndexArray, FloatArray]]) -> Column:
-    index = np.concatenate([index for index, _ in parts])
+def _joined(parts: list[Column]) -> Column:
+    if len(parts) == 1:
+        return parts[0]
+    index = np.concatenate([part.index for part in parts])
     order = np.argsort(index)
-    return Column(index[order], np.concatenate([values for _, values in parts])[order])
+    return Column(index[order], np.concatenate([part.values for part in parts])[order])

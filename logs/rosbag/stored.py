@@ -13,7 +13,7 @@ class Announced:
     Attributes:
         topic: Name in the file.
         type: Message type in the file.
-        encoding: Encoding of the messages; only ``cdr`` is supported.
+        encoding: Encoding of the messages.
     """
 
     topic: str
@@ -26,12 +26,12 @@ class Stored:
     """Message in a file.
 
     Attributes:
-        topic: Name of the topic.
+        announced: Topic of the message.
         time: Log time, ns.
         payload: Bytes of the message, possibly compressed with zstd.
     """
 
-    topic: str
+    announced: Announced
     time: int
     payload: bytes
 

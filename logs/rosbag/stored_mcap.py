@@ -8,16 +8,14 @@ of messages are verified.
 import struct
 from collections.abc import Iterator
 from pathlib import Path
-from typing import IO
 
 import zstandard
 from mcap.exceptions import EndOfFile, InvalidMagic, McapError
-from mcap.records import Channel, Chunk, Footer, McapRecord, Message, Schema, Statistics
-from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.records import Channel, Message, Schema, Statistics
+from mcap.stream_reader import StreamReader
 
-from selfmodel.logs.decompress import MAX_DECOMPRESSED_BYTES
 from selfmodel.logs.errors import CorruptError, LogError, NotMcapError, TruncatedError
-from selfmodel.logs.framing import unpack_chunk
+from selfmodel.logs.rosbag.bounded_file import BoundedFile
 from selfmodel.logs.rosbag.stored import Announced, DamageError, Stored, checked_time
 
 ADVICE = "record it again, or recover its intact part with `mcap recover`"
@@ -28,7 +26,6 @@ _FAILURES = (
     RuntimeError,  # lz4
     struct.error,
     zstandard.ZstdError,
-    MemoryError,
     OverflowError,
 )
 """Exceptions that the mcap library and its decompressors raise for damaged bytes."""
@@ -49,7 +46,7 @@ def read_mcap(path: Path, name: Path) -> Iterator[Announced | Stored]:
     """
     count = 0
     try:
-        with path.open("rb") as file:
+        with BoundedFile(path) as file:
             for item in _items(file):
                 count += isinstance(item, Stored)
                 yield item
@@ -57,12 +54,12 @@ def read_mcap(path: Path, name: Path) -> Iterator[Announced | Stored]:
         raise _explained(name, failure, f"{count} messages before that can be read") from failure
 
 
-def _items(file: IO[bytes]) -> Iterator[Announced | Stored]:
+def _items(file: BoundedFile) -> Iterator[Announced | Stored]:
     schemas: dict[int, str] = {}
-    topics: dict[int, str] = {}
+    topics: dict[int, Announced] = {}
     count = 0
     claimed: int | None = None
-    for record in _records(file):
+    for record in StreamReader(file, validate_crcs=True, record_size_limit=None).records:
         if isinstance(record, Message):
             count += 1
             if record.channel_id not in topics:
@@ -72,38 +69,15 @@ def _items(file: IO[bytes]) -> Iterator[Announced | Stored]:
             schemas[record.id] = record.name
         elif isinstance(record, Channel):
             kind = schemas.get(record.schema_id, "")  # 0: no schema
-            topics[record.id] = record.topic
-            yield Announced(record.topic, kind, record.message_encoding)
+            topics[record.id] = Announced(record.topic, kind, record.message_encoding)
+            yield topics[record.id]
         elif isinstance(record, Statistics):
             claimed = record.message_count
+    # The library skips records of a damaged type: the messages would be missing silently.
     if claimed is not None and claimed != count:
         raise DamageError(f"its statistics have {claimed} messages, its records {count}")
     if file.read(1):
         raise DamageError("bytes follow its end")
-
-
-def _records(file: IO[bytes]) -> Iterator[McapRecord]:
-    reader = StreamReader(
-        file, emit_chunks=True, validate_crcs=True, record_size_limit=MAX_DECOMPRESSED_BYTES
-    )
-    ended = False
-    for record in reader.records:
-        if isinstance(record, Chunk):
-            yield from breakup_chunk(_unpacked(record), validate_crc=True)
-        else:
-            ended |= isinstance(record, Footer)
-            yield record
-    if not ended:
-        raise EndOfFile
-
-
-def _unpacked(chunk: Chunk) -> Chunk:
-    if chunk.uncompressed_size > MAX_DECOMPRESSED_BYTES:
-        raise DamageError(
-            f"a chunk claims {chunk.uncompressed_size} bytes, more than {MAX_DECOMPRESSED_BYTES}"
-        )
-    unpack_chunk(chunk)
-    return chunk
 
 
 def _explained(name: Path, failure: Exception, good: str) -> LogError:

@@ -4,33 +4,48 @@ Comments mark uncertain entries: ``CHECK`` marks a guess, ``CHANGE`` an entry to
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 
-from selfmodel.logs.rosbag.bag import Bag, Topic
+from selfmodel.logs.rosbag.bag import Bag, read_bag
 from selfmodel.logs.rosbag.checks import TYPES
 from selfmodel.logs.rosbag.likeness import NameMatch, matched
 from selfmodel.logs.rosbag.mapping import UNKNOWN, RoleKind
-from selfmodel.logs.rosbag.messages import ARRAY, JOINT_STATE, NUMBERS, ODOMETRY, WRENCH
-from selfmodel.logs.rosbag.series import Series, read_series
+from selfmodel.logs.rosbag.message_types import (
+    ARRAY,
+    ENCODINGS,
+    JOINT_STATE,
+    NUMBERS,
+    ODOMETRY,
+    WRENCH,
+)
+from selfmodel.logs.rosbag.series import Series, Topic
 from selfmodel.robot.robot import Robot
+from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 
 _COMMANDED = ("command", "cmd", "target", "desired", "setpoint", "goal", "reference")
 
 
-def suggest(bag: Bag, robot: Robot, name: str, *, with_timestep: bool) -> str:
+def suggest(
+    path: Path, robot: Robot, name: str, *, with_timestep: bool, budget: Budget = DEFAULT_BUDGET
+) -> str:
     """Returns the suggestion of a mapping, as TOML.
 
     Args:
-        bag: The bag.
+        path: Folder or file of the bag.
         robot: Robot of the recording.
         name: Name of the robot in the mapping, or its MJCF file.
         with_timestep: Whether the mapping must contain the control time step.
+        budget: Memory and time for the bag.
 
     Raises:
-        LogError: A message of the bag is damaged.
+        LogError: The bag is damaged.
+        BudgetError: The bag takes more than the budget allows.
+        InputError: The bag cannot be read.
     """
+    bag = read_bag(path, (), budget)
     hinges, motors = robot.anatomy.hinges, robot.anatomy.motors
     joints, commands = _able(bag, "joints"), _able(bag, "commands")
-    series = read_series(bag, {topic.name for topic in (*joints, *commands)})
+    series = read_bag(path, {topic.name for topic in (*joints, *commands)}, budget).series
     joints = [topic for topic in joints if not _is_command(topic)]
     joints.sort(key=lambda topic: -_fit(series[topic.name], hinges))
     commands = [topic for topic in commands if topic not in joints[:1]]
@@ -67,7 +82,7 @@ def _able(bag: Bag, kind: RoleKind) -> list[Topic]:
     able = [
         topic
         for topic in bag.topics.values()
-        if topic.type in TYPES[kind] and topic.encoding == "cdr" and topic.count
+        if topic.type in TYPES[kind] and topic.encoding in ENCODINGS and topic.count
     ]
     return sorted(able, key=lambda topic: TYPES[kind].index(topic.type))
 

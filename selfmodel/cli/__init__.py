@@ -94,7 +94,7 @@ def _run() -> None:
         status = _print_usage(error)
     finally:
         flush_output()
-    sys.exit(status)
+    sys.exit(status or 0)
 
 
 def _print_usage(error: Any) -> int:  # noqa: ANN401  # typer hides the type
@@ -108,4 +108,4 @@ def _print_usage(error: Any) -> int:  # noqa: ANN401  # typer hides the type
 
 def _fail(message: str, status: int) -> None:
     print_notes(f"error: {message}")
-    sys.exit(status)
+    sys.exit(status or 0)

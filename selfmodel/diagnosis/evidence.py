@@ -11,6 +11,7 @@ from selfmodel.diagnosis.comparator import Comparator, PiecewiseTrial, PreparedT
 from selfmodel.diagnosis.search_cost import steps_of
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.simulation.batch_memory import largest_batch
 from selfmodel.simulation.cache import Cache
 from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments, recordable
@@ -131,7 +132,16 @@ class Evidence:
         return cache.get_or_compute(hypotheses, partial(self._compute, trial))
 
     def _compute(self, trial: Trial, hypotheses: list[Hypothesis]) -> FloatArray:
-        prepared = self._prepare(trial)
+        prepared, simulator = self._prepare(trial), self._simulator
+        size = largest_batch(
+            simulator.robot, prepared.request, trial.behaviour.steps, simulator.budget
+        )
+        batches = [hypotheses[first : first + size] for first in range(0, len(hypotheses), size)]
+        return np.concatenate([self._batch_losses(prepared, trial, batch) for batch in batches])
+
+    def _batch_losses(
+        self, prepared: PreparedTrial, trial: Trial, hypotheses: list[Hypothesis]
+    ) -> FloatArray:
         result = simulate(self._simulator, prepared.request, trial, hypotheses)
         diverged = result.diverged[:, np.newaxis]
         # The losses of diverged simulations are replaced below.

@@ -5,6 +5,7 @@ The constants were measured on quadruped and hexapod, with every comparator, pop
 of ``SimulationStats.steps``. Severities are fitted, which takes up to four times as many steps.
 """
 
+import math
 from dataclasses import dataclass
 
 from selfmodel.settings import Settings
@@ -62,7 +63,7 @@ class SearchSize:
         settings = self.settings
         children = settings.population - settings.survivors
         evaluations = settings.population + (settings.generations - 1) * children
-        hypotheses = min(evaluations, DISTINCT_SCALE * evaluations**DISTINCT_EXPONENT)
+        hypotheses = min(evaluations, DISTINCT_SCALE * math.pow(evaluations, DISTINCT_EXPONENT))
         if self.is_refined:
             hypotheses += REFINED_PER_CANDIDATE * self.candidates
         if self.uses_segments:

@@ -8,6 +8,7 @@ from selfmodel.errors import InputError
 from selfmodel.files import encodable, read_file
 from selfmodel.robot.mjcf.adaptation import adapt
 from selfmodel.robot.mjcf.load import load_mjcf
+from selfmodel.robot.mjcf.rehearsal import rehearse
 from selfmodel.robot.mjcf.settings import MjcfSettings, parse_setting, read_settings
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import Entry, entry
@@ -69,6 +70,7 @@ def robot(name: str, control_timestep: float) -> Robot:
         return robot_entry(name).robot()
     data = read_file(path, "an MJCF file", LARGEST_MODEL)
     try:
+        rehearse(data.decode(), {}, control_timestep)
         return Robot(encodable(path.stem), data.decode(), control_timestep)
     except (ValueError, KeyError) as error:
         reason = " ".join(str(error).split())

@@ -201,7 +201,9 @@ def recover(
     if calibration is not None:
         on_event(calibration)
         if calibration.robot is not simulator.robot:
-            simulator = Simulator(calibration.robot, simulator.threads, simulator.stats)
+            simulator = Simulator(
+                calibration.robot, simulator.threads, simulator.stats, simulator.budget
+            )
             repair = RepairSearch(simulator, settings, design, repair.evaluations, score)
     search = DiagnosticSearch(simulator, comparator, settings, kinds, intact=healthy_trials)
     act(damaged, "after", INTACT, gait)

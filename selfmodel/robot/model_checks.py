@@ -35,6 +35,15 @@ _NUMBERS = (
 )
 """Attributes of a model that determine its motion."""
 
+MAX_ITERATIONS = 10_000
+"""Largest number of iterations of a solver; MuJoCo's default is 100 or less. The number of a step
+depends on the contacts, so the first steps of a model do not bound it."""
+
+_ITERATIONS = (
+    *("iterations", "ls_iterations", "noslip_iterations", "ccd_iterations"),
+    *("sdf_iterations", "sdf_initpoints"),
+)
+
 
 def check_model(model: mujoco.MjModel, root: int) -> None:
     """Checks that a robot of this model can be logged, damaged and predicted from its logs.
@@ -61,6 +70,12 @@ def check_model(model: mujoco.MjModel, root: int) -> None:
             "the model has soft bodies (flex) or plugins, whose state a log does not contain: "
             "expected rigid bodies only"
         )
+    for name in _ITERATIONS:
+        if getattr(model.opt, name) > MAX_ITERATIONS:
+            raise ValueError(
+                f"the model has {name}={getattr(model.opt, name)}, expected at most "
+                f"{MAX_ITERATIONS}: a step of its physics could take any time"
+            )
     for m in range(model.nu):
         _check_motor(model, m)
     _check_names(model)

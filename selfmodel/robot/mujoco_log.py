@@ -1,10 +1,13 @@
 """MuJoCo's warnings: counted, and written neither to the terminal nor to a file.
 
 MuJoCo has one log per process. By default it prints every warning and error, and appends it to
-``MUJOCO_LOG.TXT`` in the working folder. Every module that compiles a model calls ``configure``.
+``MUJOCO_LOG.TXT`` in the working folder. Every module that compiles a model calls ``configure``,
+and so does every block that simulates one, because dm_control sets a handler of its own, which
+prints, when it is imported.
 """
 
 import re
+import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -19,12 +22,18 @@ _counts: Counter[str] = Counter()
 
 def configure() -> None:
     """Turns MuJoCo's log off, and counts its warnings, unless the program handles them itself."""
-    if mujoco.get_mju_user_warning() is not None:
+    handler = mujoco.get_mju_user_warning()
+    if handler is not None and handler is not _handler_of_dm_control():
         return
     config = mujoco.MjLogConfig.get()
     config.logto_console = config.logto_file = False
     mujoco.MjLogConfig.set(config)
     mujoco.set_mju_user_warning(_count)
+
+
+def _handler_of_dm_control() -> object:
+    module = sys.modules.get("dm_control.mujoco.wrapper.core")
+    return getattr(module, "_warning_callback", None)
 
 
 def _count(message: str) -> None:
@@ -40,6 +49,7 @@ def mujoco_warnings() -> Mapping[str, int]:
 @contextmanager
 def uncounted_warnings() -> Iterator[None]:
     """Discards the warnings of a block that reports them by itself."""
+    configure()
     before = Counter(_counts)
     try:
         yield

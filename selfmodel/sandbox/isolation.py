@@ -14,7 +14,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import selfmodel
 from selfmodel.errors import InputError, WorkError
 from selfmodel.sandbox.budget import Budget, BudgetError
 from selfmodel.sandbox.message import Message, MessageError, receive, send
@@ -121,7 +120,7 @@ class _Server:
         self.owner = os.getpid()
         own, other = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         # The child's path contains this package, and not the working folder.
-        package = str(Path(selfmodel.__file__).parent.parent)
+        package = str(Path(__file__).parents[2])
         paths = [package, *filter(None, [os.environ.get("PYTHONPATH")])]
         self._control = own
         with other:

@@ -27,6 +27,8 @@ from selfmodel.robot.parameters import (
     with_parameters,
 )
 from selfmodel.robot.robot import Robot
+from selfmodel.sandbox.budget import DEFAULT_BUDGET
+from selfmodel.simulation.batch_memory import hypothesis_bytes
 from selfmodel.simulation.calibration_segments import (
     CalibrationSegments,
     calibration_segments_of,
@@ -295,7 +297,25 @@ def _errors(
     threads: int,
     stats: SimulationStats,
 ) -> FloatArray:
-    """Returns prediction errors divided by their scales, ``(errors, models)``, all finite."""
+    """Returns prediction errors divided by their scales, ``(errors, models)``, all finite.
+
+    The models are predicted in batches, so that their memory is bounded.
+    """
+    needed = max(hypothesis_bytes(robot, own.segments, steps=0) for own in data)
+    size = max(1, DEFAULT_BUDGET.models_bytes // needed)
+    batches = [models[first : first + size] for first in range(0, len(models), size)]
+    return np.concatenate(
+        [_batch_errors(robot, batch, data, threads, stats) for batch in batches], axis=1
+    )
+
+
+def _batch_errors(
+    robot: Robot,
+    models: Sequence[Parameters],
+    data: Sequence[CalibrationSegments],
+    threads: int,
+    stats: SimulationStats,
+) -> FloatArray:
     predict_with = _predictor(robot, models, threads, stats)
     rows = []
     for own in data:

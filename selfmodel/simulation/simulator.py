@@ -16,6 +16,7 @@ from selfmodel.physical.reality_gap import perturbed_models
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
+from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.simulation.batch import LiveBatch, live_signals, new_batch
 from selfmodel.simulation.ground_contacts import ground_contact_points
 from selfmodel.simulation.outcome import SimulationResult, SimulationStats
@@ -29,16 +30,18 @@ Run = tuple[Hypothesis, CommandSource]
 """A simulation: faults of the robot, and the source of its commands."""
 
 MAX_CACHED_EMBODIMENTS = 1024
-"""Largest number of cached models, if ``MAX_CACHED_BYTES`` does not limit it."""
+"""Largest number of cached models, if the budget does not limit it."""
 
 MAX_CACHED_TRIALS = 16
 """Trials with cached ground contact points."""
 
 MAX_CACHED_ENSEMBLES = 16
-"""Cached ensembles, one per edit of the model's specification."""
+"""Largest number of cached ensembles, one per edit of the model's specification."""
 
-MAX_CACHED_BYTES = 2**29
-"""Size of the cached models: a quadruped or hexapod has 0.3 MB, a dog with its meshes 5 MB."""
+CACHED_SHARE = 0.5
+"""Size of the cached models, and of the cached ensembles, relative to the models of a batch."""
+
+_ENSEMBLE_MODELS = 8
 
 
 class Simulator:
@@ -58,20 +61,28 @@ class Simulator:
         robot: The healthy robot.
         threads: Threads of MuJoCo's steps, including the caller's; 0 for all processors.
         stats: Statistics that are updated; new ones by default.
+        budget: Memory of the models and results of a batch.
     """
 
     def __init__(
-        self, robot: Robot, threads: int = 0, stats: SimulationStats | None = None
+        self,
+        robot: Robot,
+        threads: int = 0,
+        stats: SimulationStats | None = None,
+        budget: Budget = DEFAULT_BUDGET,
     ) -> None:
         self.robot = robot
         self.threads = thread_count(threads)
         self.stats = SimulationStats() if stats is None else stats
-        affordable = MAX_CACHED_BYTES // int(robot.model.nbuffer)
+        self.budget = budget
+        # A quadruped or hexapod has 0.3 MB, a dog with its meshes 5 MB.
+        affordable = int(CACHED_SHARE * budget.models_bytes) // int(robot.model.nbuffer)
         self._embodiment = lru_cache(max(1, min(MAX_CACHED_EMBODIMENTS, affordable)))(
             partial(build, robot)
         )
         self._contact_points = lru_cache(MAX_CACHED_TRIALS)(partial(ground_contact_points, robot))
-        self._members = lru_cache(MAX_CACHED_ENSEMBLES)(partial(perturbed_models, robot))
+        ensembles = max(1, min(MAX_CACHED_ENSEMBLES, affordable // _ENSEMBLE_MODELS))
+        self._members = lru_cache(ensembles)(partial(perturbed_models, robot))
 
     def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> SimulationResult:
         """Simulates each run for ``steps`` control steps from the initial pose.

@@ -19,7 +19,9 @@ from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot
+from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.settings import Settings
+from selfmodel.simulation.batch_memory import hypothesis_bytes
 from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
 from selfmodel.simulation.simulator import Run, Simulator
@@ -42,12 +44,14 @@ CLOSED_LOOP = ClosedLoop(("base_position",))
 class CountingSimulator(Simulator):
     """Counts how often each hypothesis is simulated for each driver or each set of segments."""
 
-    def __init__(self, robot: Robot) -> None:
-        super().__init__(robot, threads=1)
+    def __init__(self, robot: Robot, budget: Budget = DEFAULT_BUDGET) -> None:
+        super().__init__(robot, threads=1, budget=budget)
         self.times: Counter = Counter()
+        self.calls = 0
 
     def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> SimulationResult:
         """Simulates as ever."""
+        self.calls += 1
         self.times.update(runs)
         return super().run(runs, steps, record)
 
@@ -58,6 +62,7 @@ class CountingSimulator(Simulator):
         observed: Behaviour | None = None,
     ) -> SimulationResult:
         """Predicts as ever."""
+        self.calls += 1
         self.times.update((one, segments.commands.tobytes()) for one in hypotheses)
         return super().predict(hypotheses, segments, observed)
 
@@ -69,6 +74,7 @@ class CountingSimulator(Simulator):
         ensemble: Ensemble,
     ) -> SimulationResult:
         """Simulates as ever."""
+        self.calls += 1
         self.times.update((one, driver) for one in hypotheses)
         return super().run_ensemble(hypotheses, driver, steps, ensemble)
 
@@ -119,6 +125,20 @@ REQUESTS = [
     pytest.param(SEGMENT_PREDICTION, id="segments"),
     pytest.param(Plain(Ensemble(("base_position",), members=2, level=0.05)), id="ensemble"),
 ]
+
+
+@pytest.mark.parametrize("comparator", REQUESTS)
+def test_losses_are_the_same_in_batches_that_fit_into_a_small_budget(
+    comparator: Comparator, quadruped: Robot, trials: list[Trial], three: list[Hypothesis]
+):
+    whole = Evidence(Simulator(quadruped, 1), comparator).losses(three, trials)
+    request = comparator.prepare(trials[0]).request
+    needed = hypothesis_bytes(quadruped, request, STEPS)
+    small = CountingSimulator(quadruped, Budget(memory=4 * needed))  # two hypotheses in a batch
+    batched = Evidence(small, comparator).losses(three, trials)
+
+    assert small.calls == 2 * len(trials)
+    assert np.array_equal(whole, batched)
 
 
 @pytest.mark.parametrize("comparator", REQUESTS)

@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from selfmodel.cli.output.plain import counted
 from selfmodel.logs.verify import verify
 from selfmodel.tasks.walking import environment, motion_capture
 from tests.helpers.code_blocks import blocks
@@ -122,8 +123,9 @@ def test_a_dropped_connection_stops_the_robot_and_leaves_a_whole_log(tmp_path: P
     assert heard(tmp_path) == [STOP, *range(71), STOP]
     told = selfmodel("logs", "info", "trial.mcap", cwd=tmp_path, PYTHONPATH=str(ROOT))
     assert f"of quadruped, stopped: {log.reason}" in " ".join(told.stdout.split("\n"))
-    late, missing = log.timing.late.sum(), log.timing.missing.sum()
-    assert f"clock: {late} steps late, {missing} observations missing" in told.stdout
+    late = counted(int(log.timing.late.sum()), "step")
+    missing = counted(int(log.timing.missing.sum()), "observation")
+    assert f"clock: {late} late, {missing} missing" in told.stdout
     told = selfmodel("logs", "verify", "trial.mcap", cwd=tmp_path, PYTHONPATH=str(ROOT))
     stopped = f"ok: trial.mcap: 70 steps, stopped ({log.reason})"
     assert told.stdout == f"{stopped}; digest {verified.digest}\n"

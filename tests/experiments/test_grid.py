@@ -16,6 +16,7 @@ from hypothesis import given, strategies as st
 from selfmodel.errors import InputError
 from selfmodel.experiments.grid import GridBegins, Job, PartEnds, difference, finished, run_grid
 from selfmodel.experiments.grid.worker_pool import MAX_TASKS_PER_WORKER, run_tasks
+from selfmodel.physical.stop_signals import STOP_SIGNALS
 
 ROOT = Path(__file__).parents[2]
 
@@ -33,7 +34,7 @@ def work(job: Job, part: str, folder: Path) -> dict:
         case "crash":
             os._exit(7)
     sys.stdout.write("a plug-in may print")
-    deaf = signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+    deaf = set(STOP_SIGNALS) <= signal.pthread_sigmask(signal.SIG_BLOCK, ())
     return {"part": part, "number": job.seed * job.parameters["factor"], "deaf": deaf}
 
 
@@ -206,7 +207,7 @@ def test_an_interrupt_ends_every_process_at_once_and_quietly(tmp_path: Path):
     assert len(calls(tmp_path / "runs")) == started < 6
 
 
-def test_a_worker_never_sees_an_interrupt_not_even_while_it_starts(tmp_path: Path):
+def test_a_worker_never_sees_a_stop_signal_not_even_while_it_starts(tmp_path: Path):
     run_grid(tmp_path, jobs(2), work, workers=2, on_progress=silent)
 
     assert all(each.result["deaf"] for each in finished(tmp_path))

@@ -27,9 +27,9 @@ from selfmodel.logs.writer import write_trial
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.signals import SIGNALS
+from tests.fuzz.mcap_file import of_records, written
 from tests.logs import splice
 from tests.logs.conftest import STEPS, made_up, plan_of
-from tests.logs.fuzz import written
 from tests.logs.test_salvage import spoiled
 
 OLD = Path(__file__).parents[1] / "data" / "logs-0.1"
@@ -144,7 +144,7 @@ def test_an_altered_batch_is_left_out(log: Path, saved: Path):
     for record in records:
         if isinstance(record, Message) and record.log_time == 70 * 10**7:
             record.data = record.data[:-1] + b"\1"
-    log.write_bytes(written(records, CompressionType.ZSTD, 2**20))
+    log.write_bytes(written(of_records(records), CompressionType.ZSTD, 2**20))
     told = salvage(log, saved)
 
     assert told.steps == STEPS - 50

@@ -20,8 +20,8 @@ from selfmodel.logs.verify import verify
 from selfmodel.logs.writer import write_trial
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
+from tests.fuzz.mcap_file import of_records, read_file, written
 from tests.logs.conftest import STEPS, made_up, plan_of
-from tests.logs.fuzz import packed, written
 from tests.logs.test_damage import metadata, rewritten, without
 
 COUNTS = st.integers(0, 2**32 - 1)
@@ -131,9 +131,9 @@ def test_parts_of_two_trials_are_no_log_even_with_right_checksums(
     log: Path, other: Path, splice: Callable[[Records, Records], Records]
 ):
     one, two = (list(verified_records(path.read_bytes())) for path in (log, other))
-    log.write_bytes(written(one, CompressionType.ZSTD, 2**20))
+    log.write_bytes(written(of_records(one), CompressionType.ZSTD, 2**20))
     read_log(log)  # writing the same records again harms nothing
-    log.write_bytes(written(splice(one, two), CompressionType.ZSTD, 2**20))
+    log.write_bytes(written(of_records(splice(one, two)), CompressionType.ZSTD, 2**20))
     with pytest.raises(CorruptError, match=r"batch|of another trial|not that of the trial"):
         read_log(log)
 
@@ -142,7 +142,7 @@ def test_parts_of_two_trials_are_no_log_even_with_right_checksums(
 def test_a_log_in_another_packing_has_the_same_digest(log: Path, size: int | None):
     digest = read_contents(log).digest
     assert len(digest) == 64
-    log.write_bytes(packed(log.read_bytes(), CompressionType.LZ4, size))
+    log.write_bytes(written(read_file(log.read_bytes()), CompressionType.LZ4, size))
     assert verify(log).digest == digest
 
 
@@ -200,7 +200,7 @@ def test_a_changed_definition_is_not_read_as_ours(log: Path, tmp_path: Path, pat
         rewritten(copy, swapped_fields)
     else:
         records = map(swapped_fields, verified_records(copy.read_bytes()))
-        copy.write_bytes(written(records, CompressionType.ZSTD, 2**20))
+        copy.write_bytes(written(of_records(records), CompressionType.ZSTD, 2**20))
     with pytest.raises(SchemaMismatchError, match="its definition of sensor_msgs/msg/JointS"):
         read_log(copy)
 
@@ -208,17 +208,17 @@ def test_a_changed_definition_is_not_read_as_ours(log: Path, tmp_path: Path, pat
 def test_the_truth_may_be_removed_but_not_replaced(log: Path, other: Path):
     whole = list(verified_records(log.read_bytes()))
     blind = [record for record in whole if without(Metadata, HIDDEN)(record)]
-    log.write_bytes(written(blind, CompressionType.ZSTD, 2**20))
+    log.write_bytes(written(of_records(blind), CompressionType.ZSTD, 2**20))
     digest = verify(log).digest
     assert read_truth(log) is None
 
     splice = of_the_other(Metadata, HIDDEN)
     records = splice(whole, list(verified_records(other.read_bytes())))
-    log.write_bytes(written(records, CompressionType.ZSTD, 2**20))
+    log.write_bytes(written(of_records(records), CompressionType.ZSTD, 2**20))
     for read in (verify, read_truth):
         with pytest.raises(CorruptError, match=r"the record selfmodel\.hidden is not that of"):
             read(log)
-    log.write_bytes(written(whole, CompressionType.ZSTD, 2**20))
+    log.write_bytes(written(of_records(whole), CompressionType.ZSTD, 2**20))
     assert verify(log).digest == digest
 
 

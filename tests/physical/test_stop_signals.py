@@ -250,6 +250,6 @@ def test_at_whatever_line_a_signal_comes_the_robot_is_stopped_last_and_the_log_i
         assert not executed or executed[-1] == "stop", f"at line {place} of {lines}"
         assert files in ([], ["trial.mcap"]), f"at line {place} of {lines}: {executed}"
         if files:
-            assert verify(folder / "trial.mcap")[0].status in ("stopped", "finished")
+            assert verify(folder / "trial.mcap").log.status in ("stopped", "finished")
         else:
             assert "step" not in executed

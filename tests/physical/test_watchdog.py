@@ -15,7 +15,8 @@ from selfmodel.logs.verify import verify
 from selfmodel.physical.environment_robot import EnvironmentRobot
 from selfmodel.physical.stop_signals import Terminated
 from selfmodel.physical.watchdog import Watchdog
-from tests.helpers.bench import CONTROLLER, QUADRUPED, STEPS, Bench, bench_robot, logged
+from selfmodel.trials.signals import SIGNALS
+from tests.helpers.bench import CONTROLLER, QUADRUPED, STEPS, Bench, bench_robot, driven, logged
 
 LIMIT = 0.1
 
@@ -110,17 +111,16 @@ def test_a_signal_ends_a_trial_whose_driver_hangs_before_the_watchdog_does(
         logged(bench, tmp_path, watchdog=20.0)
 
     assert bench.executed[-3:] == ["stop", "targets", "stop"]
-    assert verify(tmp_path / "trial.mcap")[0].reason == "Terminated: SIGTERM"
+    assert verify(tmp_path / "trial.mcap").log.reason == "Terminated: SIGTERM"
 
 
-def test_a_watchdog_changes_nothing_where_the_driver_is_in_time(tmp_path: Path):
-    for name, watchdog in (("with", 10.0), ("without", None)):
-        (tmp_path / name).mkdir()
-        logged(Bench({3: None, 5: TimeoutError()}), tmp_path / name, watchdog=watchdog)
+def test_a_watchdog_changes_nothing_where_the_driver_is_in_time():
+    with_one, without = (
+        driven(Bench({3: None, 5: TimeoutError()}), watchdog=watchdog) for watchdog in (10.0, None)
+    )
 
-    assert (tmp_path / "with" / "trial.mcap").read_bytes() == (
-        tmp_path / "without" / "trial.mcap"
-    ).read_bytes()
+    for name in SIGNALS:
+        assert with_one[name].tobytes() == without[name].tobytes()
 
 
 def test_an_error_of_the_driver_is_the_same_with_a_watchdog(tmp_path: Path):

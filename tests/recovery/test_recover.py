@@ -27,6 +27,7 @@ from selfmodel.recovery.events import Event, SearchBegins
 from selfmodel.recovery.next_trial import NextTrial, Situation, by_repair, discriminating_controller
 from selfmodel.recovery.recover import Recovery, recover
 from selfmodel.robot.robot import Robot
+from selfmodel.sandbox.budget import Budget
 from selfmodel.settings import Settings
 from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.simulator import Run, Simulator
@@ -324,9 +325,9 @@ def test_each_trial_is_read_from_its_log_once_and_is_all_that_is_known(
     reads: Counter[str] = Counter()
     read_contents = reader.read_contents
 
-    def counted(path: Path, unread: Collection[str] = ()) -> Contents:
+    def counted(path: Path, unread: Collection[str], budget: Budget) -> Contents:
         reads[path.name] += 1
-        return read_contents(path, unread)
+        return read_contents(path, unread, budget)
 
     monkeypatch.setattr(reader, "read_contents", counted)
     truth = parse("break:back_left_knee", quadruped.anatomy)

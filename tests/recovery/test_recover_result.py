@@ -90,7 +90,7 @@ def test_a_replay_is_serialisable_and_a_table(different: Replay):
     values = json.loads(json.dumps(different.to_dict(), allow_nan=False))
     rows = different.to_pandas()
 
-    assert list(values) == ["identical", "first_divergence_step", "diverged", "rms"]
+    assert list(values) == ["observed", "identical", "first_divergence_step", "diverged", "rms"]
     assert values["rms"] == {signal: different.rms(signal) for signal in SIGNALS}
     assert [row["step"] for row in rows] == list(range(60))
     assert rows[7]["commands"] == different.errors["commands"][7]

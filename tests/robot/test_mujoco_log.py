@@ -1,11 +1,13 @@
 """MuJoCo's warnings: counted, and never in a file of the user's folder or raw on the terminal."""
 
+import importlib
 import threading
 from pathlib import Path
 
 import mujoco
 import pytest
 
+from selfmodel.robot.mjcf.mujoco_errors import mujoco_errors_as_input_errors
 from selfmodel.robot.mujoco_log import configure, mujoco_warnings, uncounted_warnings
 
 STORM = """
@@ -30,6 +32,7 @@ def test_a_warning_is_counted_and_goes_to_no_file_and_no_terminal(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ):
     monkeypatch.chdir(tmp_path)
+    configure()
     before = total()
     warn()
     threads = [threading.Thread(target=warn) for _ in range(3)]
@@ -64,3 +67,21 @@ def test_a_handler_of_the_program_is_kept():
         mujoco.set_mju_user_warning(own)
     assert len(heard) == 1
     assert total() == before
+
+
+def test_the_handler_of_dm_control_is_replaced_whenever_it_was_imported(
+    capfd: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+):
+    own = mujoco.get_mju_user_warning()
+    core = importlib.import_module("dm_control.mujoco.wrapper.core")
+    before = total()
+    mujoco.set_mju_user_warning(core._warning_callback)  # as its import does
+    try:
+        with mujoco_errors_as_input_errors("simulate a stone"):
+            warn()
+    finally:
+        mujoco.set_mju_user_warning(own)
+
+    assert total() == before + 1
+    assert capfd.readouterr() == ("", "")
+    assert not caplog.records

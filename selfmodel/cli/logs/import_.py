@@ -1,4 +1,4 @@
-"""``selfmodel logs import``: a rosbag2 recording of a robot as a trial log."""
+"""``selfmodel logs import``: a ROS 1 or ROS 2 recording of a robot as a trial log."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -17,19 +17,21 @@ from selfmodel.experiments import robots, trial_logs
 from selfmodel.experiments.robots import LARGEST_MODEL, is_model
 from selfmodel.files import read_file
 from selfmodel.logs.files import refuse_existing
-from selfmodel.logs.rosbag.bag import open_bag
 from selfmodel.logs.rosbag.importer import Recording, import_bag, write_recording
 from selfmodel.logs.rosbag.mapping import BagMapping
 from selfmodel.logs.rosbag.mapping_file import read_mapping
 from selfmodel.logs.rosbag.suggest import suggest as suggest_mapping
 from selfmodel.robot.robot import Robot
+from selfmodel.sandbox.budget import Budget
 
 TIMESTEP = 0.01
 """Approximate control time step that ``--suggest`` assumes for an MJCF file, s."""
 
 
 def import_(
-    bag: Annotated[Path, typer.Argument(metavar="BAG", help="Folder of a bag, .mcap or .db3.")],
+    bag: Annotated[
+        Path, typer.Argument(metavar="BAG", help="Folder of a bag, .mcap, .db3 or .bag.")
+    ],
     *,
     out: Annotated[
         Path | None,
@@ -49,13 +51,15 @@ def import_(
     budget: FileBudget = DEFAULT_BUDGET,
     as_json: Json = False,
 ) -> None:
-    """Import a rosbag2 recording of a robot as a trial log, without ROS."""
+    """Import a ROS 1 or ROS 2 recording of a robot as a trial log, without ROS."""
+    allowed = Budget.parse(budget)
     if suggest:
         if robot is None or out or mapping or as_json:
             raise InputError(
-                "--suggest needs --robot NAME|MODEL.xml, and excludes all other options"
+                "--suggest needs --robot NAME|MODEL.xml, and excludes --out, --mapping and --json"
             )
-        print_lines(*_suggestion(bag, robot).removesuffix("\n").split("\n"))
+        lines = _suggestion(bag, robot, allowed).removesuffix("\n").split("\n")
+        print_lines(*lines)
         return
     if robot is not None:
         raise InputError("--robot is for --suggest: the robot of an import is in its mapping")
@@ -65,14 +69,13 @@ def import_(
             "--suggest --robot NAME|MODEL.xml prints a mapping to edit"
         )
     check_log_name(out)
-    _import(bag, out, mapping, as_json=as_json)
+    _import(bag, out, mapping, allowed, as_json=as_json)
 
 
-def _suggestion(bag: Path, name: str) -> str:
+def _suggestion(bag: Path, name: str, budget: Budget) -> str:
     own = not is_model(name)
     made = robots.robot(name, TIMESTEP if own else _timestep(Path(name)))
-    with open_bag(bag) as opened:
-        return suggest_mapping(opened, made, name, with_timestep=not own)
+    return suggest_mapping(bag, made, name, with_timestep=not own, budget=budget)
 
 
 def _timestep(path: Path) -> float:
@@ -86,12 +89,12 @@ def _timestep(path: Path) -> float:
     return max(1, round(TIMESTEP / physics)) * physics
 
 
-def _import(bag: Path, out: Path, path: Path, *, as_json: bool) -> None:
+def _import(bag: Path, out: Path, path: Path, budget: Budget, *, as_json: bool) -> None:
     refuse_existing(out)
     mapping = read_mapping(path)
     made = _mapped_robot(mapping, path.parent)
     controller = _controller(mapping, path.parent, made)
-    recording = import_bag(bag, mapping, made)
+    recording = import_bag(bag, mapping, made, budget)
     write_recording(out, made, recording, mapping, controller)
     if as_json:
         print_json(_facts(out, mapping, recording))

@@ -6,8 +6,10 @@ control time step, so that a log with both contains the robot.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET  # of checked texts
 
 from selfmodel.errors import InputError
 from selfmodel.files import encodable, read_file
@@ -18,14 +20,17 @@ from selfmodel.robot.mjcf.files import Folder, InMemory
 from selfmodel.robot.mjcf.forward import turn_forward
 from selfmodel.robot.mjcf.ground import add_ground
 from selfmodel.robot.mjcf.keyframe import bake_keyframe
-from selfmodel.robot.mjcf.mujoco_errors import compile_model
+from selfmodel.robot.mjcf.mujoco_errors import compile_model, mujoco_errors_as_input_errors
 from selfmodel.robot.mjcf.names import name_parts
-from selfmodel.robot.mjcf.resource_limits import MAX_MODEL_SIZE
+from selfmodel.robot.mjcf.rehearsal import run_on_model
 from selfmodel.robot.mjcf.sensors import add_sensors
 from selfmodel.robot.mjcf.settings import MAX_CONTROL_TIMESTEP, MjcfSettings
 from selfmodel.robot.mjcf.untrusted import checked_model
 from selfmodel.robot.mjcf.usability import check_usable
 from selfmodel.robot.mjcf.visuals import drop_visuals
+from selfmodel.robot.robot import Robot
+from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
+from selfmodel.sandbox.message import Message
 
 MIN_CONTROL_TIMESTEP = 0.01
 """Lower bound of the default control time step, s."""
@@ -53,28 +58,55 @@ class AdaptedMjcf:
     notes: tuple[str, ...]
 
 
-def adapt(path: Path, settings: MjcfSettings) -> AdaptedMjcf:
-    """Returns the adapted MJCF of a file.
+def adapt(path: Path, settings: MjcfSettings, budget: Budget = DEFAULT_BUDGET) -> AdaptedMjcf:
+    """Returns the adapted MJCF of a file; MuJoCo compiles the file in a child process.
 
     Args:
         path: The file, which may include and name files of its folder and subfolders.
         settings: Properties that the file does not contain.
+        budget: Limits of memory and time.
 
     Raises:
         InputError: The file cannot be a robot; the message has the reason and the remedy.
     """
-    data = read_file(path, "an MJCF file", MAX_MODEL_SIZE)
+    data = read_file(path, "an MJCF file", budget.model_text)
     try:
-        document = read_document(data, Folder(path.parent), path.name)
-        return _adapted(encodable(path.stem), document, settings)
+        document = read_document(data, Folder(path.parent), path.name, budget=budget)
+        request = Message(
+            {"name": encodable(path.stem), "mjcf": document.text, "settings": asdict(settings)},
+            document.assets,
+        )
+        found = run_on_model("selfmodel.robot.mjcf.adaptation:adapt_message", request, budget)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
+    notes = tuple(found.facts["notes"])
+    return AdaptedMjcf(**{**found.facts, "notes": notes, "assets": found.blobs})
+
+
+def adapt_message(message: Message, budget: Budget, _scratch: Path) -> Message:
+    """Task of a child process: adapts the document in a message, and checks the robot of it."""
+    facts = message.facts
+    document = Document(ET.fromstring(facts["mjcf"]), dict(message.blobs))  # noqa: S314  # checked
+    settings: dict[str, Any] = {
+        name: tuple(value) if isinstance(value, list) else value
+        for name, value in facts["settings"].items()
+    }
+    adapted = _adapted(facts["name"], document, MjcfSettings(**settings), budget)
+    with mujoco_errors_as_input_errors("use the model"):
+        Robot(adapted.name, adapted.mjcf, adapted.control_timestep, adapted.assets)
+    result = {
+        "name": adapted.name,
+        "mjcf": adapted.mjcf,
+        "control_timestep": adapted.control_timestep,
+        "notes": adapted.notes,
+    }
+    return Message(result, adapted.assets)
 
 
 def adapt_text(
     name: str, mjcf: str, files: Mapping[str, bytes | str], settings: MjcfSettings
 ) -> AdaptedMjcf:
-    """Returns the adapted MJCF of a text in memory; see ``adapt``.
+    """Returns the adapted MJCF of a trusted text in memory, which this process compiles.
 
     Args:
         name: Name of the robot.
@@ -86,13 +118,14 @@ def adapt_text(
         InputError: The text cannot be a robot; the message has the reason and the remedy.
     """
     try:
-        return _adapted(name, read_document(mjcf.encode(), InMemory(files)), settings)
+        document = read_document(mjcf.encode(), InMemory(files))
+        return _adapted(name, document, settings, DEFAULT_BUDGET)
     except InputError as error:
         raise InputError(f"{name}: {error}") from error
 
 
-def _adapted(name: str, document: Document, settings: MjcfSettings) -> AdaptedMjcf:
-    check_loggable(document)
+def _adapted(name: str, document: Document, settings: MjcfSettings, budget: Budget) -> AdaptedMjcf:
+    check_loggable(document, budget)
     expand(document)
     name_parts(document)
     for body in document.bodies():
@@ -109,7 +142,7 @@ def _adapted(name: str, document: Document, settings: MjcfSettings) -> AdaptedMj
     add_sensors(document, compile_model(document.text, document.assets), settings)
     add_command_ranges(document, model, settings)
     try:
-        checked = checked_model(document.text, document.assets)
+        checked = checked_model(document.text, document.assets, budget)
     except ValueError as error:
         raise InputError(f"a log cannot contain the model: {error}") from error
     return AdaptedMjcf(

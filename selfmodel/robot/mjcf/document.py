@@ -5,15 +5,13 @@ from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from posixpath import dirname, join, normpath
-from xml.etree import ElementTree as ET  # _check_xml refuses document types and large trees
+from xml.etree import ElementTree as ET  # _check_xml refuses document types and deep trees
 from xml.parsers import expat  # the same
 
 from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.files import Files
-from selfmodel.robot.mjcf.resource_limits import MAX_DEPTH, MAX_ELEMENTS, MAX_MODEL_SIZE
-
-MAX_SOURCE_ASSET_BYTES = 64 * 2**20
-"""Largest sum of all files that a user's MJCF names, in bytes, before visual meshes are removed."""
+from selfmodel.robot.mjcf.untrusted import MAX_DEPTH
+from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 
 _FOLDER_ATTRIBUTES = {"meshdir": ("mesh", "skin", "flex", "hfield"), "texturedir": ("texture",)}
 _NAMED_BY_FILE = ("mesh", "texture", "hfield")
@@ -59,27 +57,28 @@ class Document:
         return [body for world in self.root.findall("worldbody") for body in world.iter("body")]
 
 
-def read_document(mjcf: bytes, files: Files, name: str = "") -> Document:
+def read_document(
+    mjcf: bytes, files: Files, name: str = "", budget: Budget = DEFAULT_BUDGET
+) -> Document:
     """Returns the document of an MJCF, with includes inserted and all named files read.
 
     Args:
         mjcf: The MJCF.
         files: Source of the files that the MJCF includes and names.
         name: Name of the MJCF among the files, which it cannot include.
+        budget: Limits of the sizes of the files.
 
     Raises:
         InputError: A file is missing, too large, outside the folder, or no MJCF.
     """
-    if len(mjcf) > MAX_MODEL_SIZE:
-        raise InputError(f"expected an MJCF of at most {MAX_MODEL_SIZE} bytes, got {len(mjcf)}")
+    if len(mjcf) > budget.model_text:
+        raise InputError(f"expected an MJCF of at most {budget.model_text} bytes, got {len(mjcf)}")
     root = _parse(mjcf)
     if root.tag != "mujoco":
         raise InputError(_no_mjcf_message(root.tag))
-    _include(root, files, "", {normpath(name)})
-    if sum(1 for _ in root.iter()) > MAX_ELEMENTS:
-        raise InputError(f"the MJCF has more than {MAX_ELEMENTS} elements: remove static scenery")
+    _include(root, files, "", {normpath(name)}, budget.model_text)
     document = Document(root)
-    _read_assets(document, files)
+    _read_assets(document, files, budget.file_bytes)
     return document
 
 
@@ -101,17 +100,14 @@ def _parse(data: bytes) -> ET.Element:
 
 
 def _check_xml(data: bytes) -> None:
-    """Refuses document types (and with them entities) and large trees, before a tree is built."""
-    depth = count = 0
+    """Refuses document types (and with them entities) and deep trees, before a tree is built."""
+    depth = 0
 
     def start(_tag: str, _attributes: dict[str, str]) -> None:
-        nonlocal depth, count
+        nonlocal depth
         depth += 1
-        count += 1
-        if depth > MAX_DEPTH or count > MAX_ELEMENTS:
-            raise InputError(
-                f"the MJCF has more than {MAX_ELEMENTS} elements, or {MAX_DEPTH} within each other"
-            )
+        if depth > MAX_DEPTH:
+            raise InputError(f"the MJCF has more than {MAX_DEPTH} elements within each other")
 
     def end(_tag: str) -> None:
         nonlocal depth
@@ -131,7 +127,7 @@ def _check_xml(data: bytes) -> None:
         raise InputError(f"expected an MJCF file, got no XML: {error}") from error
 
 
-def _include(parent: ET.Element, files: Files, folder: str, included: set[str]) -> None:
+def _include(parent: ET.Element, files: Files, folder: str, included: set[str], limit: int) -> None:
     """Replaces each ``<include>`` by the content of its file, recursively.
 
     Args:
@@ -139,24 +135,25 @@ def _include(parent: ET.Element, files: Files, folder: str, included: set[str]) 
         files: Source of the files.
         folder: Folder of the file that contains ``parent``.
         included: Paths of the files that are included already; extended.
+        limit: Largest size of an included file, bytes.
     """
     for index, child in reversed(list(enumerate(parent))):
         if child.tag != "include":
-            _include(child, files, folder, included)
+            _include(child, files, folder, included, limit)
             continue
         name = child.get("file", "")
         # MuJoCo's order: relative to the folder of the main file, then of the including file.
         path = normpath(name if files.has(name) else join(folder, name))
-        data = files.read(path, f"a file to <include> ({name!r})", MAX_MODEL_SIZE)
+        data = files.read(path, f"a file to <include> ({name!r})", limit)
         if path in included:
             raise InputError(f"the MJCF includes {name!r} twice: name each file once")
         included.add(path)
         inner = _parse(data)
-        _include(inner, files, dirname(path), included)
+        _include(inner, files, dirname(path), included, limit)
         parent[index : index + 1] = list(inner)
 
 
-def _read_assets(document: Document, files: Files) -> None:
+def _read_assets(document: Document, files: Files, limit: int) -> None:
     """Reads the files that the MJCF names, and renames them to names without folders."""
     folders = _pop_asset_folders(document.root)
     names: dict[str, str] = {}
@@ -167,11 +164,10 @@ def _read_assets(document: Document, files: Files) -> None:
             path = str(PurePosixPath(folders.get(element.tag, ""), name))
             if path not in names:
                 what = f"the file of a <{element.tag}> ({name!r})"
-                data = files.read(path, what, MAX_SOURCE_ASSET_BYTES)
-                if sum(map(len, document.assets.values())) + len(data) > MAX_SOURCE_ASSET_BYTES:
+                data = files.read(path, what, limit)
+                if sum(map(len, document.assets.values())) + len(data) > limit:
                     raise InputError(
-                        f"the files of the MJCF have over {MAX_SOURCE_ASSET_BYTES} bytes: "
-                        f"simplify them"
+                        f"the files of the MJCF have over {limit} bytes: simplify them"
                     )
                 names[path] = _plain_name(path, document.assets)
                 document.assets[names[path]] = data

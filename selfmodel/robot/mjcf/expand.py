@@ -1,36 +1,27 @@
 """Expands an MJCF: copies, frames and scaled masses become explicit elements."""
 
-from math import prod
 from xml.etree import ElementTree as ET  # of checked texts, or of texts from MuJoCo
 
 import mujoco
 import numpy as np
 
 from selfmodel.errors import InputError
-from selfmodel.robot.mjcf.document import MAX_SOURCE_ASSET_BYTES, Document
+from selfmodel.robot.mjcf.document import Document
 from selfmodel.robot.mjcf.mujoco_errors import compile_model, loading_a_model
-from selfmodel.robot.mjcf.resource_limits import MAX_ELEMENTS, REFUSED_ELEMENTS
-from selfmodel.robot.mjcf.untrusted import checked_model
+from selfmodel.robot.mjcf.untrusted import REFUSED_ELEMENTS, checked_model
+from selfmodel.sandbox.budget import Budget
 
 _COPYING_ELEMENTS = ("replicate", "composite")
 
 
-def check_loggable(document: Document) -> None:
+def check_loggable(document: Document, budget: Budget) -> None:
     """Checks that a log can contain the model, before MuJoCo compiles the model.
 
     Raises:
-        InputError: The model reads other models, runs other code, or exceeds a limit.
+        InputError: The model reads other models, runs other code, or is too long.
     """
-    if _expanded_size(document.root) > MAX_ELEMENTS:
-        copying = "> and <".join(_COPYING_ELEMENTS)
-        raise InputError(f"the <{copying}> of the MJCF make more than {MAX_ELEMENTS} elements")
     try:
-        checked_model(
-            document.text,
-            document.assets,
-            allowed=_COPYING_ELEMENTS,
-            max_asset_bytes=MAX_SOURCE_ASSET_BYTES,
-        )
+        checked_model(document.text, document.assets, budget)
     except ValueError as error:
         raise InputError(
             f"the log of a trial contains the robot's model, and cannot contain this model: {error}"
@@ -72,17 +63,6 @@ def _keep_all_elements(document: Document) -> None:
                 document.notes.append(
                     f"{attribute} is removed: each body and geom of the file is kept"
                 )
-
-
-def _expanded_size(element: ET.Element) -> int:
-    """Returns the approximate number of elements after the expansion of copies."""
-    counts = element.get("count", "1").split() if element.tag in _COPYING_ELEMENTS else ["1"]
-    if not all(count.isdecimal() and len(count) < 7 for count in counts):
-        raise InputError(
-            f"the MJCF's <{element.tag}> has count={element.get('count')!r}: expected whole "
-            f"numbers below 1,000,000"
-        )
-    return prod(map(int, counts)) * (1 + sum(_expanded_size(child) for child in element))
 
 
 def write_masses(document: Document, model: mujoco.MjModel) -> None:

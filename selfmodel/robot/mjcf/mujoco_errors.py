@@ -8,6 +8,7 @@ import mujoco
 
 from selfmodel.errors import InputError
 from selfmodel.robot.mujoco_log import configure, uncounted_warnings
+from selfmodel.sandbox.budget import BudgetError
 
 configure()
 
@@ -21,6 +22,9 @@ MUJOCO_ERRORS = (
 )
 """Exceptions that MuJoCo raises for a model that it cannot compile or simulate."""
 
+_OUT_OF_MEMORY = ("ould not allocate", "unknown exception")
+"""Parts of MuJoCo's messages when it is out of memory; the second is a C++ ``bad_alloc``."""
+
 
 @contextmanager
 def mujoco_errors_as_input_errors(task: str) -> Iterator[None]:
@@ -31,13 +35,20 @@ def mujoco_errors_as_input_errors(task: str) -> Iterator[None]:
 
     Raises:
         InputError: MuJoCo raised an exception.
+        BudgetError: MuJoCo is out of memory.
     """
+    configure()
     try:
         yield
     except MUJOCO_ERRORS as error:
         if isinstance(error, InputError):
             raise
         message = " ".join(str(error).split()).removeprefix("Error: ")
+        if isinstance(error, MemoryError) or any(part in message for part in _OUT_OF_MEMORY):
+            raise BudgetError(
+                f"MuJoCo cannot {task}, for lack of memory: to go on, raise the memory with "
+                f"--budget memory=..."
+            ) from error
         raise InputError(f"MuJoCo cannot {task}: {message}") from error
 
 

@@ -69,9 +69,9 @@ def _check_passive_base(model: mujoco.MjModel, root: int) -> None:
 
 def _check_stable(model: mujoco.MjModel) -> None:
     """Checks that a short simulation without commands does not diverge."""
-    data = mujoco.MjData(model)
     steps = min(_MAX_PROBE_STEPS, max(1, round(_PROBE_SECONDS / model.opt.timestep)))
     with loading_a_model():
+        data = mujoco.MjData(model)
         for _ in range(steps):
             mujoco.mj_step(model, data)
     unstable = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL)

@@ -7,7 +7,9 @@ import mujoco
 from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.document import Document
 from selfmodel.robot.mjcf.expand import write_masses
-from selfmodel.robot.mjcf.resource_limits import MAX_ASSET_BYTES
+
+MAX_ASSET_BYTES = 4 * 2**20
+"""Largest sum of the files of a robot, bytes: every trial's log contains them."""
 
 _REFERRING_SECTIONS = ("tendon", "sensor", "contact", "actuator", "equality", "deformable")
 _MESH = int(mujoco.mjtGeom.mjGEOM_MESH)

@@ -57,7 +57,7 @@ def test_a_result_is_printed_where_python_has_no_standard_error(
     with redirect_stdout(io.StringIO()) as stdout, pytest.raises(SystemExit) as end:
         main()
 
-    assert end.value.code == 0
+    assert not end.value.code
     assert json.loads(stdout.getvalue())["diagnosis"]
 
 

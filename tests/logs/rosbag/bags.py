@@ -4,10 +4,12 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
+from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 ROS = get_typestore(Stores.ROS2_HUMBLE)
+ROS1 = get_typestore(Stores.ROS1_NOETIC)
 T0 = 1_700_000_000 * 10**9
 """When the made-up bags begin, ns."""
 
@@ -40,10 +42,53 @@ def write_bag(folder: Path, items: Iterable[Item], form: str = "mcap") -> Path:
     return folder
 
 
+ROS1_FORMS = {
+    "none": None,
+    "bz2": Ros1Writer.CompressionFormat.BZ2,
+    "lz4": Ros1Writer.CompressionFormat.LZ4,
+}
+
+
+def write_ros1(path: Path, items: Iterable[Item], form: str = "none") -> Path:
+    """Writes a ROS 1 bag in one of ``ROS1_FORMS``, in several chunks, and returns its path."""
+    writer = Ros1Writer(path)
+    writer.chunk_threshold = 2**14
+    if (compression := ROS1_FORMS[form]) is not None:
+        writer.set_compression(compression)
+    with writer:
+        known = {}
+        for topic, time, message in sorted(items, key=lambda item: item[1]):
+            kind = message.__msgtype__
+            if topic not in known:
+                known[topic] = writer.add_connection(topic, kind, typestore=ROS1)
+            writer.write(known[topic], time, ros1_payload(message))
+    return path
+
+
+def ros1_payload(message: object) -> memoryview:
+    """A message in the encoding of ROS 1."""
+    kind = message.__msgtype__
+    return ROS.cdr_to_ros1(ROS.serialize_cdr(message, kind), kind)
+
+
 def storage(folder: Path) -> Path:
     """The one storage file of a bag."""
     (found,) = (path for path in folder.iterdir() if path.name != "metadata.yaml")
     return found
+
+
+def spoilt(data: bytes, damage: str, rng: np.random.Generator) -> bytes:
+    """Data with one ``flip`` of a bit, ``cut``, or 64 bytes of ``garbage``, at a random place."""
+    found = bytearray(data)
+    at = int(rng.integers(len(data)))
+    match damage:
+        case "flip":
+            found[at] ^= 1 << int(rng.integers(8))
+        case "cut":
+            del found[at:]
+        case "garbage":
+            found[at : at + 64] = rng.bytes(64)[: len(data) - at]
+    return bytes(found)
 
 
 def made(kind: str, **fields: object) -> object:

@@ -5,9 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from selfmodel.logs.rosbag.child import read
 from selfmodel.logs.rosbag.importer import Recording, import_bag
 from selfmodel.logs.rosbag.mapping_file import parse_mapping
 from selfmodel.robot.robot import Robot
+from selfmodel.sandbox.budget import DEFAULT_BUDGET
+from selfmodel.sandbox.message import Message
 from tests.logs.conftest import biped  # noqa: F401 - a fixture
 from tests.logs.rosbag.bags import T0, Item, array, imu, joint_state, odometry, wrench, write_bag
 
@@ -90,3 +93,10 @@ def bag(tmp_path: Path) -> Path:
 def imported(path: Path, robot: Robot, mapping: str = MAPPING) -> Recording:
     """Imports a bag of the biped."""
     return import_bag(path, parse_mapping(mapping, "MAP.toml"), robot)
+
+
+def decoded(path: Path, scratch: Path) -> Message:
+    """Reads all topics of a bag as the child process does, in this process."""
+    wanted = [topic for topic, _, _ in recorded(0.02)]
+    request = {"path": str(path), "folder": str(Path.cwd()), "wanted": sorted(set(wanted))}
+    return read(Message(request), DEFAULT_BUDGET, scratch)

@@ -13,6 +13,7 @@ from selfmodel.logs import read_log
 from selfmodel.logs.rosbag.importer import import_bag, write_recording
 from selfmodel.logs.rosbag.mapping_file import parse_mapping
 from selfmodel.robot.robot import Robot
+from selfmodel.sandbox.budget import Budget
 from tests.logs.conftest import MJCF
 from tests.logs.rosbag.bags import (
     ROS,
@@ -93,6 +94,21 @@ def test_start_and_duration_choose_a_part(bag: Path, biped: Robot):
             InputError, match=rf"MAP\.toml:{line}: every role has data for 0\.980 s"
         ):
             imported(bag, biped, f"{wrong}\n{MAPPING}")
+
+
+def test_a_trial_longer_than_its_log_may_be_is_refused(biped: Robot, tmp_path: Path):
+    stretched = [
+        (topic, stamp, joint_state(stamp, JOINTS, [0.0] * 4))
+        for topic in ("/joint_states", "/commands")
+        for stamp in range(T0, T0 + 61 * 10**9, 10**9)
+    ]
+    text = MAPPING[: MAPPING.index("[base]")].replace('order = ["RHY", "RHX", "LHY", "LHX"]\n', "")
+    mapping = parse_mapping(text, "MAP.toml")
+    bag = write_bag(tmp_path / "bag", stretched)
+
+    assert import_bag(bag, mapping, biped).behaviour.steps == 6001
+    with pytest.raises(InputError, match=r"2 to 5000 steps, got 6001: .* --budget memory="):
+        import_bag(bag, mapping, biped, Budget(memory=5 * 10**7))
 
 
 def test_messages_may_be_partial_and_in_any_order(biped: Robot, tmp_path: Path):

@@ -14,7 +14,6 @@ from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log, save_controller
-from selfmodel.logs.rosbag.bag import open_bag
 from selfmodel.logs.rosbag.importer import import_bag
 from selfmodel.logs.rosbag.mapping_file import parse_mapping
 from selfmodel.logs.rosbag.suggest import suggest
@@ -110,8 +109,7 @@ def test_the_right_fault_is_found_in_an_imported_trial(
 
 
 def test_the_suggested_mapping_needs_only_what_is_marked(quadruped: Robot, driven: Path):
-    with open_bag(driven) as bag:
-        text = suggest(bag, quadruped, "quadruped", with_timestep=False)
+    text = suggest(driven, quadruped, "quadruped", with_timestep=False)
     assert "CHANGE must" in text
     assert text.count("CHANGE") == 1  # nothing else
     suggested = parse_mapping(text, "map.toml")

@@ -4,7 +4,6 @@ from pathlib import Path
 
 import pytest
 
-from selfmodel.logs.rosbag.bag import open_bag
 from selfmodel.logs.rosbag.likeness import likeness, matched
 from selfmodel.logs.rosbag.mapping_file import parse_mapping
 from selfmodel.logs.rosbag.suggest import suggest
@@ -51,8 +50,7 @@ def test_a_name_that_might_be_either_is_a_guess():
 
 
 def test_commands_without_names_get_an_order_to_check(biped: Robot, bag: Path):
-    with open_bag(bag) as opened:
-        text = suggest(opened, biped, "biped.xml", with_timestep=True)
+    text = suggest(bag, biped, "biped.xml", with_timestep=True)
     assert 'order = ["LHX", "LHY", "RHX", "RHY"]  # CHECK: the bag has no names' in text
     assert "control_timestep = 0.01" in text
     assert "# No topic is similar to right_touch" in text
@@ -62,8 +60,7 @@ def test_commands_without_names_get_an_order_to_check(biped: Robot, bag: Path):
 
 def test_what_the_bag_lacks_must_be_filled_in(biped: Robot, tmp_path: Path):
     items = [("/joints", T0, joint_state(T0, ["arm"], [0.0])), ("/x", T0, array([0.0]))]
-    with open_bag(write_bag(tmp_path / "bag", items)) as opened:
-        text = suggest(opened, biped, "biped.xml", with_timestep=True)
+    text = suggest(write_bag(tmp_path / "bag", items), biped, "biped.xml", with_timestep=True)
     assert 'left_hip_x = "?"  # CHANGE: the bag has arm' in text
     assert 'order = ["arm"]  # CHECK' in text
     assert "# No topic has the position of the base" in text
@@ -73,8 +70,8 @@ def test_states_and_commands_of_one_type_are_told_apart_by_name(biped: Robot, tm
     items = [item for item in recorded() if item[0] == "/joint_states"]
     items += [("/joint_cmd", time, message) for _, time, message in items]
     items += [("/arm/joints", T0, joint_state(T0, ["elbow"], [0.0])), ("/lamp_cmd", T0, array([0]))]
-    with open_bag(write_bag(tmp_path / "bag", items)) as opened:
-        mapping = parse_mapping(suggest(opened, biped, "b.xml", with_timestep=True), "m")
+    bag = write_bag(tmp_path / "bag", items)
+    mapping = parse_mapping(suggest(bag, biped, "b.xml", with_timestep=True), "m")
     assert (mapping.joints.topic, mapping.commands.topic) == ("/joint_states", "/joint_cmd")
 
 
@@ -82,8 +79,7 @@ def test_names_that_hold_anything_stay_names(biped: Robot, tmp_path: Path):
     names = ['LHX\n"', "left\x1b[31m_hip_y\\", "right hip é x", "RHY"]
     items = [("/joints", T0, joint_state(T0, names, [0.0] * 4))]
     items.append(("/x\n\x7f", T0, joint_state(T0, names[:1], [0.0])))
-    with open_bag(write_bag(tmp_path / "bag", items)) as opened:
-        text = suggest(opened, biped, "b.xml", with_timestep=True)
+    text = suggest(write_bag(tmp_path / "bag", items), biped, "b.xml", with_timestep=True)
     assert all(char.isprintable() or char == "\n" for char in text)
     for number in range(text.count('"?"')):
         text = text.replace('"?"', f'"{number}"', 1)

@@ -73,7 +73,7 @@ AWKWARD: dict[str, Awkward] = {
     "a URDF": Awkward('<robot name="r"><link name="l"/></robot>', "got a URDF"),
     "other XML": Awkward("<html><body/></html>", "got <html>"),
     "an entity bomb": Awkward(BOMB, "<!DOCTYPE>"),
-    "deep nesting": Awkward(_deep(5000), "200 within each other"),
+    "deep nesting": Awkward(_deep(5000), "200 elements within each other"),
     "an element that MJCF has not": Awkward(mjcf(more="<leg/>"), "MuJoCo cannot load the model"),
     "UTF-16": Awkward(f'<?xml version="1.0" encoding="utf-16"?>{mjcf()}'.encode("utf-16")),
     # Files.
@@ -170,7 +170,7 @@ AWKWARD: dict[str, Awkward] = {
     ),
     "a flex": Awkward(
         mjcf(torso=TORSO + '<flexcomp name="f" type="grid" count="3 3 1" spacing=".1 .1 .1"/>'),
-        "<flexcomp>",
+        "slide joint",
     ),
     "a composite": Awkward(
         mjcf(
@@ -184,7 +184,7 @@ AWKWARD: dict[str, Awkward] = {
             legs='<replicate count="1000"><replicate count="1000"><replicate count="1000">'
             f"{LEGS}</replicate></replicate></replicate>"
         ),
-        "20000 elements",
+        "--budget",
     ),
     "an attached model": Awkward(
         mjcf(more='<asset><model name="o" file="o.xml"/></asset>'), "<model>", {"o.xml": mjcf()}
@@ -197,7 +197,7 @@ AWKWARD: dict[str, Awkward] = {
     ),
     "a height field without end": Awkward(
         mjcf(more='<asset><hfield name="h" nrow="90000" ncol="90000" size="2 2 .1 .1"/></asset>'),
-        "nrow",
+        "--budget",
     ),
     "frames and copies": Awkward(
         mjcf(legs=f'<frame pos="0 0 .01" euler="0 0 5">{LEGS}</frame>', more="")
@@ -225,10 +225,10 @@ AWKWARD: dict[str, Awkward] = {
     ),
     "no ground": Awkward(mjcf(world="")),
     "ten thousand bodies": Awkward(
-        mjcf(legs=LEGS + '<body><geom size=".01"/></body>' * 10_000), "20000 elements"
+        mjcf(legs=LEGS + '<body><geom size=".01"/></body>' * 10_000), "--budget"
     ),
     "two thousand joints": Awkward(
-        mjcf(legs="".join(LEG.format(f"leg{k}", f"{k / 100}") for k in range(2000))), "<joint>"
+        mjcf(legs="".join(LEG.format(f"leg{k}", f"{k / 100}") for k in range(2000))), "left_hip"
     ),
     "NaN inertia": Awkward(
         mjcf(torso='<inertial pos="0 0 0" mass="1" diaginertia="nan 1 1"/>' + TORSO),

@@ -10,12 +10,19 @@ import pytest
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.robot.mjcf.load import load_mjcf
+from selfmodel.sandbox.budget import Budget
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.signals import SIGNALS
 from tests.helpers.drivers import random_controllers
 from tests.robot.mjcf.awkward import AWKWARD
 
 SECONDS_EACH = 5
+
+SHORT = Budget(time=9)
+"""Half a second of processor time for a model."""
+
+SLOW = ("a billion copies", "ten thousand bodies")
+"""Cases that take all of it."""
 
 
 @pytest.mark.parametrize("what", [what for what, case in AWKWARD.items() if not case.sentence])
@@ -32,12 +39,19 @@ def test_an_awkward_but_valid_file_gives_a_robot_that_moves(what: str, tmp_path:
     assert before == {file: file.read_bytes() for file in tmp_path.rglob("*") if file.is_file()}
 
 
-@pytest.mark.parametrize("what", [what for what, case in AWKWARD.items() if case.sentence])
+@pytest.mark.parametrize(
+    "what",
+    [
+        pytest.param(what, marks=[pytest.mark.process] if what in SLOW else [])
+        for what, case in AWKWARD.items()
+        if case.sentence
+    ],
+)
 def test_an_invalid_file_is_refused_in_one_sentence(what: str, tmp_path: Path):
     path = AWKWARD[what].write(tmp_path)
 
     with pytest.raises(InputError) as refusal:
-        load_mjcf(path)
+        load_mjcf(path, budget=SHORT)
 
     said = str(refusal.value)
     assert said.startswith(str(path.parent))
@@ -50,6 +64,7 @@ def test_there_are_enough_awkward_files():
     assert len(AWKWARD) >= 30
 
 
+@pytest.mark.process
 def test_no_file_takes_long_or_ends_the_process(tmp_path: Path):
     code = (
         "import sys\nfrom pathlib import Path\n"

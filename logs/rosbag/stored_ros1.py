@@ -1,0 +1,82 @@
+"""Reader of a ROS 1 bag (``.bag``, format 2.0), whose chunks may be compressed."""
+
+import shlex
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+from rosbags.rosbag1 import Reader, ReaderError
+
+from selfmodel.logs.errors import CorruptError, IncompleteError, LogError
+from selfmodel.logs.rosbag.bounded_file import BoundedPath
+from selfmodel.logs.rosbag.message_types import ROS1
+from selfmodel.logs.rosbag.stored import Announced, DamageError, Stored, checked_time
+
+if TYPE_CHECKING:
+    from rosbags.interfaces.typing import RPath
+
+ROS1_MAGIC = b"#ROSBAG V"
+
+_FAILURES = (
+    ReaderError,
+    AssertionError,  # the library's checks of the index
+    LookupError,
+    ValueError,  # invalid text, and DamageError
+    OverflowError,
+    RuntimeError,  # lz4
+    EOFError,  # bz2
+    OSError,  # bz2, and a position beyond every file
+    struct.error,
+)
+"""Exceptions that the rosbags library and its decompressors raise for damaged bytes."""
+
+
+def read_ros1(path: Path, name: Path) -> Iterator[Announced | Stored]:
+    """Yields the records of a file: topics, then messages in the order of their log times.
+
+    Args:
+        path: The file.
+        name: Name of the file in errors: the name before decompression.
+
+    Raises:
+        LogError: The file is damaged, ends too early, or has no index.
+    """
+    count = 0
+    try:
+        for item in _items(path):
+            count += isinstance(item, Stored)
+            yield item
+    except _FAILURES as failure:
+        raise _explained(name, failure, f"{count} messages before that can be read") from failure
+
+
+def _items(path: Path) -> Iterator[Announced | Stored]:
+    with Reader(cast("RPath", BoundedPath(path))) as reader:
+        topics = {
+            connection.id: Announced(connection.topic, connection.msgtype, ROS1)
+            for connection in reader.connections
+        }
+        yield from topics.values()
+        count = 0
+        for connection, time, payload in reader.messages():
+            count += 1
+            yield Stored(topics[connection.id], checked_time(time), payload)
+        # The chunks have counts of their own.
+        if count != reader.message_count:
+            raise DamageError(f"its chunks have {reader.message_count} messages, its index {count}")
+
+
+def _explained(name: Path, failure: Exception, good: str) -> LogError:
+    again = f"`rosbag reindex {shlex.quote(name.name)}`"
+    if "not indexed" in str(failure):
+        return IncompleteError(
+            name, "its recorder did not close it: it has no index", advice=f"add one with {again}"
+        )
+    reason = failure or type(failure).__name__
+    return CorruptError(
+        name,
+        f"the file is damaged, or ends too early: {reason}",
+        good=good,
+        advice=f"record it again, or recover its intact part with {again}",
+    )

@@ -1,0 +1,138 @@
+"""Rehearsal: compiles and steps an untrusted model in a child process, before this process does."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from statistics import median
+from time import perf_counter
+
+import mujoco
+
+from selfmodel.robot.mjcf.mujoco_errors import mujoco_errors_as_input_errors
+from selfmodel.robot.robot import Robot
+from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget, BudgetError
+from selfmodel.sandbox.isolation import Isolated, run_isolated
+from selfmodel.sandbox.message import Message
+
+MAX_STEPS = 20
+"""Largest number of physics steps of a rehearsal."""
+
+MAX_STEPPING_SECONDS = 0.1
+"""Time after which a rehearsal takes no further step, s."""
+
+_MAX_REMEMBERED = 8
+
+_DIVERGED = tuple(
+    int(kind)
+    for kind in (
+        mujoco.mjtWarning.mjWARN_BADQPOS,
+        mujoco.mjtWarning.mjWARN_BADQVEL,
+        mujoco.mjtWarning.mjWARN_BADQACC,
+    )
+)
+
+
+@dataclass(frozen=True)
+class ModelCost:
+    """Memory and time of a model, measured in a child process.
+
+    Attributes:
+        model_bytes: Size of the compiled model, bytes. Each embodiment has a copy.
+        data_bytes: Size of MuJoCo's data for one thread, bytes.
+        peak_bytes: Largest address space during compilation and steps, bytes; 0 where unknown.
+        compile_seconds: Time of a compilation with the search for the robot's parts, s.
+        step_seconds: Time of a physics step, median of the first steps, s.
+        failure: Reason why the first steps without commands failed; "" for a sound model.
+    """
+
+    model_bytes: int
+    data_bytes: int
+    peak_bytes: int
+    compile_seconds: float
+    step_seconds: float
+    failure: str
+
+
+def rehearse(
+    mjcf: str,
+    assets: Mapping[str, bytes],
+    control_timestep: float,
+    budget: Budget = DEFAULT_BUDGET,
+) -> ModelCost:
+    """Returns the cost of a robot's model, measured once in a child process.
+
+    Args:
+        mjcf: The MJCF as one text without includes.
+        assets: Contents of the files that the MJCF names, by name.
+        control_timestep: Time between two commands, s.
+        budget: Limits of memory and time.
+
+    Raises:
+        InputError: The model cannot be compiled, or is no valid robot.
+        BudgetError: The model exceeds the budget.
+    """
+    return _rehearsed(mjcf, tuple(assets.items()), control_timestep, budget)
+
+
+@lru_cache(_MAX_REMEMBERED)
+def _rehearsed(
+    mjcf: str, assets: tuple[tuple[str, bytes], ...], control_timestep: float, budget: Budget
+) -> ModelCost:
+    message = Message({"mjcf": mjcf, "control_timestep": control_timestep}, dict(assets))
+    found = run_on_model("selfmodel.robot.mjcf.rehearsal:build_and_step", message, budget)
+    return ModelCost(peak_bytes=found.peak, **found.facts)
+
+
+def run_on_model(task: str, message: Message, budget: Budget) -> Isolated:
+    """Runs a function that compiles a model in a child process; see ``run_isolated``.
+
+    Raises:
+        InputError: The task raised it, or the process crashed.
+        BudgetError: The model exceeds the budget.
+    """
+    found = run_isolated(task, message, what="the model", budget=budget)
+    if found.peak > budget.models_bytes:
+        raise BudgetError(
+            f"the model takes {found.peak / 1e9:.2g} GB of memory, more than "
+            f"{budget.models_bytes / 1e9:.2g} GB: to go on, raise the memory with "
+            f"--budget memory=..., from {budget.memory / 1e9:.3g} GB"
+        )
+    return found
+
+
+def build_and_step(message: Message, _budget: Budget, _scratch: Path) -> Message:
+    """Task of a child process: measures a robot, as ``ModelCost``."""
+    facts = message.facts
+    start = perf_counter()
+    with mujoco_errors_as_input_errors("use the model"):
+        robot = Robot("robot", facts["mjcf"], facts["control_timestep"], message.blobs)
+        build_seconds = perf_counter() - start
+        data = mujoco.MjData(robot.model)
+    seconds, failure = _first_steps(robot.model, data)
+    return Message(
+        {
+            "model_bytes": int(robot.model.nbuffer),
+            "data_bytes": int(data.nbuffer + robot.model.narena),
+            "compile_seconds": build_seconds,
+            "step_seconds": median(seconds),
+            "failure": failure,
+        }
+    )
+
+
+def _first_steps(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[list[float], str]:
+    """Returns the time of each physics step, s, and the reason of a failure."""
+    seconds: list[float] = []
+    failure = ""
+    while not failure and len(seconds) < MAX_STEPS and sum(seconds) < MAX_STEPPING_SECONDS:
+        start = perf_counter()
+        try:
+            mujoco.mj_step(model, data)
+        except mujoco.FatalError as error:
+            failure = " ".join(str(error).split())
+        seconds.append(perf_counter() - start)
+    for kind in _DIVERGED:
+        if data.warning[kind].number:
+            failure = failure or mujoco.mju_warningText(kind, data.warning[kind].lastinfo)
+    return seconds, failure
