@@ -11,19 +11,18 @@ from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.rehearsal import rehearse
 from selfmodel.robot.mjcf.settings import MjcfSettings, parse_setting, read_settings
 from selfmodel.robot.robot import Robot
+from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.tasks import Entry, entry
 
-LARGEST_MODEL = 64 * 2**20
-"""Largest size of an MJCF file, bytes."""
 
-
-def robot_entry(name: str, settings: Iterable[str] = ()) -> Entry:
+def robot_entry(name: str, settings: Iterable[str] = (), budget: Budget = DEFAULT_BUDGET) -> Entry:
     """Returns a robot, its cases and its tasks, by name or by MJCF file.
 
     Args:
         name: Name of a robot of selfmodel, or a path that ends in ``.xml``.
         settings: Settings of the MJCF file, such as ``forward=-x``; they override those of the
             TOML file beside it.
+        budget: Memory and time that the model may take.
 
     Raises:
         InputError: The name is unknown (the message has the nearest names), the MJCF file is no
@@ -31,7 +30,7 @@ def robot_entry(name: str, settings: Iterable[str] = ()) -> Entry:
     """
     given = tuple(settings)
     if is_model(name):
-        made = load_mjcf(Path(name), _settings(name, given))
+        made = load_mjcf(Path(name), _settings(name, given), budget)
         return Entry(robot=lambda: made)
     if given:
         raise InputError(f"--set {given[0]} is for an MJCF file: {name!r} is the name of a robot")
@@ -40,9 +39,11 @@ def robot_entry(name: str, settings: Iterable[str] = ()) -> Entry:
     return entry(name)
 
 
-def notes_on(name: str, settings: Iterable[str]) -> tuple[str, ...]:
+def notes_on(
+    name: str, settings: Iterable[str], budget: Budget = DEFAULT_BUDGET
+) -> tuple[str, ...]:
     """Returns the changes that made an MJCF file a robot; see ``robot_entry``."""
-    return adapt(Path(name), _settings(name, settings)).notes
+    return adapt(Path(name), _settings(name, settings), budget).notes
 
 
 def _settings(name: str, given: Iterable[str]) -> MjcfSettings:
@@ -55,12 +56,13 @@ def is_model(name: str) -> bool:
     return Path(name).suffix.lower() == ".xml"
 
 
-def robot(name: str, control_timestep: float) -> Robot:
+def robot(name: str, control_timestep: float, budget: Budget = DEFAULT_BUDGET) -> Robot:
     """Returns a robot by name, or the robot of an unadapted MJCF file.
 
     Args:
         name: Name of a robot of selfmodel, or a path that ends in ``.xml``.
         control_timestep: Duration of a control step of an MJCF file, s.
+        budget: Memory and time that the model may take.
 
     Raises:
         InputError: The name is unknown, or the model is unusable.
@@ -68,9 +70,9 @@ def robot(name: str, control_timestep: float) -> Robot:
     path = Path(name)
     if not is_model(name):
         return robot_entry(name).robot()
-    data = read_file(path, "an MJCF file", LARGEST_MODEL)
+    data = read_file(path, "an MJCF file", budget.model_text)
     try:
-        rehearse(data.decode(), {}, control_timestep)
+        rehearse(data.decode(), {}, control_timestep, budget)
         return Robot(encodable(path.stem), data.decode(), control_timestep)
     except (ValueError, KeyError) as error:
         reason = " ".join(str(error).split())

@@ -9,7 +9,7 @@ from time import perf_counter
 
 import mujoco
 
-from selfmodel.robot.mjcf.mujoco_errors import mujoco_errors_as_input_errors
+from selfmodel.robot.mjcf.mujoco_errors import compile_model, mujoco_errors_as_input_errors
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget, BudgetError
 from selfmodel.sandbox.isolation import Isolated, run_isolated
@@ -84,6 +84,21 @@ def _rehearsed(
     return ModelCost(peak_bytes=found.peak, **found.facts)
 
 
+def physics_timestep(mjcf: str, budget: Budget = DEFAULT_BUDGET) -> float:
+    """Returns the physics time step of a model that names no files, s.
+
+    Args:
+        mjcf: The MJCF as one text.
+        budget: Limits of memory and time.
+
+    Raises:
+        InputError: The model cannot be compiled.
+        BudgetError: The model exceeds the budget.
+    """
+    task = "selfmodel.robot.mjcf.rehearsal:read_timestep"
+    return float(run_on_model(task, Message({"mjcf": mjcf}), budget).facts["timestep"])
+
+
 def run_on_model(task: str, message: Message, budget: Budget) -> Isolated:
     """Runs a function that compiles a model in a child process; see ``run_isolated``.
 
@@ -119,6 +134,11 @@ def build_and_step(message: Message, _budget: Budget, _scratch: Path) -> Message
             "failure": failure,
         }
     )
+
+
+def read_timestep(message: Message, _budget: Budget, _scratch: Path) -> Message:
+    """Task of a child process: compiles a model, as for ``physics_timestep``."""
+    return Message({"timestep": float(compile_model(message.facts["mjcf"], {}).opt.timestep)})
 
 
 def _first_steps(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[list[float], str]:
