@@ -3,7 +3,6 @@
 from pathlib import Path
 from typing import Annotated, Any
 
-import mujoco
 import typer
 
 from selfmodel.cli.inputs import check_log_name
@@ -14,8 +13,7 @@ from selfmodel.cli.output.tables import show
 from selfmodel.controllers.controller import Controller
 from selfmodel.errors import InputError
 from selfmodel.experiments import robots, trial_logs
-from selfmodel.experiments.robots import LARGEST_MODEL, is_model
-from selfmodel.files import read_file
+from selfmodel.experiments.robots import is_model
 from selfmodel.logs.files import refuse_existing
 from selfmodel.logs.rosbag.importer import Recording, import_bag, write_recording
 from selfmodel.logs.rosbag.mapping import BagMapping
@@ -74,25 +72,20 @@ def import_(
 
 def _suggestion(bag: Path, name: str, budget: Budget) -> str:
     own = not is_model(name)
-    made = robots.robot(name, TIMESTEP if own else _timestep(Path(name)))
+    made = robots.robot(name, TIMESTEP if own else _timestep(Path(name), budget), budget)
     return suggest_mapping(bag, made, name, with_timestep=not own, budget=budget)
 
 
-def _timestep(path: Path) -> float:
+def _timestep(path: Path, budget: Budget) -> float:
     """Returns the multiple of a model's physics time step nearest to ``TIMESTEP``, s."""
-    data = read_file(path, "an MJCF file", LARGEST_MODEL)
-    try:
-        physics = float(mujoco.MjModel.from_xml_string(data.decode()).opt.timestep)
-    except ValueError as error:
-        what = " ".join(str(error).split())
-        raise InputError(f"{path}: expected an MJCF file of a robot: {what}") from error
+    physics = robots.physics_timestep(path, budget)
     return max(1, round(TIMESTEP / physics)) * physics
 
 
 def _import(bag: Path, out: Path, path: Path, budget: Budget, *, as_json: bool) -> None:
     refuse_existing(out)
     mapping = read_mapping(path)
-    made = _mapped_robot(mapping, path.parent)
+    made = _mapped_robot(mapping, path.parent, budget)
     controller = _controller(mapping, path.parent, made)
     recording = import_bag(bag, mapping, made, budget)
     write_recording(out, made, recording, mapping, controller)
@@ -102,7 +95,7 @@ def _import(bag: Path, out: Path, path: Path, budget: Budget, *, as_json: bool) 
         _print(out, recording)
 
 
-def _mapped_robot(mapping: BagMapping, folder: Path) -> Robot:
+def _mapped_robot(mapping: BagMapping, folder: Path, budget: Budget) -> Robot:
     """Returns the robot of a mapping: one of selfmodel's, or an MJCF file beside the mapping."""
     name, timestep = mapping.robot, mapping.control_timestep
     own = not is_model(name)
@@ -115,7 +108,8 @@ def _mapped_robot(mapping: BagMapping, folder: Path) -> Robot:
             ("robot",), f"{name} has no control time step: add control_timestep, s"
         )
     try:
-        return robots.robot(name if own else str(folder / name), timestep or TIMESTEP)
+        path = name if own else str(folder / name)
+        return robots.robot(path, timestep or TIMESTEP, budget)
     except InputError as error:
         raise mapping.document.error(("robot",), str(error)) from error
 
