@@ -4,11 +4,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from selfmodel.logs.contents import read_contents
-from selfmodel.logs.errors import CorruptError, SchemaMismatchError
+from selfmodel.logs.errors import GOOD, CorruptError, SchemaMismatchError
 from selfmodel.logs.provenance import UNTIED
 from selfmodel.logs.reader import TrialLog, interpret
 from selfmodel.robot.mjcf.untrusted import checked_model
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
+from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget, BudgetError
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,13 +31,13 @@ def verify(path: Path, expected: str = "", budget: Budget = DEFAULT_BUDGET) -> V
     """Verifies a log.
 
     Verified are the checks of ``read_log``; that the hidden faults of a simulated robot are those
-    of the trial; that the model names no other files and has bounded sizes; and, if MuJoCo is
-    installed, that the model loads and is of the robot of the messages.
+    of the trial; that the model names no other files; and, if MuJoCo is installed, that the model
+    loads within the budget and is of the robot of the messages.
 
     Args:
         path: The log.
         expected: Digest that the log must have, or "".
-        budget: Memory that the file may take.
+        budget: Memory and time that the file and its model may take.
 
     Raises:
         LogError: A check failed.
@@ -50,16 +50,18 @@ def verify(path: Path, expected: str = "", budget: Budget = DEFAULT_BUDGET) -> V
         what = f"expected the log with the digest {expected}; this log has {has}"
         raise CorruptError(path, what, advice="get the expected log from its origin again")
     try:
-        checked_model(log.mjcf, log.assets)
+        checked_model(log.mjcf, log.assets, budget)
+    except BudgetError as error:
+        raise SchemaMismatchError(path, str(error), good=GOOD, advice="") from error
     except ValueError as error:
-        raise SchemaMismatchError(path, str(error), good="its observations are intact") from error
-    return Verified(log, _load(log), contents.digest)
+        raise SchemaMismatchError(path, str(error), good=GOOD) from error
+    return Verified(log, _load(log, budget), contents.digest)
 
 
-def _load(log: TrialLog) -> bool:
+def _load(log: TrialLog, budget: Budget) -> bool:
     try:
         from selfmodel.logs.robots import robot_of  # noqa: PLC0415  # it needs MuJoCo
     except ImportError:
         return False
-    robot_of(log)
+    robot_of(log, budget)
     return True

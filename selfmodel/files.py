@@ -1,5 +1,6 @@
-"""Bounded reading of files that a user names."""
+"""Bounded reading of files that a user names, and their digests."""
 
+import hashlib
 import re
 import stat
 import tomllib
@@ -50,6 +51,18 @@ def check_regular(path: Path, what: str) -> None:
         raise InputError(f"{path}: expected {what} that can be read, got: Is a directory")
     if not stat.S_ISREG(mode):
         raise InputError(f"{path}: expected {what}, got a pipe or a device: give a file")
+
+
+def file_digest(path: Path) -> str:
+    """Returns the SHA-256 of a file.
+
+    Raises:
+        InputError: The file is missing, a folder, a pipe or a device.
+        OSError: The file cannot be read.
+    """
+    check_regular(path, "a file")
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _unreadable(path: Path, what: str, error: OSError | ValueError) -> InputError:

@@ -79,7 +79,7 @@ class Budget:
 
     @property
     def attached_bytes(self) -> int:
-        """Largest size of all attachments of a log, and of all files of a model, bytes."""
+        """Largest size of all attachments of a log, bytes."""
         return self.memory // 30
 
     @property
@@ -138,3 +138,18 @@ DEFAULT_BUDGET = Budget()
 
 class BudgetError(InputError):
     """Work on a file would exceed the budget; the message contains the option that raises it."""
+
+
+def memory_error(what: str, budget: Budget) -> BudgetError:
+    """Returns the error of work that takes too much memory, with its remedy.
+
+    Args:
+        what: Sentence about the work, without a full stop.
+        budget: The budget.
+    """
+    return BudgetError(f"{what}: to go on, {more_memory(budget)}")
+
+
+def more_memory(budget: Budget) -> str:
+    """Returns the remedy of work that takes too much memory, as a clause."""
+    return f"raise the memory with --budget memory=..., from {budget.memory / 1e9:.3g}GB"

@@ -10,7 +10,7 @@ import mujoco
 
 from selfmodel.robot.mjcf.mujoco_errors import compile_model, mujoco_errors_as_input_errors
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget, BudgetError
+from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget, memory_error
 from selfmodel.sandbox.isolation import Isolated, run_isolated
 from selfmodel.sandbox.message import Message
 
@@ -85,18 +85,24 @@ def _rehearsed(
 
 
 def physics_timestep(mjcf: str, budget: Budget = DEFAULT_BUDGET) -> float:
-    """Returns the physics time step of a model that names no files, s.
+    """Returns the physics time step of a model, s, compiled in a child process.
 
     Args:
-        mjcf: The MJCF as one text.
+        mjcf: The MJCF as one text without includes.
         budget: Limits of memory and time.
 
     Raises:
         InputError: The model cannot be compiled.
         BudgetError: The model exceeds the budget.
     """
-    task = "selfmodel.robot.mjcf.rehearsal:read_timestep"
-    return float(run_on_model(task, Message({"mjcf": mjcf}), budget).facts["timestep"])
+    message = Message({"mjcf": mjcf})
+    found = run_on_model("selfmodel.robot.mjcf.rehearsal:compiled_timestep", message, budget)
+    return float(found.facts["timestep"])
+
+
+def compiled_timestep(message: Message, _budget: Budget, _scratch: Path) -> Message:
+    """Task of a child process: returns the physics time step of a model as ``timestep``, s."""
+    return Message({"timestep": float(compile_model(message.facts["mjcf"], {}).opt.timestep)})
 
 
 def run_on_model(task: str, message: Message, budget: Budget) -> Isolated:
@@ -108,10 +114,10 @@ def run_on_model(task: str, message: Message, budget: Budget) -> Isolated:
     """
     found = run_isolated(task, message, what="the model", budget=budget)
     if found.peak > budget.models_bytes:
-        raise BudgetError(
+        raise memory_error(
             f"the model takes {found.peak / 1e9:.2g} GB of memory, more than "
-            f"{budget.models_bytes / 1e9:.2g} GB: to go on, raise the memory with "
-            f"--budget memory=..., from {budget.memory / 1e9:.3g} GB"
+            f"{budget.models_bytes / 1e9:.2g} GB",
+            budget,
         )
     return found
 

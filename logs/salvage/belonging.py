@@ -8,10 +8,10 @@ from typing import TypeVar
 
 from selfmodel.logs.chain import batch_of
 from selfmodel.logs.contents import Contents
-from selfmodel.logs.findings import Channels, Findings, Group
 from selfmodel.logs.framing import ContradictionError
 from selfmodel.logs.provenance import identity_of, manifest, manifest_parts, seal_of
 from selfmodel.logs.records import MANIFEST, NONCE, RESULT, TRIAL
+from selfmodel.logs.salvage.findings import Channels, Findings, Group
 
 _Item = TypeVar("_Item")
 
