@@ -52,7 +52,9 @@ def result_bytes(content: Mapping[str, Any]) -> bytes:
         ValueError: A number is NaN or infinite, or the file is larger than ``MAX_BYTES``.
         TypeError: A value has no form in JSON.
     """
-    values = {**content, MADE_WITH: versions()}
+    # The digest is that of the values as a reader parses them: JSON's keys are texts.
+    given = {**content, MADE_WITH: versions()}
+    values = parse_json(json.dumps(given, allow_nan=False).encode())
     data = json.dumps({**values, DIGEST: _digest(values)}, indent=1, allow_nan=False).encode()
     if len(data) > MAX_BYTES:
         raise ValueError(f"expected a result of at most {MAX_BYTES} bytes as JSON, got {len(data)}")

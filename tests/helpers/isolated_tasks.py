@@ -1,7 +1,9 @@
 """Tasks for the tests of isolation: each is one thing that a child process may do."""
 
 import ctypes
+import os
 import socket
+import stat
 from pathlib import Path
 
 from selfmodel.errors import InputError
@@ -71,3 +73,17 @@ def fill_disk(message: Message, _: Budget, scratch: Path) -> Message:
     with (scratch / "big").open("wb") as file:
         file.truncate(message.facts["bytes"])
     return Message({})
+
+
+def answer(message: Message, _: Budget, __: Path) -> Message:
+    return Message({"text": "x" * message.facts["characters"]})
+
+
+def sockets(_: Message, __: Budget, ___: Path) -> Message:
+    found = 0
+    for descriptor in range(64):
+        try:
+            found += stat.S_ISSOCK(os.fstat(descriptor).st_mode)
+        except OSError:
+            continue
+    return Message({"sockets": found})
