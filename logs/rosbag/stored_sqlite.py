@@ -88,18 +88,16 @@ def _items(path: Path) -> Iterator[Announced | Stored]:
 
 
 def _check_tables(database: sqlite3.Connection) -> None:
-    """Checks that the file contains its rows: those of a view may be computed without end.
+    """Checks that the rows are stored: those of a view may be computed without end.
 
     Raises:
-        DamageError: A table is missing, a view or virtual, or has computed columns.
+        DamageError: A table is a view, or virtual, or has computed columns.
     """
     for table in ("topics", "messages"):
-        (stored,) = database.execute(
-            "SELECT count(*) FROM sqlite_schema WHERE name = ? AND type = 'table' AND rootpage > 0",
-            (table,),
-        ).fetchone()
         (computed,) = database.execute(
-            "SELECT count(*) FROM pragma_table_xinfo(?) WHERE hidden", (table,)
+            "SELECT (SELECT count(*) FROM pragma_table_xinfo(:name) WHERE hidden)"
+            " + (SELECT count(*) FROM sqlite_schema WHERE name = :name AND NOT rootpage)",
+            {"name": table},
         ).fetchone()
-        if not stored or computed:
-            raise DamageError(f"{table} is not a table of stored columns")
+        if computed:
+            raise DamageError(f"{table} has computed rows")

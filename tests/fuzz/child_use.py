@@ -48,8 +48,8 @@ def child_use() -> Iterator[ChildUse]:
     use = ChildUse()
     call = isolation._Server.call
 
-    def counted(*arguments: Any) -> tuple[Message | None, Mapping[str, Any]]:
-        answer, ended = call(*arguments)
+    def counted(*arguments: object) -> tuple[Message | None, Mapping[str, Any]]:
+        answer, ended = call(*arguments)  # type: ignore[arg-type]  # they are passed on
         use.add(answer, ended)
         return answer, ended
 
