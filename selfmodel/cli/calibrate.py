@@ -6,13 +6,23 @@ from typing import Annotated, Any
 
 import typer
 
+from selfmodel.cli.confirmation import confirm_time
 from selfmodel.cli.inputs import check_folder
-from selfmodel.cli.options import DEFAULT_BUDGET, FileBudget, Json, LogFiles, SelfModel, Threads
+from selfmodel.cli.options import (
+    DEFAULT_BUDGET,
+    FileBudget,
+    Json,
+    LogFiles,
+    SelfModel,
+    Threads,
+    Yes,
+)
 from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.tables import show
 from selfmodel.errors import InputError
 from selfmodel.experiments import trial_logs
+from selfmodel.experiments.expected_time import calibration_seconds
 from selfmodel.logs.files import as_write_error, create_partial, publish, refuse_existing
 from selfmodel.robot.parameters import factor_names
 from selfmodel.robot.robot import Robot
@@ -33,6 +43,7 @@ def calibrate(
     robot: SelfModel = None,
     threads: Threads = 0,
     budget: FileBudget = DEFAULT_BUDGET,
+    yes: Yes = False,
     as_json: Json = False,
 ) -> None:
     """Fit masses, friction, damping, motors and delay of the self-model to logged trials.
@@ -49,7 +60,10 @@ def calibrate(
     logs = trial_logs.logs(files, allowed)
     before = trial_logs.robot_of_logs(logs, robot, allowed)
     _refuse_assets(before, robot or str(files[0]))
-    fit = fit_to(before, [log.trial for log in logs], thread_count(threads))
+    trials = [log.trial for log in logs]
+    expected = calibration_seconds(before, trials, threads=threads, budget=allowed)
+    confirm_time(expected, allowed, yes=yes)
+    fit = fit_to(before, trials, thread_count(threads))
     with create_partial(out) as file, as_write_error(out):
         file.write(fit.robot.mjcf.encode())
         publish(file, out)

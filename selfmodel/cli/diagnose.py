@@ -1,10 +1,12 @@
 """``selfmodel diagnose``: hypotheses ranked by how well they predict logged trials."""
 
 import dataclasses
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+from selfmodel.cli.confirmation import confirm_time
 from selfmodel.cli.options import (
     DEFAULT_BUDGET,
     DEFAULT_KINDS,
@@ -19,6 +21,7 @@ from selfmodel.cli.options import (
     LoggedSeed,
     SelfModel,
     Threads,
+    Yes,
 )
 from selfmodel.cli.output.display import display
 from selfmodel.cli.output.plain import counted
@@ -29,6 +32,7 @@ from selfmodel.comparators import DEFAULT
 from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
 from selfmodel.experiments import plugins, trial_logs
+from selfmodel.experiments.expected_time import diagnosis_seconds
 from selfmodel.experiments.log_diagnosis import by_stage, set_up_diagnosis
 from selfmodel.logs import TrialLog
 from selfmodel.recovery.sequential_diagnosis import diagnose_trials
@@ -48,6 +52,7 @@ def diagnose(
     seed: LoggedSeed = None,
     threads: Threads = 0,
     budget: FileBudget = DEFAULT_BUDGET,
+    yes: Yes = False,
     as_json: Json = False,
 ) -> None:
     """Rank hypotheses by how well they predict logged trials, without a robot.
@@ -64,7 +69,8 @@ def diagnose(
     failed, healthy = by_stage([log.trial for log in logs])
     used = [log for log in logs if log.trial in failed]
     first = used[0]
-    found = set_up_diagnosis(
+    set_up = partial(
+        set_up_diagnosis,
         failed,
         healthy,
         robot=model,
@@ -72,9 +78,14 @@ def diagnose(
         kinds=considered,
         settings=_settings(first.settings, population, generations),
         seed=seed,
-        calibrate=calibrate,
         threads=threads,
+        budget=allowed,
     )
+    expected = diagnosis_seconds(
+        model, set_up(calibrate=False), calibrate=calibrate, threads=threads, budget=allowed
+    )
+    confirm_time(expected, allowed, yes=yes)
+    found = set_up(calibrate=calibrate)
     print_notes(*(f"note: {note}" for note in _notes(used)))
     with display() as on_event:
         if found.calibration is not None:

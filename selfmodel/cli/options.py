@@ -347,3 +347,6 @@ FileBudget = Annotated[
         show_default=False,
     ),
 ]
+Yes = Annotated[
+    bool, typer.Option("--yes", help="Go on although the expected time is above the budget.")
+]

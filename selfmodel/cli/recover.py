@@ -8,12 +8,14 @@ import typer
 
 from selfmodel.cli import inputs
 from selfmodel.cli.options import (
+    DEFAULT_BUDGET,
     DEFAULT_KINDS,
     Calibrated,
     Case,
     ComparatorName,
     ControllerKind,
     Damage,
+    FileBudget,
     GapLevel,
     Generations,
     Json,
@@ -39,6 +41,7 @@ from selfmodel.experiments.experiment import Experiment, run
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.neuron import silent_neurons
 from selfmodel.logs.files import replace_file
+from selfmodel.sandbox.budget import Budget
 from selfmodel.settings import Settings
 from selfmodel.simulation.threads import thread_count
 
@@ -72,6 +75,7 @@ def recover(
         ),
     ] = None,
     threads: Threads = 0,
+    budget: FileBudget = DEFAULT_BUDGET,
     as_json: Json = False,
 ) -> None:
     """Recover a robot from a failure: diagnose it from logged trials, evolve a controller.
@@ -79,7 +83,7 @@ def recover(
     The physical robot is a simulated one with the failure of --case or --damage, which the
     algorithm does not read. Every physical trial becomes a log in the folder of the run.
     """
-    entry = robots.robot_entry(robot, model_settings or ())
+    entry = robots.robot_entry(robot, model_settings or (), Budget.parse(budget))
     considered = plugins.kinds(kinds)
     damaged = inputs.case_notation(entry.cases, case, damage)
     made = entry.robot()

@@ -14,6 +14,7 @@ from selfmodel.cli.options import (
     NamedKinds,
     SelfModel,
     Threads,
+    Yes,
 )
 from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_json, print_lines
@@ -69,6 +70,7 @@ def render(
     ] = 6,
     threads: Threads = 0,
     budget: FileBudget = DEFAULT_BUDGET,
+    yes: Yes = False,
     as_json: Json = False,
 ) -> None:
     """Draw a logged trial beside a simulation of the same controller.
@@ -98,6 +100,7 @@ def render(
         sticks=library is None,
         threads=threads,
         budget=Budget.parse(budget),
+        yes=yes,
     )
     result |= {"drawn_by": "matplotlib" if library is None else "mujoco", "gl": library}
     if as_json:

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import mujoco
 import typer
 
+from selfmodel.cli.confirmation import confirm_time
 from selfmodel.cli.options import (
     DEFAULT_BUDGET,
     FileBudget,
@@ -16,6 +17,7 @@ from selfmodel.cli.options import (
     NamedKinds,
     SelfModel,
     Threads,
+    Yes,
 )
 from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_json, print_lines
@@ -23,6 +25,7 @@ from selfmodel.cli.output.replay_figure import check_figure, draw
 from selfmodel.cli.output.tables import show
 from selfmodel.errors import InputError
 from selfmodel.experiments import plugins, trial_logs
+from selfmodel.experiments.expected_time import replay_seconds
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.logs import TrialLog
 from selfmodel.sandbox.budget import Budget
@@ -61,6 +64,7 @@ def replay(
     ] = None,
     threads: Threads = 0,
     budget: FileBudget = DEFAULT_BUDGET,
+    yes: Yes = False,
     as_json: Json = False,
 ) -> None:
     """Simulate a logged trial again from its log, and compare the two bit by bit."""
@@ -73,7 +77,8 @@ def replay(
     logged = log.software.get("mujoco", "unknown")
     exact = logged == mujoco.__version__ and not log.imported
     tolerance = 0.0 if exact else TOLERANCE
-    simulator = Simulator(robot, thread_count(threads))
+    confirm_time(replay_seconds(robot, log.trial, allowed), allowed, yes=yes)
+    simulator = Simulator(robot, thread_count(threads), budget=allowed)
     found = simulate(log.trial, assumed, simulator, tolerance)
     if not found.observed:
         raise InputError(

@@ -109,7 +109,9 @@ class Evidence:
     def _prepare(self, trial: Trial) -> PreparedTrial:
         key = _key(trial)
         if key not in self._prepared:
-            prepared = self._checked(self._comparator.prepare(trial))
+            # Numbers that are too large for arithmetic are refused by name, after the preparation.
+            with np.errstate(over="ignore", invalid="ignore"):
+                prepared = self._checked(self._comparator.prepare(trial))
             check_magnitudes(trial, _compared_signals(prepared.request))
             self._prepared[key] = prepared
         return self._prepared[key]

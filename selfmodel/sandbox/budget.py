@@ -52,7 +52,8 @@ class Budget:
             if match is None or match[2] not in units or name in values:
                 raise InputError(
                     f"expected a budget such as memory=4GB,time=30min, got {text!r}: units are "
-                    f"{', '.join(_UNITS['memory'])} and {', '.join(_UNITS['time'])}"
+                    f"{', '.join(filter(None, _UNITS['memory']))} and "
+                    f"{', '.join(filter(None, _UNITS['time']))}"
                 )
             values[name] = float(match[1]) * units[match[2]]
         given = cls(**values)  # type: ignore[arg-type]  # memory becomes a whole number below

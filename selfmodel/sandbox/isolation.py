@@ -1,7 +1,6 @@
 """Isolation: runs a function on untrusted bytes in a child process with limits."""
 
 import atexit
-import json
 import os
 import signal
 import socket
@@ -17,7 +16,6 @@ from typing import Any
 from selfmodel.errors import InputError, WorkError
 from selfmodel.sandbox.budget import Budget, BudgetError
 from selfmodel.sandbox.message import Message, MessageError, receive, send
-from selfmodel.sandbox.server import CONTROL_BYTES
 
 
 @dataclass(frozen=True)
@@ -118,7 +116,7 @@ class _Server:
 
     def __init__(self) -> None:
         self.owner = os.getpid()
-        own, other = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        own, other = socket.socketpair()
         # The child's path contains this package, and not the working folder.
         package = str(Path(__file__).parents[2])
         paths = [package, *filter(None, [os.environ.get("PYTHONPATH")])]
@@ -151,12 +149,13 @@ class _Server:
         own, other = socket.socketpair()
         with own:
             with other:
-                socket.send_fds(self._control, [json.dumps(request).encode()], [other.fileno()])
+                socket.send_fds(self._control, [b"\0"], [other.fileno()])
+            send(self._control, Message(request))
             answer = _exchange(own, message, budget)
-        ended = self._control.recv(CONTROL_BYTES)
-        if not ended:
-            raise WorkError("the process that reads files for this one ended unexpectedly")
-        return answer, json.loads(ended)
+        try:
+            return answer, receive(self._control, 0).facts
+        except MessageError as error:
+            raise WorkError("the process that reads files ended unexpectedly") from error
 
     def stop(self) -> None:
         """Ends the server, and a child that is running."""

@@ -4,14 +4,13 @@ The server imports the modules of the tasks; it never reads a file's content its
 """
 
 import importlib
-import json
 import os
 import resource
 import signal
 import socket
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +19,6 @@ from selfmodel.sandbox.budget import Budget
 from selfmodel.sandbox.limits import address_space, restrict
 from selfmodel.sandbox.message import Message, receive, send
 
-CONTROL_BYTES = 2**16
-"""Largest request or answer on the control channel, bytes."""
-
 Task = Callable[[Message, Budget, Path], Message]
 """Function that runs in a child: the request, the budget and the scratch folder."""
 
@@ -30,20 +26,20 @@ Task = Callable[[Message, Budget, Path], Message]
 def serve(control: socket.socket) -> None:
     """Serves requests until the client closes the control channel.
 
-    A request is JSON (``task``, ``memory``, ``time``, ``scratch``) with the file descriptor of a
-    data channel, on which the child receives its message and sends its answer. The server's own
-    answer is the exit status and the use of the child.
+    A request is one byte with the file descriptor of a data channel, on which the child receives
+    its message and sends its answer, and then a message (``task``, ``memory``, ``time``,
+    ``scratch``). The server's own answer is the exit status and the use of the child.
 
     Args:
-        control: Channel of sequenced packets from the client.
+        control: Channel from the client.
     """
     for ended in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(ended, signal.SIG_IGN)  # the client decides; its end closes the channel
     while True:
-        request, descriptors, _, _ = socket.recv_fds(control, CONTROL_BYTES, 1)
-        if not request:
+        byte, descriptors, _, _ = socket.recv_fds(control, 1, 1)
+        if not byte:
             return
-        facts = json.loads(request)
+        facts = receive(control, 0).facts
         module, _, name = facts["task"].partition(":")
         task = getattr(importlib.import_module(module), name)
         with socket.socket(fileno=descriptors[0]) as channel:
@@ -56,10 +52,10 @@ def serve(control: socket.socket) -> None:
             "status": os.waitstatus_to_exitcode(status),
             "seconds": usage.ru_utime + usage.ru_stime,
         }
-        control.send(json.dumps(answer).encode())
+        send(control, Message(answer))
 
 
-def _run(channel: socket.socket, task: Task, facts: dict[str, Any]) -> None:
+def _run(channel: socket.socket, task: Task, facts: Mapping[str, Any]) -> None:
     """Runs a task in this child, and ends the process."""
     budget = Budget(facts["memory"], facts["time"])
     scratch = Path(facts["scratch"])

@@ -8,6 +8,7 @@ import pytest
 
 from selfmodel.cli.output.ranking import confidence_sentence
 from selfmodel.comparators import (
+    COMPARATORS,
     FORWARD_DISPLACEMENT,
     SEGMENT_PREDICTION,
     SEGMENT_PREDICTION_ONBOARD,
@@ -15,6 +16,7 @@ from selfmodel.comparators import (
 from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
+from selfmodel.diagnosis.evidence import Evidence
 from selfmodel.diagnosis.serialization import (
     confidence_to_dict,
     diagnosis_from_dict,
@@ -203,3 +205,15 @@ def test_an_absurd_number_is_refused_before_the_search_and_named(quadruped: Robo
 
     # A comparator that does not use the position compares the rest.
     DiagnosticSearch(simulator, SEGMENT_PREDICTION_ONBOARD, Settings()).check([trial])
+
+
+@pytest.mark.parametrize("name", sorted(COMPARATORS))
+def test_an_absurd_number_is_refused_without_a_warning_of_numpy(quadruped: Robot, name: str):
+    (controller,) = random_controllers(quadruped, 1)
+    trial = logged(quadruped, "intact", controller, steps=100)
+    for signal in ("base_position", "joint_positions", "sensors"):
+        trial = with_value(trial, signal, 7, 1, 1e300)
+    evidence = Evidence(Simulator(quadruped, 1), COMPARATORS[name])
+
+    with pytest.raises(InputError, match=r"is 1e\+300 at step 7, expected at"):
+        evidence.check([trial])

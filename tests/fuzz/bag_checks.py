@@ -5,7 +5,6 @@ from pathlib import Path
 
 from selfmodel.errors import InputError, WorkError
 from selfmodel.logs import read_log
-from selfmodel.logs.rosbag.bag import open_bag
 from selfmodel.logs.rosbag.importer import import_bag, write_recording
 from selfmodel.logs.rosbag.mapping import BagMapping
 from selfmodel.logs.rosbag.mapping_file import parse_mapping
@@ -21,8 +20,7 @@ def check_bag(bag: str, mapping: BagMapping, robot: Robot) -> str:
         mapping: Mapping of the bag.
         robot: Robot of the mapping.
     """
-    with open_bag(Path(bag)) as opened:
-        proposal = suggest(opened, robot, "biped.xml", with_timestep=True)
+    proposal = suggest(Path(bag), robot, "biped.xml", with_timestep=True)
     try:
         parse_mapping(proposal, "MAP.toml")
     except (InputError, WorkError) as error:

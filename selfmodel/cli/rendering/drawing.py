@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.progress import track
 
+from selfmodel.cli.confirmation import confirm_time
 from selfmodel.cli.output.console import text_console
 from selfmodel.cli.output.plain import counted, plain
 from selfmodel.cli.output.printing import print_notes
@@ -17,6 +18,7 @@ from selfmodel.cli.rendering.filmstrip import stick_frames, strip
 from selfmodel.cli.rendering.poses import POSE
 from selfmodel.errors import InputError, WorkError
 from selfmodel.experiments import plugins, trial_logs
+from selfmodel.experiments.expected_time import replay_seconds
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.logs import TrialLog
@@ -41,6 +43,7 @@ def draw_trial(
     sticks: bool,
     threads: int,
     budget: Budget,
+    yes: bool,
 ) -> dict[str, Any]:
     """Draws a logged trial beside its simulation; returns the facts of the drawing as JSON values.
 
@@ -53,7 +56,8 @@ def draw_trial(
         pictures: Pictures of a strip; None for a film.
         sticks: Draws with matplotlib instead of MuJoCo.
         threads: Threads of the physics; 0 for one per processor.
-        budget: Memory that the log may take.
+        budget: Memory and time that the log may take.
+        yes: Whether a longer time is allowed.
 
     Raises:
         InputError: The log, the hypothesis or the model cannot be used.
@@ -62,6 +66,7 @@ def draw_trial(
     (log,) = trial_logs.logs([file], budget)
     robot = trial_logs.robot_of_logs([log], model, budget)
     assumed = HypothesisSpace(robot.anatomy, plugins.kinds(kinds)).parse(hypothesis)
+    confirm_time(replay_seconds(robot, log.trial, budget), budget, yes=yes)
     film, facts = _filmed(log, robot, assumed, pictures, thread_count(threads))
     print_notes(*(f"note: {note}" for note in facts["notes"]))
     data = _drawn(film, out.suffix.lower().removeprefix("."), pictures, sticks=sticks)
