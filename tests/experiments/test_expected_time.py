@@ -5,6 +5,7 @@ import pytest
 from selfmodel.comparators import DEFAULT
 from selfmodel.experiments import expected_time
 from selfmodel.experiments.expected_time import (
+    TIME_PER_STEP,
     calibration_seconds,
     diagnosis_seconds,
     replay_seconds,
@@ -48,7 +49,7 @@ def test_the_time_of_a_replay_is_that_of_its_physics_steps_and_its_model(quadrup
 
     seconds = replay_seconds(quadruped, trial, DEFAULT_BUDGET)
 
-    assert seconds == trial.behaviour.steps * quadruped.substeps + 10
+    assert seconds == TIME_PER_STEP * trial.behaviour.steps * quadruped.substeps + 10
 
 
 @pytest.mark.usefixtures("slow_model")
