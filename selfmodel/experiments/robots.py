@@ -1,15 +1,14 @@
 """Robots by name or by MJCF file."""
 
 import os
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from pathlib import Path
 
 from selfmodel.errors import InputError
 from selfmodel.files import encodable, read_file
 from selfmodel.robot.mjcf.adaptation import adapt
 from selfmodel.robot.mjcf.load import load_mjcf
-from selfmodel.robot.mjcf.rehearsal import physics_timestep as physics_timestep_of, rehearse
+from selfmodel.robot.mjcf.rehearsal import rehearse
 from selfmodel.robot.mjcf.settings import MjcfSettings, parse_setting, read_settings
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
@@ -63,43 +62,18 @@ def robot(name: str, control_timestep: float, budget: Budget = DEFAULT_BUDGET) -
     Args:
         name: Name of a robot of selfmodel, or a path that ends in ``.xml``.
         control_timestep: Duration of a control step of an MJCF file, s.
-        budget: Memory and time that the MJCF file may take.
+        budget: Memory and time that the model may take.
 
     Raises:
         InputError: The name is unknown, or the model is unusable.
     """
+    path = Path(name)
     if not is_model(name):
         return robot_entry(name).robot()
-    path = Path(name)
-    with _named(path):
-        mjcf = _text(path, budget)
-        rehearse(mjcf, {}, control_timestep, budget)
-        return Robot(encodable(path.stem), mjcf, control_timestep)
-
-
-def physics_timestep(path: Path, budget: Budget = DEFAULT_BUDGET) -> float:
-    """Returns the physics time step of an MJCF file, s.
-
-    Args:
-        path: The file.
-        budget: Memory and time that the file may take.
-
-    Raises:
-        InputError: The model is unusable.
-    """
-    with _named(path):
-        return physics_timestep_of(_text(path, budget), budget)
-
-
-def _text(path: Path, budget: Budget) -> str:
-    return read_file(path, "an MJCF file", budget.model_text).decode()
-
-
-@contextmanager
-def _named(path: Path) -> Iterator[None]:
-    """Context manager that adds the name of an MJCF file to errors about its content."""
+    data = read_file(path, "an MJCF file", budget.model_text)
     try:
-        yield
+        rehearse(data.decode(), {}, control_timestep, budget)
+        return Robot(encodable(path.stem), data.decode(), control_timestep)
     except (ValueError, KeyError) as error:
         reason = " ".join(str(error).split())
         raise InputError(

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 _LENGTH = struct.Struct("<Q")
-HEADER_SHARE = 15
-"""The JSON part of a message may take one of this many parts of its largest size."""
+MAX_HEADER_BYTES = 64 * 2**20
+"""Largest JSON part of a message, bytes."""
 
 OUT_OF_MEMORY = 71
 """Exit status of a child process without the memory to send its answer."""
@@ -51,13 +51,13 @@ def receive(channel: socket.socket, limit: int) -> Message:
 
     Args:
         channel: Channel to read.
-        limit: Largest total size of the blobs, bytes; for the JSON part, see ``HEADER_SHARE``.
+        limit: Largest total size of the blobs, bytes.
 
     Raises:
         MessageError: The channel ended before the end of the message, or the message is invalid.
     """
     (length,) = _LENGTH.unpack(_exactly(channel, _LENGTH.size))
-    if length > limit // HEADER_SHARE:
+    if length > MAX_HEADER_BYTES:
         raise MessageError(f"a header of {length} bytes")
     try:
         header = json.loads(_exactly(channel, length))

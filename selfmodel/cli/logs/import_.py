@@ -14,11 +14,13 @@ from selfmodel.controllers.controller import Controller
 from selfmodel.errors import InputError
 from selfmodel.experiments import robots, trial_logs
 from selfmodel.experiments.robots import is_model
+from selfmodel.files import read_file
 from selfmodel.logs.files import refuse_existing
 from selfmodel.logs.rosbag.importer import Recording, import_bag, write_recording
 from selfmodel.logs.rosbag.mapping import BagMapping
 from selfmodel.logs.rosbag.mapping_file import read_mapping
 from selfmodel.logs.rosbag.suggest import suggest as suggest_mapping
+from selfmodel.robot.mjcf.rehearsal import physics_timestep
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import Budget
 
@@ -78,7 +80,12 @@ def _suggestion(bag: Path, name: str, budget: Budget) -> str:
 
 def _timestep(path: Path, budget: Budget) -> float:
     """Returns the multiple of a model's physics time step nearest to ``TIMESTEP``, s."""
-    physics = robots.physics_timestep(path, budget)
+    data = read_file(path, "an MJCF file", budget.model_text)
+    try:
+        physics = physics_timestep(data.decode(), budget)
+    except ValueError as error:
+        what = " ".join(str(error).split())
+        raise InputError(f"{path}: expected an MJCF file of a robot: {what}") from error
     return max(1, round(TIMESTEP / physics)) * physics
 
 
@@ -108,8 +115,7 @@ def _mapped_robot(mapping: BagMapping, folder: Path, budget: Budget) -> Robot:
             ("robot",), f"{name} has no control time step: add control_timestep, s"
         )
     try:
-        path = name if own else str(folder / name)
-        return robots.robot(path, timestep or TIMESTEP, budget)
+        return robots.robot(name if own else str(folder / name), timestep or TIMESTEP, budget)
     except InputError as error:
         raise mapping.document.error(("robot",), str(error)) from error
 

@@ -85,24 +85,18 @@ def _rehearsed(
 
 
 def physics_timestep(mjcf: str, budget: Budget = DEFAULT_BUDGET) -> float:
-    """Returns the physics time step of a model, s, compiled in a child process.
+    """Returns the physics time step of a model that names no files, s.
 
     Args:
-        mjcf: The MJCF as one text without includes.
+        mjcf: The MJCF as one text.
         budget: Limits of memory and time.
 
     Raises:
         InputError: The model cannot be compiled.
         BudgetError: The model exceeds the budget.
     """
-    message = Message({"mjcf": mjcf})
-    found = run_on_model("selfmodel.robot.mjcf.rehearsal:compiled_timestep", message, budget)
-    return float(found.facts["timestep"])
-
-
-def compiled_timestep(message: Message, _budget: Budget, _scratch: Path) -> Message:
-    """Task of a child process: returns the physics time step of a model as ``timestep``, s."""
-    return Message({"timestep": float(compile_model(message.facts["mjcf"], {}).opt.timestep)})
+    task = "selfmodel.robot.mjcf.rehearsal:read_timestep"
+    return float(run_on_model(task, Message({"mjcf": mjcf}), budget).facts["timestep"])
 
 
 def run_on_model(task: str, message: Message, budget: Budget) -> Isolated:
@@ -140,6 +134,11 @@ def build_and_step(message: Message, _budget: Budget, _scratch: Path) -> Message
             "failure": failure,
         }
     )
+
+
+def read_timestep(message: Message, _budget: Budget, _scratch: Path) -> Message:
+    """Task of a child process: compiles a model, as for ``physics_timestep``."""
+    return Message({"timestep": float(compile_model(message.facts["mjcf"], {}).opt.timestep)})
 
 
 def _first_steps(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[list[float], str]:

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from selfmodel.errors import InputError
-from selfmodel.robot.mjcf.rehearsal import ModelCost, rehearse
+from selfmodel.robot.mjcf.rehearsal import ModelCost, physics_timestep, rehearse
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget, BudgetError
 from tests.robot.mjcf.awkward import GROUND, TORSO, mjcf
@@ -71,3 +71,16 @@ def test_a_heavier_model_takes_longer_steps():
 
     assert cost(crowd).step_seconds > 2 * cost(mjcf()).step_seconds
     assert np.isfinite(cost(crowd).step_seconds)
+
+
+def test_the_physics_time_step_is_that_of_the_compiled_model():
+    text = '<mujoco><option timestep="0.004"/><worldbody/></mujoco>'
+
+    assert physics_timestep(text) == 0.004
+
+
+def test_the_time_step_of_a_model_that_exceeds_the_budget_is_not_read():
+    grid = '<asset><hfield name="h" nrow="30000" ncol="30000" size="1 1 1 1"/></asset>'
+
+    with pytest.raises(BudgetError, match="--budget memory="):
+        physics_timestep(f"<mujoco>{grid}<worldbody/></mujoco>")
