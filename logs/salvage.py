@@ -63,7 +63,8 @@ class Salvaged:
         missing: Number of lost messages by topic; they are replaced by NaN (not observed), except
             on ``/tf``, where they are left out.
         lost: Other lost parts. A lost controller is replaced by a playback of the commands, lost
-            settings by those of the paper.
+            settings by those of the paper. Other records and files are known to be lost only if the
+            trial is tied.
         tied: Whether every saved message is proven to be of this trial. False for a log of an
             earlier version, in which a mixture of two trials cannot be noticed.
         discarded: Intact messages that are of other trials or lack that proof; they are left out.
@@ -120,7 +121,8 @@ def _saved(path: Path, budget: Budget) -> tuple[Contents, Salvaged]:
     rescued = rescue(path, budget)
     contents = rescued.contents
     _drop_foreign_displays(contents)
-    record, lost = _with_what_is_left(path, contents)
+    record, replaced = _with_what_is_left(path, contents)
+    lost = (*replaced, *(name for name in rescued.absent if name not in replaced))
     controller = read_controller(path, contents, record)
     every, whole = _complete(path, contents, record, rescued.discarded, budget)
     span = max(whole) + 1
@@ -189,7 +191,7 @@ def _complete(
     discarded: Sequence[Discarded],
     budget: Budget,
 ) -> tuple[tuple[Topic, ...], set[int]]:
-    """Topics, and the steps for which every topic has a message."""
+    """Topics, and the steps for which every topic has a message of the trial."""
     try:
         every = topics(read_names(path, contents), record.root)
         if record.format == TIMED_FORMAT:
@@ -203,6 +205,8 @@ def _complete(
         messages = contents.topics.get(topic.name)
         times = {log for log, _ in messages.times} if messages else set()
         whole = {k for k in whole if _time_of(k, record) in times}
+    if whole and SALVAGE in contents.metadata:
+        whole -= _filled_in(contents, every, whole, record)
     if not whole:
         raise _nothing(path, discarded)
     span = max(whole) + 1
@@ -219,6 +223,30 @@ def _nothing(path: Path, discarded: Sequence[Discarded]) -> CorruptError:
     return CorruptError(path, what)
 
 
+def _filled_in(
+    contents: Contents, every: Sequence[Topic], steps: set[int], record: TrialRecord
+) -> set[int]:
+    """Steps whose messages have no numbers: an earlier salvage filled them in."""
+    times = {_time_of(k, record): k for k in steps}
+    found = set(steps)
+    for topic in every:
+        empty = _empty_messages(topic, list(times))
+        messages = contents.topics[topic.name]
+        found &= {
+            times[log]
+            for payload, (log, _) in zip(messages.payloads, messages.times, strict=True)
+            if empty.get(log) == payload
+        }
+    return found
+
+
+def _empty_messages(topic: Topic, times: Sequence[int]) -> dict[int, bytes]:
+    """Messages in which nothing was observed, by time."""
+    stamps = np.array(times, dtype=np.int64)
+    numbers = np.full((len(times), topic.template.width), np.nan)
+    return dict(zip(times, topic.template.encode(stamps, numbers), strict=True))
+
+
 def _fill(contents: Contents, topic: Topic, steps: int, record: TrialRecord) -> int:
     """Fills the missing messages of a topic with NaN; returns their number."""
     messages = contents.topics[topic.name]
@@ -227,9 +255,8 @@ def _fill(contents: Contents, topic: Topic, steps: int, record: TrialRecord) -> 
         for payload, (log, publish) in zip(messages.payloads, messages.times, strict=True)
     }
     times = [_time_of(k, record) for k in range(steps)]
-    stamps = np.array(times, dtype=np.int64)
-    empty = topic.template.encode(stamps, np.full((steps, topic.template.width), np.nan))
-    rows = [known.get(time, (nothing, time)) for time, nothing in zip(times, empty, strict=True)]
+    empty = _empty_messages(topic, times)
+    rows = [known.get(time, (empty[time], time)) for time in times]
     messages.payloads = [payload for payload, _ in rows]
     messages.times = [(time, publish) for time, (_, publish) in zip(times, rows, strict=True)]
     return len(set(times) - set(known))
