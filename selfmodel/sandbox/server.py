@@ -52,7 +52,7 @@ def serve(control: socket.socket) -> None:
                 control.close()
                 _run(channel, task, facts)
         os.close(end)
-        select.select([control, alive], [], [])
+        select.select([control.fileno(), alive], [], [])
         if _has_ended(control):  # the client was killed: nothing else ends the child
             os.kill(child, signal.SIGKILL)
         _, status, usage = os.wait4(child, 0)
