@@ -56,7 +56,8 @@ class Salvaged:
         missing: Number of lost messages by topic; they are replaced by NaN (not observed), except
             on ``/tf``, where they are left out.
         lost: Other lost parts. A lost controller is replaced by a playback of the commands, lost
-            settings by those of the paper.
+            settings by those of the paper. Other records and files are known to be lost only if the
+            trial is tied.
         tied: Whether every saved message is proven to be of this trial. False for a log of an
             earlier version, in which a mixture of two trials cannot be noticed.
         discarded: Intact messages that are of other trials or lack that proof; they are left out.
@@ -113,7 +114,8 @@ def _saved(path: Path, budget: Budget) -> tuple[Contents, Salvaged]:
     rescued = rescue(path, budget)
     contents = rescued.contents
     drop_foreign_displays(contents)
-    record, lost = _with_what_is_left(path, contents)
+    record, replaced = _with_what_is_left(path, contents)
+    lost = (*replaced, *(name for name in rescued.absent if name not in replaced))
     controller = read_controller(path, contents, record)
     every, whole = complete_steps(path, contents, record, rescued.discarded, budget)
     span = max(whole) + 1

@@ -7,7 +7,7 @@ import numpy as np
 
 from selfmodel.logs.contents import Contents
 from selfmodel.logs.errors import CorruptError, SchemaMismatchError
-from selfmodel.logs.records import TIMED_FORMAT, TrialRecord
+from selfmodel.logs.records import SALVAGE, TIMED_FORMAT, TrialRecord
 from selfmodel.logs.salvage.belonging import Discarded
 from selfmodel.logs.schemas import schema_text
 from selfmodel.logs.signals import read_names
@@ -31,7 +31,7 @@ def complete_steps(
     discarded: Sequence[Discarded],
     budget: Budget,
 ) -> tuple[tuple[Topic, ...], set[int]]:
-    """Returns the topics of the steps, and the steps for which every topic has a message.
+    """Returns the topics of the steps, and the steps with a message of the trial on every topic.
 
     Args:
         path: The log.
@@ -56,6 +56,8 @@ def complete_steps(
         messages = contents.topics.get(topic.name)
         times = {log for log, _ in messages.times} if messages else set()
         whole = {k for k in whole if _time_of(k, record) in times}
+    if whole and SALVAGE in contents.metadata:
+        whole -= _filled_in(contents, every, whole, record)
     if not whole:
         raise _nothing(path, discarded)
     span = max(whole) + 1
@@ -70,6 +72,30 @@ def _nothing(path: Path, discarded: Sequence[Discarded]) -> CorruptError:
     if steps := sum(other.steps for other in discarded):
         what += f", and {steps} other steps in the file are not proven to be of the trial"
     return CorruptError(path, what)
+
+
+def _filled_in(
+    contents: Contents, every: Sequence[Topic], steps: set[int], record: TrialRecord
+) -> set[int]:
+    """Steps whose messages have no numbers: an earlier salvage filled them in."""
+    times = {_time_of(k, record): k for k in steps}
+    found = set(steps)
+    for topic in every:
+        empty = _empty_messages(topic, list(times))
+        messages = contents.topics[topic.name]
+        found &= {
+            times[log]
+            for payload, (log, _) in zip(messages.payloads, messages.times, strict=True)
+            if empty.get(log) == payload
+        }
+    return found
+
+
+def _empty_messages(topic: Topic, times: Sequence[int]) -> dict[int, bytes]:
+    """Messages in which nothing was observed, by time."""
+    stamps = np.array(times, dtype=np.int64)
+    numbers = np.full((len(times), topic.template.width), np.nan)
+    return dict(zip(times, topic.template.encode(stamps, numbers), strict=True))
 
 
 def fill(contents: Contents, topic: Topic, steps: int, record: TrialRecord) -> int:
@@ -87,9 +113,8 @@ def fill(contents: Contents, topic: Topic, steps: int, record: TrialRecord) -> i
         for payload, (log, publish) in zip(messages.payloads, messages.times, strict=True)
     }
     times = [_time_of(k, record) for k in range(steps)]
-    stamps = np.array(times, dtype=np.int64)
-    empty = topic.template.encode(stamps, np.full((steps, topic.template.width), np.nan))
-    rows = [known.get(time, (nothing, time)) for time, nothing in zip(times, empty, strict=True)]
+    empty = _empty_messages(topic, times)
+    rows = [known.get(time, (empty[time], time)) for time in times]
     messages.payloads = [payload for payload, _ in rows]
     messages.times = [(time, publish) for time, (_, publish) in zip(times, rows, strict=True)]
     return len(set(times) - set(known))

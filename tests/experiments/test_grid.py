@@ -1,5 +1,7 @@
 """Promises of a grid: nothing is done twice, nothing is lost, and one failure stops no other."""
 
+import errno
+import fcntl
 import json
 import multiprocessing
 import os
@@ -16,6 +18,7 @@ from hypothesis import given, strategies as st
 
 from selfmodel.errors import InputError
 from selfmodel.experiments.grid import GridBegins, Job, PartEnds, difference, finished, run_grid
+from selfmodel.experiments.grid.lock import exclusive
 from selfmodel.experiments.grid.worker_pool import MAX_TASKS_PER_WORKER, WorkerExit, run_tasks
 from selfmodel.physical.stop_signals import STOP_SIGNALS
 
@@ -236,6 +239,31 @@ def test_a_worker_is_replaced_after_its_largest_number_of_tasks():
 
     assert len(set(processes[:-1])) == 1
     assert processes[-1] != processes[0]
+
+
+def test_a_folder_has_one_lock_whatever_path_leads_to_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    folder, link = tmp_path / "runs", tmp_path / "link"
+    folder.mkdir()
+    link.symlink_to(folder)
+    monkeypatch.chdir(folder)
+
+    with exclusive(folder):
+        for path in (Path(), Path("../runs"), link):
+            with pytest.raises(InputError, match="another process"), exclusive(path):
+                pass
+
+
+def test_a_file_system_without_locks_is_one_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    def flock(*_: object) -> None:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr(fcntl, "flock", flock)
+    with pytest.raises(InputError, match="this file system has no locks"), exclusive(tmp_path):
+        pass
 
 
 @pytest.mark.process

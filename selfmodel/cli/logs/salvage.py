@@ -37,7 +37,7 @@ def salvage(
     for topic, count in saved.missing.items():
         print_lines(f"{topic}: {counted(count, 'message')} lost")
     for name in saved.lost:
-        print_lines(f"{name} is lost: {_CONSEQUENCES[name]}")
+        print_lines(f"{name} is lost: {_CONSEQUENCES.get(name, _OTHERWISE)}")
     print_lines(*map(_left_out, saved.discarded))
     if not saved.tied:
         print_lines(
@@ -60,3 +60,4 @@ _CONSEQUENCES = {
     "/robot_description": "viewers do not draw the robot",
     "settings.json": "the paper's settings are used instead",
 }
+_OTHERWISE = "the new log does not contain it"

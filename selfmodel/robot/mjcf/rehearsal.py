@@ -136,11 +136,6 @@ def build_and_step(message: Message, _budget: Budget, _scratch: Path) -> Message
     )
 
 
-def read_timestep(message: Message, _budget: Budget, _scratch: Path) -> Message:
-    """Task of a child process: compiles a model, as for ``physics_timestep``."""
-    return Message({"timestep": float(compile_model(message.facts["mjcf"], {}).opt.timestep)})
-
-
 def _first_steps(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[list[float], str]:
     """Returns the time of each physics step, s, and the reason of a failure."""
     seconds: list[float] = []
