@@ -183,7 +183,9 @@ _servers: list[_Server] = []
 def _server() -> _Server:
     """Server of this process; a forked process starts its own."""
     if not _servers or _servers[-1].owner != os.getpid():
-        _servers[:] = [_Server()]
+        for inherited in _servers:
+            inherited.stop()
+        _servers.append(_Server())
     return _servers[-1]
 
 
