@@ -59,6 +59,8 @@ def _items(path: Path) -> Iterator[Announced | Stored]:
             for connection in reader.connections
         }
         yield from topics.values()
+        if len(reader.chunks) != len(reader.chunk_infos):
+            raise DamageError("its index lists a chunk twice")
         # The chunks have counts of their own, by connection.
         expected: Counter[int] = Counter()
         for chunk in reader.chunk_infos:

@@ -1,6 +1,7 @@
 """Tasks for the tests of isolation: each is one thing that a child process may do."""
 
 import ctypes
+import resource
 import socket
 from pathlib import Path
 
@@ -21,6 +22,10 @@ def allocate(message: Message, _: Budget, __: Path) -> Message:
 def loop(_: Message, __: Budget, ___: Path) -> Message:
     while True:
         pass
+
+
+def cpu_limit(_: Message, __: Budget, ___: Path) -> Message:
+    return Message({"seconds": resource.getrlimit(resource.RLIMIT_CPU)[0]})
 
 
 def wait(_: Message, __: Budget, ___: Path) -> Message:
