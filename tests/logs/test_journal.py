@@ -181,7 +181,7 @@ def test_a_folder_without_a_run_is_said_so(biped: Robot, tmp_path: Path):
         '[{"trials": 1}]',
         '[{"trials": 1, "ranked": [{"hypothesis": "break:nose", "distance": 1}]}]',
         '[{"trials": 1, "ranked": [{"hypothesis": 3, "distance": 1}]}]',
-        '[{"trials": 1, "ranked": [], "intact_distance": 1, '
+        HEAD.replace('{"hypothesis": "intact", "distance": 1}', "")
         + '"rivals": [], "verdict": "explained", "test": ""}]',
         HEAD.replace('"distance": 1', '"distance": "nan"')
         + '"rivals": [], "verdict": "explained", "test": ""}]',
