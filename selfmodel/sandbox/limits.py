@@ -27,7 +27,7 @@ def restrict(budget: Budget, scratch: Path) -> None:
     """
     seconds = ceil(budget.file_seconds)
     used = resource.getrusage(resource.RUSAGE_SELF)
-    spent = ceil(used.ru_utime + used.ru_stime)
+    spent = round(used.ru_utime + used.ru_stime)
     _lower(resource.RLIMIT_CPU, spent + seconds, spent + seconds + 1)  # SIGXCPU, then SIGKILL
     _lower(resource.RLIMIT_FSIZE, budget.unpacked_bytes)
     _lower(resource.RLIMIT_CORE, 0)

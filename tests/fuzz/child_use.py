@@ -18,8 +18,8 @@ class ChildUse:
     Attributes:
         seconds: CPU time of all of them, s.
         megabytes: Largest growth of the address space of one of them, 10^6 bytes.
-        problem: Report of a finding: the first that crashed, was stopped, or raised an error that
-            is not declared; "" without one.
+        problem: Report of the first that crashed, waited too long, or raised an error that is not
+            declared; "" without one.
     """
 
     seconds: float = 0.0
@@ -34,11 +34,12 @@ class ChildUse:
             ended: Its exit status and CPU time, from the server.
         """
         self.seconds += ended["seconds"]
-        if answer is None:
-            problem = f"a child process ended with {_name(ended['status'])}"
-        else:
+        problem = ""
+        if answer is not None:
             self.megabytes = max(self.megabytes, answer.facts["peak"] / 1e6)
             problem = answer.facts["message"] if answer.facts.get("error") == "" else ""
+        elif ended["status"] != -signal.SIGXCPU:  # the limit of the budget is no crash
+            problem = f"a child process ended with {_name(ended['status'])}"
         self.problem = self.problem or problem
 
 

@@ -29,7 +29,10 @@ MEGABYTES = 1000
 """Largest growth of the memory by one case, 10^6 bytes."""
 
 SECONDS = 10
-"""Largest CPU time of one case, s."""
+"""Largest CPU time of one case, s: that of a child process by the default budget."""
+
+MARGIN = 0.5
+"""CPU time beside a child process that the budget's limit ended, s."""
 
 DECLARED = (InputError, WorkError)
 """Errors for input that is refused; LogError is a WorkError."""
@@ -86,7 +89,7 @@ def judge(case: Case, folder: Path, output: Path) -> Verdict:
         problem, place = f"files left or changed: {files}", f"files-{_words(files)}"
     if not problem and megabytes > MEGABYTES:
         problem, place = f"took {megabytes:.0f} MB", "memory"
-    if not problem and seconds > SECONDS:
+    if not problem and seconds > SECONDS + MARGIN:
         problem, place = f"took {seconds:.1f} s", "time"
     if not problem:
         os.chdir(folder.parent)

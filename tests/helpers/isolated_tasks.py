@@ -2,6 +2,7 @@
 
 import ctypes
 import os
+import resource
 import socket
 import stat
 from pathlib import Path
@@ -23,6 +24,10 @@ def allocate(message: Message, _: Budget, __: Path) -> Message:
 def loop(_: Message, __: Budget, ___: Path) -> Message:
     while True:
         pass
+
+
+def cpu_limit(_: Message, __: Budget, ___: Path) -> Message:
+    return Message({"seconds": resource.getrlimit(resource.RLIMIT_CPU)[0]})
 
 
 def wait(_: Message, __: Budget, ___: Path) -> Message:

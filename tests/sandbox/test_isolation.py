@@ -5,6 +5,7 @@ import subprocess
 import sys
 import threading
 import time
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -82,6 +83,10 @@ def test_the_peak_of_the_memory_is_reported():
 def test_a_task_that_does_not_end_is_stopped_after_the_time_of_the_budget():
     with pytest.raises(BudgetError, match=r"more than 1 s of processor time.*--budget time="):
         call("loop")
+
+
+def test_the_limit_of_the_processor_time_is_that_of_the_budget():
+    assert call("cpu_limit").facts["seconds"] == 1
 
 
 @pytest.mark.process
@@ -186,7 +191,10 @@ def test_an_interrupted_call_leaves_no_answer_to_the_next():
 
 
 def _echo_in_a_fork(pipe: "multiprocessing.connection.Connection") -> None:
-    pipe.send(call("echo", x=3).facts["facts"])
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        facts = call("echo", x=3).facts["facts"]
+    pipe.send((facts, [str(warning.message) for warning in caught]))
 
 
 @pytest.mark.process
@@ -198,7 +206,7 @@ def test_a_forked_process_has_a_server_of_its_own():
     process = context.Process(target=_echo_in_a_fork, args=(other,))
     process.start()
 
-    assert own.recv() == {"x": 3}
+    assert own.recv() == ({"x": 3}, [])
     process.join()
     assert call("echo", x=4).facts["facts"] == {"x": 4}
 

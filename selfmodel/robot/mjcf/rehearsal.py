@@ -99,6 +99,11 @@ def physics_timestep(mjcf: str, budget: Budget = DEFAULT_BUDGET) -> float:
     return float(run_on_model(task, Message({"mjcf": mjcf}), budget).facts["timestep"])
 
 
+def read_timestep(message: Message, _budget: Budget, _scratch: Path) -> Message:
+    """Task of a child process: compiles a model, as for ``physics_timestep``."""
+    return Message({"timestep": float(compile_model(message.facts["mjcf"], {}).opt.timestep)})
+
+
 def run_on_model(task: str, message: Message, budget: Budget) -> Isolated:
     """Runs a function that compiles a model in a child process; see ``run_isolated``.
 
