@@ -296,7 +296,7 @@ def _rows(names: Names, observation: Mapping[str, Any]) -> dict[Signal, FloatArr
     """Returns the row of every signal but the commands, NaN where not observed.
 
     Raises:
-        InputError: The shape of a signal is not ``(width,)``.
+        InputError: The shape of a signal is not ``(width,)``, or a value is no number.
     """
     rows: dict[Signal, FloatArray] = {}
     for signal in SIGNALS:
@@ -304,7 +304,10 @@ def _rows(names: Names, observation: Mapping[str, Any]) -> dict[Signal, FloatArr
             continue
         width = names.width(signal)
         given = observation.get(signal)
-        row = np.full(width, np.nan) if given is None else np.array(given, dtype=np.float64)
+        try:
+            row = np.full(width, np.nan) if given is None else np.array(given, dtype=np.float64)
+        except (ValueError, TypeError) as error:
+            raise InputError(f"expected numbers of {signal} in an observation: {error}") from error
         if row.shape != (width,):
             raise InputError(
                 f"expected {signal} of shape ({width},) in an observation, its columns being "

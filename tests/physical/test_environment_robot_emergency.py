@@ -91,6 +91,12 @@ EMERGENCIES: dict[str, tuple[dict[int, object], dict[str, object], type[BaseExce
         InputError,
         r"expected sensors of shape \(8,\) in an observation, .* got the shape \(1,\)",
     ),
+    "text": (
+        {7: observation(7, sensors=["off"] * 8)},
+        {},
+        InputError,
+        r"expected numbers of sensors in an observation: could not convert string to float",
+    ),
 }
 
 
