@@ -1,6 +1,7 @@
 """Mutations of ``.npz`` files: arrays of other types, shapes and numbers, other archives."""
 
 import io
+import tokenize
 import zipfile
 from typing import Any
 
@@ -12,6 +13,9 @@ from tests.fuzz.mutate.numbers import number, packed, text
 
 Arrays = dict[str, NDArray[Any]]
 
+_UNREADABLE = (ValueError, EOFError, SyntaxError, tokenize.TokenError, zipfile.BadZipFile)
+"""Exceptions of numpy and zipfile for an archive that was damaged before."""
+
 
 def mutated(data: bytes, rng: np.random.Generator) -> tuple[bytes, str]:
     """Returns an archive with one or two mutations, and their names."""
@@ -22,7 +26,7 @@ def mutated(data: bytes, rng: np.random.Generator) -> tuple[bytes, str]:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = {info.filename: archive.read(info) for info in archive.infolist()}
         arrays = {name: np.load(io.BytesIO(content)) for name, content in members.items()}
-    except (ValueError, EOFError, SyntaxError, zipfile.BadZipFile):  # an earlier mutation
+    except _UNREADABLE:  # an earlier mutation
         return raw.mutated(data, rng)
     if kind < 0.4:
         return _packed(*_member_changed(members, rng), rng)
