@@ -37,7 +37,7 @@ def verify(path: Path, expected: str = "", budget: Budget = DEFAULT_BUDGET) -> V
     Args:
         path: The log.
         expected: Digest that the log must have, or "".
-        budget: Memory that the file may take.
+        budget: Memory and time that the file and its model may take.
 
     Raises:
         LogError: A check failed.
@@ -50,16 +50,16 @@ def verify(path: Path, expected: str = "", budget: Budget = DEFAULT_BUDGET) -> V
         what = f"expected the log with the digest {expected}; this log has {has}"
         raise CorruptError(path, what, advice="get the expected log from its origin again")
     try:
-        checked_model(log.mjcf, log.assets)
+        checked_model(log.mjcf, log.assets, budget)
     except ValueError as error:
         raise SchemaMismatchError(path, str(error), good="its observations are intact") from error
-    return Verified(log, _load(log), contents.digest)
+    return Verified(log, _load(log, budget), contents.digest)
 
 
-def _load(log: TrialLog) -> bool:
+def _load(log: TrialLog, budget: Budget) -> bool:
     try:
         from selfmodel.logs.robots import robot_of  # noqa: PLC0415  # it needs MuJoCo
     except ImportError:
         return False
-    robot_of(log)
+    robot_of(log, budget)
     return True
