@@ -9,8 +9,8 @@ from selfmodel.errors import WorkError
 AGAIN = "make the trial again"
 ANOTHER = "give a trial log, NAME.mcap"
 IMPORT_IT = "a recording of a robot becomes a trial log with `selfmodel logs import`"
+GOOD = "its observations are intact"
 OTHER_VERSION = "read it with the version of selfmodel that wrote it"
-
 
 _LONGEST = 2000
 

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
+import lz4.frame
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile, McapError
@@ -34,7 +35,6 @@ from mcap.records import (
 )
 from mcap.stream_reader import get_chunk_data_stream
 
-from selfmodel.logs.decompress import unlz4, unzstd
 from selfmodel.logs.meter import Meter
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -185,15 +185,20 @@ def unpack_chunk(chunk: Chunk) -> None:
     """
     size = chunk.uncompressed_size
     if chunk.compression == "zstd":
-        chunk.data = unzstd(chunk.data, size)
+        # Not decompress(), which allocates the size that the frame claims.
+        with zstandard.ZstdDecompressor().stream_reader(chunk.data) as reader:
+            chunk.data = reader.read(size + 1)
     elif chunk.compression == "lz4":
-        chunk.data = unlz4(chunk.data, size)
+        unlz4 = lz4.frame.LZ4FrameDecompressor()
+        chunk.data = unlz4.decompress(chunk.data, max_length=size + 1)
     elif chunk.compression:
         raise UnknownCompressionError(
             f"a chunk is packed with {chunk.compression!r}; zstd and lz4 are known"
         )
     chunk.compression = ""
-    if len(chunk.data) != size:
+    if len(chunk.data) > size:
+        raise ContradictionError(f"a chunk unpacks to more than {size} bytes, which it claims")
+    if len(chunk.data) < size:
         raise ContradictionError(f"a chunk claims {size} bytes, and has {len(chunk.data)}")
 
 

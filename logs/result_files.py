@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from selfmodel.errors import InputError
-from selfmodel.files import check_regular, read_file
+from selfmodel.files import read_file
 from selfmodel.sandbox.budget import DEFAULT_BUDGET
 
 MAX_BYTES = DEFAULT_BUDGET.json_bytes
@@ -52,7 +52,9 @@ def result_bytes(content: Mapping[str, Any]) -> bytes:
         ValueError: A number is NaN or infinite, or the file is larger than ``MAX_BYTES``.
         TypeError: A value has no form in JSON.
     """
-    values = {**content, MADE_WITH: versions()}
+    # The digest is that of the values as a reader parses them: JSON's keys are texts.
+    given = {**content, MADE_WITH: versions()}
+    values = parse_json(json.dumps(given, allow_nan=False).encode())
     data = json.dumps({**values, DIGEST: _digest(values)}, indent=1, allow_nan=False).encode()
     if len(data) > MAX_BYTES:
         raise ValueError(f"expected a result of at most {MAX_BYTES} bytes as JSON, got {len(data)}")
@@ -107,18 +109,6 @@ def verified(values: Any) -> ResultFile:  # noqa: ANN401  # JSON
     if not isinstance(made_with, dict):
         raise ValueError("it lacks the versions that made it")  # noqa: TRY004  # as above
     return ResultFile(content, made_with)
-
-
-def file_digest(path: Path) -> str:
-    """Returns the SHA-256 of a file.
-
-    Raises:
-        InputError: The file is missing, a folder, a pipe or a device.
-        OSError: The file cannot be read.
-    """
-    check_regular(path, "a file")
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _digest(values: Mapping[str, Any]) -> str:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from selfmodel.errors import InputError, WorkError
-from selfmodel.logs.errors import SchemaMismatchError
+from selfmodel.logs.errors import GOOD, SchemaMismatchError
 from selfmodel.logs.reader import TrialLog
 from selfmodel.robot.mjcf.adaptation import MAX_SUBSTEPS
 from selfmodel.robot.mjcf.mujoco_errors import MUJOCO_ERRORS
@@ -13,8 +13,6 @@ from selfmodel.robot.mujoco_log import uncounted_warnings
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget, BudgetError
 from selfmodel.trials.signals import Names
-
-GOOD = "its observations are intact"
 
 
 def robot_of(log: TrialLog, budget: Budget = DEFAULT_BUDGET) -> Robot:

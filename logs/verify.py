@@ -4,11 +4,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from selfmodel.logs.contents import read_contents
-from selfmodel.logs.errors import CorruptError, SchemaMismatchError
+from selfmodel.logs.errors import GOOD, CorruptError, SchemaMismatchError
 from selfmodel.logs.provenance import UNTIED
 from selfmodel.logs.reader import TrialLog, interpret
 from selfmodel.robot.mjcf.untrusted import checked_model
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
+from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget, BudgetError
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,8 +31,8 @@ def verify(path: Path, expected: str = "", budget: Budget = DEFAULT_BUDGET) -> V
     """Verifies a log.
 
     Verified are the checks of ``read_log``; that the hidden faults of a simulated robot are those
-    of the trial; that the model names no other files and has bounded sizes; and, if MuJoCo is
-    installed, that the model loads and is of the robot of the messages.
+    of the trial; that the model names no other files; and, if MuJoCo is installed, that the model
+    loads within the budget and is of the robot of the messages.
 
     Args:
         path: The log.
@@ -51,8 +51,10 @@ def verify(path: Path, expected: str = "", budget: Budget = DEFAULT_BUDGET) -> V
         raise CorruptError(path, what, advice="get the expected log from its origin again")
     try:
         checked_model(log.mjcf, log.assets, budget)
+    except BudgetError as error:
+        raise SchemaMismatchError(path, str(error), good=GOOD, advice="") from error
     except ValueError as error:
-        raise SchemaMismatchError(path, str(error), good="its observations are intact") from error
+        raise SchemaMismatchError(path, str(error), good=GOOD) from error
     return Verified(log, _load(log, budget), contents.digest)
 
 

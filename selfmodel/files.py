@@ -1,5 +1,7 @@
-"""Bounded reading of files that a user names."""
+"""Bounded reading of files that a user names, and their digests."""
 
+import hashlib
+import os
 import re
 import stat
 import tomllib
@@ -24,7 +26,8 @@ def read_file(path: Path, what: str, limit: int) -> bytes:
     check_regular(path, what)
     try:
         with path.open("rb") as file:
-            data = file.read(limit + 1)
+            # Python reserves as many bytes as it may read.
+            data = file.read(min(limit, os.fstat(file.fileno()).st_size) + 1)
     except OSError as error:
         raise _unreadable(path, what, error) from error
     if len(data) > limit:
@@ -50,6 +53,18 @@ def check_regular(path: Path, what: str) -> None:
         raise InputError(f"{path}: expected {what} that can be read, got: Is a directory")
     if not stat.S_ISREG(mode):
         raise InputError(f"{path}: expected {what}, got a pipe or a device: give a file")
+
+
+def file_digest(path: Path) -> str:
+    """Returns the SHA-256 of a file.
+
+    Raises:
+        InputError: The file is missing, a folder, a pipe or a device.
+        OSError: The file cannot be read.
+    """
+    check_regular(path, "a file")
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _unreadable(path: Path, what: str, error: OSError | ValueError) -> InputError:

@@ -3,10 +3,11 @@
 import os
 from pathlib import Path
 
+from selfmodel.files import file_digest
 from selfmodel.logs.rosbag.answer import Source, answer
 from selfmodel.logs.rosbag.files import bag_files, explained
 from selfmodel.logs.rosbag.gathering import Gathering
-from selfmodel.logs.rosbag.storage import read_storage, sha256
+from selfmodel.logs.rosbag.storage import read_storage
 from selfmodel.sandbox.budget import Budget
 from selfmodel.sandbox.message import Message
 
@@ -36,5 +37,5 @@ def read(request: Message, budget: Budget, scratch: Path) -> Message:
         for name in names:
             for item in read_storage(name, scratch, budget):
                 gathering.add(item)
-        sources = [Source(name.name, sha256(name)) for name in names]
+        sources = [Source(name.name, file_digest(name)) for name in names]
     return answer(gathering.topics().values(), sources, gathering.decoded())

@@ -16,7 +16,7 @@ from selfmodel.logs.rosbag.messages import (
 from selfmodel.logs.rosbag.series import Topic
 from selfmodel.logs.rosbag.storage import unpacked
 from selfmodel.logs.rosbag.stored import Announced, Stored
-from selfmodel.sandbox.budget import Budget, BudgetError
+from selfmodel.sandbox.budget import Budget, BudgetError, memory_error
 
 LONGEST_NAME = 1000
 """Maximum length of a name in a bag, characters."""
@@ -135,7 +135,4 @@ class Gathering:
             raise self._beyond(f"{most} numbers on the topics of the mapping")
 
     def _beyond(self, what: str) -> BudgetError:
-        return BudgetError(
-            f"{self._path} has more than {what}: to go on, raise the memory with "
-            f"--budget memory=..., from {self._budget.memory / 1e9:g}GB"
-        )
+        return memory_error(f"{self._path} has more than {what}", self._budget)

@@ -29,7 +29,7 @@ from selfmodel.logs.rosbag.signals import (
 from selfmodel.logs.rosbag.tracks import Tracks, read_tracks, required
 from selfmodel.logs.writer import write_trial
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
+from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget, more_memory
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Behaviour, Sample
 from selfmodel.trials.signals import SIGNALS, Signal
@@ -189,8 +189,8 @@ def _steps(mapping: BagMapping, tracks: Tracks, timestep: float, budget: Budget)
     if not 2 <= steps <= most:
         raise mapping.document.error(
             ("duration",),
-            f"a trial has 2 to {most} steps, got {steps}: set another duration, or raise the "
-            f"memory with --budget memory=..., from {budget.memory / 1e9:g}GB",
+            f"a trial has 2 to {most} steps, got {steps}: set another duration, or "
+            f"{more_memory(budget)}",
         )
     return Steps(origin, np.rint(np.arange(steps) * period).astype(np.int64))
 

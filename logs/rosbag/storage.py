@@ -1,7 +1,6 @@
 """Content of one file of a bag, in any format, compressed or not."""
 
 import errno
-import hashlib
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -15,7 +14,7 @@ from selfmodel.logs.rosbag.stored import Announced, Stored
 from selfmodel.logs.rosbag.stored_mcap import read_mcap
 from selfmodel.logs.rosbag.stored_ros1 import ROS1_MAGIC, read_ros1
 from selfmodel.logs.rosbag.stored_sqlite import SQLITE_MAGIC, read_sqlite
-from selfmodel.sandbox.budget import Budget, BudgetError
+from selfmodel.sandbox.budget import Budget, memory_error
 
 AGAIN = "record it again, or unpack its intact part with the tool of its format"
 
@@ -74,12 +73,6 @@ def unpacked(payload: bytes, name: Path, topic: str) -> bytes:
         ) from failure
 
 
-def sha256(path: Path) -> str:
-    """Returns the SHA-256 of a file, in hexadecimal."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
 def _unpack_file(name: Path, place: Path, budget: Budget) -> None:
     try:
         with name.open("rb") as source, place.open("wb") as target:
@@ -89,10 +82,8 @@ def _unpack_file(name: Path, place: Path, budget: Budget) -> None:
     except OSError as failure:
         if failure.errno != errno.EFBIG:
             raise
-        raise BudgetError(
-            f"{name} unpacks to more than {budget.unpacked_bytes} bytes: to go on, raise the "
-            f"memory with --budget memory=..., from {budget.memory / 1e9:g}GB"
-        ) from failure
+        what = f"{name} unpacks to more than {budget.unpacked_bytes} bytes"
+        raise memory_error(what, budget) from failure
 
 
 def _begins(path: Path, magic: bytes) -> bool:

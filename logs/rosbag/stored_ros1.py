@@ -2,6 +2,7 @@
 
 import shlex
 import struct
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -58,13 +59,21 @@ def _items(path: Path) -> Iterator[Announced | Stored]:
             for connection in reader.connections
         }
         yield from topics.values()
-        count = 0
+        if len(reader.chunks) != len(reader.chunk_infos):
+            raise DamageError("its index lists a chunk twice")
+        # The chunks have counts of their own, by connection.
+        expected: Counter[int] = Counter()
+        for chunk in reader.chunk_infos:
+            expected.update(chunk.connection_counts)
+        found: Counter[int] = Counter()
         for connection, time, payload in reader.messages():
-            count += 1
+            found[connection.id] += 1
             yield Stored(topics[connection.id], checked_time(time), payload)
-        # The chunks have counts of their own.
-        if count != reader.message_count:
-            raise DamageError(f"its chunks have {reader.message_count} messages, its index {count}")
+        if found != expected:
+            raise DamageError(
+                f"its chunks have {expected.total()} messages, its index {found.total()}, or of "
+                f"other connections"
+            )
 
 
 def _explained(name: Path, failure: Exception, good: str) -> LogError:

@@ -66,6 +66,7 @@ def _items(path: Path) -> Iterator[Announced | Stored]:
     # Immutable: SQLite cannot create its lock files on a read-only disk.
     address = f"{path.resolve().as_uri()}?mode=ro&immutable=1"
     with closing(sqlite3.connect(address, uri=True)) as database:
+        _check_tables(database)
         # Reading a page that is damaged may skip its messages silently.
         (verdict,) = database.execute("PRAGMA quick_check(1)").fetchone()
         if verdict != "ok":
@@ -84,3 +85,19 @@ def _items(path: Path) -> Iterator[Announced | Stored]:
             if number not in topics or not isinstance(payload, bytes):
                 raise DamageError(f"a message of topic {number!r} with {type(payload).__name__}")
             yield Stored(topics[number], checked_time(time), payload)
+
+
+def _check_tables(database: sqlite3.Connection) -> None:
+    """Checks that the rows are stored: those of a view may be computed without end.
+
+    Raises:
+        DamageError: A table is a view, or virtual, or has computed columns.
+    """
+    for table in ("topics", "messages"):
+        (computed,) = database.execute(
+            "SELECT (SELECT count(*) FROM pragma_table_xinfo(:name) WHERE hidden)"
+            " + (SELECT count(*) FROM sqlite_schema WHERE name = :name AND NOT rootpage)",
+            {"name": table},
+        ).fetchone()
+        if computed:
+            raise DamageError(f"{table} has computed rows")

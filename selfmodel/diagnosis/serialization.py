@@ -6,6 +6,7 @@ the undetectable faults: ``diagnoses.json`` contains whole hypotheses, which can
 """
 
 import math
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, get_args
 
@@ -42,11 +43,14 @@ def diagnosis_from_dict(values: Mapping[str, Any], parse: Callable[[str], Hypoth
         AttributeError: A hypothesis is not a string.
     """
     outside = values.get("outside")
+    ranked = tuple(
+        Candidate(parse(item["hypothesis"]), _from_json(item["distance"]))
+        for item in values["ranked"]
+    )
+    if not ranked:
+        raise ValueError("expected at least one ranked hypothesis, got none")
     return Diagnosis(
-        ranked=tuple(
-            Candidate(parse(item["hypothesis"]), _from_json(item["distance"]))
-            for item in values["ranked"]
-        ),
+        ranked=ranked,
         trials=int(values["trials"]),
         intact_distance=_from_json(values["intact_distance"]),
         indistinguishable=tuple(parse(text) for text in values["rivals"]),
@@ -65,8 +69,12 @@ def _extra(hypothesis: Hypothesis, best: Hypothesis) -> str:
     return str(Hypothesis(tuple(fault for fault in hypothesis.faults if fault not in best.faults)))
 
 
-def _from_json(distance: float | None) -> float:
-    return math.inf if distance is None else float(distance)
+def _from_json(distance: object) -> float:
+    if distance is None:
+        return math.inf
+    if not isinstance(distance, (int, float)) or not abs(distance) <= sys.float_info.max:
+        raise ValueError(f"expected a finite number or null as a distance, got {distance!r:.60}")
+    return float(distance)
 
 
 def _verdict(text: str) -> Verdict:

@@ -1,6 +1,5 @@
 """Trials, robots and controllers from log files."""
 
-import hashlib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -8,6 +7,7 @@ from selfmodel.controllers.controller import Controller, Design
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError
 from selfmodel.experiments.robots import is_model, robot, robot_entry
+from selfmodel.files import file_digest
 from selfmodel.logs import LogError, TrialLog, load_controller, read_log
 from selfmodel.logs.robots import common_robot, describe_difference
 from selfmodel.robot.designs import DESIGNS
@@ -31,10 +31,9 @@ def logs(paths: Sequence[Path], budget: Budget = DEFAULT_BUDGET) -> list[TrialLo
         found = [read_log(path, budget) for path in paths]
     except LogError as error:
         raise InputError(str(error)) from error
-    digests: dict[bytes, Path] = {}
+    digests: dict[str, Path] = {}
     for path in paths:
-        with path.open("rb") as file:
-            first = digests.setdefault(hashlib.file_digest(file, "sha256").digest(), path)
+        first = digests.setdefault(file_digest(path), path)
         if first is not path:
             raise InputError(f"{first} and {path} are the same log: give each log once")
     return found

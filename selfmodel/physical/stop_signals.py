@@ -168,9 +168,11 @@ class _Region:
         self._handler = handler = _handler if _in_main_thread() else None
         if handler is not None:
             self._before = handler.mode
+            handler.mode = self._mode
+            # In this order: a signal in between would wait while the code of the region blocks. If
+            # it is raised here, the end of the outer region restores the mode.
             if self._mode is _Mode.RELEASED:
                 handler.raise_waiting()
-            handler.mode = self._mode
 
     def __exit__(
         self,

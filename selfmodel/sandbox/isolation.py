@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,7 +16,7 @@ from typing import Any
 
 from selfmodel.errors import InputError, WorkError
 from selfmodel.sandbox.budget import Budget, BudgetError
-from selfmodel.sandbox.message import Message, MessageError, receive, send
+from selfmodel.sandbox.message import OUT_OF_MEMORY, Message, MessageError, receive, send
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ def run_isolated(
         ChildError: The child crashed.
         InputError: The task raised it; so for each class in ``errors``.
     """
-    with _LOCK, TemporaryDirectory(prefix="selfmodel-") as scratch:
+    with _lock, TemporaryDirectory(prefix="selfmodel-") as scratch:
         try:
             answer, ended = _server().call(task, message, budget, Path(scratch))
         except BaseException:  # also Ctrl-C: the answer of this call must not reach the next one
@@ -85,10 +86,19 @@ def _ended(what: str, status: int, budget: Budget) -> InputError:
             f"{what} takes more than {budget.file_seconds:.3g} s of processor time: to go on, "
             f"raise the time with --budget time=..., from {budget.time:g} s"
         )
+    if status == OUT_OF_MEMORY:
+        return _too_large(what, budget)
     if status < 0:
         reason = signal.Signals(-status).name
         return ChildError(f"{what} made the process that read it crash with {reason}")
     return ChildError(f"{what} made the process that read it end with status {status}")
+
+
+def _too_large(what: str, budget: Budget) -> BudgetError:
+    return BudgetError(
+        f"{what} takes more than {budget.memory / 1e9:.3g} GB of memory: to go on, raise it "
+        f"with --budget memory=..."
+    )
 
 
 def _error(
@@ -96,10 +106,7 @@ def _error(
 ) -> Exception:
     name, text, fields = facts["error"], facts["message"], facts["fields"]
     if name == "MemoryError":
-        return BudgetError(
-            f"{what} takes more than {budget.memory / 1e9:.3g} GB of memory: to go on, raise it "
-            f"with --budget memory=..."
-        )
+        return _too_large(what, budget)
     if name == "RecursionError":
         return InputError(f"{what} is nested too deeply")
     for known in (*errors, InputError, BudgetError):
@@ -115,7 +122,7 @@ class _Server:
     """Server process of this process."""
 
     def __init__(self) -> None:
-        self.owner = os.getpid()
+        self._owner = os.getpid()
         own, other = socket.socketpair()
         # The child's path contains this package, and not the working folder.
         package = str(Path(__file__).parents[2])
@@ -154,14 +161,25 @@ class _Server:
             answer = _exchange(own, message, budget)
         try:
             return answer, receive(self._control, 0).facts
-        except MessageError as error:
+        except (MessageError, OSError) as error:
             raise WorkError("the process that reads files ended unexpectedly") from error
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether the idle server was killed, such as for lack of memory."""
+        try:
+            return not self._control.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT)
+        except BlockingIOError:
+            return False
+        except OSError:
+            return True
 
     def stop(self) -> None:
         """Ends the server, and a child that is running."""
         self._control.close()
-        if self.owner == os.getpid():
-            os.killpg(self._process.pid, signal.SIGKILL)
+        if self._owner == os.getpid():
+            with suppress(ProcessLookupError, PermissionError):  # the server has ended already
+                os.killpg(self._process.pid, signal.SIGKILL)
             self._process.wait()
 
 
@@ -176,14 +194,16 @@ def _exchange(channel: socket.socket, message: Message, budget: Budget) -> Messa
         return None
 
 
-_LOCK = threading.Lock()
+_lock = threading.Lock()
 _servers: list[_Server] = []
 
 
 def _server() -> _Server:
-    """Server of this process; a forked process starts its own."""
-    if not _servers or _servers[-1].owner != os.getpid():
-        _servers[:] = [_Server()]
+    """Server of this process."""
+    if _servers and _servers[-1].has_ended:
+        _stop_server()
+    if not _servers:
+        _servers.append(_Server())
     return _servers[-1]
 
 
@@ -191,3 +211,13 @@ def _server() -> _Server:
 def _stop_server() -> None:
     while _servers:
         _servers.pop().stop()
+
+
+def _start_anew() -> None:
+    """Prepares a forked process, which starts a server of its own."""
+    global _lock  # noqa: PLW0603  # a thread that the fork does not have may hold the lock
+    _lock = threading.Lock()
+    _stop_server()  # closes the copy of the channel: the server ends with its own client
+
+
+os.register_at_fork(after_in_child=_start_anew)

@@ -27,7 +27,7 @@ def restrict(budget: Budget, scratch: Path) -> None:
     """
     seconds = ceil(budget.file_seconds)
     used = resource.getrusage(resource.RUSAGE_SELF)
-    spent = ceil(used.ru_utime + used.ru_stime)
+    spent = round(used.ru_utime + used.ru_stime)
     _lower(resource.RLIMIT_CPU, spent + seconds, spent + seconds + 1)  # SIGXCPU, then SIGKILL
     _lower(resource.RLIMIT_FSIZE, budget.unpacked_bytes)
     _lower(resource.RLIMIT_CORE, 0)
@@ -54,9 +54,9 @@ def address_space(peak: str = "VmSize") -> int | None:
 
 
 def _lower(limit: int, soft: int, hard: int | None = None) -> None:
-    _, present = resource.getrlimit(limit)
-    most = sys.maxsize if present == resource.RLIM_INFINITY else present
-    resource.setrlimit(limit, (min(soft, most), min(soft if hard is None else hard, most)))
+    present = resource.getrlimit(limit)
+    most = [sys.maxsize if value == resource.RLIM_INFINITY else value for value in present]
+    resource.setrlimit(limit, (min(soft, *most), min(soft if hard is None else hard, most[1])))
 
 
 # Landlock: Linux, include/uapi/linux/landlock.h; the numbers of the calls are those of every

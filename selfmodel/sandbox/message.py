@@ -11,6 +11,9 @@ _LENGTH = struct.Struct("<Q")
 MAX_HEADER_BYTES = 64 * 2**20
 """Largest JSON part of a message, bytes."""
 
+OUT_OF_MEMORY = 71
+"""Exit status of a child process without the memory to send its answer."""
+
 
 class MessageError(ValueError):
     """The bytes are no complete message."""
@@ -59,6 +62,8 @@ def receive(channel: socket.socket, limit: int) -> Message:
     try:
         header = json.loads(_exactly(channel, length))
         facts, sizes = header["facts"], header["sizes"]
+        if not isinstance(facts, dict):
+            raise MessageError(f"facts that are a {type(facts).__name__}")
         if sum(sizes.values()) > limit or min(sizes.values(), default=0) < 0:
             raise MessageError(f"blobs of {sum(sizes.values())} bytes, more than {limit}")
         blobs = {name: _exactly(channel, size) for name, size in sizes.items()}

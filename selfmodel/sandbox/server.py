@@ -6,6 +6,8 @@ The server imports the modules of the tasks; it never reads a file's content its
 import importlib
 import os
 import resource
+import select
+import shutil
 import signal
 import socket
 import sys
@@ -17,7 +19,7 @@ from typing import Any
 from selfmodel.errors import InputError, WorkError
 from selfmodel.sandbox.budget import Budget
 from selfmodel.sandbox.limits import address_space, restrict
-from selfmodel.sandbox.message import Message, receive, send
+from selfmodel.sandbox.message import OUT_OF_MEMORY, Message, receive, send
 
 Task = Callable[[Message, Budget, Path], Message]
 """Function that runs in a child: the request, the budget and the scratch folder."""
@@ -42,17 +44,32 @@ def serve(control: socket.socket) -> None:
         facts = receive(control, 0).facts
         module, _, name = facts["task"].partition(":")
         task = getattr(importlib.import_module(module), name)
+        # The child's end of the pipe is closed by its death only.
+        alive, end = os.pipe()
         with socket.socket(fileno=descriptors[0]) as channel:
             child = os.fork()
             if child == 0:
                 control.close()
                 _run(channel, task, facts)
+        os.close(end)
+        select.select([control.fileno(), alive], [], [])
+        if _has_ended(control):  # the client was killed: nothing else ends the child
+            os.kill(child, signal.SIGKILL)
         _, status, usage = os.wait4(child, 0)
+        os.close(alive)
+        if _has_ended(control):
+            shutil.rmtree(facts["scratch"], ignore_errors=True)
+            return
         answer = {
             "status": os.waitstatus_to_exitcode(status),
             "seconds": usage.ru_utime + usage.ru_stime,
         }
         send(control, Message(answer))
+
+
+def _has_ended(control: socket.socket) -> bool:
+    """Returns whether the client has closed its end; it sends nothing before it has an answer."""
+    return bool(select.select([control], [], [], 0)[0])
 
 
 def _run(channel: socket.socket, task: Task, facts: Mapping[str, Any]) -> None:
@@ -70,6 +87,8 @@ def _run(channel: socket.socket, task: Task, facts: Mapping[str, Any]) -> None:
         peak = (address_space("VmPeak") or before) - before
         send(channel, Message({**answer.facts, "peak": peak}, answer.blobs))
         status = 0
+    except MemoryError:
+        status = OUT_OF_MEMORY
     except BaseException:  # noqa: BLE001  # the child ends here, whatever happened
         status = _EX_SOFTWARE
     finally:
@@ -97,7 +116,10 @@ def _answer(task: Task, message: Message, budget: Budget, scratch: Path) -> Mess
 def main() -> None:
     """Runs the server on the channel that is the process's standard input."""
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    with socket.socket(fileno=os.dup(0)) as control:
+    channel = os.dup(0)
+    with Path(os.devnull).open("rb") as nothing:
+        os.dup2(nothing.fileno(), 0)  # a child has no end of the control channel
+    with socket.socket(fileno=channel) as control:
         serve(control)
 
 

@@ -3,7 +3,7 @@
 import mujoco
 
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import Budget, BudgetError
+from selfmodel.sandbox.budget import Budget, memory_error
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
 
 _NUMBER_BYTES = 8
@@ -28,10 +28,10 @@ def largest_batch(robot: Robot, request: Request, steps: int, budget: Budget) ->
     """
     needed = hypothesis_bytes(robot, request, steps)
     if needed > budget.models_bytes:
-        raise BudgetError(
+        raise memory_error(
             f"the simulation of one hypothesis takes {needed / 1e9:.2g} GB of memory, more than "
-            f"{budget.models_bytes / 1e9:.2g} GB: to go on, raise the memory with "
-            f"--budget memory=..., from {budget.memory / 1e9:.3g} GB"
+            f"{budget.models_bytes / 1e9:.2g} GB",
+            budget,
         )
     return budget.models_bytes // needed
 

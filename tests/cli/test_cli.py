@@ -14,9 +14,10 @@ import pytest
 from selfmodel import cli
 from selfmodel.errors import TrialError
 from selfmodel.faults.hypothesis_space import HypothesisSpace
+from selfmodel.files import file_digest
 from selfmodel.logs import read_log, save_controller
 from selfmodel.logs.journal import FolderJournal
-from selfmodel.logs.result_files import file_digest, read_result, versions
+from selfmodel.logs.result_files import read_result, versions
 from selfmodel.robot.robot import Robot
 from tests.helpers.command import DIAGNOSIS, SMALL, Done, selfmodel, selfmodel_process
 from tests.helpers.drivers import random_controllers

@@ -1,6 +1,9 @@
 """Promises of a grid: nothing is done twice, nothing is lost, and one failure stops no other."""
 
+import errno
+import fcntl
 import json
+import multiprocessing
 import os
 import shutil
 import signal
@@ -15,7 +18,8 @@ from hypothesis import given, strategies as st
 
 from selfmodel.errors import InputError
 from selfmodel.experiments.grid import GridBegins, Job, PartEnds, difference, finished, run_grid
-from selfmodel.experiments.grid.worker_pool import MAX_TASKS_PER_WORKER, run_tasks
+from selfmodel.experiments.grid.lock import exclusive
+from selfmodel.experiments.grid.worker_pool import MAX_TASKS_PER_WORKER, WorkerExit, run_tasks
 from selfmodel.physical.stop_signals import STOP_SIGNALS
 
 ROOT = Path(__file__).parents[2]
@@ -235,6 +239,55 @@ def test_a_worker_is_replaced_after_its_largest_number_of_tasks():
 
     assert len(set(processes[:-1])) == 1
     assert processes[-1] != processes[0]
+
+
+def test_a_folder_has_one_lock_whatever_path_leads_to_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    folder, link = tmp_path / "runs", tmp_path / "link"
+    folder.mkdir()
+    link.symlink_to(folder)
+    monkeypatch.chdir(folder)
+
+    with exclusive(folder):
+        for path in (Path(), Path("../runs"), link):
+            with pytest.raises(InputError, match="another process"), exclusive(path):
+                pass
+
+
+def test_a_file_system_without_locks_is_one_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    def flock(*_: object) -> None:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr(fcntl, "flock", flock)
+    with pytest.raises(InputError, match="this file system has no locks"), exclusive(tmp_path):
+        pass
+
+
+@pytest.mark.process
+def test_an_idle_worker_that_was_killed_is_replaced_and_fails_no_task():
+    with closing(run_tasks(process_id, [[1], [2]], 1)) as answers:
+        _, first = next(answers)
+        os.kill(first, signal.SIGKILL)
+        _wait_for_the_exit_of(first)
+        _, second = next(answers)
+
+    assert second not in (first, WorkerExit(-signal.SIGKILL))
+
+
+def _wait_for_the_exit_of(process: int) -> None:
+    while process in [child.pid for child in multiprocessing.active_children()]:
+        time.sleep(0.01)
+
+
+@pytest.mark.parametrize(
+    ("there", "requested"),
+    [({"gap": None}, {}), ({}, {"gap": None}), ({"gap": None}, {"gap": 0}), ({"a": 1}, {})],
+)
+def test_a_value_that_is_absent_differs_from_null(there: dict, requested: dict):
+    assert difference(there, requested) is not None
 
 
 @pytest.mark.parametrize("key", ["", "..", "a/b", ".hidden", "a b"])

@@ -21,8 +21,8 @@ from tests.fuzz.player import Player
 from tests.fuzz.tally import Tally
 from tests.fuzz.target import Target
 
-BATCH = 250
-"""Cases of one process."""
+BATCH = 1000
+"""Largest number of cases of one process: each process starts a server of the sandbox."""
 
 STALLED = 300.0
 """Wall time after which a case without an answer is ended, s."""

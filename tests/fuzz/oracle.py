@@ -2,7 +2,7 @@
 
 A case passes if the code under test accepts it, or refuses it with an error that is declared for
 invalid input; writes nothing on standard error; leaves no file but ``.part``; changes no input; and
-stays within ``MEGABYTES`` and ``SECONDS``.
+stays within ``MEGABYTES`` and ``SECONDS``. The child processes of the sandbox belong to the case.
 """
 
 import os
@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import TextIO
 
 from selfmodel.errors import InputError, WorkError
+from tests.fuzz.child_use import child_use
 from tests.fuzz.target import Case
 
 ROOT = Path(__file__).parents[2]
@@ -28,7 +29,10 @@ MEGABYTES = 1000
 """Largest growth of the memory by one case, 10^6 bytes."""
 
 SECONDS = 10
-"""Largest CPU time of one case, s."""
+"""Largest CPU time of one case, s: that of a child process by the default budget."""
+
+MARGIN = 0.5
+"""CPU time beside a child process that the budget's limit ended, s."""
 
 DECLARED = (InputError, WorkError)
 """Errors for input that is refused; LogError is a WorkError."""
@@ -42,8 +46,8 @@ class Verdict:
         outcome: Result of the check, or the class of the declared error.
         problem: Report of a finding; "" if the case passes.
         place: Class and place of a finding, equal for findings of one cause; "" without one.
-        megabytes: Growth of the memory at its peak, 10^6 bytes.
-        seconds: CPU time, s.
+        megabytes: Growth of the memory at its peak, of this process or of a child, 10^6 bytes.
+        seconds: CPU time with that of the children, s.
     """
 
     outcome: str
@@ -72,15 +76,21 @@ def judge(case: Case, folder: Path, output: Path) -> Verdict:
     start = time.process_time()
     # A C function cannot be interrupted by a handler: the default action ends the process.
     signal.setitimer(signal.ITIMER_PROF, SECONDS)
-    outcome, problem, place = _outcome(case)
+    with child_use() as children:
+        outcome, problem, place = _outcome(case)
     signal.setitimer(signal.ITIMER_PROF, 0)
-    seconds, megabytes = time.process_time() - start, _peak() - before
+    seconds = time.process_time() - start + children.seconds
+    megabytes = max(_peak() - before, children.megabytes)
+    if children.problem:
+        problem, place = children.problem, f"child-{_child_place(children.problem)}"
     if not problem and (printed := output.read_text(errors="replace")):
         problem, place = f"printed:\n{printed}", f"printed-{_words(printed)}"
     if not problem and (files := _changed(case, folder)):
         problem, place = f"files left or changed: {files}", f"files-{_words(files)}"
     if not problem and megabytes > MEGABYTES:
         problem, place = f"took {megabytes:.0f} MB", "memory"
+    if not problem and seconds > SECONDS + MARGIN:
+        problem, place = f"took {seconds:.1f} s", "time"
     if not problem:
         os.chdir(folder.parent)
         shutil.rmtree(folder)
@@ -109,8 +119,14 @@ def _place(error: BaseException) -> str:
 
 def innermost(trace: str) -> str:
     """Returns the innermost line of the package in a trace of faulthandler."""
-    found = re.findall(r'File "(.+)", line (\d+) in', trace)
+    found = re.findall(r'File "(.+)", line (\d+),? in', trace)
     return _own_line([(name, int(line)) for name, line in found])
+
+
+def _child_place(problem: str) -> str:
+    """Last line of a report, and the innermost line of the package in it."""
+    lines = problem.strip().splitlines()[::-1]
+    return f"{_words(lines[0])}-{innermost(chr(10).join(lines))}"
 
 
 def _own_line(frames: Sequence[tuple[str, int]]) -> str:

@@ -6,14 +6,19 @@ import struct
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
-from mcap.records import Message
+from mcap.records import Message as McapMessage
 
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError, read_log
+from selfmodel.sandbox.budget import Budget
+from selfmodel.sandbox.isolation import run_isolated
+from selfmodel.sandbox.message import Message
 from tests.fuzz import oracle
 from tests.fuzz.campaign import Plan, run, work_folder
 from tests.fuzz.mcap_file import McapFile, read_file, replaced, written
@@ -100,6 +105,14 @@ def _spin() -> str:
     return "fine"
 
 
+def _run(task: str, *, allowed: tuple[type[Exception], ...] = (), **facts: object) -> str:
+    with suppress(*allowed):
+        run_isolated(
+            f"tests.helpers.isolated_tasks:{task}", Message(facts), what="x", budget=Budget(time=18)
+        )
+    return "fine"
+
+
 def _crash() -> str:
     os.kill(os.getpid(), signal.SIGSEGV)
     return "fine"
@@ -116,12 +129,21 @@ def _crash() -> str:
         (_fill, "took "),
         (_spin, "its process ended with SIGPROF"),
         (_crash, "its process ended with SIGSEGV"),
+        pytest.param(
+            partial(_run, "fail", allowed=(RuntimeError,)), "ZeroDivisionError", id="fail"
+        ),
+        pytest.param(
+            partial(_run, "crash"), "a child process ended with SIGSEGV", id="crash in a child"
+        ),
+        pytest.param(partial(_run, "allocate", bytes=4 * 10**7), "took ", id="memory of a child"),
+        pytest.param(partial(_run, "loop"), " s\n", id="time of a child"),
     ],
 )
 def test_a_finding_is_reported_with_its_command_and_ends_no_campaign(
     check: Callable[[], str], reported: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setattr(oracle, "SECONDS", 0.6)
+    monkeypatch.setattr(oracle, "MARGIN", 0.0)
     monkeypatch.setattr(oracle, "MEGABYTES", 20)
 
     tally = campaign(tmp_path, failing(check), 5)
@@ -166,4 +188,4 @@ def test_a_sealed_log_passes_every_check_of_damage(tmp_path: Path, *, clock: boo
 
 
 def _is_position(file: McapFile, item: object) -> bool:
-    return isinstance(item, Message) and file.channels[item.channel_id].topic == BASE
+    return isinstance(item, McapMessage) and file.channels[item.channel_id].topic == BASE

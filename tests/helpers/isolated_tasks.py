@@ -1,7 +1,10 @@
 """Tasks for the tests of isolation: each is one thing that a child process may do."""
 
 import ctypes
+import os
+import resource
 import socket
+import stat
 from pathlib import Path
 
 from selfmodel.errors import InputError
@@ -21,6 +24,10 @@ def allocate(message: Message, _: Budget, __: Path) -> Message:
 def loop(_: Message, __: Budget, ___: Path) -> Message:
     while True:
         pass
+
+
+def cpu_limit(_: Message, __: Budget, ___: Path) -> Message:
+    return Message({"seconds": resource.getrlimit(resource.RLIMIT_CPU)[0]})
 
 
 def wait(_: Message, __: Budget, ___: Path) -> Message:
@@ -71,3 +78,17 @@ def fill_disk(message: Message, _: Budget, scratch: Path) -> Message:
     with (scratch / "big").open("wb") as file:
         file.truncate(message.facts["bytes"])
     return Message({})
+
+
+def answer(message: Message, _: Budget, __: Path) -> Message:
+    return Message({"text": "x" * message.facts["characters"]})
+
+
+def sockets(_: Message, __: Budget, ___: Path) -> Message:
+    found = 0
+    for descriptor in range(64):
+        try:
+            found += stat.S_ISSOCK(os.fstat(descriptor).st_mode)
+        except OSError:
+            continue
+    return Message({"sockets": found})

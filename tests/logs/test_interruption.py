@@ -13,7 +13,7 @@ import pytest
 from selfmodel.errors import InputError
 from selfmodel.logs import IncompleteError, LogWriteError, TruncatedError, files, logfile, read_log
 from selfmodel.logs.records import TrialHeader
-from selfmodel.logs.rescue import rescue
+from selfmodel.logs.salvage.rescue import rescue
 from selfmodel.logs.signals import topics
 from selfmodel.logs.writer import FLUSH_STEPS, write_trial
 from selfmodel.robot.robot import Robot

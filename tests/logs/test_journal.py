@@ -181,6 +181,12 @@ def test_a_folder_without_a_run_is_said_so(biped: Robot, tmp_path: Path):
         '[{"trials": 1}]',
         '[{"trials": 1, "ranked": [{"hypothesis": "break:nose", "distance": 1}]}]',
         '[{"trials": 1, "ranked": [{"hypothesis": 3, "distance": 1}]}]',
+        HEAD.replace('{"hypothesis": "intact", "distance": 1}', "")
+        + '"rivals": [], "verdict": "explained", "test": ""}]',
+        HEAD.replace('"distance": 1', '"distance": "nan"')
+        + '"rivals": [], "verdict": "explained", "test": ""}]',
+        HEAD.replace('"distance": 1', f'"distance": {10**400}')
+        + '"rivals": [], "verdict": "explained", "test": ""}]',
         HEAD + '"rivals": ["break:nose"], "verdict": "explained", "test": ""}]',
         HEAD + '"rivals": 3, "verdict": "explained", "test": ""}]',
         HEAD + '"rivals": [], "verdict": "certain", "test": ""}]',

@@ -48,6 +48,13 @@ def test_content_is_read_as_it_was_written(content: dict):
     assert json.dumps(found) == json.dumps(content)
 
 
+def test_numbers_as_keys_are_texts_in_the_file_and_its_digest_is_right():
+    content = {"losses": {2: 0.5, 10: 0.25}, "pair": (1, 2)}
+
+    found = verified(parse_json(result_bytes(content))).content
+    assert found == {"losses": {"2": 0.5, "10": 0.25}, "pair": [1, 2]}
+
+
 @given(st.data())
 def test_a_changed_byte_is_refused_or_changes_nothing(data: st.DataObject):
     original = result_bytes(CONTENT)

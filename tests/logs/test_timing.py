@@ -21,8 +21,8 @@ from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Sample, collect
 from selfmodel.trials.signals import SIGNALS
 from tests.logs.conftest import STEPS, made_up, plan_of, timed
+from tests.logs.salvage.test_salvage import spoiled
 from tests.logs.test_damage import metadata, rewritten
-from tests.logs.test_salvage import spoiled
 
 
 def write(path: Path, robot: Robot, samples: Iterator[Sample], **options: object) -> Path:

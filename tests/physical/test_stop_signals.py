@@ -18,6 +18,7 @@ import pytest
 
 import selfmodel
 from selfmodel.logs.verify import verify
+from selfmodel.physical import stop_signals
 from selfmodel.physical.stop_signals import (
     STOP_SIGNALS,
     HeldIterator,
@@ -74,6 +75,25 @@ def test_a_held_signal_is_raised_before_code_that_may_block():
     done = []
     with pytest.raises(Terminated), handle_stop_signals(), hold_stop_signals():  # noqa: PT012  # all of it is the promise
         signal.raise_signal(signal.SIGTERM)
+        with release_stop_signals():
+            done.append("driver")
+
+    assert done == []
+
+
+def test_a_signal_at_the_very_beginning_of_code_that_may_block_is_raised_before_it(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    done = []
+    original = stop_signals._Handler.raise_waiting
+
+    def raise_waiting(handler: stop_signals._Handler) -> None:
+        original(handler)
+        monkeypatch.undo()
+        signal.raise_signal(signal.SIGTERM)
+
+    with pytest.raises(Terminated), handle_stop_signals(), hold_stop_signals():  # noqa: PT012  # all of it is the promise
+        monkeypatch.setattr(stop_signals._Handler, "raise_waiting", raise_waiting)
         with release_stop_signals():
             done.append("driver")
 

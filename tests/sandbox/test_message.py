@@ -54,6 +54,7 @@ def test_an_empty_blob_needs_no_receiver_any_more():
         struct.pack("<Q", 2) + b"{x",
         framed([]),
         framed({"facts": {}}),
+        framed({"facts": [], "sizes": {}}),
         framed({"facts": {}, "sizes": {"a": LIMIT + 1}}),
         framed({"facts": {}, "sizes": {"a": -1}}),
         framed({"facts": {}, "sizes": {"a": "1"}}),

@@ -10,9 +10,8 @@ from selfmodel.cli.inputs import check_log_name
 from selfmodel.cli.options import DEFAULT_BUDGET, FileBudget, Json, NewLog
 from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_json, print_lines
-from selfmodel.logs.belonging import Discarded
 from selfmodel.logs.provenance import UNTIED
-from selfmodel.logs.salvage import salvage as save
+from selfmodel.logs.salvage import Discarded, salvage as save
 from selfmodel.sandbox.budget import Budget
 
 
@@ -38,7 +37,7 @@ def salvage(
     for topic, count in saved.missing.items():
         print_lines(f"{topic}: {counted(count, 'message')} lost")
     for name in saved.lost:
-        print_lines(f"{name} is lost: {_CONSEQUENCES[name]}")
+        print_lines(f"{name} is lost: {_CONSEQUENCES.get(name, _OTHERWISE)}")
     print_lines(*map(_left_out, saved.discarded))
     if not saved.tied:
         print_lines(
@@ -61,3 +60,4 @@ _CONSEQUENCES = {
     "/robot_description": "viewers do not draw the robot",
     "settings.json": "the paper's settings are used instead",
 }
+_OTHERWISE = "the new log does not contain it"

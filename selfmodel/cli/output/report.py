@@ -12,7 +12,8 @@ from selfmodel.cli.output.ranking import confidence_sentence, ranking_table
 from selfmodel.cli.output.tables import folding, print_tables
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
 from selfmodel.experiments.experiment import Experiment, Outcome
-from selfmodel.logs.result_files import file_digest, result_bytes
+from selfmodel.files import file_digest
+from selfmodel.logs.result_files import result_bytes
 from selfmodel.robot.designs import network_for
 
 

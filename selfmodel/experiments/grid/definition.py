@@ -138,13 +138,20 @@ def difference(there: Any, requested: Any, name: str = "") -> str | None:  # noq
     """Returns the first difference of two JSON values as a clause; None if they are equal."""
     if isinstance(there, dict) and isinstance(requested, dict):
         for key in sorted(there.keys() | requested.keys()):
-            inner = difference(there.get(key), requested.get(key), f"{name}.{key}".lstrip("."))
+            values = there.get(key, _ABSENT), requested.get(key, _ABSENT)
+            inner = difference(*values, f"{name}.{key}".lstrip("."))
             if inner:
                 return inner
         return None
     if there == requested:
         return None
-    return f"{_short(name)} is {_short(json.dumps(there))} there, requested is {requested!r}"
+    found = "absent" if there is _ABSENT else _short(json.dumps(there))
+    wanted = "none" if requested is _ABSENT else repr(requested)
+    return f"{_short(name)} is {found} there, requested is {wanted}"
+
+
+_ABSENT = object()
+"""Value of a key that only the other object has; null is a value."""
 
 
 def as_json(definition: Mapping[str, Any]) -> Any:  # noqa: ANN401  # JSON

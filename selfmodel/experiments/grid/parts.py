@@ -21,10 +21,10 @@ from selfmodel.experiments.grid.definition import (
     read_definition,
     runs,
 )
+from selfmodel.files import file_digest
 from selfmodel.logs.files import make_folder, replace_file
 from selfmodel.logs.result_files import (
     ResultFile,
-    file_digest,
     read_result,
     result_bytes,
     versions,

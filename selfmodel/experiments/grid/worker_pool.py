@@ -11,7 +11,7 @@ import threading
 import warnings
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
@@ -59,6 +59,7 @@ def run_tasks(
         busy: dict[Connection, _Worker] = {}
         while waiting or busy:
             while waiting and len(busy) < workers:
+                idle = [worker for worker in idle if worker.process.is_alive()]
                 worker = idle.pop() if idle else spawn(perform)
                 worker.begin(waiting.popleft())
                 busy[worker.pipe] = worker
@@ -94,7 +95,8 @@ class _Worker:
     def begin(self, chain: Sequence[Any]) -> None:
         """Sends the first task of a chain."""
         self.chain = deque(chain)
-        self.pipe.send(self.chain[0])
+        with suppress(ConnectionError):  # the process has exited; ``finish`` returns its status
+            self.pipe.send(self.chain[0])
 
     def finish(self) -> tuple[Any, Any]:
         """Returns the current task and its result, and removes the task from the chain."""

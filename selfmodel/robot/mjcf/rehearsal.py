@@ -13,7 +13,7 @@ from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.mujoco_errors import compile_model, mujoco_errors_as_input_errors
 from selfmodel.robot.model_checks import MAX_NUMBER
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget, BudgetError
+from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget, BudgetError, memory_error
 from selfmodel.sandbox.isolation import Isolated, run_isolated
 from selfmodel.sandbox.message import Message
 
@@ -112,6 +112,11 @@ def physics_timestep(mjcf: str, budget: Budget = DEFAULT_BUDGET) -> float:
     return timestep
 
 
+def read_timestep(message: Message, _budget: Budget, _scratch: Path) -> Message:
+    """Task of a child process: compiles a model, as for ``physics_timestep``."""
+    return Message({"timestep": float(compile_model(message.facts["mjcf"], {}).opt.timestep)})
+
+
 def run_on_model(task: str, message: Message, budget: Budget) -> Isolated:
     """Runs a function that compiles a model in a child process; see ``run_isolated``.
 
@@ -121,10 +126,10 @@ def run_on_model(task: str, message: Message, budget: Budget) -> Isolated:
     """
     found = run_isolated(task, message, what="the model", budget=budget)
     if found.peak > budget.models_bytes:
-        raise BudgetError(
+        raise memory_error(
             f"the model takes {found.peak / 1e9:.2g} GB of memory, more than "
-            f"{budget.models_bytes / 1e9:.2g} GB: to go on, raise the memory with "
-            f"--budget memory=..., from {budget.memory / 1e9:.3g} GB"
+            f"{budget.models_bytes / 1e9:.2g} GB",
+            budget,
         )
     return found
 
@@ -147,11 +152,6 @@ def build_and_step(message: Message, _budget: Budget, _scratch: Path) -> Message
             "failure": failure,
         }
     )
-
-
-def read_timestep(message: Message, _budget: Budget, _scratch: Path) -> Message:
-    """Task of a child process: compiles a model, as for ``physics_timestep``."""
-    return Message({"timestep": float(compile_model(message.facts["mjcf"], {}).opt.timestep)})
 
 
 def _first_steps(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[list[float], str]:

@@ -11,7 +11,7 @@ from types import MappingProxyType
 from xml.etree import ElementTree as ET  # _Checker refuses document types and deep trees
 from xml.parsers import expat  # the same
 
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
+from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget, memory_error
 
 MAX_DEPTH = 200
 """Largest number of XML elements within each other."""
@@ -61,14 +61,13 @@ def checked_model(
         budget: Limit of the text.
 
     Raises:
-        ValueError: The model is no XML, is too long or nested too deeply, or names other files;
-            the message contains the element.
+        BudgetError: The text is too long.
+        ValueError: The model is no XML, is nested too deeply, or names other files; the message
+            contains the element.
     """
     if len(mjcf) > budget.model_text:
-        raise ValueError(
-            f"the model has {len(mjcf)} characters, more than {budget.model_text}: to go on, "
-            f"raise the memory with --budget memory=..., from {budget.memory / 1e9:.3g} GB"
-        )
+        what = f"the model has {len(mjcf)} characters, more than {budget.model_text}"
+        raise memory_error(what, budget)
     checker = _Checker(attached)
     try:
         checker.check(mjcf)

@@ -3,6 +3,7 @@
 from tests.fuzz.target import Target
 from tests.fuzz.targets import (
     bags_mcap,
+    bags_ros1,
     bags_sqlite,
     command_line,
     controllers,
@@ -22,6 +23,7 @@ TARGETS: dict[str, Target] = {
         sealed_logs,
         bags_mcap,
         bags_sqlite,
+        bags_ros1,
         mappings,
         mjcf_files,
         controllers,

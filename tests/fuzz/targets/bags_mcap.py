@@ -83,4 +83,4 @@ def _metadata(data: bytes, rng: np.random.Generator) -> tuple[bytes, str]:
     return "\n".join(lines).encode("utf-8", "replace"), f"line {at + 1} kind {kind}"
 
 
-TARGET = Target("bags-mcap", 10, prepare)
+TARGET = Target("bags-mcap", 9, prepare)

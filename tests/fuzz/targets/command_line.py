@@ -189,4 +189,4 @@ def _refuse(name: str) -> None:
     raise AssertionError(f"{name} in JSON")
 
 
-TARGET = Target("command-line", 5, prepare)
+TARGET = Target("command-line", 4, prepare)

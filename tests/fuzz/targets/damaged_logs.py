@@ -174,4 +174,4 @@ def _check_salvage(form: Form) -> str:
     return "saved"
 
 
-TARGET = Target("damaged-logs", 34, prepare)
+TARGET = Target("damaged-logs", 25, prepare)

@@ -122,4 +122,4 @@ def _diagnosis(comparator: Comparator) -> str:
     return "judged"
 
 
-TARGET = Target("sealed-logs", 18, prepare)
+TARGET = Target("sealed-logs", 15, prepare)

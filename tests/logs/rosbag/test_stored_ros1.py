@@ -87,6 +87,17 @@ def test_messages_that_the_index_lacks_are_missed(recording: Path):
         read_bag(recording, ())
 
 
+def test_messages_of_a_damaged_connection_are_missed(recording: Path):
+    """The library leaves out the messages of a connection that the index does not list."""
+    data = bytearray(recording.read_bytes())
+    conn = data.rindex(b"conn=", 0, data.index(b"op=\x06")) + len(b"conn=")  # the last connection
+    data[conn : conn + 4] = struct.pack("<I", 77)
+    recording.write_bytes(data)
+
+    with pytest.raises(CorruptError, match=r"its chunks have .* messages, its index"):
+        read_bag(recording, ())
+
+
 @pytest.mark.parametrize("form", ROS1_FORMS)
 @pytest.mark.parametrize("damage", ["flip", "cut", "garbage"])
 def test_no_damage_of_a_ros_1_bag_crashes(form: str, damage: str, tmp_path: Path):

@@ -41,6 +41,13 @@ def test_rows_that_a_damaged_page_lacks_are_missed(recording: Path):
         messages(recording)
 
 
+COPIES = (
+    "ALTER TABLE messages RENAME TO m;"
+    "CREATE VIEW messages AS SELECT a.id, a.topic_id, a.timestamp, a.data FROM m a, m b, m c"
+)
+"""A view with millions of rows."""
+
+
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
@@ -50,12 +57,13 @@ def test_rows_that_a_damaged_page_lacks_are_missed(recording: Path):
         ("UPDATE topics SET type = x'00' WHERE id = 1", "the description of topic 1 is not text"),
         ("DROP TABLE messages", "no such table: messages"),
         ("DROP TABLE topics", "no such table: topics"),
+        (COPIES, "messages has computed rows"),
+        ("ALTER TABLE topics ADD COLUMN more AS (hex(id))", "topics has computed rows"),
     ],
 )
 def test_impossible_content_is_refused(change: str, sentence: str, recording: Path):
     with closing(sqlite3.connect(recording)) as database:
-        database.execute(change)
-        database.commit()
+        database.executescript(change)
 
     with pytest.raises(CorruptError, match=sentence):
         messages(recording)

@@ -98,3 +98,16 @@ FACTS = {
 def test_a_physics_time_step_that_is_not_positive_and_finite_is_refused(timestep: str):
     with pytest.raises(InputError, match="the physics time step must be above 0 s"):
         physics_timestep(f'<mujoco><option timestep="{timestep}"/></mujoco>')
+
+
+def test_the_physics_time_step_is_that_of_the_compiled_model():
+    text = '<mujoco><option timestep="0.004"/><worldbody/></mujoco>'
+
+    assert physics_timestep(text) == 0.004
+
+
+def test_the_time_step_of_a_model_that_exceeds_the_budget_is_not_read():
+    grid = '<asset><hfield name="h" nrow="30000" ncol="30000" size="1 1 1 1"/></asset>'
+
+    with pytest.raises(BudgetError, match="--budget memory="):
+        physics_timestep(f"<mujoco>{grid}<worldbody/></mujoco>")

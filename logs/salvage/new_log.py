@@ -1,18 +1,14 @@
-"""Salvage of a damaged or unfinished log: its complete steps in a new log."""
+"""New log with the complete steps of a damaged or unfinished log."""
 
 import dataclasses
-from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from selfmodel.errors import InputError
 from selfmodel.files import encodable
-from selfmodel.logs.belonging import Discarded
 from selfmodel.logs.contents import Contents, Messages, read_bytes
-from selfmodel.logs.errors import CorruptError, LogError, SchemaMismatchError
+from selfmodel.logs.errors import LogError
 from selfmodel.logs.files import refuse_existing
 from selfmodel.logs.logfile import LogFile
 from selfmodel.logs.reader import interpret, read_controller, read_log, read_record
@@ -25,7 +21,6 @@ from selfmodel.logs.records import (
     SALVAGE,
     SETTINGS_FILE,
     TIED,
-    TIMED_FORMAT,
     TRIAL,
     Result,
     TrialRecord,
@@ -33,19 +28,17 @@ from selfmodel.logs.records import (
     settings_json,
     sha256,
 )
-from selfmodel.logs.rescue import rescue
-from selfmodel.logs.schemas import schema_text
-from selfmodel.logs.signals import read_behaviour, read_names
-from selfmodel.logs.topics import (
-    DESCRIPTION,
-    DESCRIPTION_TYPE,
-    TIMING,
-    TRANSFORMS,
-    TRANSFORMS_TYPE,
-    Topic,
-    frames_stride,
-    topics,
+from selfmodel.logs.salvage.belonging import Discarded
+from selfmodel.logs.salvage.rescue import rescue
+from selfmodel.logs.salvage.steps import (
+    complete_steps,
+    cut,
+    drop_foreign_displays,
+    fill,
+    missing_frames,
 )
+from selfmodel.logs.signals import read_behaviour
+from selfmodel.logs.topics import DESCRIPTION, TRANSFORMS
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import forward_displacement
@@ -63,7 +56,8 @@ class Salvaged:
         missing: Number of lost messages by topic; they are replaced by NaN (not observed), except
             on ``/tf``, where they are left out.
         lost: Other lost parts. A lost controller is replaced by a playback of the commands, lost
-            settings by those of the paper.
+            settings by those of the paper. Other records and files are known to be lost only if the
+            trial is tied.
         tied: Whether every saved message is proven to be of this trial. False for a log of an
             earlier version, in which a mixture of two trials cannot be noticed.
         discarded: Intact messages that are of other trials or lack that proof; they are left out.
@@ -119,14 +113,15 @@ def _saved(path: Path, budget: Budget) -> tuple[Contents, Salvaged]:
     """Contents of the new log, checked as a reader would check them."""
     rescued = rescue(path, budget)
     contents = rescued.contents
-    _drop_foreign_displays(contents)
-    record, lost = _with_what_is_left(path, contents)
+    drop_foreign_displays(contents)
+    record, replaced = _with_what_is_left(path, contents)
+    lost = (*replaced, *(name for name in rescued.absent if name not in replaced))
     controller = read_controller(path, contents, record)
-    every, whole = _complete(path, contents, record, rescued.discarded, budget)
+    every, whole = complete_steps(path, contents, record, rescued.discarded, budget)
     span = max(whole) + 1
-    missing = {topic.name: _fill(contents, topic, span, record) for topic in every}
-    _cut(contents, {topic.name for topic in every}, _time_of(span, record))
-    missing[TRANSFORMS] = _missing_frames(contents, span, record)
+    missing = {topic.name: fill(contents, topic, span, record) for topic in every}
+    cut(contents, {topic.name for topic in every}, span, record)
+    missing[TRANSFORMS] = missing_frames(contents, span, record)
     behaviour = read_behaviour(path, contents, record, span, controller)
     earlier = contents.metadata.get(SALVAGE, {})
     tied = bool(rescued.identity) and earlier.get(TIED) != "no"
@@ -180,88 +175,6 @@ def _with_what_is_left(path: Path, contents: Contents) -> tuple[TrialRecord, tup
     if DESCRIPTION not in contents.topics or not contents.topics[DESCRIPTION].payloads:
         lost.append(DESCRIPTION)
     return record, tuple(lost)
-
-
-def _complete(
-    path: Path,
-    contents: Contents,
-    record: TrialRecord,
-    discarded: Sequence[Discarded],
-    budget: Budget,
-) -> tuple[tuple[Topic, ...], set[int]]:
-    """Topics, and the steps for which every topic has a message."""
-    try:
-        every = topics(read_names(path, contents), record.root)
-        if record.format == TIMED_FORMAT:
-            every = (*every, TIMING)
-    except SchemaMismatchError as error:
-        raise _nothing(path, discarded) from error
-    if record.steps > budget.records // len(every):
-        raise CorruptError(path, f"it claims {record.steps} steps, more than a log may have")
-    whole = set(range(record.steps))
-    for topic in every:
-        messages = contents.topics.get(topic.name)
-        times = {log for log, _ in messages.times} if messages else set()
-        whole = {k for k in whole if _time_of(k, record) in times}
-    if not whole:
-        raise _nothing(path, discarded)
-    span = max(whole) + 1
-    # Missing messages are filled in, and may take many times the size of the file.
-    if span * sum(len(topic.template.payload) for topic in every) > budget.unpacked_bytes:
-        raise CorruptError(path, f"{span} steps of it have more bytes than a log may")
-    return every, whole
-
-
-def _nothing(path: Path, discarded: Sequence[Discarded]) -> CorruptError:
-    what = "nothing can be salvaged: not one step of the trial is complete"
-    if steps := sum(other.steps for other in discarded):
-        what += f", and {steps} other steps in the file are not proven to be of the trial"
-    return CorruptError(path, what)
-
-
-def _fill(contents: Contents, topic: Topic, steps: int, record: TrialRecord) -> int:
-    """Fills the missing messages of a topic with NaN; returns their number."""
-    messages = contents.topics[topic.name]
-    known = {
-        log: (payload, publish)
-        for payload, (log, publish) in zip(messages.payloads, messages.times, strict=True)
-    }
-    times = [_time_of(k, record) for k in range(steps)]
-    stamps = np.array(times, dtype=np.int64)
-    empty = topic.template.encode(stamps, np.full((steps, topic.template.width), np.nan))
-    rows = [known.get(time, (nothing, time)) for time, nothing in zip(times, empty, strict=True)]
-    messages.payloads = [payload for payload, _ in rows]
-    messages.times = [(time, publish) for time, (_, publish) in zip(times, rows, strict=True)]
-    return len(set(times) - set(known))
-
-
-def _drop_foreign_displays(contents: Contents) -> None:
-    """Removes topics for viewers whose messages are not of the type that selfmodel writes."""
-    for name, kind in ((TRANSFORMS, TRANSFORMS_TYPE), (DESCRIPTION, DESCRIPTION_TYPE)):
-        held = contents.topics.get(name)
-        if held and (held.type, held.schema) != (kind, schema_text(kind).encode()):
-            del contents.topics[name]
-
-
-def _cut(contents: Contents, names: set[str], end: int) -> None:
-    """Removes messages after the last complete step, and topics that selfmodel does not write."""
-    for name in set(contents.topics) - names - {TRANSFORMS, DESCRIPTION}:
-        del contents.topics[name]
-    for messages in contents.topics.values():
-        kept = [k for k, (log, _) in enumerate(messages.times) if log < end]
-        messages.payloads = [messages.payloads[k] for k in kept]
-        messages.times = [messages.times[k] for k in kept]
-
-
-def _missing_frames(contents: Contents, span: int, record: TrialRecord) -> int:
-    """Number of missing messages on ``/tf``."""
-    stride = frames_stride(record.control_timestep)
-    held = contents.topics.get(TRANSFORMS)
-    return len(range(0, span, stride)) - (len(held.payloads) if held else 0)
-
-
-def _time_of(step: int, record: TrialRecord) -> int:
-    return round(step * record.control_timestep * 1e9)
 
 
 def _write(out: Path, contents: Contents, result: Result) -> None:

@@ -18,14 +18,17 @@ from selfmodel.errors import InputError
 from selfmodel.logs import LogError, LogWriteError, read_log, read_truth
 from selfmodel.logs.contents import read_contents
 from selfmodel.logs.framing import FRAME, frames
-from selfmodel.logs.records import HIDDEN, RESULT, SALVAGE, sha256
+from selfmodel.logs.records import HIDDEN, RESULT, SALVAGE, TrialHeader, sha256
 from selfmodel.logs.salvage import salvage, salvageable_steps
 from selfmodel.logs.topics import TRANSFORMS, TRANSFORMS_TYPE
+from selfmodel.logs.writer import write_trial
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.trial import TrialPlan
 from tests.fuzz.mcap_file import read_file, written
 from tests.fuzz.seal import seal
-from tests.logs.conftest import STEPS
+from tests.logs.conftest import STEPS, made_up
 
 
 def spoiled(log: Path, opcode: int, number: int, at: int = 60) -> None:
@@ -169,6 +172,36 @@ def test_without_its_settings_a_trial_has_those_of_the_paper(log: Path, saved: P
 
     assert salvage(log, saved).lost == ("settings.json",)
     assert read_log(saved).settings == Settings()
+
+
+def test_steps_that_a_salvage_filled_in_are_not_complete_in_the_next(
+    log: Path, saved: Path, tmp_path: Path
+):
+    spoiled(log, Opcode.CHUNK, 2)  # steps 1 to 50
+    first = salvage(log, saved)
+    saved.write_bytes(saved.read_bytes()[:-20])
+    second = salvage(saved, tmp_path / "again.mcap")
+
+    assert (second.steps, second.span) == (first.steps, first.span) == (STEPS - 50, STEPS)
+
+
+def test_a_record_or_a_file_of_the_model_that_is_lost_is_reported(
+    biped: Robot, plan: TrialPlan, tmp_path: Path, saved: Path
+):
+    robot = Robot("biped", biped.mjcf, biped.control_timestep, {"mesh.stl": bytes(100)})
+    log = tmp_path / "with-mesh.mcap"
+    write_trial(log, robot, plan, made_up(biped, STEPS), TrialHeader(Settings(), hidden="intact"))
+    spoiled(log, Opcode.ATTACHMENT, 1)
+    spoiled(log, Opcode.METADATA, 1, at=40)
+
+    assert salvage(log, saved).lost == ("selfmodel.software", "mesh.stl")
+
+
+def test_that_the_truth_was_removed_is_no_loss(log: Path, saved: Path):
+    spoiled(log, Opcode.METADATA, 2, at=40)
+
+    assert salvage(log, saved).lost == ()
+    assert read_truth(saved) is None
 
 
 @pytest.mark.parametrize(

@@ -8,10 +8,10 @@ from typing import TypeVar
 
 from selfmodel.logs.chain import batch_of
 from selfmodel.logs.contents import Contents
-from selfmodel.logs.findings import Channels, Findings, Group
 from selfmodel.logs.framing import ContradictionError
 from selfmodel.logs.provenance import identity_of, manifest, manifest_parts, seal_of
-from selfmodel.logs.records import MANIFEST, NONCE, RESULT, TRIAL
+from selfmodel.logs.records import HIDDEN, MANIFEST, NONCE, RESULT, TRIAL
+from selfmodel.logs.salvage.findings import Channels, Findings, Group
 
 _Item = TypeVar("_Item")
 
@@ -42,11 +42,14 @@ class Rescued:
         contents: Records, files and messages of one trial.
         identity: Identity of the trial, in hexadecimal; "" for a log of an earlier version, whose
             messages are not tied to their trial.
+        absent: Names of the records and files in the manifest that were not found. The truth may be
+            removed from a log, and is not among them.
         discarded: Intact messages that are left out.
     """
 
     contents: Contents
     identity: str
+    absent: tuple[str, ...]
     discarded: tuple[Discarded, ...]
 
 
@@ -67,9 +70,10 @@ def own_contents(found: Findings) -> Rescued:
         listed = _manifest(found, digest)
         identity = identity_of(listed)
         contents = _listed(found, listed)
+        absent = _absent(listed, contents)
         own = _consistent(groups, identity, channels)
     else:
-        identity = b""
+        identity, absent = b"", ()
         contents = Contents("ros2", _firsts(found.records), _firsts(found.files))
         own = [group for group in groups if group.seal is None]
     contents.topics = channels.by_topic(chain.from_iterable(group.messages for group in own))
@@ -79,7 +83,7 @@ def own_contents(found: Findings) -> Rescued:
         for group in groups
         if (group.seal.digest not in digests if group.seal else bool(identity))
     ]
-    return Rescued(contents, identity.hex(), _discarded(others, channels))
+    return Rescued(contents, identity.hex(), absent, _discarded(others, channels))
 
 
 def _firsts(items: Mapping[str, Mapping[str, _Item]]) -> dict[str, _Item]:
@@ -114,6 +118,14 @@ def _listed(found: Findings, listed: Mapping[str, str]) -> Contents:
             for name, digest in files.items()
             if digest in found.files.get(name, {})
         },
+    )
+
+
+def _absent(listed: Mapping[str, str], contents: Contents) -> tuple[str, ...]:
+    records, files = manifest_parts(listed)
+    return (
+        *sorted(records.keys() - contents.metadata.keys() - {HIDDEN}),
+        *sorted(files.keys() - contents.attachments.keys()),
     )
 
 

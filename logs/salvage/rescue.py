@@ -7,10 +7,8 @@ from pathlib import Path
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, McapRecord, Metadata, Schema
 
-from selfmodel.logs.belonging import Rescued, own_contents
 from selfmodel.logs.contents import MORE_MEMORY, read_bytes
 from selfmodel.logs.errors import ANOTHER, CorruptError, NotMcapError, UnsupportedError
-from selfmodel.logs.findings import Findings
 from selfmodel.logs.framing import (
     FAILURES,
     MAGIC,
@@ -23,6 +21,8 @@ from selfmodel.logs.framing import (
 )
 from selfmodel.logs.meter import ExcessError, Meter
 from selfmodel.logs.records import OWN, without_digest
+from selfmodel.logs.salvage.belonging import Rescued, own_contents
+from selfmodel.logs.salvage.findings import Findings
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 
 

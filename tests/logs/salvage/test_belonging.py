@@ -15,13 +15,13 @@ from typer.testing import CliRunner
 
 from selfmodel.cli.logs import app
 from selfmodel.logs import CorruptError, read_log
-from selfmodel.logs.belonging import Discarded
 from selfmodel.logs.checksums import verified_records
 from selfmodel.logs.contents import read_contents
 from selfmodel.logs.framing import frames
 from selfmodel.logs.provenance import identity_of
 from selfmodel.logs.records import MANIFEST, SALVAGE, TrialHeader
 from selfmodel.logs.salvage import salvage
+from selfmodel.logs.salvage.belonging import Discarded
 from selfmodel.logs.verify import verify
 from selfmodel.logs.writer import write_trial
 from selfmodel.robot.robot import Robot
@@ -30,9 +30,9 @@ from selfmodel.trials.signals import SIGNALS
 from tests.fuzz.mcap_file import of_records, written
 from tests.logs import splice
 from tests.logs.conftest import STEPS, made_up, plan_of
-from tests.logs.test_salvage import spoiled
+from tests.logs.salvage.test_salvage import spoiled
 
-OLD = Path(__file__).parents[1] / "data" / "logs-0.1"
+OLD = Path(__file__).parents[2] / "data" / "logs-0.1"
 
 
 @pytest.fixture
