@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from selfmodel.errors import InputError
+from selfmodel.errors import InputError, WorkError
 from selfmodel.logs.errors import GOOD, SchemaMismatchError
 from selfmodel.logs.reader import TrialLog
 from selfmodel.robot.mjcf.adaptation import MAX_SUBSTEPS
@@ -28,6 +28,7 @@ def robot_of(log: TrialLog, budget: Budget = DEFAULT_BUDGET) -> Robot:
     Raises:
         LogError: The model is invalid, names other files, exceeds the budget, or is of another
             robot than the messages.
+        WorkError: The child process ended for a reason other than the model.
     """
     path = log.trial.path
     try:
@@ -39,6 +40,8 @@ def robot_of(log: TrialLog, budget: Budget = DEFAULT_BUDGET) -> Robot:
         raise SchemaMismatchError(
             path, f"its model cannot be loaded: {error}", good=GOOD, advice=""
         ) from error
+    except WorkError:  # a failure of this computer says nothing about the log
+        raise
     except MUJOCO_ERRORS as error:
         raise SchemaMismatchError(
             path, f"its model cannot be loaded: {_line(error)}", good=GOOD

@@ -1,6 +1,7 @@
 """Bounded reading of files that a user names, and their digests."""
 
 import hashlib
+import os
 import re
 import stat
 import tomllib
@@ -25,7 +26,8 @@ def read_file(path: Path, what: str, limit: int) -> bytes:
     check_regular(path, what)
     try:
         with path.open("rb") as file:
-            data = file.read(limit + 1)
+            # Python reserves as many bytes as it may read.
+            data = file.read(min(limit, os.fstat(file.fileno()).st_size) + 1)
     except OSError as error:
         raise _unreadable(path, what, error) from error
     if len(data) > limit:

@@ -1,8 +1,10 @@
 """TOML from any source is read in linear time, or refused in a sentence."""
 
+from pathlib import Path
+
 import pytest
 
-from selfmodel.files import load_toml
+from selfmodel.files import load_toml, read_file
 
 
 def test_tables_are_read_as_tomllib_reads_them():
@@ -29,3 +31,10 @@ def test_what_is_not_toml_or_takes_too_long_is_refused(text: str, match: str):
     with pytest.raises(ValueError, match=match) as caught:
         load_toml(text)
     assert len(str(caught.value)) < 200
+
+
+def test_a_limit_far_above_the_size_of_a_file_takes_no_memory(tmp_path: Path):
+    path = tmp_path / "file"
+    path.write_bytes(b"content")
+
+    assert read_file(path, "a file", 10**18) == b"content"

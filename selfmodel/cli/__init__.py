@@ -77,7 +77,9 @@ def main() -> None:
             # A full disk, a folder without write permission: the message contains the file's name.
             _fail(describe(error), 1)
         except MemoryError as error:
-            _fail(f"there is not enough memory ({error or 'for this'}): request less at once", 1)
+            _fail(
+                f"there is not enough memory ({str(error) or 'for this'}): request less at once", 1
+            )
         except KeyboardInterrupt as interruption:
             notes = "; ".join(getattr(interruption, "__notes__", ()))
             _fail(f"interrupted: {notes}" if notes else "interrupted", status_of(interruption))

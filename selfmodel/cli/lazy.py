@@ -26,6 +26,13 @@ class Interrupted(Exception):  # noqa: N818  # no error: the user ended the comm
 class InterruptibleGroup(TyperGroup):
     """Command group whose commands end with ``Interrupted``."""
 
+    def make_context(self, *args: Any, **extra: Any) -> Any:  # noqa: ANN401  # as typer declares it
+        """Parses the arguments before the command."""
+        try:
+            return super().make_context(*args, **extra)
+        except KeyboardInterrupt as interruption:
+            raise Interrupted(interruption) from interruption
+
     def invoke(self, ctx: Any) -> Any:  # noqa: ANN401  # as typer declares it
         """Runs a command."""
         try:

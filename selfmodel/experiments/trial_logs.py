@@ -59,7 +59,7 @@ def robot_of_logs(
         raise InputError(str(error)) from error
     if override is None:
         return own
-    chosen = _override(override, own)
+    chosen = _override(override, own, budget)
     if chosen.anatomy.names != own.anatomy.names:
         raise InputError(
             f"{override} is another robot than that of {found[0].trial.path}: "
@@ -68,19 +68,19 @@ def robot_of_logs(
     return chosen
 
 
-def _override(name: str, own: Robot) -> Robot:
+def _override(name: str, own: Robot, budget: Budget) -> Robot:
     """Returns the robot that replaces the model in a log; an MJCF file is adapted or unchanged."""
     if not is_model(name):
         return robot_entry(name).robot()
     try:
-        raw = robot(name, own.control_timestep)
+        raw = robot(name, own.control_timestep, budget)
     except InputError:
         raw = None
     if raw is not None and raw.is_calibrated:
         return raw
     path = Path(name)
     settings = read_settings(path, {"control_timestep": own.control_timestep})
-    ready = load_mjcf(path, settings)
+    ready = load_mjcf(path, settings, budget)
     names = own.anatomy.names
     if raw is not None and ready.anatomy.names != names == raw.anatomy.names:
         return raw

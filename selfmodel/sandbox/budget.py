@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import dataclass, fields
-from math import isfinite
 
 from selfmodel.errors import InputError
 
@@ -25,17 +24,19 @@ class Budget:
         time: Estimated time from which a command requires confirmation, s.
 
     Raises:
-        InputError: A value is not positive and finite.
+        InputError: A value is not positive, or is too large for a limit of the system.
     """
 
     memory: int = 10**9
     time: float = 180.0
 
     def __post_init__(self) -> None:
-        for name in ("memory", "time"):
+        for name, most in _LARGEST.items():
             value = getattr(self, name)
-            if not (isfinite(value) and value > 0):
-                raise InputError(f"expected a positive {name} of the budget, got {value!r}")
+            if not 0 < value <= most:
+                raise InputError(
+                    f"expected a {name} of the budget above 0 and at most {most:.0e}, got {value!r}"
+                )
 
     @classmethod
     def parse(cls, text: str) -> "Budget":
@@ -126,6 +127,9 @@ class Budget:
         """The text that ``parse`` reads."""
         return ",".join(f"{field.name}={getattr(self, field.name):.12g}" for field in fields(self))
 
+
+_LARGEST = {"memory": 10**15, "time": 10**9}
+"""Largest values: 1 PB and 30 years. The limits of a process and of a read are 63-bit integers."""
 
 _UNITS = {
     "memory": {"B": 1, "kB": 10**3, "MB": 10**6, "GB": 10**9, "": 1},

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from typer.core import TyperGroup
 
 from selfmodel.controllers.command_source import CommandSource
 from selfmodel.physical.simulated_robot import SimulatedRobot
@@ -85,3 +86,42 @@ def test_a_stop_signal_to_a_study_and_its_workers_leaves_no_process(
     assert "Traceback" not in errors
     assert "failed" not in errors
     assert "the same command continues with the rest" in errors.splitlines()[-1]
+
+
+@pytest.mark.parametrize("number", STOP_SIGNALS)
+def test_a_stop_signal_while_arguments_are_parsed_has_its_own_status(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
+):
+    def signalled(*_: object) -> None:
+        signal.raise_signal(number)
+
+    monkeypatch.setattr(TyperGroup, "parse_args", signalled)
+    done = selfmodel("logs", "verify", "a.mcap", cwd=tmp_path)
+
+    assert (done.returncode, done.stderr) == (STATUS[number], "error: interrupted\n")
+
+
+IMPORT_SIGNALLED = """
+import runpy, signal, sys
+
+class Signalled:
+    def find_spec(self, name, *_):
+        if name == "selfmodel.cli":
+            signal.raise_signal(signal.SIGINT)
+
+sys.meta_path.insert(0, Signalled())
+runpy.run_module("selfmodel", run_name="__main__")
+"""
+
+
+@pytest.mark.process
+def test_ctrl_c_while_the_command_line_is_imported_ends_it_without_a_traceback(tmp_path: Path):
+    done = subprocess.run(
+        [sys.executable, "-c", IMPORT_SIGNALLED],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        check=False,
+    )
+
+    assert (done.returncode, done.stderr) == (-signal.SIGINT, b"")

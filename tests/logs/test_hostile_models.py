@@ -8,13 +8,18 @@ import mujoco
 import numpy as np
 import pytest
 
-from selfmodel.logs import LogError, read_log
+from selfmodel.errors import WorkError
+from selfmodel.experiments.trial_logs import robot_of_logs
+from selfmodel.logs import LogError, read_log, robots
 from selfmodel.logs.reader import TrialLog
+from selfmodel.logs.records import MODEL_FILE
 from selfmodel.logs.robots import robot_of
+from selfmodel.logs.verify import verify
 from selfmodel.robot.mjcf.untrusted import checked_model
 from selfmodel.sandbox.budget import Budget
 from tests.logs.conftest import MJCF
 from tests.logs.hostile import outcome
+from tests.logs.test_hostile_logs import attach
 
 TASKS = Path(__file__).parents[2] / "tasks"
 
@@ -321,3 +326,36 @@ def test_a_model_that_fails_leaves_no_file(
     for mjcf in (mesh("m.stl"), MJCF.replace('pos="0 0 0.6"', 'pos="0 0 nan"')):
         outcome(lambda mjcf=mjcf: robot_of(attacked(trial, mjcf, {"m.stl": b"x" * 99})))
     assert list(folder.iterdir()) == []
+
+
+def test_a_failure_of_the_child_process_is_not_blamed_on_the_log(
+    trial: TrialLog, monkeypatch: pytest.MonkeyPatch
+):
+    def ended(*_: object) -> None:
+        raise WorkError("the process ended unexpectedly")
+
+    monkeypatch.setattr(robots, "rehearse", ended)
+    with pytest.raises(WorkError, match=r"^the process ended unexpectedly$"):
+        robot_of(trial)
+
+
+LONG = MJCF.replace("</mujoco>", f"<!-- {'long ' * 420_000} --></mujoco>")
+"""A model with more characters than the default budget allows."""
+
+
+def test_verify_accepts_a_larger_model_with_a_larger_budget(log: Path):
+    attach(log, MODEL_FILE, "model_sha256", LONG.encode())
+    with pytest.raises(LogError, match="--budget memory="):
+        verify(log)
+
+    assert verify(log, budget=Budget(memory=3 * 10**9)).model_loaded
+
+
+def test_a_larger_model_replaces_that_of_a_log_with_a_larger_budget(
+    trial: TrialLog, tmp_path: Path
+):
+    model = tmp_path / "biped.xml"
+    model.write_text(LONG)
+
+    found = robot_of_logs([trial], str(model), Budget(memory=3 * 10**9))
+    assert found.anatomy.names == trial.trial.behaviour.names

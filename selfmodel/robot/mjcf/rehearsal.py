@@ -3,14 +3,17 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from math import ceil
 from pathlib import Path
 from time import perf_counter
 
 import mujoco
 
+from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.mujoco_errors import compile_model, mujoco_errors_as_input_errors
+from selfmodel.robot.model_checks import MAX_NUMBER
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget, memory_error
+from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget, BudgetError, memory_error
 from selfmodel.sandbox.isolation import Isolated, run_isolated
 from selfmodel.sandbox.message import Message
 
@@ -81,6 +84,13 @@ def _rehearsed(
 ) -> ModelCost:
     message = Message({"mjcf": mjcf, "control_timestep": control_timestep}, dict(assets))
     found = run_on_model("selfmodel.robot.mjcf.rehearsal:build_and_step", message, budget)
+    # This process compiles the model a second time.
+    if 2 * found.seconds > ceil(budget.file_seconds):
+        raise BudgetError(
+            f"the model takes {2 * found.seconds:.3g} s of processor time, more than "
+            f"{ceil(budget.file_seconds)} s: to go on, raise the time with --budget time=..., from "
+            f"{budget.time:g} s"
+        )
     return ModelCost(peak_bytes=found.peak, **found.facts)
 
 
@@ -92,11 +102,14 @@ def physics_timestep(mjcf: str, budget: Budget = DEFAULT_BUDGET) -> float:
         budget: Limits of memory and time.
 
     Raises:
-        InputError: The model cannot be compiled.
+        InputError: The model cannot be compiled, or the time step is not positive and finite.
         BudgetError: The model exceeds the budget.
     """
     task = "selfmodel.robot.mjcf.rehearsal:read_timestep"
-    return float(run_on_model(task, Message({"mjcf": mjcf}), budget).facts["timestep"])
+    timestep = float(run_on_model(task, Message({"mjcf": mjcf}), budget).facts["timestep"])
+    if not 0 < timestep <= MAX_NUMBER:
+        raise InputError(f"the physics time step must be above 0 s, got {timestep}")
+    return timestep
 
 
 def read_timestep(message: Message, _budget: Budget, _scratch: Path) -> Message:

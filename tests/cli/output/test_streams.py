@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from selfmodel import cli
 from selfmodel.cli import main
 from tests.helpers.command import SMALL, selfmodel
 
@@ -136,3 +137,18 @@ def test_no_log_is_opened_as_a_standard_stream_that_was_closed(tmp_path: Path, s
 def test_a_wrong_usage_keeps_its_exit_status_where_nothing_can_be_told(tmp_path: Path):
     assert shell("selfmodel trial nosuch --out a.mcap 2>/dev/full", tmp_path).returncode == 2
     assert shell("selfmodel nosuch >&- 2>&-", tmp_path).returncode == 2
+
+
+def test_a_lack_of_memory_without_a_reason_is_a_whole_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    def lacking() -> None:
+        raise MemoryError
+
+    monkeypatch.setattr(cli, "_run", lacking)
+    done = selfmodel(cwd=tmp_path)
+
+    assert (done.returncode, done.stderr) == (
+        1,
+        "error: there is not enough memory (for this): request less at once\n",
+    )

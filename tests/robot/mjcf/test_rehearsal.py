@@ -2,9 +2,11 @@ import numpy as np
 import pytest
 
 from selfmodel.errors import InputError
+from selfmodel.robot.mjcf import rehearsal
 from selfmodel.robot.mjcf.rehearsal import ModelCost, physics_timestep, rehearse
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget, BudgetError
+from selfmodel.sandbox.isolation import Isolated
 from tests.robot.mjcf.awkward import GROUND, TORSO, mjcf
 
 BOX = '<geom type="box" size="0.3 0.3 0.3" {}/>'
@@ -71,6 +73,31 @@ def test_a_heavier_model_takes_longer_steps():
 
     assert cost(crowd).step_seconds > 2 * cost(mjcf()).step_seconds
     assert np.isfinite(cost(crowd).step_seconds)
+
+
+def test_a_model_has_half_of_the_processor_time_because_it_is_compiled_twice(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    def slow(*_: object) -> Isolated:
+        return Isolated(FACTS, {}, seconds=6.0, peak=0)
+
+    monkeypatch.setattr(rehearsal, "run_on_model", slow)
+    with pytest.raises(BudgetError, match=r"takes 12 s of processor time, more than 10 s"):
+        cost("<slow/>")
+    assert cost("<slow/>", Budget(time=220)).compile_seconds == 5
+
+
+FACTS = {
+    **dict.fromkeys(("model_bytes", "data_bytes", "step_seconds"), 1),
+    "compile_seconds": 5,
+    "failure": "",
+}
+
+
+@pytest.mark.parametrize("timestep", ["0", "-0.01", "nan", "inf"])
+def test_a_physics_time_step_that_is_not_positive_and_finite_is_refused(timestep: str):
+    with pytest.raises(InputError, match="the physics time step must be above 0 s"):
+        physics_timestep(f'<mujoco><option timestep="{timestep}"/></mujoco>')
 
 
 def test_the_physics_time_step_is_that_of_the_compiled_model():
