@@ -1,5 +1,6 @@
 """Reader of a ROS 1 bag (``.bag``, format 2.0), whose chunks may be compressed."""
 
+import os
 import shlex
 import struct
 from collections import Counter
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, cast
 from rosbags.rosbag1 import Reader, ReaderError
 
 from selfmodel.logs.errors import CorruptError, IncompleteError, LogError
-from selfmodel.logs.rosbag.bounded_file import BoundedPath
+from selfmodel.logs.rosbag.bounded_file import BoundedFile, BoundedPath
 from selfmodel.logs.rosbag.message_types import ROS1
 from selfmodel.logs.rosbag.stored import Announced, DamageError, Stored, checked_time
 
@@ -61,6 +62,8 @@ def _items(path: Path) -> Iterator[Announced | Stored]:
         yield from topics.values()
         if len(reader.chunks) != len(reader.chunk_infos):
             raise DamageError("its index lists a chunk twice")
+        if (claimed := len(reader.chunk_infos)) != (listed := _chunk_infos(path)):
+            raise DamageError(f"its header has {claimed} chunks, its index {listed}")
         # The chunks have counts of their own, by connection.
         expected: Counter[int] = Counter()
         for chunk in reader.chunk_infos:
@@ -74,6 +77,30 @@ def _items(path: Path) -> Iterator[Announced | Stored]:
                 f"its chunks have {expected.total()} messages, its index {found.total()}, or of "
                 f"other connections"
             )
+
+
+def _chunk_infos(path: Path) -> int:
+    """Number of chunks in the index, which the library reads up to the number in the header."""
+    count = 0
+    with BoundedFile(path) as file:
+        header = file.read(_HEADER_BYTES)
+        file.seek(*_POSITION.unpack_from(header, header.index(_INDEX_POSITION) + 10))
+        while size := file.read(_LENGTH.size):
+            header = file.read(*_LENGTH.unpack(size))
+            (length,) = _LENGTH.unpack(file.read(_LENGTH.size))
+            count += _CHUNK_INFO in header
+            file.seek(length, os.SEEK_CUR)
+    return count
+
+
+_LENGTH = struct.Struct("<I")
+_POSITION = struct.Struct("<Q")
+_INDEX_POSITION = b"index_pos="
+_HEADER_BYTES = 4096
+"""Size of the version and of the header of a bag, which is padded to at least that, bytes."""
+
+_CHUNK_INFO = b"\x04\0\0\0op=\x06"
+"""Field of the header of a chunk's entry in the index."""
 
 
 def _explained(name: Path, failure: Exception, good: str) -> LogError:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from selfmodel.experiments.fitting import optional_calibration
 from selfmodel.experiments.log_diagnosis import LogDiagnosis
 from selfmodel.recovery import sequential_diagnosis
 from selfmodel.robot.mjcf.rehearsal import rehearse
@@ -34,9 +35,11 @@ def diagnosis_seconds(
         InputError: A trial lacks signals that the comparator or the calibration needs.
         BudgetError: The model exceeds the budget.
     """
-    steps = sequential_diagnosis.simulated_steps(planned.damaged, planned.search)
+    steps = 0
     if calibrate and planned.healthy:
-        steps += calibration.simulated_steps(robot, planned.healthy)
+        with optional_calibration():
+            steps += calibration.simulated_steps(robot, planned.healthy)
+    steps += sequential_diagnosis.simulated_steps(planned.damaged, planned.search)
     # A broken joint is compiled into a model of its own.
     models = 1 + len(robot.anatomy.joints)
     return _seconds(robot, steps, models, threads, budget)

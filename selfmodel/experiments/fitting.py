@@ -1,6 +1,7 @@
 """Calibration in experiments and commands."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 from selfmodel.errors import InputError
 from selfmodel.robot.robot import Robot
@@ -14,8 +15,15 @@ def fitted(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibration:
     Raises:
         InputError: The fit failed; the message names the option that omits calibration.
     """
-    try:
+    with optional_calibration():
         return calibrate(robot, trials, threads)
+
+
+@contextmanager
+def optional_calibration() -> Iterator[None]:
+    """Context manager that adds the option that omits calibration to an error's message."""
+    try:
+        yield
     except InputError as error:
         raise InputError(
             f"{error}, or leave the calibration out (--no-calibrate, calibrate=False)"

@@ -142,6 +142,7 @@ def _crash() -> str:
 def test_a_finding_is_reported_with_its_command_and_ends_no_campaign(
     check: Callable[[], str], reported: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
+    monkeypatch.chdir(tmp_path)  # a case that is killed leaves its folder as the working folder
     monkeypatch.setattr(oracle, "SECONDS", 0.6)
     monkeypatch.setattr(oracle, "MARGIN", 0.0)
     monkeypatch.setattr(oracle, "MEGABYTES", 20)

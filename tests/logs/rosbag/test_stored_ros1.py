@@ -1,5 +1,6 @@
 """ROS 1 bags are read like ROS 2 bags, and whatever is damaged is reported."""
 
+import re
 import struct
 from contextlib import suppress
 from pathlib import Path
@@ -84,6 +85,28 @@ def test_messages_that_the_index_lacks_are_missed(recording: Path):
     )
 
     with pytest.raises(CorruptError, match=r"its chunks have .* messages, its index"):
+        read_bag(recording, ())
+
+
+def test_a_chunk_that_the_header_leaves_out_is_missed(recording: Path):
+    data = bytearray(recording.read_bytes())
+    at = data.index(b"chunk_count=") + len(b"chunk_count=")
+    (count,) = struct.unpack_from("<I", data, at)
+    struct.pack_into("<I", data, at, count - 1)
+    recording.write_bytes(data)
+
+    with pytest.raises(CorruptError, match=f"its header has {count - 1} chunks, its index {count}"):
+        read_bag(recording, ())
+
+
+def test_a_chunk_that_is_listed_twice_is_damage(recording: Path):
+    data = bytearray(recording.read_bytes())
+    places = [m.start() for m in re.finditer(rb"chunk_pos=", data)]
+    first = data[places[0] : places[0] + 18]
+    data[places[1] : places[1] + 18] = first
+    recording.write_bytes(data)
+
+    with pytest.raises(CorruptError, match="its index lists a chunk twice"):
         read_bag(recording, ())
 
 
