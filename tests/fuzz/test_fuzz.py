@@ -96,7 +96,7 @@ def _change() -> str:
 
 
 def _fill() -> str:
-    return "fine" if np.ones(5_000_000).any() else ""
+    return "fine" if np.ones(20_000_000).any() else ""
 
 
 def _spin() -> str:
