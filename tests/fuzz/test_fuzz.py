@@ -28,6 +28,8 @@ from tests.fuzz.tally import Tally
 from tests.fuzz.target import Case, Target
 from tests.fuzz.targets import TARGETS
 
+pytestmark = pytest.mark.process  # each campaign forks
+
 
 def campaign(folder: Path, target: Target, count: int, processes: int = 1) -> Tally:
     """Runs a small campaign; its findings are in the folder ``failures``."""
