@@ -20,7 +20,7 @@ $(READY): pyproject.toml constraints.txt
 demo: $(READY) ## recover a quadruped from a lost lower leg, showing what it does
 	$(BIN)/selfmodel recover quadruped --case 1
 
-test: $(READY) ## run the fast tests: every promise, in at most two minutes on two cores
+test: $(READY) ## run the fast tests: every promise, in about two minutes on two cores
 	$(BIN)/pytest --numprocesses auto --dist loadfile --durations 10
 
 test-all: $(READY) ## run every test, with every case; in about ten minutes on two cores
