@@ -23,6 +23,10 @@ NO_KEYFRAME = "none"
 """Value of ``keyframe`` for the reference pose of the MJCF."""
 
 
+BASES = ("free", "fixed")
+"""Values of ``base``."""
+
+
 @dataclass(frozen=True)
 class MjcfSettings:
     """Settings for the conversion of an MJCF to a robot.
@@ -36,6 +40,10 @@ class MjcfSettings:
         touch: Bodies that get a touch sensor; None for the end of each limb.
         angle: Joints that get an angle sensor; None for every hinge that a motor drives.
         ctrlrange: Lowest and highest command of motors without a command range.
+        base: ``free`` for a base with a free joint, ``fixed`` for a base that is fixed to the
+            world, as on a stand; None for the base of the file.
+        base_height: Height of the root body with ``base="fixed"``, m; None for the height of the
+            file, or the lowest height at which the robot cannot touch the ground if that is larger.
         assets: Folder with files that the MJCF names, in addition to its own; "" for none.
     """
 
@@ -45,6 +53,8 @@ class MjcfSettings:
     touch: tuple[str, ...] | None = None
     angle: tuple[str, ...] | None = None
     ctrlrange: tuple[float, float] | None = None
+    base: str | None = None
+    base_height: float | None = None
     assets: str = ""
 
 
@@ -135,6 +145,14 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
         raise InputError(f"forward needs one of {', '.join(FORWARD_DIRECTIONS)}, got {forward!r}")
     if not isinstance(keyframe, str):
         raise InputError(f"keyframe needs the name of a keyframe, or none, got {keyframe!r}")
+    base, height = given.get("base"), given.get("base_height")
+    if base is not None and base not in BASES:
+        raise InputError(f"base needs one of {', '.join(BASES)}, got {base!r}")
+    if height is not None and (base != "fixed" or not _is_number(height)):
+        raise InputError(
+            f'base_height needs a number of metres and base = "fixed", got {height!r} with base '
+            f"{base or 'of the file'}"
+        )
     if not isinstance(assets, str):
         raise InputError(f"assets needs the path of a folder, got {assets!r}")
     return MjcfSettings(
@@ -144,6 +162,8 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
         touch=_names(given, "touch"),
         angle=_names(given, "angle"),
         ctrlrange=_range(given),
+        base=base,
+        base_height=None if height is None else float(height),
         assets=assets,
     )
 
