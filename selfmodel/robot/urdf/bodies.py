@@ -1,0 +1,183 @@
+"""Writes the bodies of MuJoCo's importer as MJCF, exact to the last bit.
+
+``MjSpec.to_xml`` writes numbers of six digits, which would move the feet of a robot.
+"""
+
+from dataclasses import dataclass
+from xml.etree import ElementTree as ET
+
+import mujoco
+import numpy as np
+
+from selfmodel.arrays import FloatArray
+from selfmodel.robot.mjcf.expand import format_numbers
+
+_GEOMS = {
+    mujoco.mjtGeom.mjGEOM_SPHERE: ("sphere", 1),
+    mujoco.mjtGeom.mjGEOM_CAPSULE: ("capsule", 2),
+    mujoco.mjtGeom.mjGEOM_CYLINDER: ("cylinder", 2),
+    mujoco.mjtGeom.mjGEOM_BOX: ("box", 3),
+    mujoco.mjtGeom.mjGEOM_MESH: ("mesh", 0),
+}
+"""Name and number of sizes of the geoms of a URDF."""
+
+_VISUAL_GROUP, _HIDDEN_GROUP = "2", "3"
+"""Groups of visuals, and of collisions of a link with visuals, as in MuJoCo's Menagerie."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame in another frame.
+
+    Attributes:
+        position: ``(3,)``, m.
+        orientation: ``(4,)``, unit quaternion.
+    """
+
+    position: FloatArray
+    orientation: FloatArray
+
+    def then(self, inner: "Frame") -> "Frame":
+        """Returns a frame that is given in this frame, in the outer frame."""
+        position, orientation = np.empty(3), np.empty(4)
+        mujoco.mju_rotVecQuat(position, inner.position, self.orientation)
+        mujoco.mju_mulQuat(orientation, self.orientation, inner.orientation)
+        return Frame(self.position + position, orientation)
+
+    def seen_from_inside(self) -> "Frame":
+        """Returns the outer frame in this frame."""
+        position, orientation = np.empty(3), np.empty(4)
+        mujoco.mju_negQuat(orientation, self.orientation)
+        mujoco.mju_rotVecQuat(position, -self.position, orientation)
+        return Frame(position, orientation)
+
+    def direction(self, vector: FloatArray) -> FloatArray:
+        """Returns a vector that is given in this frame, in the outer frame."""
+        result = np.empty(3)
+        mujoco.mju_rotVecQuat(result, np.asarray(vector, float), self.orientation)
+        return result
+
+
+_NO_FRAME = Frame(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
+
+
+@dataclass(frozen=True, eq=False)
+class _Hinge:
+    """A hinge of a massless link, in the frame of the link that it is merged into."""
+
+    joint: mujoco.MjsJoint
+    frame: Frame
+
+
+def bodies(spec: mujoco.MjSpec) -> list[ET.Element]:
+    """Returns the bodies of a specification as MJCF, the roots with their descendants."""
+    return [_body(body, _NO_FRAME, []) for body in spec.worldbody.bodies]
+
+
+def meshes(spec: mujoco.MjSpec) -> list[ET.Element]:
+    """Returns the meshes of a specification as MJCF."""
+    # With the inertia of a shell, MuJoCo accepts flat and open meshes; masses are not from meshes.
+    return [
+        ET.Element(
+            "mesh",
+            {
+                "name": mesh.name,
+                "file": mesh.file,
+                "scale": format_numbers(mesh.scale),
+                "inertia": "shell",
+            },
+        )
+        for mesh in spec.meshes
+    ]
+
+
+def _body(body: mujoco.MjsBody, outer: Frame, hinges: list[_Hinge]) -> ET.Element:
+    """Returns a body as MJCF.
+
+    A link without mass and geoms that moves and has one child becomes a further hinge of that
+    child, because MuJoCo moves no massless body.
+
+    Args:
+        body: The body.
+        outer: Frame of the body's parent in the last written body.
+        hinges: Hinges of the massless parents, in the frame ``outer``'s last link.
+    """
+    own = Frame(np.array(body.pos), np.array(body.quat))
+    frame = outer.then(own)
+    inner = own.seen_from_inside()
+    before = [_Hinge(hinge.joint, inner.then(hinge.frame)) for hinge in hinges]
+    here = [*before, *(_Hinge(joint, _NO_FRAME) for joint in body.joints)]
+    if here and not body.mass and not len(body.geoms) and len(body.bodies) == 1:
+        return _body(body.bodies[0], frame, here)
+    element = ET.Element("body", {"name": body.name} | _placed(frame))
+    if body.mass:
+        ET.SubElement(element, "inertial", _inertial(body))
+    for hinge in here:
+        element.append(_joint(hinge))
+    seen = any(not geom.contype for geom in body.geoms)
+    element.extend(_geom(geom, seen=seen) for geom in body.geoms)
+    element.extend(_body(child, _NO_FRAME, []) for child in body.bodies)
+    return element
+
+
+def _inertial(body: mujoco.MjsBody) -> dict[str, str]:
+    """Returns the attributes of an ``<inertial>``."""
+    mass = {"mass": repr(float(body.mass))}
+    full = np.array(body.fullinertia)
+    if not np.any(full[3:]):
+        frame = Frame(np.array(body.ipos), np.array(body.iquat))
+        return _placed(frame) | mass | {"diaginertia": format_numbers(full[:3])}
+    # MJCF has no orientation beside a full inertia.
+    rotation = np.empty(9)
+    mujoco.mju_quat2Mat(rotation, np.array(body.iquat))
+    turn = rotation.reshape(3, 3)
+    matrix = turn @ inertia_matrix(body) @ turn.T
+    elements = matrix[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    return {"pos": format_numbers(np.array(body.ipos)), "fullinertia": format_numbers(elements)} | mass
+
+
+def inertia_matrix(body: mujoco.MjsBody) -> FloatArray:
+    """Returns the inertia of a body in its inertial frame, ``(3, 3)`` kg m²."""
+    xx, yy, zz, xy, xz, yz = body.fullinertia
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def _joint(hinge: _Hinge) -> ET.Element:
+    joint, frame = hinge.joint, hinge.frame
+    attributes = {
+        "name": joint.name,
+        "type": "hinge",
+        "pos": format_numbers(frame.position),
+        "axis": format_numbers(frame.direction(joint.axis)),
+    }
+    if joint.range[0] < joint.range[1]:
+        attributes |= {"range": format_numbers(joint.range), "limited": "true"}
+    for name, value in (("damping", joint.damping[0]), ("frictionloss", joint.frictionloss)):
+        if value:
+            attributes[name] = repr(float(value))
+    return ET.Element("joint", attributes)
+
+
+def _geom(geom: mujoco.MjsGeom, *, seen: bool) -> ET.Element:
+    """Returns a geom as MJCF.
+
+    Args:
+        geom: The geom.
+        seen: Whether the link has visuals, so that its collisions are not drawn.
+    """
+    kind, sizes = _GEOMS[geom.type]
+    attributes = {"type": kind} | _placed(Frame(np.array(geom.pos), np.array(geom.quat)))
+    if sizes:
+        attributes["size"] = format_numbers(geom.size[:sizes])
+    else:
+        attributes["mesh"] = geom.meshname
+    attributes["rgba"] = format_numbers(np.array(geom.rgba, float))
+    if not geom.contype:
+        attributes |= {"contype": "0", "conaffinity": "0", "group": _VISUAL_GROUP}
+    elif seen:
+        attributes["group"] = _HIDDEN_GROUP
+    return ET.Element("geom", attributes)
+
+
+def _placed(frame: Frame) -> dict[str, str]:
+    return {"pos": format_numbers(frame.position), "quat": format_numbers(frame.orientation)}
