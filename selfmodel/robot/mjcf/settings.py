@@ -2,12 +2,13 @@
 
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.files import load_toml, read_file
+from selfmodel.robot.urdf.settings import URDF_SETTINGS, UrdfSettings, checked_urdf_settings
 from selfmodel.robot.mjcf.files import is_around_home
 
 MAX_SETTINGS_BYTES = 2**16
@@ -37,6 +38,7 @@ class MjcfSettings:
         angle: Joints that get an angle sensor; None for every hinge that a motor drives.
         ctrlrange: Lowest and highest command of motors without a command range.
         assets: Folder with files that the MJCF names, in addition to its own; "" for none.
+        urdf: Settings for a URDF; in a settings file they are beside the others.
     """
 
     forward: str = "x"
@@ -46,6 +48,7 @@ class MjcfSettings:
     angle: tuple[str, ...] | None = None
     ctrlrange: tuple[float, float] | None = None
     assets: str = ""
+    urdf: UrdfSettings = field(default_factory=UrdfSettings)
 
 
 def read_settings(path: Path, extra: Mapping[str, Any] | None = None) -> MjcfSettings:
@@ -121,8 +124,8 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
                 "neurons is a setting of a controller, not of a robot: leave neurons out, and give "
                 "--neurons N to the command"
             )
-        if key not in {field.name for field in fields(MjcfSettings)}:
-            raise unknown_name("setting", key, [field.name for field in fields(MjcfSettings)])
+        if key not in _KEYS:
+            raise unknown_name("setting", key, _KEYS)
     step = given.get("control_timestep")
     if step is not None and not (_is_number(step) and 0 < step <= MAX_CONTROL_TIMESTEP):
         raise InputError(
@@ -145,7 +148,12 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
         angle=_names(given, "angle"),
         ctrlrange=_range(given),
         assets=assets,
+        urdf=checked_urdf_settings(given),
     )
+
+
+_KEYS = [key.name for key in fields(MjcfSettings) if key.name != "urdf"] + list(URDF_SETTINGS)
+"""Names of the settings in a file."""
 
 
 def _is_number(value: object) -> bool:

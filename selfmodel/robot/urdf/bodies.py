@@ -3,7 +3,8 @@
 ``MjSpec.to_xml`` writes numbers of six digits, which would move the feet of a robot.
 """
 
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 from xml.etree import ElementTree as ET
 
 import mujoco
@@ -44,7 +45,7 @@ class Frame:
         mujoco.mju_mulQuat(orientation, self.orientation, inner.orientation)
         return Frame(self.position + position, orientation)
 
-    def seen_from_inside(self) -> "Frame":
+    def inverse(self) -> "Frame":
         """Returns the outer frame in this frame."""
         position, orientation = np.empty(3), np.empty(4)
         mujoco.mju_negQuat(orientation, self.orientation)
@@ -69,9 +70,41 @@ class _Hinge:
     frame: Frame
 
 
+@dataclass(frozen=True, eq=False)
+class _Main:
+    """The element of a body with hinges, or of the root, and what is fixed to it.
+
+    Attributes:
+        element: The ``<body>``.
+        frame: Frame of a body that is fixed to it, in its frame.
+        in_middle: Whether another body hangs on it by a hinge.
+    """
+
+    element: ET.Element
+    frame: Frame
+    in_middle: bool
+
+
 def bodies(spec: mujoco.MjSpec) -> list[ET.Element]:
-    """Returns the bodies of a specification as MJCF, the roots with their descendants."""
-    return [_body(body, _NO_FRAME, []) for body in spec.worldbody.bodies]
+    """Returns the bodies of a specification as MJCF, the roots with their descendants.
+
+    A link without mass and geoms that moves and has one child becomes a further hinge of that
+    child, because MuJoCo moves no massless body. The geoms of a link that is fixed to a part in the
+    middle of a limb are given to that part, so that only the ends of limbs, such as feet, are
+    bodies with geoms and without children.
+    """
+    middle: set[str] = set()
+    for body in spec.bodies:
+        if body.joints and body.parent is not None:
+            middle.add(_main(body.parent).name)
+    return [_written(body, _NO_FRAME, [], None, middle) for body in spec.worldbody.bodies]
+
+
+def _main(body: mujoco.MjsBody) -> mujoco.MjsBody:
+    """Returns the body with joints, or the root, that a body is fixed to."""
+    while not body.joints and body.parent is not None and body.parent.parent is not None:
+        body = body.parent
+    return body
 
 
 def meshes(spec: mujoco.MjSpec) -> list[ET.Element]:
@@ -91,32 +124,41 @@ def meshes(spec: mujoco.MjSpec) -> list[ET.Element]:
     ]
 
 
-def _body(body: mujoco.MjsBody, outer: Frame, hinges: list[_Hinge]) -> ET.Element:
-    """Returns a body as MJCF.
-
-    A link without mass and geoms that moves and has one child becomes a further hinge of that
-    child, because MuJoCo moves no massless body.
+def _written(
+    body: mujoco.MjsBody,
+    outer: Frame,
+    hinges: list[_Hinge],
+    main: _Main | None,
+    middle: Collection[str],
+) -> ET.Element:
+    """Returns a body with its descendants as MJCF.
 
     Args:
         body: The body.
-        outer: Frame of the body's parent in the last written body.
-        hinges: Hinges of the massless parents, in the frame ``outer``'s last link.
+        outer: Frame of the body's parent in the parent element.
+        hinges: Hinges of the massless parents, in the frame of the body's parent.
+        main: The element that the body's parent is fixed to; None for a root.
+        middle: Names of the bodies in the middle of limbs.
     """
     own = Frame(np.array(body.pos), np.array(body.quat))
-    frame = outer.then(own)
-    inner = own.seen_from_inside()
-    before = [_Hinge(hinge.joint, inner.then(hinge.frame)) for hinge in hinges]
-    here = [*before, *(_Hinge(joint, _NO_FRAME) for joint in body.joints)]
+    frame, inner = outer.then(own), own.inverse()
+    own_hinges = [_Hinge(joint, _NO_FRAME) for joint in body.joints]
+    here = [_Hinge(hinge.joint, inner.then(hinge.frame)) for hinge in hinges] + own_hinges
     if here and not body.mass and not len(body.geoms) and len(body.bodies) == 1:
-        return _body(body.bodies[0], frame, here)
+        return _written(body.bodies[0], frame, here, main, middle)
     element = ET.Element("body", {"name": body.name} | _placed(frame))
     if body.mass:
         ET.SubElement(element, "inertial", _inertial(body))
-    for hinge in here:
-        element.append(_joint(hinge))
+    element.extend(_joint(hinge) for hinge in here)
+    if here or main is None:
+        main = _Main(element, _NO_FRAME, in_middle=body.name in middle)
+    else:
+        main = replace(main, frame=main.frame.then(frame))
     seen = any(not geom.contype for geom in body.geoms)
-    element.extend(_geom(geom, seen=seen) for geom in body.geoms)
-    element.extend(_body(child, _NO_FRAME, []) for child in body.bodies)
+    at = main if main.in_middle else _Main(element, _NO_FRAME, in_middle=False)
+    for geom in body.geoms:
+        at.element.append(_geom(geom, at.frame, seen=seen))
+    element.extend(_written(child, _NO_FRAME, [], main, middle) for child in body.bodies)
     return element
 
 
@@ -158,15 +200,16 @@ def _joint(hinge: _Hinge) -> ET.Element:
     return ET.Element("joint", attributes)
 
 
-def _geom(geom: mujoco.MjsGeom, *, seen: bool) -> ET.Element:
+def _geom(geom: mujoco.MjsGeom, frame: Frame, *, seen: bool) -> ET.Element:
     """Returns a geom as MJCF.
 
     Args:
         geom: The geom.
+        frame: Frame of its body in the element that gets the geom.
         seen: Whether the link has visuals, so that its collisions are not drawn.
     """
     kind, sizes = _GEOMS[geom.type]
-    attributes = {"type": kind} | _placed(Frame(np.array(geom.pos), np.array(geom.quat)))
+    attributes = {"type": kind} | _placed(frame.then(Frame(np.array(geom.pos), np.array(geom.quat))))
     if sizes:
         attributes["size"] = format_numbers(geom.size[:sizes])
     else:

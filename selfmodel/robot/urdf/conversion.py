@@ -9,8 +9,9 @@ from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.document import Document
 from selfmodel.robot.mjcf.expand import format_numbers
 from selfmodel.robot.mjcf.mujoco_errors import compile_model, loading_a_model
-from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.robot.urdf.bodies import bodies, inertia_matrix, meshes
+from selfmodel.robot.urdf.reading import number
+from selfmodel.robot.urdf.settings import UrdfSettings
 from selfmodel.robot.urdf.servos import check_patterns, servo
 from selfmodel.robot.urdf.stance import stance
 from selfmodel.robot.urdf.tree import HINGE_TYPES
@@ -18,10 +19,13 @@ from selfmodel.robot.urdf.tree import HINGE_TYPES
 PHYSICS_TIMESTEP = 0.002
 """Physics time step of a robot from a URDF, s."""
 
+KEYFRAME = "stance"
+"""Name of the keyframe with the initial pose."""
+
 _MAX_LISTED = 6
 
 
-def convert(document: Document, settings: MjcfSettings) -> Document:
+def convert(document: Document, settings: UrdfSettings) -> Document:
     """Returns the MJCF of a URDF, with a free joint, position servos, ground and a keyframe.
 
     Args:
@@ -89,4 +93,49 @@ def _add_free_joint(made: Document, root: ET.Element) -> None:
 
 
 def _add_couplings(made: Document, hinges: list[ET.Element]) -> None:
-    """Adds the couplings of the joints that mimic another joint, which MuJoCo's importer reads."""
+    """Adds an equality constraint for each joint that mimics another joint."""
+    known = {joint.get("name") for joint in hinges}
+    for joint in hinges:
+        mimic = joint.find("mimic")
+        if mimic is None:
+            continue
+        leader = mimic.get("joint", "")
+        if leader not in known:
+            raise InputError(
+                f"the joint {joint.get('name')!r} mimics {leader!r}, which is no revolute or "
+                f"continuous joint of the URDF"
+            )
+        factor, offset = number(mimic, "multiplier", 1.0), number(mimic, "offset", 0.0)
+        coupling = {
+            "joint1": joint.get("name", ""),
+            "joint2": leader,
+            "polycoef": f"{offset!r} {factor!r} 0 0 0",
+        }
+        ET.SubElement(made.section("equality"), "joint", coupling)
+        made.notes.append(f"{joint.get('name')} mimics {leader}, and gets no motor")
+
+
+def _add_servos(made: Document, driven: list[ET.Element], settings: UrdfSettings) -> None:
+    servos = [servo(joint, settings) for joint in driven]
+    made.section("actuator").extend(element for element, _ in servos)
+    names: dict[str, list[str]] = {}
+    for joint, (_, gains) in zip(driven, servos, strict=True):
+        names.setdefault(gains, []).append(joint.get("name", ""))
+    for gains, joints in names.items():
+        made.notes.append(f"position servos with {gains}: {_listed(joints)}")
+
+
+def _add_stance(made: Document, settings: UrdfSettings) -> None:
+    """Adds the initial pose as a keyframe, and excludes the contacts of bodies that overlap."""
+    found = stance(compile_model(made.text, made.assets), settings.pose)
+    for first, second in found.overlapping:
+        pair = {"body1": first, "body2": second}
+        ET.SubElement(made.section("contact"), "exclude", pair)
+        made.notes.append(f"{first} and {second} overlap in the initial pose, and never touch")
+    key = {"name": KEYFRAME, "qpos": format_numbers(found.qpos)}
+    ET.SubElement(made.section("keyframe"), "key", key)
+
+
+def _listed(names: list[str]) -> str:
+    more = f" and {len(names) - _MAX_LISTED} more" if len(names) > _MAX_LISTED else ""
+    return ", ".join(names[:_MAX_LISTED]) + more

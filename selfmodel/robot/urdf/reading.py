@@ -13,7 +13,7 @@ from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.document import Document
 from selfmodel.robot.mjcf.files import Files
 from selfmodel.robot.urdf.meshes import READABLE, Meshes
-from selfmodel.robot.urdf.tree import check_tree
+from selfmodel.robot.urdf.tree import check_tree, check_types
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 
 _ORIGIN = ("xyz", "rpy")
@@ -72,6 +72,7 @@ def read_urdf(root: ET.Element, files: Files, budget: Budget = DEFAULT_BUDGET) -
     if left_out:
         document.notes.append(f"elements that no robot needs are left out: {_counted(left_out)}")
     _free_the_root(document, main)
+    check_types(document.root)
     _fix_rangeless(document)
     _read_meshes(document, Meshes(files, budget.file_bytes, document))
     return document
@@ -95,15 +96,18 @@ def _kept(element: ET.Element) -> ET.Element:
 
 
 def _free_the_root(document: Document, main: str) -> None:
-    """Removes a link ``world`` without content that is the root."""
+    """Removes a root link without a body that is the world: by its name, or a floating joint."""
     links = {link.get("name"): link for link in document.root.findall("link")}
     joints = [j for j in document.root.findall("joint") if _link_of(j, "parent") == main]
-    if main != "world" or len(links[main]) or len(joints) != 1:
+    has_body = any(element.tag in ("inertial", "collision") for element in links[main])
+    if has_body or len(joints) != 1:
+        return
+    if main != "world" and joints[0].get("type") != "floating":
         return
     document.root.remove(links[main])
     document.root.remove(joints[0])
     document.notes.append(
-        f"the link 'world' and the joint {joints[0].get('name')!r} are left out: the base is free"
+        f"the link {main} and the joint {joints[0].get('name')} are left out: the base is free"
     )
 
 
@@ -169,8 +173,8 @@ def _read_meshes(document: Document, meshes: Meshes) -> None:
                 raise InputError(
                     f"the collision of the link {link.get('name')!r} needs the mesh {uri!r}, which "
                     f"is missing, lies outside the folders of the model, or is no STL or OBJ: "
-                    f"save the mesh as .stl beside it, or give the folder of the packages with "
-                    f"--assets DIR"
+                    f"save the mesh as .stl, or name a folder that contains it, with --set "
+                    f"assets=DIR"
                 )
     for reason, count in left_out.items():
         document.notes.append(f"{count} visual meshes are left out: {reason}")

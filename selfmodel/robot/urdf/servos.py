@@ -1,13 +1,13 @@
 """Position servos for the hinges of a URDF, from the limits of effort and velocity."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from xml.etree import ElementTree as ET  # of checked texts
 
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.robot.urdf.reading import number
+from selfmodel.robot.urdf.settings import URDF_SETTINGS, UrdfSettings, value_of
 
 FULL_EFFORT_ERROR = 0.5
 """Position error at which a servo without the setting ``kp`` exerts its full effort, rad; half of
@@ -21,7 +21,7 @@ UNLIMITED_RANGE = (-math.pi, math.pi)
 """Command range of a continuous joint, rad."""
 
 
-def servo(joint: ET.Element, settings: MjcfSettings) -> tuple[ET.Element, str]:
+def servo(joint: ET.Element, settings: UrdfSettings) -> tuple[ET.Element, str]:
     """Returns the position servo of a joint as MJCF, and a note.
 
     Args:
@@ -34,7 +34,7 @@ def servo(joint: ET.Element, settings: MjcfSettings) -> tuple[ET.Element, str]:
     name = joint.get("name", "")
     limit = joint.find("limit")
     limit = ET.Element("limit") if limit is None else limit
-    effort = setting_of(settings.effort, name)
+    effort = value_of(settings.effort, name)
     if effort is None:
         effort = number(limit, "effort", 0.0)
     if effort <= 0:
@@ -45,10 +45,10 @@ def servo(joint: ET.Element, settings: MjcfSettings) -> tuple[ET.Element, str]:
     low, high = UNLIMITED_RANGE
     if joint.get("type") == "revolute":
         low, high = number(limit, "lower", 0.0), number(limit, "upper", 0.0)
-    kp = setting_of(settings.kp, name)
+    kp = value_of(settings.kp, name)
     if kp is None:
         kp = effort / min(FULL_EFFORT_ERROR, (high - low) / 2)
-    kd = setting_of(settings.kd, name)
+    kd = value_of(settings.kd, name)
     if kd is None:
         velocity = number(limit, "velocity", 0.0)
         least, most = (kp * time for time in DAMPING_TIMES)
@@ -66,21 +66,13 @@ def servo(joint: ET.Element, settings: MjcfSettings) -> tuple[ET.Element, str]:
     return ET.Element("position", attributes), f"kp {kp:.3g}, kd {kd:.3g}, {effort:.3g} N m"
 
 
-def setting_of(setting: float | Mapping[str, float] | None, joint: str) -> float | None:
-    """Returns the value of a setting for a joint, or None; the last pattern that fits counts."""
-    if not isinstance(setting, Mapping):
-        return setting
-    found = [value for pattern, value in setting.items() if fnmatchcase(joint, pattern)]
-    return found[-1] if found else None
-
-
-def check_patterns(settings: MjcfSettings, joints: Sequence[str]) -> None:
+def check_patterns(settings: UrdfSettings, joints: Sequence[str]) -> None:
     """Checks that each name or pattern in the settings fits a joint.
 
     Raises:
         InputError: One fits none.
     """
-    for setting in (settings.kp, settings.kd, settings.effort, settings.pose):
-        for pattern in setting if isinstance(setting, Mapping) else ():
+    for name in URDF_SETTINGS:
+        for pattern in getattr(settings, name):
             if not any(fnmatchcase(joint, pattern) for joint in joints):
                 raise unknown_name("joint", pattern, list(joints))

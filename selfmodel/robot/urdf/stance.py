@@ -1,6 +1,5 @@
 """The initial pose of a robot from a URDF: joint angles, the height of the base, and contacts."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import mujoco
@@ -8,8 +7,9 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
+from selfmodel.robot.mjcf.contacts import ground_contact_geoms
 from selfmodel.robot.mjcf.ground import lowest_point
-from selfmodel.robot.urdf.servos import setting_of
+from selfmodel.robot.urdf.settings import ByJoint, value_of
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Stance:
     overlapping: list[tuple[str, str]]
 
 
-def stance(model: mujoco.MjModel, pose: Mapping[str, float]) -> Stance:
+def stance(model: mujoco.MjModel, pose: ByJoint) -> Stance:
     """Returns the initial pose of a robot.
 
     Args:
@@ -43,19 +43,18 @@ def stance(model: mujoco.MjModel, pose: Mapping[str, float]) -> Stance:
     _follow_couplings(model, data.qpos)
     mujoco.mj_kinematics(model, data)
     free = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
-    height = lowest_point(model, data)
-    if len(free) and height is not None:
-        data.qpos[model.jnt_qposadr[free[0]] + 2] -= height
+    if len(free) and ground_contact_geoms(model):
+        data.qpos[model.jnt_qposadr[free[0]] + 2] -= lowest_point(model, data)
         mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
     mujoco.mj_collision(model, data)
     return Stance(data.qpos.copy(), _overlapping(model, data))
 
 
-def _angle(model: mujoco.MjModel, joint: int, pose: Mapping[str, float]) -> float:
+def _angle(model: mujoco.MjModel, joint: int, pose: ByJoint) -> float:
     name = model.joint(joint).name
     low, high = model.jnt_range[joint] if model.jnt_limited[joint] else (-np.inf, np.inf)
-    angle = setting_of(pose, name)
+    angle = value_of(pose, name)
     if angle is None:
         return float(np.clip(0.0, low, high))
     if not low <= angle <= high:
@@ -68,12 +67,14 @@ def _angle(model: mujoco.MjModel, joint: int, pose: Mapping[str, float]) -> floa
 
 def _follow_couplings(model: mujoco.MjModel, qpos: FloatArray) -> None:
     """Moves the joints that mimic another joint, whatever the order of the couplings."""
-    for _ in range(model.neq):
-        for eq in range(model.neq):
-            first, second = (
-                model.jnt_qposadr[objects[eq]] for objects in (model.eq_obj1id, model.eq_obj2id)
-            )
-            qpos[first] = model.eq_data[eq, 0] + model.eq_data[eq, 1] * qpos[second]
+    followers, leaders = (
+        model.jnt_qposadr[joints] for joints in (model.eq_obj1id, model.eq_obj2id)
+    )
+    for _ in range(model.neq):  # a chain of couplings has at most as many links
+        angles = model.eq_data[:, 0] + model.eq_data[:, 1] * qpos[leaders]
+        if np.array_equal(qpos[followers], angles):
+            return
+        qpos[followers] = angles
 
 
 def _overlapping(model: mujoco.MjModel, data: mujoco.MjData) -> list[tuple[str, str]]:

@@ -36,7 +36,6 @@ def check_tree(root: ET.Element) -> str:
     parents: dict[str, str] = {}
     for joint in root.findall("joint"):
         name = joint.get("name", "")
-        _check_type(joint)
         parent, child = (_end(joint, end, links) for end in ("parent", "child"))
         if child in parents:
             raise InputError(
@@ -65,11 +64,17 @@ def _names(root: ET.Element, tag: str) -> Counter[str]:
     return counts
 
 
-def _check_type(joint: ET.Element) -> None:
-    kind, name = joint.get("type", ""), joint.get("name", "")
-    if kind not in JOINT_TYPES:
-        remedy = _REMEDIES.get(kind, f"expected one of {', '.join(JOINT_TYPES)}")
-        raise InputError(f"the joint {name!r} has the type {kind!r}: {remedy}")
+def check_types(root: ET.Element) -> None:
+    """Checks that all joints of a URDF are hinges, or fixed.
+
+    Raises:
+        InputError: A joint has another type; the message has the remedy.
+    """
+    for joint in root.findall("joint"):
+        kind, name = joint.get("type", ""), joint.get("name", "")
+        if kind not in JOINT_TYPES:
+            remedy = _REMEDIES.get(kind, f"expected one of {', '.join(JOINT_TYPES)}")
+            raise InputError(f"the joint {name!r} has the type {kind[:40]!r}: {remedy}")
 
 
 def _end(joint: ET.Element, end: str, links: Collection[str]) -> str:
