@@ -5,10 +5,10 @@ from pathlib import Path
 
 from selfmodel.errors import InputError, WorkError
 from selfmodel.logs import read_log
-from selfmodel.logs.rosbag.importer import import_bag, write_recording
-from selfmodel.logs.rosbag.mapping import BagMapping
-from selfmodel.logs.rosbag.mapping_file import parse_mapping
-from selfmodel.logs.rosbag.suggest import suggest
+from selfmodel.logs.recordings.importer import import_bag, write_recording
+from selfmodel.logs.recordings.mapping.mapping import BagMapping
+from selfmodel.logs.recordings.mapping.mapping_file import parse_mapping
+from selfmodel.logs.recordings.mapping.suggest import suggest
 from selfmodel.robot.robot import Robot
 
 

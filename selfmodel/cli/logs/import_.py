@@ -16,10 +16,10 @@ from selfmodel.experiments import robots, trial_logs
 from selfmodel.experiments.robots import is_model
 from selfmodel.files import read_file
 from selfmodel.logs.files import refuse_existing
-from selfmodel.logs.rosbag.importer import Recording, import_bag, write_recording
-from selfmodel.logs.rosbag.mapping import BagMapping
-from selfmodel.logs.rosbag.mapping_file import read_mapping
-from selfmodel.logs.rosbag.suggest import suggest as suggest_mapping
+from selfmodel.logs.recordings.importer import Recording, import_bag, write_recording
+from selfmodel.logs.recordings.mapping.mapping import BagMapping
+from selfmodel.logs.recordings.mapping.mapping_file import read_mapping
+from selfmodel.logs.recordings.mapping.suggest import suggest as suggest_mapping
 from selfmodel.robot.mjcf.rehearsal import physics_timestep
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import Budget

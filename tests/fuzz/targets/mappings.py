@@ -5,14 +5,14 @@ from pathlib import Path
 
 import numpy as np
 
-from selfmodel.logs.rosbag.importer import import_bag
-from selfmodel.logs.rosbag.mapping_file import read_mapping
+from selfmodel.logs.recordings.importer import import_bag
+from selfmodel.logs.recordings.mapping.mapping_file import read_mapping
 from selfmodel.robot.robot import Robot
 from tests.fuzz.mutate import tomls
 from tests.fuzz.seeds import DATA, OTHER_MAPPING, biped, recording
 from tests.fuzz.target import Case, Make, Target
-from tests.logs.rosbag.bags import storage, write_bag
-from tests.logs.rosbag.conftest import MAPPING
+from tests.logs.recordings.conftest import MAPPING
+from tests.logs.recordings.rosbag.bags import storage, write_bag
 
 SECONDS = 0.1
 NAME = "map.toml"
