@@ -24,6 +24,10 @@ NO_KEYFRAME = "none"
 """Value of ``keyframe`` for the reference pose of the MJCF."""
 
 
+BASES = ("free", "fixed")
+"""Values of ``base``."""
+
+
 @dataclass(frozen=True)
 class MjcfSettings:
     """Settings for the conversion of an MJCF to a robot.
@@ -39,6 +43,10 @@ class MjcfSettings:
         ctrlrange: Lowest and highest command of motors without a command range.
         assets: Folder with files that the MJCF names, in addition to its own; "" for none.
         urdf: Settings for a URDF; in a settings file they are beside the others.
+        base: ``free`` for a base with a free joint, ``fixed`` for a base that is fixed to the
+            world, as on a stand; None for the base of the file.
+        base_height: Height of the root body with ``base="fixed"``, m; None for the height of the
+            file, or the lowest height at which the robot cannot touch the ground if that is larger.
     """
 
     forward: str = "x"
@@ -49,6 +57,8 @@ class MjcfSettings:
     ctrlrange: tuple[float, float] | None = None
     assets: str = ""
     urdf: UrdfSettings = field(default_factory=UrdfSettings)
+    base: str | None = None
+    base_height: float | None = None
 
 
 def read_settings(path: Path, extra: Mapping[str, Any] | None = None) -> MjcfSettings:
@@ -140,6 +150,14 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
         raise InputError(f"keyframe needs the name of a keyframe, or none, got {keyframe!r}")
     if not isinstance(assets, str):
         raise InputError(f"assets needs the path of a folder, got {assets!r}")
+    base, height = given.get("base"), given.get("base_height")
+    if base is not None and base not in BASES:
+        raise InputError(f"base needs one of {', '.join(BASES)}, got {base!r}")
+    if height is not None and (base != "fixed" or not _is_number(height)):
+        raise InputError(
+            f'base_height needs a number of metres and base = "fixed", got {height!r} with base '
+            f"{base or 'of the file'}"
+        )
     return MjcfSettings(
         forward=forward,
         keyframe=keyframe,
@@ -149,6 +167,8 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
         ctrlrange=_range(given),
         assets=assets,
         urdf=checked_urdf_settings(given),
+        base=base,
+        base_height=None if height is None else float(height),
     )
 
 

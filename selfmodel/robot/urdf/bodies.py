@@ -166,6 +166,8 @@ def _inertial(body: mujoco.MjsBody) -> dict[str, str]:
     """Returns the attributes of an ``<inertial>``."""
     mass = {"mass": repr(float(body.mass))}
     full = np.array(body.fullinertia)
+    if not is_rigid(body):
+        full = np.array([*np.full(3, max(0.0, float(full[:3].mean()))), 0.0, 0.0, 0.0])
     if not np.any(full[3:]):
         frame = Frame(np.array(body.ipos), np.array(body.iquat))
         return _placed(frame) | mass | {"diaginertia": format_numbers(full[:3])}
@@ -173,12 +175,21 @@ def _inertial(body: mujoco.MjsBody) -> dict[str, str]:
     rotation = np.empty(9)
     mujoco.mju_quat2Mat(rotation, np.array(body.iquat))
     turn = rotation.reshape(3, 3)
-    matrix = turn @ inertia_matrix(body) @ turn.T
+    matrix = turn @ _inertia_matrix(body) @ turn.T
     elements = matrix[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     return {"pos": format_numbers(np.array(body.ipos)), "fullinertia": format_numbers(elements)} | mass
 
 
-def inertia_matrix(body: mujoco.MjsBody) -> FloatArray:
+def is_rigid(body: mujoco.MjsBody) -> bool:
+    """Returns whether the inertia of a body is that of a rigid body, or zero."""
+    matrix = _inertia_matrix(body)
+    if not np.any(matrix) or not np.all(np.isfinite(matrix)):
+        return True
+    least, middle, most = np.linalg.eigvalsh(matrix)
+    return bool(least > 0 and least + middle >= most)
+
+
+def _inertia_matrix(body: mujoco.MjsBody) -> FloatArray:
     """Returns the inertia of a body in its inertial frame, ``(3, 3)`` kg m²."""
     xx, yy, zz, xy, xz, yz = body.fullinertia
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])

@@ -3,13 +3,12 @@
 from xml.etree import ElementTree as ET  # of checked texts
 
 import mujoco
-import numpy as np
 
 from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.document import Document
 from selfmodel.robot.mjcf.expand import format_numbers
 from selfmodel.robot.mjcf.mujoco_errors import compile_model, loading_a_model
-from selfmodel.robot.urdf.bodies import bodies, inertia_matrix, meshes
+from selfmodel.robot.urdf.bodies import bodies, is_rigid, meshes
 from selfmodel.robot.urdf.reading import number
 from selfmodel.robot.urdf.settings import UrdfSettings
 from selfmodel.robot.urdf.servos import check_patterns, servo
@@ -42,7 +41,9 @@ def convert(document: Document, settings: UrdfSettings) -> Document:
     spec = _imported(document)
     root = ET.Element("mujoco", {"model": urdf.get("name", "robot")})
     made = Document(root, document.assets, list(document.notes))
-    _add_compiler(made, spec)
+    # Links without an <inertial> have no mass, as URDF defines.
+    ET.SubElement(root, "compiler", {"angle": "radian", "inertiafromgeom": "false"})
+    _note_inertias(made, spec)
     option = {"timestep": repr(PHYSICS_TIMESTEP), "integrator": "implicitfast"}
     ET.SubElement(root, "option", option)
     made.section("asset").extend(meshes(spec))
@@ -69,20 +70,12 @@ def _imported(document: Document) -> mujoco.MjSpec:
         return mujoco.MjSpec.from_string(document.text, assets=document.assets)
 
 
-def _add_compiler(made: Document, spec: mujoco.MjSpec) -> None:
-    """Adds the compiler options; links without an ``<inertial>`` have no mass, as URDF defines."""
-    compiler = ET.SubElement(made.root, "compiler", {"angle": "radian", "inertiafromgeom": "false"})
-    unbalanced = []
-    for body in spec.bodies:
-        if body.mass:
-            moments = np.linalg.eigvalsh(inertia_matrix(body))
-            if moments[0] + moments[1] < moments[2]:
-                unbalanced.append(body.name)
-    if unbalanced:
-        compiler.set("balanceinertia", "true")
+def _note_inertias(made: Document, spec: mujoco.MjSpec) -> None:
+    replaced = [body.name for body in spec.bodies if body.mass and not is_rigid(body)]
+    if replaced:
         made.notes.append(
-            f"the inertia of {_listed(unbalanced)} is of no rigid body (two moments sum to less "
-            f"than the third), and is replaced by the mean of the moments"
+            f"the inertia of {_listed(replaced)} is that of no rigid body (a moment is not above "
+            f"0, or exceeds the sum of the others), and is replaced by the mean of its moments"
         )
 
 
