@@ -8,7 +8,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree as ET  # of checked texts
 
 from selfmodel.errors import InputError
@@ -22,9 +21,11 @@ from selfmodel.robot.mjcf.ground import add_ground
 from selfmodel.robot.mjcf.keyframe import bake_keyframe
 from selfmodel.robot.mjcf.mujoco_errors import compile_model, mujoco_errors_as_input_errors
 from selfmodel.robot.mjcf.names import name_parts
+from selfmodel.robot.mjcf.reach import limit_reach
 from selfmodel.robot.mjcf.rehearsal import run_on_model
 from selfmodel.robot.mjcf.sensors import add_sensors
-from selfmodel.robot.mjcf.settings import MAX_CONTROL_TIMESTEP, MjcfSettings
+from selfmodel.robot.mjcf.servos import add_servos
+from selfmodel.robot.mjcf.settings import MAX_CONTROL_TIMESTEP, MjcfSettings, checked_settings
 from selfmodel.robot.mjcf.untrusted import checked_model
 from selfmodel.robot.mjcf.usability import check_usable
 from selfmodel.robot.mjcf.visuals import drop_visuals
@@ -87,11 +88,8 @@ def adapt_message(message: Message, budget: Budget, _scratch: Path) -> Message:
     """Task of a child process: adapts the document in a message, and checks the robot of it."""
     facts = message.facts
     document = Document(ET.fromstring(facts["mjcf"]), dict(message.blobs))  # noqa: S314  # checked
-    settings: dict[str, Any] = {
-        name: tuple(value) if isinstance(value, list) else value
-        for name, value in facts["settings"].items()
-    }
-    adapted = _adapted(facts["name"], document, MjcfSettings(**settings), budget)
+    given = {name: value for name, value in facts["settings"].items() if value is not None}
+    adapted = _adapted(facts["name"], document, checked_settings(given), budget)
     with mujoco_errors_as_input_errors("use the model"):
         Robot(adapted.name, adapted.mjcf, adapted.control_timestep, adapted.assets)
     result = {
@@ -140,7 +138,12 @@ def _adapted(name: str, document: Document, settings: MjcfSettings, budget: Budg
     turn_forward(document, compile_model(document.text, document.assets), settings)
     add_ground(document, compile_model(document.text, document.assets))
     add_sensors(document, compile_model(document.text, document.assets), settings)
-    add_command_ranges(document, model, settings)
+    if settings.servo is not None:
+        model = compile_model(document.text, document.assets)
+        add_servos(document, model, settings.servo, settings.reach)
+    if settings.reach is not None:
+        limit_reach(document, compile_model(document.text, document.assets), settings.reach)
+    add_command_ranges(document, compile_model(document.text, document.assets), settings)
     try:
         checked = checked_model(document.text, document.assets, budget)
     except ValueError as error:

@@ -23,6 +23,19 @@ NO_KEYFRAME = "none"
 
 
 @dataclass(frozen=True)
+class Servo:
+    """Gains of a position servo: torque = kp (command - angle) - kd (angular velocity).
+
+    Attributes:
+        kp: Stiffness, N m/rad; above 0.
+        kd: Damping, N m s/rad; at least 0.
+    """
+
+    kp: float
+    kd: float
+
+
+@dataclass(frozen=True)
 class MjcfSettings:
     """Settings for the conversion of an MJCF to a robot.
 
@@ -35,6 +48,9 @@ class MjcfSettings:
         touch: Bodies that get a touch sensor; None for the end of each limb.
         angle: Joints that get an angle sensor; None for every hinge that a motor drives.
         ctrlrange: Lowest and highest command of motors without a command range.
+        servo: Gains of position servos that replace the torque motors; None to keep the motors.
+        reach: Largest distance of a servo's command from the initial pose, rad; None for the
+            servo's command range.
     """
 
     forward: str = "x"
@@ -43,6 +59,8 @@ class MjcfSettings:
     touch: tuple[str, ...] | None = None
     angle: tuple[str, ...] | None = None
     ctrlrange: tuple[float, float] | None = None
+    servo: Servo | None = None
+    reach: float | None = None
 
 
 def read_settings(path: Path, extra: Mapping[str, Any] | None = None) -> MjcfSettings:
@@ -119,6 +137,8 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
         touch=_names(given, "touch"),
         angle=_names(given, "angle"),
         ctrlrange=_range(given),
+        servo=_servo(given),
+        reach=_reach(given),
     )
 
 
@@ -137,6 +157,28 @@ def _range(given: Mapping[str, Any]) -> tuple[float, float] | None:
     if not ends[0] < ends[1]:
         raise InputError(f"ctrlrange needs its lower end first, got {ends!r}")
     return float(ends[0]), float(ends[1])
+
+
+def _servo(given: Mapping[str, Any]) -> Servo | None:
+    gains = given.get("servo")
+    if gains is None:
+        return None
+    valid = isinstance(gains, dict) and set(gains) == {"kp", "kd"}
+    if not (valid and all(map(_is_number, gains.values())) and gains["kp"] > 0 <= gains["kd"]):
+        raise InputError(
+            f"servo needs kp above 0 and kd of at least 0, such as {{kp = 40, kd = 1}}, "
+            f"got {gains!r}"
+        )
+    return Servo(float(gains["kp"]), float(gains["kd"]))
+
+
+def _reach(given: Mapping[str, Any]) -> float | None:
+    reach = given.get("reach")
+    if reach is None:
+        return None
+    if not (_is_number(reach) and reach > 0):
+        raise InputError(f"reach needs an angle above 0 rad, such as 0.5, got {reach!r}")
+    return float(reach)
 
 
 def _names(given: Mapping[str, Any], key: str) -> tuple[str, ...] | None:
