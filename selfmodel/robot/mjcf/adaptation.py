@@ -18,6 +18,7 @@ from selfmodel.robot.mjcf.expand import check_loggable, expand
 from selfmodel.robot.mjcf.files import Folder, InMemory
 from selfmodel.robot.mjcf.forward import turn_forward
 from selfmodel.robot.mjcf.ground import add_ground
+from selfmodel.robot.mjcf.hidden_state import remove_hidden_state
 from selfmodel.robot.mjcf.keyframe import bake_keyframe
 from selfmodel.robot.mjcf.mujoco_errors import compile_model, mujoco_errors_as_input_errors
 from selfmodel.robot.mjcf.names import name_parts
@@ -133,6 +134,7 @@ def _adapted(name: str, document: Document, settings: MjcfSettings, budget: Budg
     if drop_visuals(document, model):
         model = compile_model(document.text, document.assets)
     check_usable(model)
+    remove_hidden_state(document, model)
     timestep = _control_timestep(float(model.opt.timestep), settings.control_timestep)
     bake_keyframe(document, model, settings)
     turn_forward(document, compile_model(document.text, document.assets), settings)
