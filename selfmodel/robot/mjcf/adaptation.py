@@ -6,7 +6,7 @@ control time step, so that a log with both contains the robot.
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from xml.etree import ElementTree as ET  # of checked texts
 
@@ -15,7 +15,7 @@ from selfmodel.files import encodable, read_file
 from selfmodel.robot.mjcf.command_ranges import add_command_ranges
 from selfmodel.robot.mjcf.document import Document, read_document
 from selfmodel.robot.mjcf.expand import check_loggable, expand
-from selfmodel.robot.mjcf.files import Folder, InMemory
+from selfmodel.robot.mjcf.files import InMemory, robot_folder
 from selfmodel.robot.mjcf.forward import turn_forward
 from selfmodel.robot.mjcf.ground import add_ground
 from selfmodel.robot.mjcf.hidden_state import remove_hidden_state
@@ -64,7 +64,8 @@ def adapt(path: Path, settings: MjcfSettings, budget: Budget = DEFAULT_BUDGET) -
     """Returns the adapted MJCF of a file; MuJoCo compiles the file in a child process.
 
     Args:
-        path: The file, which may include and name files of its folder and subfolders.
+        path: The file, which may include and name files of its folder, of the folder above in a
+            usual layout (``root_around``), and of the folder ``assets`` of the settings.
         settings: Properties that the file does not contain.
         budget: Limits of memory and time.
 
@@ -73,9 +74,11 @@ def adapt(path: Path, settings: MjcfSettings, budget: Budget = DEFAULT_BUDGET) -
     """
     data = read_file(path, "an MJCF file", budget.model_text)
     try:
-        document = read_document(data, Folder(path.parent), path.name, budget=budget)
+        files = robot_folder(path.parent, settings.assets)
+        document = read_document(data, files, path.name, budget=budget)
+        read = asdict(replace(settings, assets=""))  # the files are read
         request = Message(
-            {"name": encodable(path.stem), "mjcf": document.text, "settings": asdict(settings)},
+            {"name": encodable(path.stem), "mjcf": document.text, "settings": read},
             document.assets,
         )
         found = run_on_model("selfmodel.robot.mjcf.adaptation:adapt_message", request, budget)

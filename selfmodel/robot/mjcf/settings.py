@@ -8,6 +8,7 @@ from typing import Any
 
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.files import load_toml, read_file
+from selfmodel.robot.mjcf.files import is_around_home
 
 MAX_SETTINGS_BYTES = 2**16
 """Largest settings file, in bytes."""
@@ -51,6 +52,7 @@ class MjcfSettings:
         servo: Gains of position servos that replace the torque motors; None to keep the motors.
         reach: Largest distance of a servo's command from the initial pose, rad; None for the
             servo's command range.
+        assets: Folder with files that the MJCF names, in addition to its own; "" for none.
     """
 
     forward: str = "x"
@@ -61,6 +63,7 @@ class MjcfSettings:
     ctrlrange: tuple[float, float] | None = None
     servo: Servo | None = None
     reach: float | None = None
+    assets: str = ""
 
 
 def read_settings(path: Path, extra: Mapping[str, Any] | None = None) -> MjcfSettings:
@@ -68,7 +71,8 @@ def read_settings(path: Path, extra: Mapping[str, Any] | None = None) -> MjcfSet
 
     Args:
         path: The MJCF file.
-        extra: Settings that override those of the file.
+        extra: Settings that override those of the file. Folders are relative to the working folder;
+            in the file, to the folder of the file.
 
     Raises:
         InputError: A setting is unknown or invalid, or the file cannot be read.
@@ -82,9 +86,27 @@ def read_settings(path: Path, extra: Mapping[str, Any] | None = None) -> MjcfSet
         except ValueError as error:
             raise InputError(f"{file}: expected a file of settings in TOML: {error}") from error
     try:
+        if "assets" in loaded:
+            loaded["assets"] = _folder_of(file, loaded["assets"])
         return checked_settings({**loaded, **(extra or {})})
     except InputError as error:
         raise InputError(f"{file}: {error}") if loaded else error from None
+
+
+def _folder_of(file: Path, assets: object) -> str:
+    """Returns the folder that a file of settings, which may be from any source, names."""
+    if not isinstance(assets, str) or Path(assets).is_absolute():
+        raise InputError(
+            f"assets needs the path of a folder, relative to this file, got {assets!r}: give an "
+            f"absolute path with --set assets=DIR"
+        )
+    folder = file.parent / assets
+    if is_around_home(folder.resolve()):
+        raise InputError(
+            f"assets may not be the home folder, or a folder around it, got {assets!r}: give that "
+            f"folder with --set assets=DIR"
+        )
+    return str(folder)
 
 
 def parse_setting(text: str) -> dict[str, Any]:
@@ -126,10 +148,13 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
             f"got {step!r}"
         )
     forward, keyframe = given.get("forward", "x"), given.get("keyframe", "")
+    assets = given.get("assets", "")
     if not isinstance(forward, str) or forward not in FORWARD_DIRECTIONS:
         raise InputError(f"forward needs one of {', '.join(FORWARD_DIRECTIONS)}, got {forward!r}")
     if not isinstance(keyframe, str):
         raise InputError(f"keyframe needs the name of a keyframe, or none, got {keyframe!r}")
+    if not isinstance(assets, str):
+        raise InputError(f"assets needs the path of a folder, got {assets!r}")
     return MjcfSettings(
         forward=forward,
         keyframe=keyframe,
@@ -139,6 +164,7 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
         ctrlrange=_range(given),
         servo=_servo(given),
         reach=_reach(given),
+        assets=assets,
     )
 
 
