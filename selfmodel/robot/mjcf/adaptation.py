@@ -12,6 +12,7 @@ from xml.etree import ElementTree as ET  # of checked texts
 
 from selfmodel.errors import InputError
 from selfmodel.files import encodable, read_file
+from selfmodel.robot.mjcf.base import carry_hinges, fix_base, free_base
 from selfmodel.robot.mjcf.command_ranges import add_command_ranges
 from selfmodel.robot.mjcf.document import Document, read_document
 from selfmodel.robot.mjcf.expand import check_loggable, expand
@@ -133,7 +134,11 @@ def _adapted(name: str, document: Document, settings: MjcfSettings, budget: Budg
     for body in document.bodies():
         if body.attrib.pop("mocap", "false") == "true":
             document.notes.append(f"the mocap body {body.get('name')} is static")
+    if settings.base == "free":
+        free_base(document, compile_model(document.text, document.assets))
     model = compile_model(document.text, document.assets)
+    if carry_hinges(document, model):
+        model = compile_model(document.text, document.assets)
     if drop_visuals(document, model):
         model = compile_model(document.text, document.assets)
     check_usable(model)
@@ -141,6 +146,8 @@ def _adapted(name: str, document: Document, settings: MjcfSettings, budget: Budg
     timestep = _control_timestep(float(model.opt.timestep), settings.control_timestep)
     bake_keyframe(document, model, settings)
     turn_forward(document, compile_model(document.text, document.assets), settings)
+    if settings.base == "fixed":
+        fix_base(document, compile_model(document.text, document.assets), settings.base_height)
     add_ground(document, compile_model(document.text, document.assets))
     add_sensors(document, compile_model(document.text, document.assets), settings)
     if settings.servo is not None:

@@ -6,6 +6,8 @@ import mujoco
 import numpy as np
 
 from selfmodel.errors import InputError
+from selfmodel.robot.anatomy_reader import driven_joints
+from selfmodel.robot.base import floating_bodies
 from selfmodel.robot.mjcf.contacts import contacts_enabled, ground_contact_geoms, joined_mask
 from selfmodel.robot.mjcf.document import Document
 from selfmodel.robot.mjcf.expand import format_numbers
@@ -19,7 +21,7 @@ _MAX_DISTANCE = 1e6
 def add_ground(document: Document, model: mujoco.MjModel) -> None:
     """Adds a plane under the lowest point of a robot that could touch no static geom.
 
-    Models without contacts, and models of swimmers, get no ground.
+    Models without contacts, models of swimmers and robots with a fixed base get no ground.
 
     Args:
         document: The MJCF, edited in place.
@@ -29,6 +31,8 @@ def add_ground(document: Document, model: mujoco.MjModel) -> None:
         InputError: No geom of the robot could touch a ground.
     """
     if not contacts_enabled(model) or ground_contact_geoms(model) or _swims(model):
+        return
+    if not floating_bodies(model, driven_joints(model)):
         return
     moving = model.body_weldid[model.geom_bodyid] != 0
     contype, conaffinity = (

@@ -23,6 +23,10 @@ NO_KEYFRAME = "none"
 """Value of ``keyframe`` for the reference pose of the MJCF."""
 
 
+BASES = ("free", "fixed")
+"""Values of ``base``."""
+
+
 @dataclass(frozen=True)
 class Servo:
     """Gains of a position servo: torque = kp (command - angle) - kd (angular velocity).
@@ -52,6 +56,10 @@ class MjcfSettings:
         servo: Gains of position servos that replace the torque motors; None to keep the motors.
         reach: Largest distance of a servo's command from the initial pose, rad; None for the
             servo's command range.
+        base: ``free`` for a base with a free joint, ``fixed`` for a base that is fixed to the
+            world, as on a stand; None for the base of the file.
+        base_height: Height of the root body with ``base="fixed"``, m; None for the height of the
+            file, or the lowest height at which the robot cannot touch the ground if that is larger.
         assets: Folder with files that the MJCF names, in addition to its own; "" for none.
     """
 
@@ -63,6 +71,8 @@ class MjcfSettings:
     ctrlrange: tuple[float, float] | None = None
     servo: Servo | None = None
     reach: float | None = None
+    base: str | None = None
+    base_height: float | None = None
     assets: str = ""
 
 
@@ -153,6 +163,14 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
         raise InputError(f"forward needs one of {', '.join(FORWARD_DIRECTIONS)}, got {forward!r}")
     if not isinstance(keyframe, str):
         raise InputError(f"keyframe needs the name of a keyframe, or none, got {keyframe!r}")
+    base, height = given.get("base"), given.get("base_height")
+    if base is not None and base not in BASES:
+        raise InputError(f"base needs one of {', '.join(BASES)}, got {base!r}")
+    if height is not None and (base != "fixed" or not _is_number(height)):
+        raise InputError(
+            f'base_height needs a number of metres and base = "fixed", got {height!r} with base '
+            f"{base or 'of the file'}"
+        )
     if not isinstance(assets, str):
         raise InputError(f"assets needs the path of a folder, got {assets!r}")
     return MjcfSettings(
@@ -164,6 +182,8 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
         ctrlrange=_range(given),
         servo=_servo(given),
         reach=_reach(given),
+        base=base,
+        base_height=None if height is None else float(height),
         assets=assets,
     )
 

@@ -16,6 +16,7 @@ from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings, parse_setting, read_settings
 from selfmodel.simulation.simulator import Simulator
 from tests.helpers.drivers import random_controllers
+from tests.helpers.exactness import remove_warm_start
 from tests.robot.mjcf.awkward import GROUND, LEGS, MOTORS, TORSO, mjcf
 from tests.robot.mjcf.samples import SAMPLES
 
@@ -29,12 +30,6 @@ def theirs(path: Path) -> mujoco.MjModel:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return mujoco.MjModel.from_xml_path(str(path))
-
-
-def without_warm_start(model: mujoco.MjModel) -> None:
-    """Sets the solver's options of an adapted model."""
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_WARMSTART
-    model.opt.iterations = max(100, model.opt.iterations)
 
 
 def written(folder: Path, text: str) -> Path:
@@ -58,7 +53,7 @@ def test_a_robot_moves_as_its_file_says(name: str):
     model, robot = theirs(SAMPLES[name]), load_mjcf(SAMPLES[name])
 
     if not model.nkey:
-        without_warm_start(model)
+        remove_warm_start(model)
         before, after = (moved(m, m.qpos0) for m in (model, robot.model))
         if "cheetah" in name:  # its masses are scaled to a sum, which is written out
             assert np.allclose(before.qpos, after.qpos, atol=1e-6)
