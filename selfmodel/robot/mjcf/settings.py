@@ -8,8 +8,8 @@ from typing import Any
 
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.files import load_toml, read_file
-from selfmodel.robot.urdf.settings import URDF_SETTINGS, UrdfSettings, checked_urdf_settings
 from selfmodel.robot.mjcf.files import is_around_home
+from selfmodel.robot.urdf.settings import URDF_SETTINGS, UrdfSettings, checked_urdf_settings
 
 MAX_SETTINGS_BYTES = 2**16
 """Largest settings file, in bytes."""
@@ -29,6 +29,19 @@ BASES = ("free", "fixed")
 
 
 @dataclass(frozen=True)
+class Servo:
+    """Gains of a position servo: torque = kp (command - angle) - kd (angular velocity).
+
+    Attributes:
+        kp: Stiffness, N m/rad; above 0.
+        kd: Damping, N m s/rad; at least 0.
+    """
+
+    kp: float
+    kd: float
+
+
+@dataclass(frozen=True)
 class MjcfSettings:
     """Settings for the conversion of an MJCF to a robot.
 
@@ -42,6 +55,9 @@ class MjcfSettings:
         angle: Joints that get an angle sensor; None for every hinge that a motor drives.
         ctrlrange: Lowest and highest command of motors without a command range.
         urdf: Settings for a URDF; in a settings file they are beside the others.
+        servo: Gains of position servos that replace the torque motors; None to keep the motors.
+        reach: Largest distance of a servo's command from the initial pose, rad; None for the
+            servo's command range.
         base: ``free`` for a base with a free joint, ``fixed`` for a base that is fixed to the
             world, as on a stand; None for the base of the file.
         base_height: Height of the root body with ``base="fixed"``, m; None for the height of the
@@ -55,6 +71,8 @@ class MjcfSettings:
     touch: tuple[str, ...] | None = None
     angle: tuple[str, ...] | None = None
     ctrlrange: tuple[float, float] | None = None
+    servo: Servo | None = None
+    reach: float | None = None
     base: str | None = None
     base_height: float | None = None
     assets: str = ""
@@ -165,6 +183,8 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
         touch=_names(given, "touch"),
         angle=_names(given, "angle"),
         ctrlrange=_range(given),
+        servo=_servo(given),
+        reach=_reach(given),
         base=base,
         base_height=None if height is None else float(height),
         assets=assets,
@@ -191,6 +211,28 @@ def _range(given: Mapping[str, Any]) -> tuple[float, float] | None:
     if not ends[0] < ends[1]:
         raise InputError(f"ctrlrange needs its lower end first, got {ends!r}")
     return float(ends[0]), float(ends[1])
+
+
+def _servo(given: Mapping[str, Any]) -> Servo | None:
+    gains = given.get("servo")
+    if gains is None:
+        return None
+    valid = isinstance(gains, dict) and set(gains) == {"kp", "kd"}
+    if not (valid and all(map(_is_number, gains.values())) and gains["kp"] > 0 <= gains["kd"]):
+        raise InputError(
+            f"servo needs kp above 0 and kd of at least 0, such as {{kp = 40, kd = 1}}, "
+            f"got {gains!r}"
+        )
+    return Servo(float(gains["kp"]), float(gains["kd"]))
+
+
+def _reach(given: Mapping[str, Any]) -> float | None:
+    reach = given.get("reach")
+    if reach is None:
+        return None
+    if not (_is_number(reach) and reach > 0):
+        raise InputError(f"reach needs an angle above 0 rad, such as 0.5, got {reach!r}")
+    return float(reach)
 
 
 def _names(given: Mapping[str, Any], key: str) -> tuple[str, ...] | None:
