@@ -20,6 +20,7 @@ from selfmodel.robot.mjcf.files import InMemory, robot_folder
 from selfmodel.robot.mjcf.forward import turn_forward
 from selfmodel.robot.mjcf.ground import add_ground
 from selfmodel.robot.mjcf.keyframe import bake_keyframe
+from selfmodel.robot.mjcf.missing_meshes import replace_missing_meshes
 from selfmodel.robot.mjcf.mujoco_errors import compile_model, mujoco_errors_as_input_errors
 from selfmodel.robot.mjcf.names import name_parts
 from selfmodel.robot.mjcf.rehearsal import run_on_model
@@ -76,7 +77,12 @@ def adapt(path: Path, settings: MjcfSettings, budget: Budget = DEFAULT_BUDGET) -
         document = read_document(data, files, path.name, budget=budget)
         read = asdict(replace(settings, assets=""))  # the files are read
         request = Message(
-            {"name": encodable(path.stem), "mjcf": document.text, "settings": read},
+            {
+                "name": encodable(path.stem),
+                "mjcf": document.text,
+                "settings": read,
+                "missing": document.missing,
+            },
             document.assets,
         )
         found = run_on_model("selfmodel.robot.mjcf.adaptation:adapt_message", request, budget)
@@ -89,7 +95,8 @@ def adapt(path: Path, settings: MjcfSettings, budget: Budget = DEFAULT_BUDGET) -
 def adapt_message(message: Message, budget: Budget, _scratch: Path) -> Message:
     """Task of a child process: adapts the document in a message, and checks the robot of it."""
     facts = message.facts
-    document = Document(ET.fromstring(facts["mjcf"]), dict(message.blobs))  # noqa: S314  # checked
+    root = ET.fromstring(facts["mjcf"])  # noqa: S314  # checked
+    document = Document(root, dict(message.blobs), missing=facts["missing"])
     settings: dict[str, Any] = {
         name: tuple(value) if isinstance(value, list) else value
         for name, value in facts["settings"].items()
@@ -136,6 +143,8 @@ def _adapted(name: str, document: Document, settings: MjcfSettings, budget: Budg
             document.notes.append(f"the mocap body {body.get('name')} is static")
     drop_textures(document)
     model = compile_model(document.text, document.assets)
+    if replace_missing_meshes(document, model):
+        model = compile_model(document.text, document.assets)
     if reduce_meshes(document, model):
         model = compile_model(document.text, document.assets)
     check_usable(model)
