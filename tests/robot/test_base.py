@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, strategies as st
 from scipy.spatial.transform import Rotation
 
-from selfmodel.robot.floating_base import read_floating_base
+from selfmodel.robot.base import read_base
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sliding_base import SlidingBase
 from selfmodel.robot.state_access import bind_data, current_value, signal_fields, state_writer
@@ -74,7 +74,7 @@ def test_a_sliding_base_has_the_signals_of_its_body(seed: int, slides: int, turn
     of_body = mujoco.mjtObj.mjOBJ_XBODY
     mujoco.mj_objectVelocity(robot.model, data, of_body, int(body.id), velocity, 1)
 
-    assert isinstance(read_floating_base([robot.model], "torso"), SlidingBase)
+    assert isinstance(read_base([robot.model], "torso"), SlidingBase)
     np.testing.assert_allclose(told["base_position"], body.xpos, atol=1e-9)
     turned = Rotation.from_quat(told["base_orientation"], scalar_first=True).as_matrix()
     np.testing.assert_allclose(turned, body.xmat.reshape(3, 3), atol=1e-9)

@@ -1,7 +1,7 @@
-"""Floating base of a robot: its root body, and its pose and velocity in MuJoCo's state.
+"""Base of a robot: its root body, and its pose and velocity in MuJoCo's state.
 
 A base moves freely, or along slide joints and about one hinge, such as the planar walkers of the
-dm_control suite.
+dm_control suite; or it is fixed to the world, such as that of an arm.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray
+from selfmodel.robot.fixed_base import FixedBase
 from selfmodel.robot.sliding_base import ScalarJoint, SlidingBase
 from selfmodel.robot.state_fields import DerivedSignal, StateField
 from selfmodel.trials.signals import Signal
@@ -61,11 +62,11 @@ class FreeBase:
         }
 
 
-FloatingBase = FreeBase | SlidingBase
+Base = FreeBase | SlidingBase | FixedBase
 
 
-def read_floating_base(models: Sequence[mujoco.MjModel], root: str) -> FloatingBase:
-    """Returns the floating base of a robot.
+def read_base(models: Sequence[mujoco.MjModel], root: str) -> Base:
+    """Returns the base of a robot.
 
     Args:
         models: One model for all rows of a state, or one model per row; they share one layout.
@@ -74,6 +75,8 @@ def read_floating_base(models: Sequence[mujoco.MjModel], root: str) -> FloatingB
     model = models[0]
     body = model.body(root)
     joints = joints_of_body(model, int(body.id))
+    if not joints:
+        return FixedBase.of(models, int(body.id))
     if model.jnt_type[joints[0]] == _FREE:
         return FreeBase(int(model.jnt_qposadr[joints[0]]), int(model.jnt_dofadr[joints[0]]))
     slides = [j for j in joints if model.jnt_type[j] == _SLIDE]
@@ -98,33 +101,87 @@ def joints_of_body(model: mujoco.MjModel, body: int) -> list[int]:
 def find_root_body(model: mujoco.MjModel, driven: frozenset[int]) -> int:
     """Returns the id of the root body of a robot.
 
+    The root body is the body with a free joint or with slide joints. Without such a body the base
+    is fixed, and the root body is the static body that carries all driven joints: of several, the
+    one nearest to the joints.
+
     Args:
         model: A compiled MJCF.
         driven: Ids of the joints that motors move.
 
     Raises:
-        ValueError: The model has no floating base, or several.
+        ValueError: The model has several floating bases; or none, and slide joints on a body of the
+            world, or no static body below the world that carries all driven joints.
     """
-    floating = [int(model.jnt_bodyid[j]) for j in np.flatnonzero(model.jnt_type == _FREE)]
-    if not floating:
-        floating = [
-            body
-            for body in np.flatnonzero(model.body_parentid == 0).tolist()
-            if body and _is_sliding_base(model, body, driven)
-        ]
+    floating = floating_bodies(model, driven)
     if len(floating) > 1:
         names = ", ".join(model.body(body).name or f"number {body}" for body in floating)
         raise ValueError(
             f"expected one root body that moves freely, got {names}: keep the robot, and remove "
             f"the other bodies or fix them to the world"
         )
-    if not floating:
+    if floating:
+        return floating[0]
+    _check_hinged(model)
+    carrier = common_carrier(model, driven)
+    if not carrier:
         raise ValueError(
-            "the model needs a root body with a free joint, or with slide joints and then at most "
-            "one hinge that no motor moves, and has none (its base is fixed): give the root body a "
-            "<freejoint/>"
+            "the driven joints are on several bodies of the world, or directly on one, and the "
+            "base is fixed: put them into one <body>, which is the root body"
         )
-    return floating[0]
+    return carrier
+
+
+def floating_bodies(model: mujoco.MjModel, driven: frozenset[int]) -> list[int]:
+    """Returns the ids of the bodies that can be a floating base.
+
+    Args:
+        model: A compiled MJCF.
+        driven: Ids of the joints that motors move.
+    """
+    free = [int(model.jnt_bodyid[j]) for j in np.flatnonzero(model.jnt_type == _FREE)]
+    return free or [
+        body
+        for body in np.flatnonzero(model.body_parentid == 0).tolist()
+        if body and _is_sliding_base(model, body, driven)
+    ]
+
+
+def common_carrier(model: mujoco.MjModel, joints: frozenset[int]) -> int:
+    """Returns the id of the static body nearest to some joints that carries all of them.
+
+    Args:
+        model: A compiled MJCF.
+        joints: Ids of at least one joint.
+
+    Returns:
+        The id of the body; 0, the world, if no other static body carries all the joints.
+    """
+    chains = [_static_chain(model, int(model.jnt_bodyid[joint])) for joint in joints]
+    return max(set(chains[0]).intersection(*chains[1:]))
+
+
+def _static_chain(model: mujoco.MjModel, body: int) -> list[int]:
+    """Returns the ids of the static bodies that carry a body, with the world."""
+    chain = []
+    while body:
+        body = int(model.body_parentid[body])
+        if not model.body_weldid[body]:
+            chain.append(body)
+    return chain
+
+
+def _check_hinged(model: mujoco.MjModel) -> None:
+    """Refuses bodies of a world that have a slide or ball joint and are no floating base."""
+    for joint in range(model.njnt):
+        parent = int(model.body_parentid[model.jnt_bodyid[joint]])
+        if model.jnt_type[joint] != _HINGE and not model.body_weldid[parent]:
+            raise ValueError(
+                f"the model needs a root body with a free joint, with slide joints and then at "
+                f"most one hinge that no motor moves, or without a joint (its base is fixed), and "
+                f"the body {model.body(model.jnt_bodyid[joint]).name or 'without a name'} has "
+                f"other joints: give the root body a <freejoint/>, or only hinges to its parent"
+            )
 
 
 def _is_sliding_base(model: mujoco.MjModel, body: int, driven: frozenset[int]) -> bool:
