@@ -83,7 +83,8 @@ def _write_parquet(file: IO[bytes], columns: Columns) -> None:
     import pyarrow as pa  # noqa: PLC0415  # an extra
     import pyarrow.parquet as pq  # noqa: PLC0415
 
-    pq.write_table(pa.table({name: np.array(values) for name, values in columns.items()}), file)
+    table = pa.table({name: np.array(values) for name, values in columns.items()})
+    pq.write_table(table, file, write_page_checksum=True)
 
 
 WRITERS: Mapping[str, Callable[[IO[bytes], Columns], None]] = MappingProxyType(

@@ -13,8 +13,10 @@ Quantity = Literal["command", "velocity", "effort", "sensor", "position"]
 _QUANTITIES: Mapping[Quantity, frozenset[str]] = MappingProxyType(
     {
         "command": frozenset(
-            ("command", "commands", "cmd", "target", "targets", "desired", "des", "setpoint")
-            + ("goal", "reference", "ref", "action", "actions", "ctrl", "control")
+            (
+                *("command", "commands", "cmd", "target", "targets", "desired", "des", "setpoint"),
+                *("goal", "reference", "ref", "action", "actions", "ctrl", "control"),
+            )
         ),
         "velocity": frozenset(("velocity", "velocities", "vel", "qd", "dq", "qvel", "qdot")),
         "effort": frozenset(("effort", "efforts", "torque", "torques", "tau")),
