@@ -92,9 +92,7 @@ def adapt(path: Path, settings: MjcfSettings, budget: Budget = DEFAULT_BUDGET) -
     return AdaptedMjcf(**{**found.facts, "notes": notes, "assets": found.blobs})
 
 
-def _read(
-    data: bytes, files: Files, name: str, settings: MjcfSettings, budget: Budget
-) -> Document:
+def _read(data: bytes, files: Files, name: str, settings: MjcfSettings, budget: Budget) -> Document:
     """Returns the document of an MJCF or of a URDF; see ``read_document`` and ``read_urdf``."""
     root = parse_xml(data)
     if root.tag == "robot":
@@ -118,7 +116,7 @@ def adapt_message(message: Message, budget: Budget, _scratch: Path) -> Message:
     }
     settings = MjcfSettings(**{**values, "urdf": UrdfSettings(**values["urdf"])})
     if root.tag == "robot":
-        document = convert(document, settings.urdf)
+        document = convert(document, settings.urdf, settings.base)
     adapted = _adapted(facts["name"], document, settings, budget)
     with mujoco_errors_as_input_errors("use the model"):
         Robot(adapted.name, adapted.mjcf, adapted.control_timestep, adapted.assets)

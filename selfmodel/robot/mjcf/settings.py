@@ -8,8 +8,8 @@ from typing import Any
 
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.files import load_toml, read_file
-from selfmodel.robot.urdf.settings import URDF_SETTINGS, UrdfSettings, checked_urdf_settings
 from selfmodel.robot.mjcf.files import is_around_home
+from selfmodel.robot.urdf.settings import URDF_SETTINGS, UrdfSettings, checked_urdf_settings
 
 MAX_SETTINGS_BYTES = 2**16
 """Largest settings file, in bytes."""

@@ -8,6 +8,7 @@ from xml.etree import ElementTree as ET  # of checked texts
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.robot.urdf.reading import number
 from selfmodel.robot.urdf.settings import URDF_SETTINGS, UrdfSettings, value_of
+from selfmodel.robot.urdf.tree import quoted
 
 FULL_EFFORT_ERROR = 0.5
 """Position error at which a servo without the setting ``kp`` exerts its full effort, rad; half of
@@ -39,8 +40,8 @@ def servo(joint: ET.Element, settings: UrdfSettings) -> tuple[ET.Element, str]:
         effort = number(limit, "effort", 0.0)
     if effort <= 0:
         raise InputError(
-            f"the joint {name!r} has no effort limit above 0: add it to its <limit>, or set the "
-            f"torque of such joints, in N m, with effort = ..."
+            f"the joint {quoted(name)} has no effort limit above 0: add it to its <limit>, or "
+            f"set the torque of such joints, in N m, with effort = ..."
         )
     low, high = UNLIMITED_RANGE
     if joint.get("type") == "revolute":
