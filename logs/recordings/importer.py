@@ -1,4 +1,4 @@
-"""Import of a recording: behaviour and quality from a bag, a mapping and a robot."""
+"""Import of a recording: behaviour and quality from a bag or table, a mapping and a robot."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -10,8 +10,13 @@ import numpy as np
 from selfmodel.arrays import FloatArray, frozen
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
-from selfmodel.logs.recordings.mapping.checks import check_columns, check_names, check_topics
-from selfmodel.logs.recordings.mapping.mapping import BagMapping
+from selfmodel.logs.recordings.mapping.checks import (
+    check_columns,
+    check_names,
+    check_table,
+    check_topics,
+)
+from selfmodel.logs.recordings.mapping.mapping import TABLE, RecordingMapping
 from selfmodel.logs.recordings.notes import notes
 from selfmodel.logs.recordings.quality import Quality, quality
 from selfmodel.logs.recordings.resampling.clock import Clocked, ClocksApartError, clocked
@@ -22,10 +27,12 @@ from selfmodel.logs.recordings.resampling.signals import (
     joint_signals,
     sensor_signals,
 )
-from selfmodel.logs.recordings.resampling.tracks import Tracks, read_tracks, required
-from selfmodel.logs.recordings.rosbag.answer import Source
+from selfmodel.logs.recordings.resampling.tracks import RawTracks, Tracks, converted, required
 from selfmodel.logs.recordings.rosbag.bag import read_bag
-from selfmodel.logs.recordings.series import Series
+from selfmodel.logs.recordings.rosbag.tracks import bag_tracks
+from selfmodel.logs.recordings.series import Series, Source
+from selfmodel.logs.recordings.tables.table import FORMATS, is_table, read_table
+from selfmodel.logs.recordings.tables.tracks import rows_of, table_tracks
 from selfmodel.logs.records import Imported, TrialHeader
 from selfmodel.logs.writing.writer import write_trial
 from selfmodel.robot.robot import Robot
@@ -41,14 +48,14 @@ MESSAGES_PER_STEP = 10
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Trial in a bag, resampled at the control steps.
+    """Trial in a recording, resampled at the control steps.
 
     Attributes:
         behaviour: Behaviour at the control steps; NaN where not observed.
         qualities: Recording quality by topic.
-        sources: Files of the bag.
-        clock: Clock of the times: ``header`` or ``log``.
-        origin: Start of the trial, ns since 1970.
+        sources: Files of the recording.
+        clock: Clock of the times: ``header``, ``log`` or ``column``.
+        origin: Start of the trial, ns since 1970 or since the start of a table's time.
         notes: Warnings for the user, one sentence each.
     """
 
@@ -81,41 +88,85 @@ class Recording:
         }
 
 
-def import_bag(
-    path: Path, mapping: BagMapping, robot: Robot, budget: Budget = DEFAULT_BUDGET
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Data of a recording, before they are resampled.
+
+    Attributes:
+        tracks: Tracks in the recording's own units and signs.
+        series: Messages by topic, or the rows of a table.
+        clocks: Times by topic.
+        sources: Files of the recording.
+    """
+
+    tracks: RawTracks
+    series: Mapping[str, Series]
+    clocks: Mapping[str, Clocked]
+    sources: tuple[Source, ...]
+
+
+def import_recording(
+    path: Path, mapping: RecordingMapping, robot: Robot, budget: Budget = DEFAULT_BUDGET
 ) -> Recording:
-    """Returns the trial in a bag.
+    """Returns the trial in a recording.
 
     Args:
-        path: Folder or file of the bag.
-        mapping: Mapping from topics to roles.
+        path: Folder or file of a bag, or a table; see ``is_table``.
+        mapping: Mapping from topics or columns to roles.
         robot: Robot that the mapping names.
-        budget: Memory and time for the bag.
+        budget: Memory and time for the files.
 
     Raises:
-        LogError: The bag is damaged.
-        BudgetError: The bag takes more than the budget allows.
-        InputError: The bag cannot be read, or the mapping does not fit the bag or the robot.
+        LogError: The recording is damaged.
+        BudgetError: The recording takes more than the budget allows.
+        InputError: The recording cannot be read, or the mapping does not fit it or the robot.
     """
     anatomy = robot.anatomy
     touches = [sensor.name for sensor in anatomy.sensors if sensor.kind == "touch"]
-    check_names(mapping, anatomy.hinges, anatomy.motors, touches)
-    bag = read_bag(path, {role.topic for role in mapping.roles}, budget)
-    check_topics(mapping, bag)
-    series = bag.series
-    check_columns(mapping, series)
-    clocks = _clocks(mapping, series)
-    tracks = read_tracks(mapping, series, clocks)
+    check_names(mapping, anatomy.hinges, anatomy.motors, touches, anatomy.names.sensors)
+    found = (_table if is_table(path) else _bag)(path, mapping, budget)
+    tracks = converted(mapping, found.tracks)
     steps = _steps(mapping, tracks, robot.control_timestep, budget)
     behaviour = _behaviour(mapping, tracks, robot, steps)
-    qualities = _qualities(mapping, series, clocks, steps.origin)
+    qualities = _qualities(mapping, found, steps.origin)
     return Recording(
         behaviour=behaviour,
         qualities=qualities,
-        sources=bag.sources,
+        sources=found.sources,
         clock=mapping.clock,
         origin=steps.origin,
         notes=notes(mapping, behaviour, qualities, robot),
+    )
+
+
+def _bag(path: Path, mapping: RecordingMapping, budget: Budget) -> Found:
+    if mapping.time is not None:
+        raise mapping.document.error(
+            ("time",),
+            f"[time] is for tables ({', '.join(FORMATS)}), got the bag {path}: make a mapping of "
+            f"it with --suggest",
+        )
+    bag = read_bag(path, {role.topic for role in mapping.roles}, budget)
+    check_topics(mapping, bag)
+    check_columns(mapping, bag.series)
+    clocks = _clocks(mapping, bag.series)
+    return Found(bag_tracks(mapping, bag.series, clocks), bag.series, clocks, bag.sources)
+
+
+def _table(path: Path, mapping: RecordingMapping, budget: Budget) -> Found:
+    if mapping.time is None:
+        raise mapping.document.error(
+            (),
+            f"the mapping of a table needs [time] and the names of columns, and has none for "
+            f"{path}: make one with --suggest",
+        )
+    table = read_table(
+        path, {name for _, name in mapping.columns}, budget, exact=mapping.time.column
+    )
+    check_table(mapping, table.names)
+    rows = rows_of(table, mapping.time)
+    return Found(
+        table_tracks(mapping, table, rows), {TABLE: rows.series}, {TABLE: rows.clock}, table.sources
     )
 
 
@@ -123,7 +174,7 @@ def write_recording(
     path: Path,
     robot: Robot,
     recording: Recording,
-    mapping: BagMapping,
+    mapping: RecordingMapping,
     controller: Controller | None,
 ) -> Path:
     """Writes a recording as the log of a trial.
@@ -131,7 +182,7 @@ def write_recording(
     Args:
         path: Name of the log; it must not exist.
         robot: Robot as its model describes it.
-        recording: Trial in the bag.
+        recording: Trial in the recording.
         mapping: Mapping of the import; the log contains its text.
         controller: Controller of the robot; if not given, a playback of the recorded commands.
 
@@ -150,7 +201,7 @@ def write_recording(
     )
 
 
-def _clocks(mapping: BagMapping, series: Mapping[str, Series]) -> dict[str, Clocked]:
+def _clocks(mapping: RecordingMapping, series: Mapping[str, Series]) -> dict[str, Clocked]:
     found = {}
     for role in mapping.roles:
         try:
@@ -162,14 +213,15 @@ def _clocks(mapping: BagMapping, series: Mapping[str, Series]) -> dict[str, Cloc
     return found
 
 
-def _steps(mapping: BagMapping, tracks: Tracks, timestep: float, budget: Budget) -> Steps:
+def _steps(mapping: RecordingMapping, tracks: Tracks, timestep: float, budget: Budget) -> Steps:
     """Control steps at which every role has data."""
     needed = required(mapping, tracks)
     for role, part, track in needed:
         if not len(track.times):
+            where = "column" if mapping.time else "topic"
             raise mapping.document.error(
-                (*role.path, "topic"),
-                f"{role.topic} has no number for {part}: name another topic",
+                role.path if mapping.time else (*role.path, "topic"),
+                f"{role.topic} has no number for {part}: name another {where}",
             )
     first = max(int(track.times[0]) for _, _, track in needed)
     # The last command is held, so the end of the commands does not end the trial.
@@ -195,12 +247,11 @@ def _steps(mapping: BagMapping, tracks: Tracks, timestep: float, budget: Budget)
     return Steps(origin, np.rint(np.arange(steps) * period).astype(np.int64))
 
 
-def _behaviour(mapping: BagMapping, tracks: Tracks, robot: Robot, steps: Steps) -> Behaviour:
+def _behaviour(mapping: RecordingMapping, tracks: Tracks, robot: Robot, steps: Steps) -> Behaviour:
     anatomy = robot.anatomy
     joints = joint_signals(tracks, robot, steps)
-    from_start = mapping.base is None or mapping.base.frame == "start"
     try:
-        base = base_signals(tracks, steps, from_start=from_start)
+        base = base_signals(tracks, steps, mapping.base)
     except ValueError as error:
         raise mapping.document.error(
             ("start",), f"{error}, because of a gap in its topic: set another start"
@@ -217,14 +268,12 @@ def _behaviour(mapping: BagMapping, tracks: Tracks, robot: Robot, steps: Steps) 
     )
 
 
-def _qualities(
-    mapping: BagMapping, series: Mapping[str, Series], clocks: Mapping[str, Clocked], origin: int
-) -> dict[str, Quality]:
+def _qualities(mapping: RecordingMapping, found: Found, origin: int) -> dict[str, Quality]:
     roles: dict[str, tuple[str, ...]] = {}
     for role in mapping.roles:
         roles[role.topic] = (*roles.get(role.topic, ()), role.name)
     return {
-        topic: quality(series[topic], clocks[topic], origin, played)
+        topic: quality(found.series[topic], found.clocks[topic], origin, played)
         for topic, played in roles.items()
     }
 

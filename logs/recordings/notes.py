@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from selfmodel.logs.recordings.mapping.mapping import BagMapping
+from selfmodel.logs.recordings.mapping.mapping import RecordingMapping
 from selfmodel.logs.recordings.quality import Quality
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Behaviour
@@ -17,7 +17,7 @@ MAX_LISTED_GAPS = 5
 
 
 def notes(
-    mapping: BagMapping, behaviour: Behaviour, qualities: Mapping[str, Quality], robot: Robot
+    mapping: RecordingMapping, behaviour: Behaviour, qualities: Mapping[str, Quality], robot: Robot
 ) -> tuple[str, ...]:
     """Returns the warnings, one sentence each, most important first."""
     return (
@@ -56,7 +56,7 @@ def _travel(behaviour: Behaviour) -> Iterator[str]:
         )
 
 
-def _clock(mapping: BagMapping, qualities: Mapping[str, Quality]) -> Iterator[str]:
+def _clock(mapping: RecordingMapping, qualities: Mapping[str, Quality]) -> Iterator[str]:
     if mapping.clock == "log":
         yield 'all times are log times, as clock = "log" says: latency is part of them'
         return

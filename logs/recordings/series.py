@@ -12,6 +12,19 @@ IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
+class Source:
+    """File of a recording.
+
+    Attributes:
+        name: Name within the recording.
+        sha256: SHA-256 of the file, in hexadecimal: recorders write no checksums.
+    """
+
+    name: str
+    sha256: str
+
+
+@dataclass(frozen=True)
 class Topic:
     """Topic of a bag.
 

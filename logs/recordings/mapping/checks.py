@@ -1,9 +1,10 @@
 """Checks of a mapping against robot and bag; an error names the line and the alternatives."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from types import MappingProxyType
 
-from selfmodel.logs.recordings.mapping.mapping import BagMapping, Role, RoleKind
+from selfmodel.logs.recordings.mapping.mapping import RecordingMapping, Role, RoleKind
+from selfmodel.logs.recordings.mapping.strict_toml import Document
 from selfmodel.logs.recordings.rosbag.bag import Bag
 from selfmodel.logs.recordings.rosbag.message_types import (
     ARRAY,
@@ -30,7 +31,11 @@ TYPES: Mapping[RoleKind, tuple[str, ...]] = MappingProxyType(
 
 
 def check_names(
-    mapping: BagMapping, hinges: Sequence[str], motors: Sequence[str], touches: Sequence[str]
+    mapping: RecordingMapping,
+    hinges: Sequence[str],
+    motors: Sequence[str],
+    touches: Sequence[str],
+    sensors: Sequence[str],
 ) -> None:
     """Checks that a mapping names the parts of the robot and no others.
 
@@ -39,6 +44,7 @@ def check_names(
         hinges: Hinges of the robot; all must be mapped.
         motors: Motors of the robot; all must be mapped.
         touches: Touch sensors of the robot; some may be mapped.
+        sensors: All sensors of the robot; some may be mapped.
 
     Raises:
         InputError: The mapping names an unknown part, or omits a required part.
@@ -49,18 +55,33 @@ def check_names(
         (mapping.commands, "motor", motors),
     ):
         path = (angles.role, "names")
-        for name in angles.links:
-            if name not in known:
-                raise document.unknown((*path, name), f"{what} of the robot", name, known)
+        _check_known(document, path, angles.links, what, known)
         if missing := [name for name in known if name not in angles.links]:
             raise document.error(
                 path,
                 f"[{'.'.join(path)}] must list every {what} of the robot, and lacks "
                 f"{', '.join(missing)}: add a line for each",
             )
-    for name in mapping.touch:
-        if name not in touches:
-            raise document.unknown(("touch", name), "touch sensor of the robot", name, touches)
+    parts: tuple[tuple[tuple[str, ...], Collection[str], str, Sequence[str]], ...] = (
+        (("joints", "velocities"), mapping.joints.velocities, "hinge", hinges),
+        (("joints", "efforts"), mapping.joints.efforts, "hinge", hinges),
+        (("touch",), mapping.touch, "touch sensor", touches),
+        (("sensors",), mapping.sensors, "sensor", sensors),
+    )
+    for path, columns, what, known in parts:
+        _check_known(document, path, columns, what, known)
+
+
+def _check_known(
+    document: Document,
+    path: tuple[str, ...],
+    parts: Collection[str],
+    what: str,
+    known: Sequence[str],
+) -> None:
+    for name in parts:
+        if name not in known:
+            raise document.unknown((*path, name), f"{what} of the robot", name, known)
 
 
 def fitting(bag: Bag, kind: RoleKind) -> list[str]:
@@ -68,7 +89,7 @@ def fitting(bag: Bag, kind: RoleKind) -> list[str]:
     return [topic.name for topic in bag.topics.values() if topic.type in TYPES[kind]]
 
 
-def check_topics(mapping: BagMapping, bag: Bag) -> None:
+def check_topics(mapping: RecordingMapping, bag: Bag) -> None:
     """Checks that each topic of a mapping exists, has a suitable type, and has messages.
 
     Raises:
@@ -95,7 +116,7 @@ def check_topics(mapping: BagMapping, bag: Bag) -> None:
         _check_columns_are_named(mapping, role, topic.type)
 
 
-def _check_columns_are_named(mapping: BagMapping, role: Role, kind: str) -> None:
+def _check_columns_are_named(mapping: RecordingMapping, role: Role, kind: str) -> None:
     """Checks that the columns of a Float64MultiArray, and of no other type, have names."""
     if role.kind == "commands":
         key, given = "order", bool(mapping.commands.order)
@@ -116,7 +137,7 @@ def _check_columns_are_named(mapping: BagMapping, role: Role, kind: str) -> None
         )
 
 
-def check_columns(mapping: BagMapping, series: Mapping[str, Series]) -> None:
+def check_columns(mapping: RecordingMapping, series: Mapping[str, Series]) -> None:
     """Checks that each name of a mapping occurs on its topic.
 
     Raises:
@@ -144,3 +165,18 @@ def check_columns(mapping: BagMapping, series: Mapping[str, Series]) -> None:
             raise mapping.document.unknown(
                 ("touch", name, "index"), f"number on {touch.topic}", touch.column, columns
             )
+
+
+def check_table(mapping: RecordingMapping, names: Collection[str]) -> None:
+    """Checks that a table has each column of a mapping.
+
+    Args:
+        mapping: Mapping of a table.
+        names: Columns of the table.
+
+    Raises:
+        InputError: A column is missing.
+    """
+    for path, name in mapping.columns:
+        if name not in names:
+            raise mapping.document.unknown(path, "column of the table", name, names)

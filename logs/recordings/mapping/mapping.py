@@ -1,8 +1,8 @@
-"""Mapping from the topics of a bag to roles and parts of a robot."""
+"""Mapping from the topics of a bag, or the columns of a table, to roles and parts of a robot."""
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Literal
 
@@ -17,10 +17,28 @@ FORCES = ("N", "kN", "raw")
 UNKNOWN = "?"
 """Placeholder of a suggested mapping for a name that the user must fill in."""
 
+COMMAND_UNITS: Mapping[str, float] = MappingProxyType({**ANGLES, "raw": 1.0})
+"""Units of commands; ``raw`` is the unit of the motor, such as N m."""
+
+TIMES: Mapping[str, int] = MappingProxyType({"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1})
+"""Units of a time column, ns."""
+
 RoleKind = Literal["joints", "commands", "base", "imu", "touch"]
 
 CLOCKS = ("header", "log")
 FRAMES = ("start", "recorded")
+VELOCITY_FRAMES = ("base", "world")
+
+TABLE = "table"
+"""Topic of all roles in a table, whose columns have their times in common."""
+
+COLUMN_CLOCK = "column"
+"""Clock of a table: its time column."""
+
+VECTORS: Mapping[str, int] = MappingProxyType(
+    {"position": 3, "orientation": 4, "linear_velocity": 3, "angular_velocity": 3}
+)
+"""Number of columns of each quantity of a base or an IMU."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +66,8 @@ class Angles:
         scale: Recorded unit, rad.
         links: Conversions by the model's hinge or motor.
         order: Names of the columns of a Float64MultiArray; empty for other types.
+        velocities: Columns of velocities in a table, by hinge.
+        efforts: Columns of torques in a table, by hinge.
     """
 
     role: Literal["joints", "commands"]
@@ -55,6 +75,8 @@ class Angles:
     scale: float
     links: Mapping[str, Link]
     order: tuple[str, ...] = ()
+    velocities: Mapping[str, str] = field(default_factory=dict)
+    efforts: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -65,11 +87,28 @@ class Base:
         topic: Name of the topic.
         frame: ``start``, in which the trial begins at x = y = 0 heading along +x; or ``recorded``.
         scale: Recorded unit, m.
+        velocity_frame: Frame of the recorded linear velocity: ``base`` or ``world``.
+        columns: Columns of a table by quantity, see ``VECTORS``; empty for a topic.
     """
 
     topic: str
     frame: str
     scale: float
+    velocity_frame: str = "base"
+    columns: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Inertial:
+    """Topic of an IMU.
+
+    Attributes:
+        topic: Name of the topic.
+        columns: Columns of a table by quantity, see ``VECTORS``; empty for a topic.
+    """
+
+    topic: str
+    columns: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -78,13 +117,26 @@ class Touch:
 
     Attributes:
         topic: Name of the topic.
-        column: Column of a Float64MultiArray; "" for other types.
+        column: Column of a Float64MultiArray or of a table; "" for other types.
         threshold: Value above which the sensor reads 1, in the unit of the topic.
     """
 
     topic: str
     column: str
     threshold: float
+
+
+@dataclass(frozen=True)
+class TimeColumn:
+    """Time column of a table.
+
+    Attributes:
+        column: Name of the column.
+        unit: Unit of its values, ns.
+    """
+
+    column: str
+    unit: int
 
 
 @dataclass(frozen=True)
@@ -108,7 +160,7 @@ class Role:
 
 
 @dataclass(frozen=True)
-class BagMapping:
+class RecordingMapping:
     """Mapping of a file, checked for internal consistency.
 
     Attributes:
@@ -117,14 +169,16 @@ class BagMapping:
         control_timestep: Control time step, s; with an MJCF file only.
         controller: File of the controller.
         stage: Stage of the trial: ``before`` for a healthy robot.
-        clock: Clock of the times: ``header`` or ``log``.
+        clock: Clock of the times: ``header`` or ``log``; ``column`` for a table.
         start: Start of the trial after the first time at which every role has data, s.
         duration: Duration, s; None for as long as every role has data.
         joints: Topic of the hinges.
         commands: Topic of the motors.
         base: Topic of the root body.
-        imu: Name of the topic of an Imu.
+        imu: Topic of an IMU.
         touch: Topics by touch sensor.
+        time: Time column of a table; None for a bag.
+        sensors: Columns of a table with the readings of sensors, by sensor.
     """
 
     document: Document
@@ -138,8 +192,10 @@ class BagMapping:
     joints: Angles
     commands: Angles
     base: Base | None
-    imu: str | None
+    imu: Inertial | None
     touch: Mapping[str, Touch]
+    time: TimeColumn | None = None
+    sensors: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def roles(self) -> tuple[Role, ...]:
@@ -151,6 +207,24 @@ class BagMapping:
         if self.base is not None:
             found.append(Role("base", ("base",), self.base.topic))
         if self.imu is not None:
-            found.append(Role("imu", ("imu",), self.imu))
+            found.append(Role("imu", ("imu",), self.imu.topic))
         found += [Role("touch", ("touch", name), touch.topic) for name, touch in self.touch.items()]
         return tuple(found)
+
+    @property
+    def columns(self) -> list[tuple[tuple[str, ...], str]]:
+        """Columns of a table, each with the path of its entry in the mapping."""
+        if self.time is None:
+            return []
+        found = [(("time", "column"), self.time.column)]
+        for angles in (self.joints, self.commands):
+            path = angles.role
+            found += [((path, "names", part), link.name) for part, link in angles.links.items()]
+            found += [((path, "velocities", k), name) for k, name in angles.velocities.items()]
+            found += [((path, "efforts", k), name) for k, name in angles.efforts.items()]
+        for role, body in (("base", self.base), ("imu", self.imu)):
+            vectors = {} if body is None else body.columns
+            found += [((role, k), name) for k, names in vectors.items() for name in names]
+        found += [(("touch", k, "column"), touch.column) for k, touch in self.touch.items()]
+        found += [(("sensors", k), name) for k, name in self.sensors.items()]
+        return found

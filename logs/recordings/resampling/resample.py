@@ -35,7 +35,8 @@ def linear(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) 
     before, after, share, valid = _bracket(times, at, limit)
     result = np.full((len(at), values.shape[1]), np.nan)
     low, high = values[before[valid]], values[after[valid]]
-    result[valid] = low + share[valid, np.newaxis] * (high - low)
+    part = share[valid, np.newaxis]
+    result[valid] = np.where(part == 0, low, low + part * (high - low))  # -0 + 0 is 0
     return result
 
 
@@ -61,7 +62,7 @@ def slerp(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -
         limit: See ``reach``.
 
     Returns:
-        Unit quaternions, ``(steps, 4)``.
+        Unit quaternions, ``(steps, 4)``; exactly the sample at the time of a sample.
     """
     before, after, share, valid = _bracket(times, at, limit)
     result = np.full((len(at), 4), np.nan)
@@ -80,7 +81,8 @@ def slerp(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -
         (1 - part) * np.sinc((1 - part) * 2 * half / np.pi) * low
         + part * np.sinc(part * 2 * half / np.pi) * high
     ) / sine
-    result[valid] = turned / np.linalg.norm(turned, axis=1, keepdims=True)
+    turned /= np.linalg.norm(turned, axis=1, keepdims=True)
+    result[valid] = np.where(part == 0, low, turned)
     return result
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmodel.arrays import FloatArray
+from selfmodel.logs.recordings.mapping.mapping import Base
 from selfmodel.logs.recordings.resampling.clock import Track
 from selfmodel.logs.recordings.resampling.resample import angles, hold, linear, reach, slerp
 from selfmodel.logs.recordings.resampling.start_frame import heading_removal, rotate_world
@@ -60,14 +61,16 @@ def sensor_signals(
     """Returns the readings of the robot's sensors.
 
     Args:
-        tracks: Tracks, of which those of touch sensors are read.
+        tracks: Tracks, of which those of sensors are read.
         anatomy: Parts of the robot.
         steps: Control steps.
         joint_positions: Joint angles, the readings of angle sensors, ``(steps, hinges)`` rad.
     """
     readings = np.full((len(steps.at), len(anatomy.sensors)), np.nan)
     for column, sensor in enumerate(anatomy.sensors):
-        if sensor.kind == "angle":
+        if sensor.name in tracks.sensors:
+            readings[:, column] = _at(tracks.sensors[sensor.name], steps, _held)[:, 0]
+        elif sensor.kind == "angle":
             angle = joint_positions[:, anatomy.hinges.index(sensor.hinge)]
             readings[:, column] = (angle - sensor.centre) / sensor.half_range
         elif sensor.name in tracks.touch:
@@ -75,13 +78,13 @@ def sensor_signals(
     return {"sensors": readings}
 
 
-def base_signals(tracks: Tracks, steps: Steps, *, from_start: bool) -> dict[Signal, FloatArray]:
+def base_signals(tracks: Tracks, steps: Steps, base: Base | None) -> dict[Signal, FloatArray]:
     """Returns the pose and velocities of the root body.
 
     Args:
         tracks: Tracks, of which those of the base are read.
         steps: Control steps.
-        from_start: Whether to transform the trial to begin at x = y = 0 heading along +x.
+        base: Frames of the tracks; without a base, an IMU's orientation is turned to head along +x.
 
     Raises:
         ValueError: The initial pose, which the transform needs, is unknown.
@@ -89,7 +92,8 @@ def base_signals(tracks: Tracks, steps: Steps, *, from_start: bool) -> dict[Sign
     position = _wide(_at(tracks.base_position, steps, linear), 3)
     orientation = _wide(_at(tracks.base_orientation, steps, slerp), 4)
     velocity = _wide(_at(tracks.base_linear_velocity, steps, linear), 3)
-    if from_start:
+    in_world = base is not None and base.velocity_frame == "world"
+    if base is None or base.frame == "start":
         required = [(tracks.base_position, position), (tracks.base_orientation, orientation)]
         if any(len(track.times) and np.isnan(rows[0]).any() for track, rows in required):
             raise ValueError("the pose of the base at the start of the trial is unknown")
@@ -97,12 +101,13 @@ def base_signals(tracks: Tracks, steps: Steps, *, from_start: bool) -> dict[Sign
             rotation = heading_removal(orientation[0])
             orientation = rotate_world(orientation, rotation)
             position = rotated(position - position[0] * [1, 1, 0], rotation[np.newaxis])
+            velocity = rotated(velocity, rotation[np.newaxis]) if in_world else velocity
         else:
             position = position - position[0] * [1, 1, 0]
     return {
         "base_position": position,
         "base_orientation": orientation,
-        "base_linear_velocity": rotated(velocity, orientation),
+        "base_linear_velocity": velocity if in_world else rotated(velocity, orientation),
         "base_angular_velocity": _wide(_at(tracks.base_angular_velocity, steps, linear), 3),
     }
 
@@ -125,6 +130,11 @@ def _at(track: Track, steps: Steps, method: Interpolation) -> FloatArray:
 def _standing(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -> FloatArray:
     del limit
     return hold(times, values, at)
+
+
+def _held(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -> FloatArray:
+    """Last samples, outside of gaps."""
+    return np.where(np.isnan(linear(times, values, at, limit)), np.nan, hold(times, values, at))
 
 
 def _wide(values: FloatArray, width: int) -> FloatArray:

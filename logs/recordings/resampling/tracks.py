@@ -6,15 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from selfmodel.logs.recordings.mapping.mapping import BagMapping, Role
-from selfmodel.logs.recordings.resampling.clock import Clocked, Track, track
-from selfmodel.logs.recordings.series import Series
+from selfmodel.logs.recordings.mapping.mapping import RecordingMapping, Role
+from selfmodel.logs.recordings.resampling.clock import Track
 
 if TYPE_CHECKING:
     from selfmodel.arrays import FloatArray
 
-_POSITION, _VELOCITY, _EFFORT = slice(0, 1), slice(1, 2), slice(2, 3)
-_NOTHING = Track(np.zeros(0, dtype=np.int64), np.zeros((0, 1)))
+NOTHING = Track(np.zeros(0, dtype=np.int64), np.zeros((0, 1)))
+"""Track of a quantity that was not recorded."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,9 +26,10 @@ class Tracks:
         efforts: Joint torques by hinge, N m.
         commands: Commanded angles by motor, rad.
         touch: Readings by touch sensor, 0 or 1.
+        sensors: Readings by sensor, as the controller received them.
         base_position: Position in the recorded frame, m.
         base_orientation: Unit quaternions, w x y z, in the recorded frame.
-        base_linear_velocity: Linear velocity in the frame of the base, m/s.
+        base_linear_velocity: Linear velocity in the frame that the mapping names, m/s.
         base_angular_velocity: Angular velocity in the frame of the base, rad/s.
     """
 
@@ -38,68 +38,88 @@ class Tracks:
     efforts: Mapping[str, Track]
     commands: Mapping[str, Track]
     touch: Mapping[str, Track]
+    sensors: Mapping[str, Track]
     base_position: Track
     base_orientation: Track
     base_linear_velocity: Track
     base_angular_velocity: Track
 
 
-def read_tracks(
-    mapping: BagMapping, series: Mapping[str, Series], clocks: Mapping[str, Clocked]
-) -> Tracks:
-    """Returns the tracks of a recording.
+@dataclass(frozen=True, eq=False)
+class RawTracks:
+    """Tracks of a recording in its own units and signs; see ``Tracks``.
 
-    Args:
-        mapping: Mapping, checked against the series.
-        series: Messages by topic.
-        clocks: Times by topic.
+    Attributes:
+        positions: Joint angles by hinge.
+        velocities: Joint velocities by hinge.
+        efforts: Joint torques by hinge.
+        commands: Commands by motor.
+        touch: Values by touch sensor, which the mapping's threshold divides.
+        sensors: Readings by sensor.
+        base: Tracks of the root body, by the names in ``VECTORS``.
+        imu: Tracks of an IMU: ``orientation`` and ``angular_velocity``.
     """
 
-    def of(topic: str, name: str, wanted: slice) -> Track:
-        column = series[topic].columns.get(name)
-        return _NOTHING if column is None else track(clocks[topic], column, wanted)
+    positions: Mapping[str, Track]
+    velocities: Mapping[str, Track]
+    efforts: Mapping[str, Track]
+    commands: Mapping[str, Track]
+    touch: Mapping[str, Track]
+    sensors: Mapping[str, Track]
+    base: Mapping[str, Track]
+    imu: Mapping[str, Track]
 
+
+def converted(mapping: RecordingMapping, raw: RawTracks) -> Tracks:
+    """Returns the tracks of a recording in the units and signs of the model.
+
+    Args:
+        mapping: Mapping, checked against the recording.
+        raw: Tracks of the recording.
+    """
     joints, commands = mapping.joints, mapping.commands
     positions, velocities, efforts = {}, {}, {}
     for hinge, link in joints.links.items():
         scale = link.sign * joints.scale
-        positions[hinge] = _scaled(of(joints.topic, link.name, _POSITION), scale, link.offset)
-        velocities[hinge] = _scaled(of(joints.topic, link.name, _VELOCITY), scale)
-        efforts[hinge] = _scaled(of(joints.topic, link.name, _EFFORT), link.sign)
-    targets = {}
-    for motor, link in commands.links.items():
-        name = str(commands.order.index(link.name)) if commands.order else link.name
-        found = of(commands.topic, name, _POSITION)
-        targets[motor] = _scaled(found, link.sign * commands.scale, link.offset)
-    touches = {}
-    for sensor, touch in mapping.touch.items():
-        found = of(touch.topic, touch.column, _POSITION)
-        touches[sensor] = Track(found.times, (found.values > touch.threshold).astype(np.float64))
-    position = orientation = linear = angular = _NOTHING
-    if mapping.base is not None:
-        topic, scale = mapping.base.topic, mapping.base.scale
-        position = _scaled(of(topic, "", slice(0, 3)), scale)
-        orientation = _unit(of(topic, "", slice(3, 7)))
-        linear = _scaled(of(topic, "", slice(7, 10)), scale)
-        angular = of(topic, "", slice(10, 13))
-    if mapping.imu is not None:
-        if mapping.base is None:
-            orientation = _unit(of(mapping.imu, "", slice(0, 4)))
-        # A gyroscope measures the angular velocity; odometry derives it.
-        measured = of(mapping.imu, "", slice(4, 7))
-        angular = measured if len(measured.times) else angular
+        positions[hinge] = _scaled(raw.positions.get(hinge, NOTHING), scale, link.offset)
+        velocities[hinge] = _scaled(raw.velocities.get(hinge, NOTHING), scale)
+        efforts[hinge] = _scaled(raw.efforts.get(hinge, NOTHING), link.sign)
+    touch = {
+        name: Track(found.times, (found.values > mapping.touch[name].threshold).astype(np.float64))
+        for name, found in raw.touch.items()
+    }
+    length = 1.0 if mapping.base is None else mapping.base.scale
+    orientation = _unit(raw.base.get("orientation", NOTHING))
+    angular = raw.base.get("angular_velocity", NOTHING)
+    if mapping.base is None:
+        orientation = _unit(raw.imu.get("orientation", NOTHING))
+    # A gyroscope measures the angular velocity; odometry derives it.
+    measured = raw.imu.get("angular_velocity", NOTHING)
     return Tracks(
-        positions, velocities, efforts, targets, touches, position, orientation, linear, angular
+        positions=positions,
+        velocities=velocities,
+        efforts=efforts,
+        commands={
+            motor: _scaled(raw.commands[motor], link.sign * commands.scale, link.offset)
+            for motor, link in commands.links.items()
+        },
+        touch=touch,
+        sensors=raw.sensors,
+        base_position=_scaled(raw.base.get("position", NOTHING), length),
+        base_orientation=orientation,
+        base_linear_velocity=_scaled(raw.base.get("linear_velocity", NOTHING), length),
+        base_angular_velocity=measured if len(measured.times) else angular,
     )
 
 
-def required(mapping: BagMapping, tracks: Tracks) -> list[tuple[Role, str, Track]]:
+def required(mapping: RecordingMapping, tracks: Tracks) -> list[tuple[Role, str, Track]]:
     """Returns the tracks that a trial requires, each with its role and part."""
     roles = {role.path: role for role in mapping.roles}
     found = [(roles["joints",], hinge, track) for hinge, track in tracks.positions.items()]
     found += [(roles["commands",], motor, track) for motor, track in tracks.commands.items()]
     if mapping.base is not None:
-        found.append((roles["base",], "the base", tracks.base_position))
+        pose = tracks.base_position if len(tracks.base_position.times) else tracks.base_orientation
+        found.append((roles["base",], "the base", pose))
     if mapping.imu is not None:
         angular, orientation = tracks.base_angular_velocity, tracks.base_orientation
         found.append((roles["imu",], "the base", angular if len(angular.times) else orientation))
@@ -108,6 +128,8 @@ def required(mapping: BagMapping, tracks: Tracks) -> list[tuple[Role, str, Track
 
 
 def _scaled(track: Track, scale: float, offset: float = 0.0) -> Track:
+    if scale == 1 and offset == 0:
+        return track  # 0 would change the sign of a zero
     return Track(track.times, track.values * scale + offset)
 
 
@@ -115,4 +137,10 @@ def _unit(track: Track) -> Track:
     """Normalised quaternions; unset ones, of length 0, are left out."""
     lengths: FloatArray = np.linalg.norm(track.values, axis=1)
     known = np.abs(lengths - 1) < 0.1
-    return Track(track.times[known], track.values[known] / lengths[known, np.newaxis])
+    # A quaternion that is normalised already keeps its bits.
+    divisors = np.where(np.abs(lengths - 1) < _ROUNDING, 1.0, lengths)
+    return Track(track.times[known], track.values[known] / divisors[known, np.newaxis])
+
+
+_ROUNDING = 1e-14
+"""Difference from 1 of the length of a normalised quaternion in float64."""

@@ -8,24 +8,11 @@ from typing import Any
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.logs.recordings.series import Layout, Series, Topic, columns_of
+from selfmodel.logs.recordings.series import Layout, Series, Source, Topic, columns_of
 from selfmodel.sandbox.message import Message
 
 Rows = tuple[tuple[str, ...], FloatArray]
 """Names in a message, and a row of numbers for each, ``(names, width)``."""
-
-
-@dataclass(frozen=True)
-class Source:
-    """File of a bag.
-
-    Attributes:
-        name: Name within the bag.
-        sha256: SHA-256 of the file, in hexadecimal: recorders write no checksums.
-    """
-
-    name: str
-    sha256: str
 
 
 @dataclass(frozen=True)

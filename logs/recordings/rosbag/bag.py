@@ -15,8 +15,8 @@ from selfmodel.logs.errors import (
     TruncatedError,
     UnsupportedError,
 )
-from selfmodel.logs.recordings.rosbag.answer import Source, parse_answer
-from selfmodel.logs.recordings.series import Series, Topic
+from selfmodel.logs.recordings.rosbag.answer import parse_answer
+from selfmodel.logs.recordings.series import Series, Source, Topic
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.sandbox.isolation import run_isolated
 from selfmodel.sandbox.message import Message

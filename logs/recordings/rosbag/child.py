@@ -4,10 +4,11 @@ import os
 from pathlib import Path
 
 from selfmodel.files import file_digest
-from selfmodel.logs.recordings.rosbag.answer import Source, answer
+from selfmodel.logs.recordings.rosbag.answer import answer
 from selfmodel.logs.recordings.rosbag.files import bag_files, explained
 from selfmodel.logs.recordings.rosbag.gathering import Gathering
 from selfmodel.logs.recordings.rosbag.storage import read_storage
+from selfmodel.logs.recordings.series import Source
 from selfmodel.sandbox.budget import Budget
 from selfmodel.sandbox.message import Message
 

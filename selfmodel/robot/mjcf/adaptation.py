@@ -8,7 +8,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree as ET  # of checked texts
 
 from selfmodel.errors import InputError
@@ -20,15 +19,18 @@ from selfmodel.robot.mjcf.expand import check_loggable, expand
 from selfmodel.robot.mjcf.files import Files, InMemory, robot_folder
 from selfmodel.robot.mjcf.forward import turn_forward
 from selfmodel.robot.mjcf.ground import add_ground
+from selfmodel.robot.mjcf.hidden_state import remove_hidden_state
 from selfmodel.robot.mjcf.keyframe import bake_keyframe
 from selfmodel.robot.mjcf.mujoco_errors import compile_model, mujoco_errors_as_input_errors
 from selfmodel.robot.mjcf.names import name_parts
+from selfmodel.robot.mjcf.reach import limit_reach
 from selfmodel.robot.mjcf.rehearsal import run_on_model
 from selfmodel.robot.mjcf.sensors import add_sensors
-from selfmodel.robot.mjcf.settings import MAX_CONTROL_TIMESTEP, MjcfSettings
+from selfmodel.robot.mjcf.servos import add_servos
+from selfmodel.robot.mjcf.settings import MAX_CONTROL_TIMESTEP, MjcfSettings, checked_settings
 from selfmodel.robot.mjcf.untrusted import checked_model
 from selfmodel.robot.mjcf.usability import check_usable
-from selfmodel.robot.mjcf.visuals import drop_visuals
+from selfmodel.robot.mjcf.visuals import drop_textures, reduce_meshes
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.urdf.conversion import convert
 from selfmodel.robot.urdf.reading import read_urdf
@@ -110,11 +112,9 @@ def adapt_message(message: Message, budget: Budget, _scratch: Path) -> Message:
     facts = message.facts
     root = ET.fromstring(facts["model"])  # noqa: S314  # checked
     document = Document(root, dict(message.blobs), list(facts["notes"]))
-    values: dict[str, Any] = {
-        name: tuple(value) if isinstance(value, list) else value
-        for name, value in facts["settings"].items()
-    }
-    settings = MjcfSettings(**{**values, "urdf": UrdfSettings(**values["urdf"])})
+    given = {name: value for name, value in facts["settings"].items() if value is not None}
+    of_urdf = given.pop("urdf")
+    settings = checked_settings({**given, **of_urdf})
     if root.tag == "robot":
         document = convert(document, settings.urdf, settings.base)
     adapted = _adapted(facts["name"], document, settings, budget)
@@ -157,14 +157,16 @@ def _adapted(name: str, document: Document, settings: MjcfSettings, budget: Budg
     for body in document.bodies():
         if body.attrib.pop("mocap", "false") == "true":
             document.notes.append(f"the mocap body {body.get('name')} is static")
+    drop_textures(document)
     if settings.base == "free":
         free_base(document, compile_model(document.text, document.assets))
     model = compile_model(document.text, document.assets)
     if carry_hinges(document, model):
         model = compile_model(document.text, document.assets)
-    if drop_visuals(document, model):
+    if reduce_meshes(document, model):
         model = compile_model(document.text, document.assets)
     check_usable(model)
+    remove_hidden_state(document, model)
     timestep = _control_timestep(float(model.opt.timestep), settings.control_timestep)
     bake_keyframe(document, model, settings)
     turn_forward(document, compile_model(document.text, document.assets), settings)
@@ -172,7 +174,12 @@ def _adapted(name: str, document: Document, settings: MjcfSettings, budget: Budg
         fix_base(document, compile_model(document.text, document.assets), settings.base_height)
     add_ground(document, compile_model(document.text, document.assets))
     add_sensors(document, compile_model(document.text, document.assets), settings)
-    add_command_ranges(document, model, settings)
+    if settings.servo is not None:
+        model = compile_model(document.text, document.assets)
+        add_servos(document, model, settings.servo, settings.reach)
+    if settings.reach is not None:
+        limit_reach(document, compile_model(document.text, document.assets), settings.reach)
+    add_command_ranges(document, compile_model(document.text, document.assets), settings)
     try:
         checked = checked_model(document.text, document.assets, budget)
     except ValueError as error:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from selfmodel.logs.recordings.mapping.mapping import BagMapping
+from selfmodel.logs.recordings.mapping.mapping import RecordingMapping
 from selfmodel.logs.recordings.mapping.mapping_file import parse_mapping
 from selfmodel.logs.recordings.rosbag.bag import Bag, read_bag
 from selfmodel.logs.recordings.series import Series
@@ -54,7 +54,7 @@ def prepare(folder: Path) -> Make:
     return make
 
 
-def _check(mapping: BagMapping, robot: Robot, whole: Bag | None) -> str:
+def _check(mapping: RecordingMapping, robot: Robot, whole: Bag | None) -> str:
     if whole is not None:
         _check_same(read_bag(Path(NAME), whole.topics), whole)
     return check_bag(NAME, mapping, robot)

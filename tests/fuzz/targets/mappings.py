@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from selfmodel.logs.recordings.importer import import_bag
+from selfmodel.logs.recordings.importer import import_recording
 from selfmodel.logs.recordings.mapping.mapping_file import read_mapping
 from selfmodel.robot.robot import Robot
 from tests.fuzz.mutate import tomls
@@ -37,7 +37,7 @@ def prepare(folder: Path) -> Make:
 
 def _check(bag: Path, robot: Robot) -> str:
     mapping = read_mapping(Path(NAME))
-    recorded = import_bag(bag, mapping, robot)
+    recorded = import_recording(bag, mapping, robot)
     return f"imported {min(recorded.behaviour.steps, 3)} steps or more"
 
 

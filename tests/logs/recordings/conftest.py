@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from selfmodel.logs.recordings.importer import Recording, import_bag
+from selfmodel.logs.recordings.importer import Recording, import_recording
 from selfmodel.logs.recordings.mapping.mapping_file import parse_mapping
 from selfmodel.logs.recordings.rosbag.child import read
 from selfmodel.robot.robot import Robot
@@ -101,7 +101,7 @@ def bag(tmp_path: Path) -> Path:
 
 def imported(path: Path, robot: Robot, mapping: str = MAPPING) -> Recording:
     """Imports a bag of the biped."""
-    return import_bag(path, parse_mapping(mapping, "MAP.toml"), robot)
+    return import_recording(path, parse_mapping(mapping, "MAP.toml"), robot)
 
 
 def decoded(path: Path, scratch: Path) -> Message:

@@ -10,7 +10,7 @@ from mcap.reader import make_reader
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError
 from selfmodel.logs import read_log
-from selfmodel.logs.recordings.importer import import_bag, write_recording
+from selfmodel.logs.recordings.importer import import_recording, write_recording
 from selfmodel.logs.recordings.mapping.mapping_file import parse_mapping
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import Budget
@@ -106,9 +106,9 @@ def test_a_trial_longer_than_its_log_may_be_is_refused(biped: Robot, tmp_path: P
     mapping = parse_mapping(text, "MAP.toml")
     bag = write_bag(tmp_path / "bag", stretched)
 
-    assert import_bag(bag, mapping, biped).behaviour.steps == 6001
+    assert import_recording(bag, mapping, biped).behaviour.steps == 6001
     with pytest.raises(InputError, match=r"2 to 5000 steps, got 6001: .* --budget memory="):
-        import_bag(bag, mapping, biped, Budget(memory=5 * 10**7))
+        import_recording(bag, mapping, biped, Budget(memory=5 * 10**7))
 
 
 def test_messages_may_be_partial_and_in_any_order(biped: Robot, tmp_path: Path):
@@ -206,7 +206,7 @@ def test_stamps_of_another_clock_are_refused_unless_told_so(biped: Robot, tmp_pa
 
 def test_a_log_of_an_import_reads_as_what_was_imported(bag: Path, biped: Robot, tmp_path: Path):
     mapping = parse_mapping(MAPPING, "MAP.toml")
-    recording = import_bag(bag, mapping, biped)
+    recording = import_recording(bag, mapping, biped)
     path = write_recording(tmp_path / "trial.mcap", biped, recording, mapping, None)
     trial = read_log(path).trial
     for signal, values in recording.behaviour.signals.items():
@@ -227,7 +227,7 @@ def test_a_mapping_says_whether_anything_was_wrong(
 ):
     mapping = parse_mapping(f"{line}\n{MAPPING}", "MAP.toml")
 
-    recording = import_bag(bag, mapping, biped)
+    recording = import_recording(bag, mapping, biped)
     path = write_recording(tmp_path / "trial.mcap", biped, recording, mapping, None)
 
     assert read_log(path).trial.plan.stage == stage
@@ -279,7 +279,7 @@ def test_a_recording_with_jitter_has_its_gap_marked_and_its_angles_right(
         "</mujoco>",
         0.01,
     )
-    recording = import_bag(bag, parse_mapping(text, "MAP.toml"), robot)
+    recording = import_recording(bag, parse_mapping(text, "MAP.toml"), robot)
     behaviour = recording.behaviour
 
     stamps, positions = [], []

@@ -14,7 +14,7 @@ from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log, save_controller
-from selfmodel.logs.recordings.importer import import_bag
+from selfmodel.logs.recordings.importer import import_recording
 from selfmodel.logs.recordings.mapping.mapping_file import parse_mapping
 from selfmodel.logs.recordings.mapping.suggest import suggest
 from selfmodel.physical.simulated_robot import SimulatedRobot
@@ -67,7 +67,7 @@ def test_what_is_imported_is_what_was_simulated(
     quadruped: Robot, driven: Path, simulated: Behaviour
 ):
     text = mapping(quadruped, STEPS, None)
-    found = import_bag(driven, parse_mapping(text, "map.toml"), quadruped).behaviour
+    found = import_recording(driven, parse_mapping(text, "map.toml"), quadruped).behaviour
     assert found.steps == STEPS
     for signal, tolerance in (
         ("commands", 0),
@@ -127,7 +127,7 @@ def test_the_suggested_mapping_needs_only_what_is_marked(quadruped: Robot, drive
     assert {k: touch.topic for k, touch in suggested.touch.items()} == {
         k: touch.topic for k, touch in right.touch.items()
     }
-    assert import_bag(driven, suggested, quadruped).behaviour.steps > STEPS
+    assert import_recording(driven, suggested, quadruped).behaviour.steps > STEPS
 
 
 @pytest.mark.process
