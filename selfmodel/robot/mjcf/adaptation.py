@@ -118,7 +118,7 @@ def adapt_message(message: Message, budget: Budget, _scratch: Path) -> Message:
     of_urdf = given.pop("urdf")
     settings = checked_settings({**given, **of_urdf})
     if root.tag == "robot":
-        document = convert(document, settings.urdf)
+        document = convert(document, settings.urdf, settings.base)
     adapted = _adapted(facts["name"], document, settings, budget)
     with mujoco_errors_as_input_errors("use the model"):
         Robot(adapted.name, adapted.mjcf, adapted.control_timestep, adapted.assets)
