@@ -30,7 +30,7 @@ from selfmodel.robot.mjcf.servos import add_servos
 from selfmodel.robot.mjcf.settings import MAX_CONTROL_TIMESTEP, MjcfSettings, checked_settings
 from selfmodel.robot.mjcf.untrusted import checked_model
 from selfmodel.robot.mjcf.usability import check_usable
-from selfmodel.robot.mjcf.visuals import drop_visuals
+from selfmodel.robot.mjcf.visuals import drop_textures, reduce_meshes
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.sandbox.message import Message
@@ -134,12 +134,13 @@ def _adapted(name: str, document: Document, settings: MjcfSettings, budget: Budg
     for body in document.bodies():
         if body.attrib.pop("mocap", "false") == "true":
             document.notes.append(f"the mocap body {body.get('name')} is static")
+    drop_textures(document)
     if settings.base == "free":
         free_base(document, compile_model(document.text, document.assets))
     model = compile_model(document.text, document.assets)
     if carry_hinges(document, model):
         model = compile_model(document.text, document.assets)
-    if drop_visuals(document, model):
+    if reduce_meshes(document, model):
         model = compile_model(document.text, document.assets)
     check_usable(model)
     remove_hidden_state(document, model)
