@@ -14,9 +14,9 @@ from selfmodel.errors import InputError
 from selfmodel.files import encodable, read_file
 from selfmodel.robot.mjcf.base import carry_hinges, fix_base, free_base
 from selfmodel.robot.mjcf.command_ranges import add_command_ranges
-from selfmodel.robot.mjcf.document import Document, read_document
+from selfmodel.robot.mjcf.document import Document, parse_xml, read_document
 from selfmodel.robot.mjcf.expand import check_loggable, expand
-from selfmodel.robot.mjcf.files import InMemory, robot_folder
+from selfmodel.robot.mjcf.files import Files, InMemory, robot_folder
 from selfmodel.robot.mjcf.forward import turn_forward
 from selfmodel.robot.mjcf.ground import add_ground
 from selfmodel.robot.mjcf.hidden_state import remove_hidden_state
@@ -32,6 +32,9 @@ from selfmodel.robot.mjcf.untrusted import checked_model
 from selfmodel.robot.mjcf.usability import check_usable
 from selfmodel.robot.mjcf.visuals import drop_textures, reduce_meshes
 from selfmodel.robot.robot import Robot
+from selfmodel.robot.urdf.conversion import convert
+from selfmodel.robot.urdf.reading import read_urdf
+from selfmodel.robot.urdf.settings import URDF_SETTINGS, UrdfSettings
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.sandbox.message import Message
 
@@ -76,12 +79,14 @@ def adapt(path: Path, settings: MjcfSettings, budget: Budget = DEFAULT_BUDGET) -
     data = read_file(path, "an MJCF file", budget.model_text)
     try:
         files = robot_folder(path.parent, settings.assets)
-        document = read_document(data, files, path.name, budget=budget)
-        read = asdict(replace(settings, assets=""))  # the files are read
-        request = Message(
-            {"name": encodable(path.stem), "mjcf": document.text, "settings": read},
-            document.assets,
-        )
+        document = _read(data, files, path.name, settings, budget)
+        facts = {
+            "name": encodable(path.stem),
+            "model": document.text,
+            "settings": asdict(replace(settings, assets="")),  # the files are read
+            "notes": document.notes,
+        }
+        request = Message(facts, document.assets)
         found = run_on_model("selfmodel.robot.mjcf.adaptation:adapt_message", request, budget)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
@@ -89,12 +94,32 @@ def adapt(path: Path, settings: MjcfSettings, budget: Budget = DEFAULT_BUDGET) -
     return AdaptedMjcf(**{**found.facts, "notes": notes, "assets": found.blobs})
 
 
+def _read(
+    data: bytes, files: Files, name: str, settings: MjcfSettings, budget: Budget
+) -> Document:
+    """Returns the document of an MJCF or of a URDF; see ``read_document`` and ``read_urdf``."""
+    root = parse_xml(data)
+    if root.tag == "robot":
+        return read_urdf(root, files, budget)
+    if settings.urdf != UrdfSettings():
+        raise InputError(
+            f"{', '.join(URDF_SETTINGS)} are settings for a URDF: in an MJCF, motors have gains "
+            f"and forces, and a <key> in <keyframe> has the pose"
+        )
+    return read_document(data, files, name, budget)
+
+
 def adapt_message(message: Message, budget: Budget, _scratch: Path) -> Message:
     """Task of a child process: adapts the document in a message, and checks the robot of it."""
     facts = message.facts
-    document = Document(ET.fromstring(facts["mjcf"]), dict(message.blobs))  # noqa: S314  # checked
+    root = ET.fromstring(facts["model"])  # noqa: S314  # checked
+    document = Document(root, dict(message.blobs), list(facts["notes"]))
     given = {name: value for name, value in facts["settings"].items() if value is not None}
-    adapted = _adapted(facts["name"], document, checked_settings(given), budget)
+    urdf = given.pop("urdf")
+    settings = checked_settings({**given, **urdf})
+    if root.tag == "robot":
+        document = convert(document, settings.urdf)
+    adapted = _adapted(facts["name"], document, settings, budget)
     with mujoco_errors_as_input_errors("use the model"):
         Robot(adapted.name, adapted.mjcf, adapted.control_timestep, adapted.assets)
     result = {

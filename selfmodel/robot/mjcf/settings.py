@@ -2,13 +2,14 @@
 
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.files import load_toml, read_file
 from selfmodel.robot.mjcf.files import is_around_home
+from selfmodel.robot.urdf.settings import URDF_SETTINGS, UrdfSettings, checked_urdf_settings
 
 MAX_SETTINGS_BYTES = 2**16
 """Largest settings file, in bytes."""
@@ -56,6 +57,7 @@ class MjcfSettings:
         servo: Gains of position servos that replace the torque motors; None to keep the motors.
         reach: Largest distance of a servo's command from the initial pose, rad; None for the
             servo's command range.
+        urdf: Settings for a URDF; in a settings file they are beside the others.
         base: ``free`` for a base with a free joint, ``fixed`` for a base that is fixed to the
             world, as on a stand; None for the base of the file.
         base_height: Height of the root body with ``base="fixed"``, m; None for the height of the
@@ -74,6 +76,7 @@ class MjcfSettings:
     base: str | None = None
     base_height: float | None = None
     assets: str = ""
+    urdf: UrdfSettings = field(default_factory=UrdfSettings)
 
 
 def read_settings(path: Path, extra: Mapping[str, Any] | None = None) -> MjcfSettings:
@@ -149,8 +152,8 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
                 "neurons is a setting of a controller, not of a robot: leave neurons out, and give "
                 "--neurons N to the command"
             )
-        if key not in {field.name for field in fields(MjcfSettings)}:
-            raise unknown_name("setting", key, [field.name for field in fields(MjcfSettings)])
+        if key not in _KEYS:
+            raise unknown_name("setting", key, _KEYS)
     step = given.get("control_timestep")
     if step is not None and not (_is_number(step) and 0 < step <= MAX_CONTROL_TIMESTEP):
         raise InputError(
@@ -185,7 +188,12 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
         base=base,
         base_height=None if height is None else float(height),
         assets=assets,
+        urdf=checked_urdf_settings(given),
     )
+
+
+_KEYS = [key.name for key in fields(MjcfSettings) if key.name != "urdf"] + list(URDF_SETTINGS)
+"""Names of the settings in a file."""
 
 
 def _is_number(value: object) -> bool:
