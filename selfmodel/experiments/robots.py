@@ -14,7 +14,6 @@ from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.tasks import Entry, entry
 
-
 _MODEL_ENDINGS = (".xml", ".urdf", ".xacro")
 """Endings of models; a xacro is refused with the remedy."""
 

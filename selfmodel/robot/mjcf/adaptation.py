@@ -94,9 +94,7 @@ def adapt(path: Path, settings: MjcfSettings, budget: Budget = DEFAULT_BUDGET) -
     return AdaptedMjcf(**{**found.facts, "notes": notes, "assets": found.blobs})
 
 
-def _read(
-    data: bytes, files: Files, name: str, settings: MjcfSettings, budget: Budget
-) -> Document:
+def _read(data: bytes, files: Files, name: str, settings: MjcfSettings, budget: Budget) -> Document:
     """Returns the document of an MJCF or of a URDF; see ``read_document`` and ``read_urdf``."""
     root = parse_xml(data)
     if root.tag == "robot":
@@ -115,8 +113,8 @@ def adapt_message(message: Message, budget: Budget, _scratch: Path) -> Message:
     root = ET.fromstring(facts["model"])  # noqa: S314  # checked
     document = Document(root, dict(message.blobs), list(facts["notes"]))
     given = {name: value for name, value in facts["settings"].items() if value is not None}
-    urdf = given.pop("urdf")
-    settings = checked_settings({**given, **urdf})
+    of_urdf = given.pop("urdf")
+    settings = checked_settings({**given, **of_urdf})
     if root.tag == "robot":
         document = convert(document, settings.urdf)
     adapted = _adapted(facts["name"], document, settings, budget)

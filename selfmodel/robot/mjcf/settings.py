@@ -54,10 +54,10 @@ class MjcfSettings:
         touch: Bodies that get a touch sensor; None for the end of each limb.
         angle: Joints that get an angle sensor; None for every hinge that a motor drives.
         ctrlrange: Lowest and highest command of motors without a command range.
+        urdf: Settings for a URDF; in a settings file they are beside the others.
         servo: Gains of position servos that replace the torque motors; None to keep the motors.
         reach: Largest distance of a servo's command from the initial pose, rad; None for the
             servo's command range.
-        urdf: Settings for a URDF; in a settings file they are beside the others.
         base: ``free`` for a base with a free joint, ``fixed`` for a base that is fixed to the
             world, as on a stand; None for the base of the file.
         base_height: Height of the root body with ``base="fixed"``, m; None for the height of the
