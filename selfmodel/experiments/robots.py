@@ -14,6 +14,9 @@ from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.tasks import Entry, entry
 
+_MODEL_ENDINGS = (".xml", ".urdf", ".xacro")
+"""Endings of models; a xacro is refused with the remedy."""
+
 
 def robot_entry(name: str, settings: Iterable[str] = (), budget: Budget = DEFAULT_BUDGET) -> Entry:
     """Returns a robot, its cases and its tasks, by name or by MJCF file.
@@ -52,8 +55,8 @@ def _settings(name: str, given: Iterable[str]) -> MjcfSettings:
 
 
 def is_model(name: str) -> bool:
-    """Returns whether a robot's name is the path of an MJCF file."""
-    return Path(name).suffix.lower() == ".xml"
+    """Returns whether a robot's name is the path of an MJCF or URDF file."""
+    return Path(name).suffix.lower() in _MODEL_ENDINGS
 
 
 def robot(name: str, control_timestep: float, budget: Budget = DEFAULT_BUDGET) -> Robot:

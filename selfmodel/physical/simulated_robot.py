@@ -18,6 +18,7 @@ from selfmodel.physical.measurement_noise import ExactMeasurement, Measurement, 
 from selfmodel.physical.reality_gap import RealityGap, perturbed_model
 from selfmodel.physical.structural_mismatch import StructuralMismatch, add_structural_mismatch
 from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.known_base import BASE_SIGNALS
 from selfmodel.robot.mjcf.mujoco_errors import mujoco_errors_as_input_errors
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
@@ -108,6 +109,8 @@ class SimulatedRobot:
         state_fields = signal_fields(robot, model)
         live = {signal: field.reader(bind_data(data)) for signal, field in state_fields.items()}
         live |= {"sensors": lambda: controllers.readings, "commands": lambda: commands}
+        # The pose of a fixed base is known, so no sensor measures it.
+        constant = BASE_SIGNALS if robot.has_fixed_base else ()
         for k in range(steps):
             reader.read(data.sensordata[np.newaxis], data.qpos[np.newaxis], controllers.readings)
             measurement.corrupt_readings(controllers.readings[0])
@@ -117,7 +120,11 @@ class SimulatedRobot:
             yield Sample(
                 time=k * robot.control_timestep,
                 values={
-                    signal: measurement.measure(signal, live[signal]()[0]).copy()
+                    signal: (
+                        live[signal]()[0]
+                        if signal in constant
+                        else measurement.measure(signal, live[signal]()[0])
+                    ).copy()
                     for signal in SIGNALS
                 },
             )

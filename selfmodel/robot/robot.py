@@ -8,8 +8,9 @@ import numpy as np
 
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.anatomy_reader import driven_joints, read_anatomy
+from selfmodel.robot.base import find_root_body
 from selfmodel.robot.control_delay import control_delay, has_control_delay
-from selfmodel.robot.floating_base import find_root_body
+from selfmodel.robot.fixed_base import reference_pose
 from selfmodel.robot.model_checks import check_model
 from selfmodel.robot.mujoco_log import configure
 
@@ -30,7 +31,8 @@ class Robot:
         assets: Contents of the files that the MJCF names, such as meshes, by file name.
         model: The compiled model.
         anatomy: Joints, sensors and motors.
-        root: Name of the root body, whose displacement is the displacement of the robot.
+        root: Name of the root body, whose displacement is the displacement of the robot; a robot
+            with a fixed base has none.
     """
 
     name: str
@@ -82,7 +84,13 @@ class Robot:
     @property
     def standing_height(self) -> float:
         """Height of the root body above the ground in the initial pose, m."""
-        return float(self.model.body(self.root).pos[2])
+        position, _ = reference_pose(self.model, int(self.model.body(self.root).id))
+        return float(position[2])
+
+    @property
+    def has_fixed_base(self) -> bool:
+        """Whether the root body is welded to the world: an arm, or a robot on a stand."""
+        return not self.model.body(self.root).jntnum[0]
 
     def specification(self) -> mujoco.MjSpec:
         """Returns the MJCF as an editable MjSpec."""

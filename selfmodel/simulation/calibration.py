@@ -18,6 +18,7 @@ from selfmodel.errors import InputError
 from selfmodel.faults.build import apply_faults
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.robot.control_delay import MAX_CONTROL_DELAY
+from selfmodel.robot.known_base import trial_with_known_base
 from selfmodel.robot.parameters import (
     Parameters,
     factor_names,
@@ -153,7 +154,7 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
     """
     if not trials:
         raise InputError("expected at least one trial of the healthy robot, got none")
-    data = [calibration_segments_of(trial) for trial in trials]
+    data = _segments(robot, trials)
     start = nominal(robot)
     stats = SimulationStats()
     before = _error(robot, start, data, threads, stats)
@@ -211,7 +212,7 @@ def simulated_steps(robot: Robot, trials: Sequence[Trial]) -> int:
     Raises:
         InputError: Too little of a trial was observed.
     """
-    cut = [calibration_segments_of(trial).segments for trial in trials]
+    cut = [own.segments for own in _segments(robot, trials)]
     slopes = 2 * len(nominal(robot).factors)
     # Errors before and after, each delay, then slopes and a new point per iteration.
     models = 3 + len(CANDIDATE_DELAYS) + MAX_ITERATIONS * (slopes + 1) + slopes
@@ -233,12 +234,16 @@ def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> flo
     Raises:
         InputError: Too little of a trial was observed.
     """
-    data = [calibration_segments_of(trial) for trial in trials]
+    data = _segments(robot, trials)
     return _error(robot, nominal(robot), data, threads, SimulationStats())
 
 
 Residual = Callable[[FloatArray], FloatArray]
 """Function from logarithms of factors, ``(factors, m)``, to residuals, ``(residuals, m)``."""
+
+
+def _segments(robot: Robot, trials: Sequence[Trial]) -> list[CalibrationSegments]:
+    return [calibration_segments_of(trial_with_known_base(robot, trial)) for trial in trials]
 
 
 def _slopes(residual: Residual, x: FloatArray) -> FloatArray:

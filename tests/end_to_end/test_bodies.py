@@ -16,13 +16,13 @@ from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log
-from selfmodel.logs.kinematics import Kinematics, body_names
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.robots import robot_of
-from selfmodel.logs.writer import write_trial
+from selfmodel.logs.writing.kinematics import Kinematics, body_names
+from selfmodel.logs.writing.writer import write_trial
 from selfmodel.physical.reality_gap import draw_gap
 from selfmodel.physical.simulated_robot import SimulatedRobot
-from selfmodel.recovery.disagreement import first_falls
+from selfmodel.recovery.falls import first_falls
 from selfmodel.robot.anatomy import Joint
 from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot

@@ -16,10 +16,10 @@ from selfmodel.experiments import robots, trial_logs
 from selfmodel.experiments.robots import is_model
 from selfmodel.files import read_file
 from selfmodel.logs.files import refuse_existing
-from selfmodel.logs.rosbag.importer import Recording, import_bag, write_recording
-from selfmodel.logs.rosbag.mapping import BagMapping
-from selfmodel.logs.rosbag.mapping_file import read_mapping
-from selfmodel.logs.rosbag.suggest import suggest as suggest_mapping
+from selfmodel.logs.recordings.importer import Recording, import_recording, write_recording
+from selfmodel.logs.recordings.mapping.mapping import RecordingMapping
+from selfmodel.logs.recordings.mapping.mapping_file import read_mapping
+from selfmodel.logs.recordings.mapping.suggest import suggest as suggest_mapping
 from selfmodel.robot.mjcf.rehearsal import physics_timestep
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import Budget
@@ -94,7 +94,7 @@ def _import(bag: Path, out: Path, path: Path, budget: Budget, *, as_json: bool) 
     mapping = read_mapping(path)
     made = _mapped_robot(mapping, path.parent, budget)
     controller = _controller(mapping, path.parent, made)
-    recording = import_bag(bag, mapping, made, budget)
+    recording = import_recording(bag, mapping, made, budget)
     write_recording(out, made, recording, mapping, controller)
     if as_json:
         print_json(_facts(out, mapping, recording))
@@ -102,7 +102,7 @@ def _import(bag: Path, out: Path, path: Path, budget: Budget, *, as_json: bool) 
         _print(out, recording)
 
 
-def _mapped_robot(mapping: BagMapping, folder: Path, budget: Budget) -> Robot:
+def _mapped_robot(mapping: RecordingMapping, folder: Path, budget: Budget) -> Robot:
     """Returns the robot of a mapping: one of selfmodel's, or an MJCF file beside the mapping."""
     name, timestep = mapping.robot, mapping.control_timestep
     own = not is_model(name)
@@ -120,7 +120,7 @@ def _mapped_robot(mapping: BagMapping, folder: Path, budget: Budget) -> Robot:
         raise mapping.document.error(("robot",), str(error)) from error
 
 
-def _controller(mapping: BagMapping, folder: Path, robot: Robot) -> Controller | None:
+def _controller(mapping: RecordingMapping, folder: Path, robot: Robot) -> Controller | None:
     if mapping.controller is None:
         return None
     try:
@@ -129,7 +129,7 @@ def _controller(mapping: BagMapping, folder: Path, robot: Robot) -> Controller |
         raise mapping.document.error(("controller",), str(error)) from error
 
 
-def _facts(out: Path, mapping: BagMapping, recording: Recording) -> dict[str, Any]:
+def _facts(out: Path, mapping: RecordingMapping, recording: Recording) -> dict[str, Any]:
     return {
         "log": str(out),
         "robot": mapping.robot,

@@ -11,12 +11,19 @@ from selfmodel.arrays import FloatArray
 from selfmodel.cli.rendering.captions import captioned
 from selfmodel.cli.rendering.film import Film
 from selfmodel.cli.rendering.view import ELEVATION, azimuth, gaze, size
+from selfmodel.cli.rendering.visible import VISUAL_GROUPS, opacity, visible_geoms
 
 WIDTH, HEIGHT = 480, 360
 """Size of a motion's picture, pixels."""
 
 CAMERA_DISTANCE = 2.7
 """Distance of the camera, in sizes of the robot."""
+
+HIDDEN_GROUP = VISUAL_GROUPS
+"""Group of the geoms that are not drawn."""
+
+OPAQUE = (0.6, 0.6, 0.6, 1.0)
+"""Colour of a transparent geom that is the only one of its body."""
 
 DETACHED = (1.0, 1.0, 1.0, 0.4)
 """Colour of a detached body: red, green, blue, opacity."""
@@ -56,8 +63,12 @@ def _set_pose(model: mujoco.MjModel, data: mujoco.MjData, qpos: FloatArray) -> N
 
 
 def painted(film: Film) -> mujoco.MjModel:
-    """Returns a copy of the model with its detached and jammed bodies coloured."""
+    """Returns a copy of the model in which the robot is seen, with its faulty bodies coloured."""
     model = copy.copy(film.model)
+    shown = visible_geoms(model)
+    model.geom_group[:] = np.where(shown, 0, HIDDEN_GROUP)
+    unseen = shown & (opacity(model) == 0)
+    model.geom_rgba[unseen], model.geom_matid[unseen] = OPAQUE, -1
     # On wide ground, shadows are grainy at any affordable size of the shadow map.
     model.light_castshadow[:] = 0
     model.vis.global_.offwidth = max(model.vis.global_.offwidth, WIDTH)

@@ -15,7 +15,7 @@ def load_mjcf(
     """Returns the robot that an MJCF file describes; see docs/reference/mjcf.md.
 
     Args:
-        path: The file, which is read only. It may name files in its folder and subfolders.
+        path: The file, which is read only. It may name the files that ``adapt`` describes.
         settings: Properties that the file does not contain; None for the settings of the TOML file
             of the same name.
         budget: Limits of memory and time.

@@ -110,7 +110,12 @@ AWKWARD: dict[str, Awkward] = {
     "an include of itself": Awkward(mjcf(more='<include file="robot.xml"/>'), "twice"),
     "a device as mesh": Awkward(mjcf(more=MESH.format("m", "/dev/zero")), "outside its own folder"),
     # The root.
-    "no free joint": Awkward(mjcf(root=""), "its base is fixed"),
+    "no free joint": Awkward(mjcf(root="")),
+    "limbs on the world": Awkward(
+        f"<mujoco><worldbody>{GROUND}{LEGS}</worldbody><actuator>{MOTORS}</actuator></mujoco>"
+    ),
+    "a root on a hinge": Awkward(mjcf(root='<joint name="pole"/>')),
+    "a fixed base beside a ball": Awkward(mjcf(root="", world=GROUND + BALL), "one tree"),
     "two floating bases": Awkward(mjcf(world=GROUND + BALL), "ball, torso"),
     "a planar root": Awkward(
         mjcf(root='<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>')
