@@ -12,6 +12,7 @@ from dm_control.rl import control
 from dm_control.suite import base
 
 from selfmodel.arrays import FloatArray
+from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.physical.debris import detached_limbs, place_debris
@@ -59,9 +60,14 @@ def environment(
         environment_kwargs: Arguments of ``control.Environment``.
 
     Raises:
-        InputError: The hypothesis cannot be parsed or does not apply, or the gap or the start noise
-            is out of range.
+        InputError: The base of the robot is fixed, the hypothesis cannot be parsed or does not
+            apply, or the gap or the start noise is out of range.
     """
+    if robot.has_fixed_base:
+        raise InputError(
+            f"the reward of walk is the forward speed, and the base of {robot.name} is fixed: "
+            f"give the model a <freejoint/>"
+        )
     if isinstance(hypothesis, str):
         hypothesis = parse(hypothesis, robot.anatomy)
     episodes = episode_numbers(random)
