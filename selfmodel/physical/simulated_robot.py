@@ -56,18 +56,7 @@ class SimulatedRobot:
         self._gap = gap if gap is not None and gap.level > 0 else None
         self._limbs = detached_limbs(robot, hidden) if self._gap is not None else ()
         seed = gap.seed if gap else OWN_SEED
-        edits = (
-            [partial(add_structural_mismatch, structure=structure)] if structure is not None else []
-        )
-        if self._limbs:
-            edits.append(partial(add_debris, limbs=self._limbs))
-        self._embodiment = build(
-            robot,
-            hidden,
-            seed,
-            edits=edits,
-            perturb=None if self._gap is None else partial(perturbed_model, gap=self._gap),
-        )
+        self._embodiment = physical_embodiment(robot, hidden, seed, self._gap, structure)
         self._noise = np.random.SeedSequence(seed, spawn_key=(stream,))
 
     def run(self, controller: CommandSource, steps: int) -> Iterator[Sample]:
@@ -144,6 +133,30 @@ class SimulatedRobot:
                     f"the simulation of the physical robot diverged after step {k}: its model "
                     f"is unstable under this controller; try a smaller physics time step"
                 )
+
+
+def physical_embodiment(
+    robot: Robot,
+    hidden: Hypothesis,
+    seed: int,
+    gap: RealityGap | None = None,
+    structure: StructuralMismatch | None = None,
+) -> Embodiment:
+    """Returns the model of a physical robot, with the debris of its detached limbs if it has a gap.
+
+    Args:
+        robot: The robot as its model describes it.
+        hidden: Hidden faults of the physical robot, as a hypothesis.
+        seed: Seed of the random parts of the faults.
+        gap: Reality gap with a level above 0; None for no gap.
+        structure: Structural mismatch; None for the structure of the model.
+    """
+    edits = [partial(add_structural_mismatch, structure=structure)] if structure is not None else []
+    limbs = () if gap is None else detached_limbs(robot, hidden)
+    if limbs:
+        edits.append(partial(add_debris, limbs=limbs))
+    perturb = None if gap is None else partial(perturbed_model, gap=gap)
+    return build(robot, hidden, seed, edits=edits, perturb=perturb)
 
 
 def _advanced(model: mujoco.MjModel, data: mujoco.MjData, substeps: int) -> bool:
