@@ -14,11 +14,11 @@ from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.logs import TrialLog, read_log
+from selfmodel.logs.recordings.importer import import_recording, write_recording
+from selfmodel.logs.recordings.mapping.mapping_file import parse_mapping
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.robots import robot_of
-from selfmodel.logs.rosbag.importer import import_bag, write_recording
-from selfmodel.logs.rosbag.mapping_file import parse_mapping
-from selfmodel.logs.writer import write_trial
+from selfmodel.logs.writing.writer import write_trial
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.recovery.random_streams import repair_stream
 from selfmodel.recovery.repair import RepairSearch
@@ -28,7 +28,7 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.trial import TrialPlan
-from tests.logs.rosbag import driver
+from tests.logs.recordings.rosbag import driver
 
 SETTINGS = Settings()
 SEED = 0
@@ -64,7 +64,7 @@ def recorded(folder: Path, robot: Robot, truth: Hypothesis, gait: Controller) ->
     exact = write_trial(folder / "exact.mcap", robot, plan, samples, TrialHeader(SETTINGS))
     bag = driver.record(folder / "bag", robot, truth, gait, steps)
     mapping = parse_mapping(driver.mapping(robot, steps, None), "mapping")
-    recording = import_bag(bag, mapping, robot)
+    recording = import_recording(bag, mapping, robot)
     imported = [
         write_recording(folder / f"{number}.mcap", robot, recording, mapping, controller)
         for number, controller in enumerate((gait, None))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from selfmodel.logs.contents import Contents, read_contents
+from selfmodel.logs.mcap.contents import Contents, read_contents
 from selfmodel.logs.reader import TrialLog, interpret
 from selfmodel.logs.records import HIDDEN, IMPORT, SALVAGE
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget

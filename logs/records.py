@@ -33,7 +33,7 @@ TIED = "tied"
 """Field of the salvage record: ``no`` for a log of an earlier version, otherwise ``yes``."""
 RESULT = "selfmodel.result"
 MANIFEST = "selfmodel.manifest"
-"""Digests of the preamble's records and files; see ``selfmodel.logs.provenance``."""
+"""Digests of the preamble's records and files; see ``selfmodel.logs.mcap.provenance``."""
 
 OWN = "selfmodel."
 """Prefix of the names of selfmodel's records; each contains a digest of itself."""

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from selfmodel.logs.contents import read_contents
 from selfmodel.logs.errors import GOOD, CorruptError, SchemaMismatchError
-from selfmodel.logs.provenance import UNTIED
+from selfmodel.logs.mcap.contents import read_contents
+from selfmodel.logs.mcap.provenance import UNTIED
 from selfmodel.logs.reader import TrialLog, interpret
 from selfmodel.robot.mjcf.untrusted import checked_model
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget, BudgetError

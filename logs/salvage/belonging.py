@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import TypeVar
 
-from selfmodel.logs.chain import batch_of
-from selfmodel.logs.contents import Contents
-from selfmodel.logs.framing import ContradictionError
-from selfmodel.logs.provenance import identity_of, manifest, manifest_parts, seal_of
+from selfmodel.logs.mcap.chain import batch_of
+from selfmodel.logs.mcap.contents import Contents
+from selfmodel.logs.mcap.framing import ContradictionError
+from selfmodel.logs.mcap.provenance import identity_of, manifest, manifest_parts, seal_of
 from selfmodel.logs.records import HIDDEN, MANIFEST, NONCE, RESULT, TRIAL
 from selfmodel.logs.salvage.findings import Channels, Findings, Group
 

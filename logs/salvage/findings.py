@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
 
-from selfmodel.logs.contents import Messages, is_seals, messages_of
-from selfmodel.logs.framing import ContradictionError
-from selfmodel.logs.provenance import Seal, parse_seal
+from selfmodel.logs.mcap.contents import Messages, is_seals, messages_of
+from selfmodel.logs.mcap.framing import ContradictionError
+from selfmodel.logs.mcap.provenance import Seal, parse_seal
 from selfmodel.logs.records import DIGEST, sha256, without_digest
 
 

@@ -7,10 +7,11 @@ from pathlib import Path
 
 from selfmodel.errors import InputError
 from selfmodel.files import encodable
-from selfmodel.logs.contents import Contents, Messages, read_bytes
 from selfmodel.logs.errors import LogError
 from selfmodel.logs.files import refuse_existing
-from selfmodel.logs.logfile import LogFile
+from selfmodel.logs.mcap.contents import Contents, Messages, read_bytes
+from selfmodel.logs.messages.signals import read_behaviour
+from selfmodel.logs.messages.topics import DESCRIPTION, TRANSFORMS
 from selfmodel.logs.reader import interpret, read_controller, read_log, read_record
 from selfmodel.logs.records import (
     CONTROLLER_FILE,
@@ -37,8 +38,7 @@ from selfmodel.logs.salvage.steps import (
     fill,
     missing_frames,
 )
-from selfmodel.logs.signals import read_behaviour
-from selfmodel.logs.topics import DESCRIPTION, TRANSFORMS
+from selfmodel.logs.writing.logfile import LogFile
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import forward_displacement

@@ -7,9 +7,9 @@ from pathlib import Path
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, McapRecord, Metadata, Schema
 
-from selfmodel.logs.contents import MORE_MEMORY, read_bytes
 from selfmodel.logs.errors import ANOTHER, CorruptError, NotMcapError, UnsupportedError
-from selfmodel.logs.framing import (
+from selfmodel.logs.mcap.contents import MORE_MEMORY, read_bytes
+from selfmodel.logs.mcap.framing import (
     FAILURES,
     MAGIC,
     ContradictionError,
@@ -19,7 +19,7 @@ from selfmodel.logs.framing import (
     parse,
     unpack,
 )
-from selfmodel.logs.meter import ExcessError, Meter
+from selfmodel.logs.mcap.meter import ExcessError, Meter
 from selfmodel.logs.records import OWN, without_digest
 from selfmodel.logs.salvage.belonging import Rescued, own_contents
 from selfmodel.logs.salvage.findings import Findings

@@ -5,13 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
-from selfmodel.logs.contents import Contents
 from selfmodel.logs.errors import CorruptError, SchemaMismatchError
-from selfmodel.logs.records import SALVAGE, TIMED_FORMAT, TrialRecord
-from selfmodel.logs.salvage.belonging import Discarded
-from selfmodel.logs.schemas import schema_text
-from selfmodel.logs.signals import read_names
-from selfmodel.logs.topics import (
+from selfmodel.logs.mcap.contents import Contents
+from selfmodel.logs.messages.schemas import schema_text
+from selfmodel.logs.messages.signals import read_names
+from selfmodel.logs.messages.topics import (
     DESCRIPTION,
     DESCRIPTION_TYPE,
     TIMING,
@@ -21,6 +19,8 @@ from selfmodel.logs.topics import (
     frames_stride,
     topics,
 )
+from selfmodel.logs.records import SALVAGE, TIMED_FORMAT, TrialRecord
+from selfmodel.logs.salvage.belonging import Discarded
 from selfmodel.sandbox.budget import Budget
 
 

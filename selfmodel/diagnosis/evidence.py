@@ -11,6 +11,7 @@ from selfmodel.diagnosis.comparator import Comparator, PiecewiseTrial, PreparedT
 from selfmodel.diagnosis.search_cost import steps_of
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.robot.known_base import BASE_SIGNALS, trial_with_known_base
 from selfmodel.simulation.batch_memory import largest_batch
 from selfmodel.simulation.cache import Cache
 from selfmodel.simulation.outcome import SimulationResult
@@ -111,7 +112,8 @@ class Evidence:
         if key not in self._prepared:
             # Numbers that are too large for arithmetic are refused by name, after the preparation.
             with np.errstate(over="ignore", invalid="ignore"):
-                prepared = self._checked(self._comparator.prepare(trial))
+                known = trial_with_known_base(self._simulator.robot, trial)
+                prepared = self._checked(self._comparator.prepare(known))
             check_magnitudes(trial, _compared_signals(prepared.request))
             self._prepared[key] = prepared
         return self._prepared[key]
@@ -124,6 +126,11 @@ class Evidence:
         if not record or not set(record) <= set(possible):
             raise self._contract_error(
                 f"requested the signals {record!r}, of {', '.join(possible)}"
+            )
+        if self._simulator.robot.has_fixed_base and set(record) <= set(BASE_SIGNALS):
+            raise InputError(
+                f"{self._comparator.name} compares the motion of the base, and the base of "
+                f"{self._simulator.robot.name} is fixed: give the comparator segment-prediction"
             )
         return prepared
 

@@ -18,6 +18,7 @@ from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import ALL_KINDS, KINDS
 from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.next_trial import NextTrial, by_disagreement, by_repair
+from selfmodel.recovery.upright import UPRIGHT
 from selfmodel.robot.designs import DESIGNS
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import Entry
@@ -153,17 +154,19 @@ def score(name: str, robot: str, entry: Entry) -> Score:
     """Returns the fitness of the repair EA by name.
 
     Args:
-        name: ``displacement``, or ``return`` for the sum of the rewards of the robot's task.
+        name: ``displacement``; ``upright``, the displacement up to the first fall; or ``return``,
+            the sum of the rewards of the robot's task.
         robot: Name of the robot.
         entry: The robot's entry.
 
     Raises:
         InputError: The name is unknown, or the robot has no task with rewards.
     """
-    if name == DISPLACEMENT.name:
-        return DISPLACEMENT
+    by_name = {DISPLACEMENT.name: DISPLACEMENT, UPRIGHT.name: UPRIGHT}
+    if name in by_name:
+        return by_name[name]
     if name != RETURN:
-        raise unknown_name("score", name, (DISPLACEMENT.name, RETURN))
+        raise unknown_name("score", name, (*by_name, RETURN))
     if entry.episode_return is None:
         raise InputError(
             f"{robot} has no task of dm_control, so no rewards: give --score {DISPLACEMENT.name}"

@@ -62,16 +62,19 @@ def as_rows(record: "type[Row]", part: FinishedPart) -> list["Row"]:
     """Returns the rows in the result of a part.
 
     Args:
-        record: Class of the rows; its annotations are the types of the columns.
+        record: Class of the rows; its annotations are the types of the columns. A column with a
+            default may be missing, as in the rows of an earlier version.
         part: The part.
 
     Raises:
         InputError: A row has other columns, or a value of another type.
     """
     types = {name: get_args(hint) or (hint,) for name, hint in get_type_hints(record).items()}
+    fields = dataclasses.fields(record)
+    needed = {field.name for field in fields if field.default is dataclasses.MISSING}
     rows = part.result if isinstance(part.result, list) else [part.result]
     for row in rows:
-        if not isinstance(row, dict) or row.keys() != types.keys():
+        if not isinstance(row, dict) or not needed <= row.keys() <= types.keys():
             raise _no_row(part, f"a row without the columns {', '.join(types)}")
         for name, value in row.items():
             known = (*types[name], int) if float in types[name] else types[name]

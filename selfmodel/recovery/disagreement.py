@@ -15,11 +15,11 @@ from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.recovery.falls import first_falls
 from selfmodel.simulation.cache import Cache
 from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
-from selfmodel.trials.rotation import directions
 from selfmodel.trials.signal_difference import difference
 from selfmodel.trials.signal_scales import DISAGREEMENT_SCALES
 
@@ -27,13 +27,6 @@ EARLY_STEPS = 100
 """Control steps over which disagreement is computed. Later, contacts make any two predictions
 differ. In closed loop, two hypotheses differed 2.4 times as much as self-models that differ by 3 %
 in the first quarter of a second, and 1.7 times after three quarters; later steps added nothing."""
-
-FALLEN_HEIGHT = 0.5
-"""Height below which a base has fallen, as a fraction of its standing height. A base that starts on
-the ground, as a swimmer's, cannot fall by this rule."""
-
-FALLEN_TILT = np.radians(60)
-"""Tilt above which a base has fallen, relative to its initial orientation, rad."""
 
 
 class Disagreement:
@@ -139,24 +132,3 @@ def disagreements(behaviour: Behaviour) -> FloatArray:
             differences = difference(name, values[:, first], values[:, second])
             total += np.minimum(np.abs(differences) / scale, 1).mean(axis=(1, 2))
     return total / max(len(pairs), 1) / len(DISAGREEMENT_SCALES)
-
-
-def first_falls(behaviour: Behaviour, normals: FloatArray, standing_height: float) -> IndexArray:
-    """Returns the first step at which the robot has fallen, or the number of steps without a fall.
-
-    Args:
-        behaviour: Position and orientation of the base, ``(..., steps, width)`` each.
-        normals: Unit normals of the ground, ``(..., 3)``, broadcast to the shape of the runs. The
-            ground passes through the origin.
-        standing_height: Height of the base in the initial pose, m.
-
-    Returns:
-        Step indices, ``(...)``.
-    """
-    height = np.einsum("...sk,...k->...s", behaviour["base_position"], normals)
-    upward = directions(behaviour["base_orientation"])[..., 2:]  # world's up, in the base frame
-    # Cosine of the tilt.
-    upright = (upward * upward[..., :1, :]).sum(axis=-1)
-    low = (height < FALLEN_HEIGHT * standing_height) & (standing_height > 0)
-    fallen = low | (upright < np.cos(FALLEN_TILT))
-    return np.where(fallen.any(axis=-1), fallen.argmax(axis=-1), behaviour.steps)

@@ -5,7 +5,7 @@ import math
 import mujoco
 
 from selfmodel.robot.anatomy import Anatomy, Joint, Sensor
-from selfmodel.robot.floating_base import joints_of_body
+from selfmodel.robot.base import joints_of_body
 from selfmodel.robot.transmission import descends, motor_bodies, motor_joints
 
 _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from selfmodel.robot.floating_base import joints_of_body
+from selfmodel.robot.base import joints_of_body
 from selfmodel.robot.transmission import SUPPORTED_TRANSMISSIONS
 
 _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)

@@ -8,8 +8,9 @@ import numpy as np
 
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.anatomy_reader import driven_joints, read_anatomy
+from selfmodel.robot.base import find_root_body
 from selfmodel.robot.control_delay import control_delay, has_control_delay
-from selfmodel.robot.floating_base import find_root_body
+from selfmodel.robot.fixed_base import reference_pose
 from selfmodel.robot.model_checks import check_model
 from selfmodel.robot.mujoco_log import configure
 
@@ -30,7 +31,8 @@ class Robot:
         assets: Contents of the files that the MJCF names, such as meshes, by file name.
         model: The compiled model.
         anatomy: Joints, sensors and motors.
-        root: Name of the root body, whose displacement is the displacement of the robot.
+        root: Name of the root body, whose displacement is the displacement of the robot; a robot
+            with a fixed base has none.
     """
 
     name: str
@@ -50,12 +52,12 @@ class Robot:
         object.__setattr__(self, "model", model)
         object.__setattr__(self, "anatomy", read_anatomy(model, root))
         object.__setattr__(self, "root", str(model.body(root).name))
-        control_delay(model)  # raises ValueError
         if not np.isclose(self.substeps * model.opt.timestep, self.control_timestep, rtol=1e-9):
             raise ValueError(
                 f"the control time step {self.control_timestep} s must be a multiple of the "
                 f"physics time step {model.opt.timestep} s"
             )
+        control_delay(model, self.substeps)  # raises ValueError
 
     def __repr__(self) -> str:
         names = self.anatomy
@@ -70,9 +72,9 @@ class Robot:
         return max(1, round(self.control_timestep / float(self.model.opt.timestep)))
 
     @property
-    def control_delay(self) -> int:
+    def control_delay(self) -> float:
         """Control delay of the model, in control steps; see ``CONTROL_DELAY``."""
-        return control_delay(self.model)
+        return control_delay(self.model, self.substeps)
 
     @property
     def is_calibrated(self) -> bool:
@@ -82,7 +84,13 @@ class Robot:
     @property
     def standing_height(self) -> float:
         """Height of the root body above the ground in the initial pose, m."""
-        return float(self.model.body(self.root).pos[2])
+        position, _ = reference_pose(self.model, int(self.model.body(self.root).id))
+        return float(position[2])
+
+    @property
+    def has_fixed_base(self) -> bool:
+        """Whether the root body is welded to the world: an arm, or a robot on a stand."""
+        return not self.model.body(self.root).jntnum[0]
 
     def specification(self) -> mujoco.MjSpec:
         """Returns the MJCF as an editable MjSpec."""

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray, columns
-from selfmodel.robot.floating_base import read_floating_base
+from selfmodel.robot.base import read_base
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state_fields import Bind, DerivedSignal, StateField
 from selfmodel.trials.signals import Signal
@@ -33,7 +33,7 @@ def signal_fields(
     return {
         "commands": StateField("ctrl", motors),
         **_joint_fields(robot, model),
-        **read_floating_base(models, robot.root).signal_fields(),
+        **read_base(models, robot.root).signal_fields(),
     }
 
 
@@ -48,7 +48,7 @@ def state_writer(robot: Robot, bind: Bind, *models: mujoco.MjModel) -> StateWrit
     models = models or (robot.model,)
     qpos, qvel = bind("qpos"), bind("qvel")
     arrays = {"qpos": qpos, "qvel": qvel}
-    base, joints = read_floating_base(models, robot.root), _joint_fields(robot, models[0])
+    base, joints = read_base(models, robot.root), _joint_fields(robot, models[0])
 
     def write(state: Mapping[Signal, FloatArray]) -> None:
         for signal in ("joint_positions", "joint_velocities"):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from selfmodel.logs.records import MODEL_FILE, TRIAL, TrialHeader
-from selfmodel.logs.writer import write_trial
+from selfmodel.logs.writing.writer import write_trial
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings

@@ -16,13 +16,13 @@ from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log
-from selfmodel.logs.kinematics import Kinematics, body_names
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.robots import robot_of
-from selfmodel.logs.writer import write_trial
+from selfmodel.logs.writing.kinematics import Kinematics, body_names
+from selfmodel.logs.writing.writer import write_trial
 from selfmodel.physical.reality_gap import draw_gap
 from selfmodel.physical.simulated_robot import SimulatedRobot
-from selfmodel.recovery.disagreement import first_falls
+from selfmodel.recovery.falls import first_falls
 from selfmodel.robot.anatomy import Joint
 from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot
@@ -89,7 +89,7 @@ def test_it_walks_in_dm_control_s_world_like_in_the_simulator_to_the_bit(body: R
     told = ("base_position", "base_orientation", "base_linear_velocity", "joint_positions")
     runs = [(INTACT, swung(body, 20))]
     truth = Simulator(body, 1).run(runs, 20, told).behaviour
-    environment = walking.environment(body, "intact", 9.0, None, None)
+    environment = walking.environment(body, time_limit=9.0)
     rows = [environment.reset()]
     rows += [environment.step(commands) for commands in swinging(body, 20)[:-1]]
 

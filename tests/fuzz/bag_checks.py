@@ -5,14 +5,14 @@ from pathlib import Path
 
 from selfmodel.errors import InputError, WorkError
 from selfmodel.logs import read_log
-from selfmodel.logs.rosbag.importer import import_bag, write_recording
-from selfmodel.logs.rosbag.mapping import BagMapping
-from selfmodel.logs.rosbag.mapping_file import parse_mapping
-from selfmodel.logs.rosbag.suggest import suggest
+from selfmodel.logs.recordings.importer import import_recording, write_recording
+from selfmodel.logs.recordings.mapping.mapping import RecordingMapping
+from selfmodel.logs.recordings.mapping.mapping_file import parse_mapping
+from selfmodel.logs.recordings.mapping.suggest import suggest
 from selfmodel.robot.robot import Robot
 
 
-def check_bag(bag: str, mapping: BagMapping, robot: Robot) -> str:
+def check_bag(bag: str, mapping: RecordingMapping, robot: Robot) -> str:
     """Reads a bag in every way.
 
     Args:
@@ -26,7 +26,7 @@ def check_bag(bag: str, mapping: BagMapping, robot: Robot) -> str:
     except (InputError, WorkError) as error:
         if "?" not in proposal:
             raise AssertionError(f"its own suggestion is refused: {error}") from error
-    recording = import_bag(Path(bag), mapping, robot)
+    recording = import_recording(Path(bag), mapping, robot)
     json.dumps(recording.facts(), allow_nan=False)
     out = Path("imported.mcap")
     write_recording(out, robot, recording, mapping, None)

@@ -10,8 +10,8 @@ from collections.abc import Mapping
 import numpy as np
 from mcap.records import Attachment, Message, Metadata
 
-from selfmodel.logs.chain import batch_of
-from selfmodel.logs.provenance import (
+from selfmodel.logs.mcap.chain import batch_of
+from selfmodel.logs.mcap.provenance import (
     PROVENANCE,
     SEAL_TYPE,
     identity_of,

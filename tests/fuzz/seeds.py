@@ -6,13 +6,13 @@ import numpy as np
 
 from selfmodel.controllers.playback import Playback
 from selfmodel.logs.records import Imported, TrialHeader
-from selfmodel.logs.writer import write_trial
+from selfmodel.logs.writing.writer import write_trial
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.trial import TrialPlan
 from tests.logs.conftest import MJCF, made_up, plan_of, timed
-from tests.logs.rosbag.bags import T0, Item, made, pose_stamped, trajectory
-from tests.logs.rosbag.conftest import JOINTS, MAPPING, angle, recorded
+from tests.logs.recordings.conftest import JOINTS, MAPPING, angle, recorded
+from tests.logs.recordings.rosbag.bags import T0, Item, made, pose_stamped, trajectory
 
 DATA = Path(__file__).parents[1] / "data" / "logs-0.1"
 """Small files of version 0.1, which are in the repository."""

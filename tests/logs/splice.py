@@ -18,10 +18,10 @@ from mcap.opcode import Opcode
 
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError, TrialLog, read_log
-from selfmodel.logs.framing import Frame, frames
+from selfmodel.logs.mcap.framing import Frame, frames
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.salvage import salvage
-from selfmodel.logs.writer import write_trial
+from selfmodel.logs.writing.writer import write_trial
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.signals import SIGNALS

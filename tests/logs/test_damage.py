@@ -28,10 +28,10 @@ from selfmodel.logs import (
     read_log,
     reader as reader_module,
 )
-from selfmodel.logs.chain import batch_of
-from selfmodel.logs.checksums import verified_records
-from selfmodel.logs.contents import Contents, read_contents
-from selfmodel.logs.provenance import (
+from selfmodel.logs.mcap.chain import batch_of
+from selfmodel.logs.mcap.checksums import verified_records
+from selfmodel.logs.mcap.contents import Contents, read_contents
+from selfmodel.logs.mcap.provenance import (
     PROVENANCE,
     identity_of,
     manifest,

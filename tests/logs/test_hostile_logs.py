@@ -17,8 +17,8 @@ from typer.testing import CliRunner
 from selfmodel.cli.logs import app
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError, read_gap, read_log, read_truth
-from selfmodel.logs.framing import MAGIC, frames
 from selfmodel.logs.info import read_info
+from selfmodel.logs.mcap.framing import MAGIC, frames
 from selfmodel.logs.records import (
     CONTROLLER_FILE,
     MODEL_FILE,

@@ -11,11 +11,12 @@ from pathlib import Path
 import pytest
 
 from selfmodel.errors import InputError
-from selfmodel.logs import IncompleteError, LogWriteError, TruncatedError, files, logfile, read_log
+from selfmodel.logs import IncompleteError, LogWriteError, TruncatedError, files, read_log
+from selfmodel.logs.messages.signals import topics
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.salvage.rescue import rescue
-from selfmodel.logs.signals import topics
-from selfmodel.logs.writer import FLUSH_STEPS, write_trial
+from selfmodel.logs.writing import logfile
+from selfmodel.logs.writing.writer import FLUSH_STEPS, write_trial
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Sample
@@ -25,7 +26,7 @@ SCRIPT = """
 import sys, time
 from pathlib import Path
 from selfmodel.logs.records import TrialHeader
-from selfmodel.logs.writer import write_trial
+from selfmodel.logs.writing.writer import write_trial
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from tests.logs.conftest import MJCF, made_up, plan_of

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from selfmodel.cli import app
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.logs.journal import FolderJournal
-from selfmodel.logs.provenance import PROVENANCE
+from selfmodel.logs.mcap.provenance import PROVENANCE
 from selfmodel.tasks import ROBOTS
 
 DATA = Path(__file__).parents[1] / "data" / "logs-0.1"

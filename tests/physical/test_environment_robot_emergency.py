@@ -13,7 +13,7 @@ from selfmodel.errors import InputError, TrialError
 from selfmodel.logs import read_log
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.verify import verify
-from selfmodel.logs.writer import TrialWriter, write_trial
+from selfmodel.logs.writing.writer import TrialWriter, write_trial
 from selfmodel.physical.environment_robot import EnvironmentRobot
 from selfmodel.physical.safety_limits import Limit, joint_limits, tilt_limit
 from selfmodel.robot.robot import Robot

@@ -13,7 +13,7 @@ from selfmodel.faults.build import build
 from selfmodel.faults.notation import parse
 from selfmodel.logs import LogError, read_gap, read_log, read_truth
 from selfmodel.logs.records import TrialHeader
-from selfmodel.logs.writer import write_trial
+from selfmodel.logs.writing.writer import write_trial
 from selfmodel.physical.measurement_noise import NoisyMeasurement
 from selfmodel.physical.reality_gap import RealityGap, draw_gap
 from selfmodel.physical.simulated_robot import SimulatedRobot

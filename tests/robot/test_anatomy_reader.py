@@ -153,8 +153,7 @@ def test_every_level_of_every_kind_is_within_the_bounds_of_its_part():
 @pytest.mark.parametrize(
     ("parts", "sentence"),
     [
-        ({"root": ""}, "its base is fixed"),
-        ({"root": '<joint name="pole"/>'}, "its base is fixed"),
+        ({"root": '<joint name="pole"/>'}, "put them into one <body>"),
         ({"root": '<joint name="s" type="slide"/><joint type="ball" name="b"/>'}, "base is fixed"),
         ({"root": '<joint name="h"/><joint name="s" type="slide"/>'}, "base is fixed"),
         (

@@ -14,7 +14,7 @@ from selfmodel.cli.output.tables import show
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError, TrialLog
 from selfmodel.logs.info import Info, has_truth, read_info
-from selfmodel.logs.provenance import UNTIED
+from selfmodel.logs.mcap.provenance import UNTIED
 from selfmodel.logs.salvage import salvageable_steps
 from selfmodel.sandbox.budget import Budget
 

@@ -10,7 +10,7 @@ from selfmodel.cli.inputs import check_log_name
 from selfmodel.cli.options import DEFAULT_BUDGET, FileBudget, Json, NewLog
 from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_json, print_lines
-from selfmodel.logs.provenance import UNTIED
+from selfmodel.logs.mcap.provenance import UNTIED
 from selfmodel.logs.salvage import Discarded, salvage as save
 from selfmodel.sandbox.budget import Budget
 

@@ -10,7 +10,7 @@ from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError
-from selfmodel.logs.provenance import UNTIED
+from selfmodel.logs.mcap.provenance import UNTIED
 from selfmodel.logs.verify import verify as check
 from selfmodel.sandbox.budget import Budget
 

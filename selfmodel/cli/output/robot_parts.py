@@ -7,6 +7,8 @@ import mujoco
 from selfmodel.cli.output.tables import folding, print_tables
 from selfmodel.faults.registry import ALL_KINDS
 from selfmodel.robot.actuator_ranges import command_ranges
+from selfmodel.robot.base import FreeBase, read_base
+from selfmodel.robot.fixed_base import FixedBase
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.transmission import motor_joints
 
@@ -14,10 +16,14 @@ from selfmodel.robot.transmission import motor_joints
 def parts(robot: Robot) -> dict[str, Any]:
     """Returns root body, joints, sensors, motors and applicable faults as JSON values."""
     anatomy, model = robot.anatomy, robot.model
-    floats = model.jnt_type[model.body(robot.root).jntadr[0]] == mujoco.mjtJoint.mjJNT_FREE
+    base = read_base([model], robot.root)
     ranges = command_ranges(model)
     return {
-        "root": {"body": robot.root, "floats": bool(floats)},
+        "root": {
+            "body": robot.root,
+            "floats": isinstance(base, FreeBase),
+            "fixed": isinstance(base, FixedBase),
+        },
         "physics_timestep": float(model.opt.timestep),
         "joint_details": [
             {
@@ -62,7 +68,9 @@ def print_parts(facts: dict[str, Any]) -> None:
     Args:
         facts: Result of ``parts``, with the robot's name, its controller and its cases.
     """
-    root = "floating" if facts["root"]["floats"] else "slides, and turns about one axis"
+    root = "slides, and turns about one axis"
+    if facts["root"]["floats"] or facts["root"]["fixed"]:
+        root = "floating" if facts["root"]["floats"] else "fixed to the world"
     tables = [
         folding(
             ("part", "value"),

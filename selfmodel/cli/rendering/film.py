@@ -12,6 +12,7 @@ from selfmodel.faults.broken import BROKEN
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.jammed import JAMMED, JAMMED_AT_ANGLE
+from selfmodel.robot.known_base import with_known_base
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Behaviour
 
@@ -80,7 +81,8 @@ def film_of(
     steps = np.searchsorted(time, moments + 1e-9, side="right") - 1
     shots: list[Shot] = []
     missing: list[str] = []
-    for title, behaviour in motions:
+    for title, motion in motions:
+        behaviour = with_known_base(robot, motion)
         poses = poses_of(robot, model, behaviour)
         x = behaviour["base_position"][:, 0]
         start = x[np.isfinite(x)][:1]

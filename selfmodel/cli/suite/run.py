@@ -40,7 +40,7 @@ from selfmodel.simulation.threads import thread_count
 
 COLUMNS = (
     *("robot", "case", "truth", "right", "before", "after", "recovered", "recovered ÷ before"),
-    *("trials", "seconds"),
+    *("upright", "trials", "seconds"),
 )
 
 
@@ -74,7 +74,8 @@ def run(
         str,
         typer.Option(
             metavar="NAME",
-            help="Fitness of controllers: displacement, or return, the sum of the task's rewards.",
+            help="Fitness of controllers: displacement; upright, the displacement until the first "
+            "fall; or return, the sum of the task's rewards.",
             rich_help_panel=CONTROLLER,
         ),
     ] = "displacement",
@@ -155,6 +156,7 @@ def _texts(summary: Summary) -> list[str]:
         f"{summary.right} of {summary.runs} ({100 * share.low:.0f} to {100 * share.high:.0f})",
         *(f"{value:.2f}" for value in (summary.before, summary.after, summary.recovered)),
         "-" if summary.recovery is None else f"{summary.recovery:.2f}",
+        f"{summary.upright} of {summary.runs}",
         f"{summary.trials:.0f}",
         f"{summary.seconds:.0f}",
     ]

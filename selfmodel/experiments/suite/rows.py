@@ -28,6 +28,8 @@ class SuiteRow:
         recovered: Score of the best recovery trial.
         diverged: Number of diverged simulations.
         seconds: Wall time of the recovery without the evolution of its first gait, on one thread.
+        upright: Whether the robot did not fall in the best recovery trial; None in a row of a
+            version that did not record it.
     """
 
     robot: str
@@ -43,6 +45,7 @@ class SuiteRow:
     recovered: float
     diverged: int
     seconds: float
+    upright: bool | None = None
 
 
 @dataclass(frozen=True)
@@ -60,6 +63,7 @@ class Summary:
         after: Median score after the failure.
         recovered: Median score of the best recovery trial.
         recovery: Median of recovered over before for runs with before above 0; None without any.
+        upright: Number of runs whose best recovery trial had no fall.
         trials: Mean number of physical trials since the failure.
         seconds: Median wall time.
     """
@@ -74,6 +78,7 @@ class Summary:
     after: float
     recovered: float
     recovery: float | None
+    upright: int
     trials: float
     seconds: float
 
@@ -106,6 +111,7 @@ def _summary(robot: str, case: int | None, truth: str, rows: Sequence[SuiteRow])
         after=median(row.after for row in rows),
         recovered=median(row.recovered for row in rows),
         recovery=median(ratios) if ratios else None,
+        upright=sum(row.upright is True for row in rows),
         trials=sum(row.trials for row in rows) / len(rows),
         seconds=median(row.seconds for row in rows),
     )

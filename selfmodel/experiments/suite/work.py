@@ -19,6 +19,7 @@ from selfmodel.faults.neuron import silent_neurons
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.recovery.fitness import Score
+from selfmodel.recovery.upright import falls_of
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Behaviour
@@ -119,6 +120,7 @@ def _recover(job: Job, _part: str, run: Path) -> PartResult:
         recovered=max(recoveries),
         diverged=outcome.stats.diverged,
         seconds=outcome.seconds,
+        upright=_stayed_upright(robot, truth, since[1 + recoveries.index(max(recoveries))]),
     )
     return PartResult(as_dicts([row]), sorted((folder / "trials").glob("*.mcap")))
 
@@ -128,3 +130,8 @@ def _score_of(score: Score, robot: Robot, hidden: Hypothesis, trial: Trial) -> f
     logged = trial.behaviour
     signals = {signal: logged[signal][np.newaxis] for signal in score.record}
     return float(score.of(robot, hidden, Behaviour(logged.names, logged.time, signals))[0])
+
+
+def _stayed_upright(robot: Robot, hidden: Hypothesis, trial: Trial) -> bool:
+    """Returns whether the robot did not fall in a physical trial."""
+    return bool(falls_of(robot, hidden, trial.behaviour) == trial.behaviour.steps)

@@ -76,25 +76,21 @@ def read_document(
     """
     if len(mjcf) > budget.model_text:
         raise InputError(f"expected an MJCF of at most {budget.model_text} bytes, got {len(mjcf)}")
-    root = _parse(mjcf)
+    root = parse_xml(mjcf)
     if root.tag != "mujoco":
-        raise InputError(_no_mjcf_message(root.tag))
+        raise InputError(f"expected an MJCF, which begins with <mujoco>, got <{root.tag[:40]}>")
     _include(root, files, "", {normpath(name)}, budget.model_text)
     document = Document(root)
     _read_assets(document, files, budget.file_bytes)
     return document
 
 
-def _no_mjcf_message(tag: str) -> str:
-    if tag == "robot":
-        return (
-            "expected <mujoco>, got a URDF: save it as MJCF first, with "
-            "mujoco.MjSpec.from_file(URDF).to_xml(), and give it a free joint and motors"
-        )
-    return f"expected an MJCF, which begins with <mujoco>, got <{tag[:40]}>"
+def parse_xml(data: bytes) -> ET.Element:
+    """Returns the root element of an XML text.
 
-
-def _parse(data: bytes) -> ET.Element:
+    Raises:
+        InputError: The text is no XML, has a document type, or is nested too deeply.
+    """
     _check_xml(data)
     try:
         return ET.fromstring(data)  # noqa: S314  # _check_xml refuses unsafe XML
@@ -151,7 +147,7 @@ def _include(parent: ET.Element, files: Files, folder: str, included: set[str], 
         if path in included:
             raise InputError(f"the MJCF includes {name!r} twice: name each file once")
         included.add(path)
-        inner = _parse(data)
+        inner = parse_xml(data)
         _include(inner, files, dirname(path), included, limit)
         parent[index : index + 1] = list(inner)
 
@@ -175,7 +171,7 @@ def _read_assets(document: Document, files: Files, limit: int) -> None:
                     raise InputError(
                         f"the files of the MJCF have over {limit} bytes: simplify them"
                     )
-                names[path] = _plain_name(path, document.assets)
+                names[path] = plain_name(path, document.assets)
                 document.assets[names[path]] = data
             element.set(attribute, names[path])
             if element.tag in _NAMED_BY_FILE and attribute == "file" and not element.get("name"):
@@ -214,7 +210,7 @@ def _strip_paths(root: ET.Element) -> None:
             element.set(attribute, PurePosixPath(name).name)
 
 
-def _plain_name(path: str, taken: Collection[str]) -> str:
+def plain_name(path: str, taken: Collection[str]) -> str:
     """Returns a unique name for an attachment of a log: no folders, no special characters."""
     name = _SPECIAL_CHARACTERS.sub("_", PurePosixPath(path).name).lstrip(".-") or "file"
     stem, dot, ending = name.rpartition(".")

@@ -6,6 +6,8 @@ import mujoco
 import numpy as np
 
 from selfmodel.errors import InputError
+from selfmodel.robot.anatomy_reader import driven_joints
+from selfmodel.robot.base import floating_bodies
 from selfmodel.robot.mjcf.contacts import contacts_enabled, ground_contact_geoms, joined_mask
 from selfmodel.robot.mjcf.document import Document
 from selfmodel.robot.mjcf.expand import format_numbers
@@ -19,7 +21,7 @@ _MAX_DISTANCE = 1e6
 def add_ground(document: Document, model: mujoco.MjModel) -> None:
     """Adds a plane under the lowest point of a robot that could touch no static geom.
 
-    Models without contacts, and models of swimmers, get no ground.
+    Models without contacts, models of swimmers and robots with a fixed base get no ground.
 
     Args:
         document: The MJCF, edited in place.
@@ -29,6 +31,8 @@ def add_ground(document: Document, model: mujoco.MjModel) -> None:
         InputError: No geom of the robot could touch a ground.
     """
     if not contacts_enabled(model) or ground_contact_geoms(model) or _swims(model):
+        return
+    if not floating_bodies(model, driven_joints(model)):
         return
     moving = model.body_weldid[model.geom_bodyid] != 0
     contype, conaffinity = (
@@ -52,7 +56,10 @@ def add_ground(document: Document, model: mujoco.MjModel) -> None:
     }
     element = ET.Element("geom", plane)
     document.section("worldbody").insert(0, element)
-    height = _lowest_point(compile_model(document.text, document.assets))
+    grounded = compile_model(document.text, document.assets)
+    data = mujoco.MjData(grounded)
+    mujoco.mj_kinematics(grounded, data)
+    height = lowest_point(grounded, data)
     element.set("pos", format_numbers(np.array([0.0, 0.0, height])))
     document.notes.append(f"a ground plane is added at a height of {height:.3g} m")
 
@@ -61,10 +68,13 @@ def _swims(model: mujoco.MjModel) -> bool:
     return bool(model.opt.density or model.opt.viscosity)
 
 
-def _lowest_point(model: mujoco.MjModel) -> float:
-    """Returns the height of the lowest geom above geom 0, a plane at height 0, in m."""
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
+def lowest_point(model: mujoco.MjModel, data: mujoco.MjData) -> float:
+    """Returns the height of the lowest moving geom above geom 0, a plane at height 0, in m.
+
+    Args:
+        model: A model with geoms that can touch the plane.
+        data: Positions of the geoms.
+    """
     distances = (
         mujoco.mj_geomDistance(model, data, 0, geom, _MAX_DISTANCE, None)
         for geom in ground_contact_geoms(model)

@@ -21,6 +21,9 @@ _POSE_TOLERANCE = 1e-9
 _EQUALITY_TOLERANCE = 1e-6
 """Largest violation of an equality constraint in the keyframe, m or rad."""
 
+_COUPLINGS = (int(mujoco.mjtEq.mjEQ_JOINT), int(mujoco.mjtEq.mjEQ_TENDON))
+"""Equality constraints with a polynomial of the distances from the reference pose."""
+
 _OTHER_KEYFRAME = (
     f"start the robot in another keyframe with keyframe=NAME, or in the reference pose with "
     f"keyframe={NO_KEYFRAME}"
@@ -51,6 +54,7 @@ def bake_keyframe(document: Document, model: mujoco.MjModel, settings: MjcfSetti
             mujoco.mj_fwdPosition(model, before)
         _check_equalities(model, before)
         _write_spring_lengths(document, model)
+        _write_couplings(document, model)
         write_frames(document, model, _frames_at(model, qpos))
         _check_pose(before, compile_model(document.text, document.assets))
     name = model.key(number).name or f"number {number}"
@@ -101,11 +105,10 @@ def _check_equalities(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     if not model.neq:
         return
     rows = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_EQUALITY
-    coupling = (int(mujoco.mjtEq.mjEQ_JOINT), int(mujoco.mjtEq.mjEQ_TENDON))
     nonlinear = [
         eq
         for eq in range(model.neq)
-        if int(model.eq_type[eq]) in coupling and np.any(model.eq_data[eq, 2:5])
+        if int(model.eq_type[eq]) in _COUPLINGS and np.any(model.eq_data[eq, 2:5])
     ]
     if nonlinear or np.any(np.abs(data.efc_pos[: data.nefc][rows]) > _EQUALITY_TOLERANCE):
         raise InputError(
@@ -119,6 +122,14 @@ def _write_spring_lengths(document: Document, model: mujoco.MjModel) -> None:
     for tendon, element in enumerate(document.children("tendon")):
         if model.tendon_stiffness[tendon]:
             element.set("springlength", format_numbers(model.tendon_lengthspring[tendon]))
+
+
+def _write_couplings(document: Document, model: mujoco.MjModel) -> None:
+    """Removes the offsets of linear couplings, which hold in the new reference pose without one."""
+    for eq, element in enumerate(document.children("equality")):
+        if int(model.eq_type[eq]) in _COUPLINGS and model.eq_data[eq, 0]:
+            coefficients = np.array([0.0, model.eq_data[eq, 1], 0.0, 0.0, 0.0])
+            element.set("polycoef", format_numbers(coefficients))
 
 
 def _check_pose(before: mujoco.MjData, model: mujoco.MjModel) -> None:

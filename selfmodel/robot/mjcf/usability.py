@@ -5,7 +5,7 @@ import numpy as np
 
 from selfmodel.errors import InputError
 from selfmodel.robot.anatomy_reader import driven_joints
-from selfmodel.robot.floating_base import find_root_body, joints_of_body
+from selfmodel.robot.base import find_root_body, joints_of_body
 from selfmodel.robot.mjcf.mujoco_errors import loading_a_model
 from selfmodel.robot.model_checks import check_model
 from selfmodel.robot.transmission import motor_joints

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from mcap.records import Attachment, Message, Metadata
 
-from selfmodel.logs.cdr import decode_names
+from selfmodel.logs.messages.cdr import decode_names
 from selfmodel.logs.records import (
     CONTROLLER_FILE,
     DIGEST,

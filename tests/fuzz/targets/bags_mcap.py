@@ -8,15 +8,15 @@ import numpy as np
 import zstandard
 from mcap.records import Message
 
-from selfmodel.logs.rosbag.mapping_file import parse_mapping
+from selfmodel.logs.recordings.mapping.mapping_file import parse_mapping
 from tests.fuzz.bag_checks import check_bag
 from tests.fuzz.mcap_file import McapFile, read_file
 from tests.fuzz.mutate import data as raw, jsons, records
 from tests.fuzz.mutate.numbers import text
 from tests.fuzz.seeds import OTHER_MAPPING, biped, recording
 from tests.fuzz.target import Case, Make, Target
-from tests.logs.rosbag.bags import storage, write_bag
-from tests.logs.rosbag.conftest import MAPPING
+from tests.logs.recordings.conftest import MAPPING
+from tests.logs.recordings.rosbag.bags import storage, write_bag
 
 SECONDS = 0.25
 

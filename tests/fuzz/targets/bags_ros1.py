@@ -9,18 +9,18 @@ from pathlib import Path
 
 import numpy as np
 
-from selfmodel.logs.rosbag.bag import Bag, read_bag
-from selfmodel.logs.rosbag.mapping import BagMapping
-from selfmodel.logs.rosbag.mapping_file import parse_mapping
-from selfmodel.logs.rosbag.series import Series
+from selfmodel.logs.recordings.mapping.mapping import RecordingMapping
+from selfmodel.logs.recordings.mapping.mapping_file import parse_mapping
+from selfmodel.logs.recordings.rosbag.bag import Bag, read_bag
+from selfmodel.logs.recordings.series import Series
 from selfmodel.robot.robot import Robot
 from tests.fuzz.bag_checks import check_bag
 from tests.fuzz.mutate import data as raw, ros1s
 from tests.fuzz.ros1_file import COMPRESSIONS, laid_out, read_file
 from tests.fuzz.seeds import OTHER_MAPPING, biped, recording
 from tests.fuzz.target import Case, Make, Target
-from tests.logs.rosbag.bags import write_ros1
-from tests.logs.rosbag.conftest import MAPPING
+from tests.logs.recordings.conftest import MAPPING
+from tests.logs.recordings.rosbag.bags import write_ros1
 
 SECONDS = 0.12
 NAME = "walk.bag"
@@ -54,7 +54,7 @@ def prepare(folder: Path) -> Make:
     return make
 
 
-def _check(mapping: BagMapping, robot: Robot, whole: Bag | None) -> str:
+def _check(mapping: RecordingMapping, robot: Robot, whole: Bag | None) -> str:
     if whole is not None:
         _check_same(read_bag(Path(NAME), whole.topics), whole)
     return check_bag(NAME, mapping, robot)

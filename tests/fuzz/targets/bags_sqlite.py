@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 
-from selfmodel.logs.rosbag.mapping_file import parse_mapping
+from selfmodel.logs.recordings.mapping.mapping_file import parse_mapping
 from tests.fuzz.bag_checks import check_bag
 from tests.fuzz.mutate import sqlites
 from tests.fuzz.seeds import OTHER_MAPPING, biped, recording
 from tests.fuzz.target import Case, Make, Target
-from tests.logs.rosbag.bags import storage, write_bag
-from tests.logs.rosbag.conftest import MAPPING
+from tests.logs.recordings.conftest import MAPPING
+from tests.logs.recordings.rosbag.bags import storage, write_bag
 
 SECONDS = 0.15
 

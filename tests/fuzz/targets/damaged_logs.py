@@ -17,8 +17,8 @@ from mcap.writer import CompressionType
 
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError, TrialLog, read_log
-from selfmodel.logs.framing import Frame, frames, parse
-from selfmodel.logs.provenance import PROVENANCE
+from selfmodel.logs.mcap.framing import Frame, frames, parse
+from selfmodel.logs.mcap.provenance import PROVENANCE
 from selfmodel.logs.records import SETTINGS_FILE
 from selfmodel.logs.salvage import salvage
 from tests.fuzz.mcap_file import read_file, written

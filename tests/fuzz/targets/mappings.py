@@ -5,14 +5,14 @@ from pathlib import Path
 
 import numpy as np
 
-from selfmodel.logs.rosbag.importer import import_bag
-from selfmodel.logs.rosbag.mapping_file import read_mapping
+from selfmodel.logs.recordings.importer import import_recording
+from selfmodel.logs.recordings.mapping.mapping_file import read_mapping
 from selfmodel.robot.robot import Robot
 from tests.fuzz.mutate import tomls
 from tests.fuzz.seeds import DATA, OTHER_MAPPING, biped, recording
 from tests.fuzz.target import Case, Make, Target
-from tests.logs.rosbag.bags import storage, write_bag
-from tests.logs.rosbag.conftest import MAPPING
+from tests.logs.recordings.conftest import MAPPING
+from tests.logs.recordings.rosbag.bags import storage, write_bag
 
 SECONDS = 0.1
 NAME = "map.toml"
@@ -37,7 +37,7 @@ def prepare(folder: Path) -> Make:
 
 def _check(bag: Path, robot: Robot) -> str:
     mapping = read_mapping(Path(NAME))
-    recorded = import_bag(bag, mapping, robot)
+    recorded = import_recording(bag, mapping, robot)
     return f"imported {min(recorded.behaviour.steps, 3)} steps or more"
 
 

@@ -9,7 +9,7 @@ from selfmodel.logs import read_log
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.robots import robot_of
 from selfmodel.logs.verify import verify
-from selfmodel.logs.writer import write_trial
+from selfmodel.logs.writing.writer import write_trial
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import read_settings
 from selfmodel.robot.robot import Robot

@@ -15,15 +15,15 @@ from typer.testing import CliRunner
 
 from selfmodel.cli.logs import app
 from selfmodel.logs import CorruptError, read_log
-from selfmodel.logs.checksums import verified_records
-from selfmodel.logs.contents import read_contents
-from selfmodel.logs.framing import frames
-from selfmodel.logs.provenance import identity_of
+from selfmodel.logs.mcap.checksums import verified_records
+from selfmodel.logs.mcap.contents import read_contents
+from selfmodel.logs.mcap.framing import frames
+from selfmodel.logs.mcap.provenance import identity_of
 from selfmodel.logs.records import MANIFEST, SALVAGE, TrialHeader
 from selfmodel.logs.salvage import salvage
 from selfmodel.logs.salvage.belonging import Discarded
 from selfmodel.logs.verify import verify
-from selfmodel.logs.writer import write_trial
+from selfmodel.logs.writing.writer import write_trial
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.signals import SIGNALS

@@ -16,12 +16,12 @@ from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError, LogWriteError, read_log, read_truth
-from selfmodel.logs.contents import read_contents
-from selfmodel.logs.framing import FRAME, frames
+from selfmodel.logs.mcap.contents import read_contents
+from selfmodel.logs.mcap.framing import FRAME, frames
+from selfmodel.logs.messages.topics import TRANSFORMS, TRANSFORMS_TYPE
 from selfmodel.logs.records import HIDDEN, RESULT, SALVAGE, TrialHeader, sha256
 from selfmodel.logs.salvage import salvage, salvageable_steps
-from selfmodel.logs.topics import TRANSFORMS, TRANSFORMS_TYPE
-from selfmodel.logs.writer import write_trial
+from selfmodel.logs.writing.writer import write_trial
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.signals import SIGNALS

@@ -71,7 +71,9 @@ AWKWARD: dict[str, Awkward] = {
     "an empty file": Awkward("", "no XML"),
     "binary junk": Awkward(bytes(range(256)) * 40, "no XML"),
     "cut off": Awkward(mjcf()[:200], "no XML"),
-    "a URDF": Awkward('<robot name="r"><link name="l"/></robot>', "got a URDF"),
+    "a URDF of one link": Awkward(
+        '<robot name="r"><link name="l"/></robot>', "no link has a <collision>"
+    ),
     "other XML": Awkward("<html><body/></html>", "got <html>"),
     "an entity bomb": Awkward(BOMB, "<!DOCTYPE>"),
     "deep nesting": Awkward(_deep(5000), "200 elements within each other"),
@@ -137,7 +139,12 @@ AWKWARD: dict[str, Awkward] = {
         mjcf(more=MESH.format("m", "/dev/zero"), torso=MESHED), "outside its own folder"
     ),
     # The root.
-    "no free joint": Awkward(mjcf(root=""), "its base is fixed"),
+    "no free joint": Awkward(mjcf(root="")),
+    "limbs on the world": Awkward(
+        f"<mujoco><worldbody>{GROUND}{LEGS}</worldbody><actuator>{MOTORS}</actuator></mujoco>"
+    ),
+    "a root on a hinge": Awkward(mjcf(root='<joint name="pole"/>')),
+    "a fixed base beside a ball": Awkward(mjcf(root="", world=GROUND + BALL), "one tree"),
     "two floating bases": Awkward(mjcf(world=GROUND + BALL), "ball, torso"),
     "a planar root": Awkward(
         mjcf(root='<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>')

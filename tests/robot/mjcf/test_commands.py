@@ -63,7 +63,7 @@ def test_the_parts_of_a_robot_are_shown(ant: Path, tmp_path: Path):
     told = json.loads(selfmodel("robots", str(ant), "--json", cwd=tmp_path).stdout)
     shown = selfmodel("robots", str(ant), cwd=tmp_path, COLUMNS="60").stdout
 
-    assert told["root"] == {"body": "torso", "floats": True}
+    assert told["root"] == {"body": "torso", "floats": True, "fixed": False}
     assert told["joint_details"][1]["limb"] == ["ankle_1"]
     assert told["motor_details"][0]["drives"] == ["hip_4"]
     assert {"break", "jam", "sensor", "motor", "friction"} <= {f["kind"] for f in told["faults"]}

@@ -1,0 +1,1 @@
+"""Import of recordings of robots as trial logs: of any source, through a mapping."""

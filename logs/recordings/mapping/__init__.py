@@ -1,0 +1,1 @@
+"""Mapping from a recording to the parts of a robot: read, checked and suggested."""

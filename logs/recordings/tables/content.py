@@ -1,0 +1,127 @@
+"""Content of a table's file, within the limits of the budget."""
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from selfmodel.errors import InputError
+from selfmodel.files import check_regular, file_digest
+from selfmodel.sandbox.budget import Budget, memory_error
+from selfmodel.sandbox.message import Message
+
+LONGEST_NAME = 1000
+"""Maximum length of a column's name, characters."""
+
+Numbers = NDArray[np.float64] | NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Content:
+    """Content of a file.
+
+    Attributes:
+        names: Names of all columns that may have numbers, in the order of the file.
+        columns: Wanted columns by name, ``(rows,)`` float64; int64 for integers of the exact one.
+    """
+
+    names: Sequence[str]
+    columns: Mapping[str, Numbers]
+
+
+@dataclass(frozen=True)
+class Request:
+    """File to read.
+
+    Attributes:
+        path: The file.
+        wanted: Names of the columns to read.
+        exact: Name of the column whose integers are not rounded.
+        budget: Limits of names and numbers.
+    """
+
+    path: Path
+    wanted: frozenset[str]
+    exact: str
+    budget: Budget
+
+    def check_names(self, names: Sequence[str]) -> None:
+        """Checks the names of the columns.
+
+        Raises:
+            BudgetError: There are more than the budget allows.
+            InputError: A name is too long, or occurs twice.
+        """
+        if len(names) > self.budget.names:
+            raise memory_error(
+                f"{self.path} has more than {self.budget.names} columns", self.budget
+            )
+        seen: dict[str, int] = {}
+        for number, name in enumerate(names, start=1):
+            if len(name) > LONGEST_NAME:
+                raise InputError(
+                    f"{self.path}: expected names of columns of at most {LONGEST_NAME} "
+                    f"characters, got one of {len(name)} in column {number}: shorten it"
+                )
+            if name and name in seen:
+                raise InputError(
+                    f"{self.path}: the columns {seen[name]} and {number} are both called "
+                    f"{name!r}: rename one of them"
+                )
+            seen[name] = number
+
+    def check_numbers(self, count: int) -> None:
+        """Checks the number of values of the wanted columns.
+
+        Raises:
+            BudgetError: There are more than the budget allows.
+        """
+        most = self.budget.file_bytes // 8
+        if count > most:
+            raise memory_error(
+                f"{self.path} has more than {most} numbers in the wanted columns", self.budget
+            )
+
+
+def answer(message: Message, budget: Budget, read: Callable[[Request], Content]) -> Message:
+    """Returns the answer of the child process that reads a table.
+
+    Args:
+        message: ``path``, ``folder`` that a relative path begins in, ``wanted`` and ``exact``.
+        budget: Limits of the content.
+        read: Reader of the format.
+
+    Raises:
+        BudgetError: The content is too large.
+        InputError: The file cannot be read.
+    """
+    facts = message.facts
+    os.chdir(facts["folder"])
+    path = Path(facts["path"])
+    check_regular(path, "a table")
+    try:
+        found = read(Request(path, frozenset(facts["wanted"]), facts["exact"], budget))
+        digest = file_digest(path)
+    except OSError as failure:
+        raise InputError(
+            f"{path}: expected a table that can be read, got: {failure.strerror or failure}"
+        ) from failure
+    kinds = {name: values.dtype.kind for name, values in found.columns.items()}
+    blobs = {name: values.tobytes() for name, values in found.columns.items()}
+    return Message({"names": list(found.names), "kinds": kinds, "sha256": digest}, blobs)
+
+
+def as_numbers(values: NDArray[Any], *, exact: bool) -> Numbers:
+    """Returns an array of numbers as float64, or its integers as int64.
+
+    Args:
+        values: Array of any numeric type.
+        exact: Whether integers are not rounded.
+    """
+    if exact and values.dtype.kind in "iu" and not (values > 2**62).any():
+        return values.astype(np.int64)
+    return values.astype(np.float64)

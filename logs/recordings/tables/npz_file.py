@@ -1,0 +1,145 @@
+"""Reader of NPZ files: arrays of numpy by name, without pickled objects.
+
+An array ``(rows,)`` is a column. An array ``(rows, n)`` is n columns, called by the array's name
+and a label: those of an array of n texts, such as ``joint_names``, or numbers from 0.
+"""
+
+import struct
+import tokenize
+import warnings
+import zipfile
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import prod
+from typing import IO, Any
+
+import numpy as np
+from numpy.lib import format as npy
+from numpy.typing import NDArray
+
+from selfmodel.errors import InputError
+from selfmodel.logs.recordings.tables.content import Content, Numbers, Request, as_numbers
+from selfmodel.sandbox.budget import memory_error
+
+_FAILURES = (
+    ValueError,  # numpy's headers
+    TypeError,
+    KeyError,
+    EOFError,
+    RuntimeError,  # an encrypted file, or an unknown compression
+    OverflowError,
+    SyntaxError,
+    tokenize.TokenError,  # numpy's headers are Python literals
+    struct.error,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+"""Exceptions of zipfile and numpy for malformed bytes."""
+
+
+@dataclass(frozen=True)
+class _Member:
+    """Array of an archive, by its header."""
+
+    file: str
+    shape: tuple[int, ...]
+    dtype: np.dtype[Any]
+
+    @property
+    def name(self) -> str:
+        return self.file.removesuffix(".npy")
+
+
+def read_npz(request: Request) -> Content:
+    """Returns the wanted columns of an NPZ file.
+
+    Raises:
+        BudgetError: An array, or the number of columns, is larger than the budget allows.
+        InputError: The file is no NPZ file.
+        OSError: The file cannot be read.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # Python's, for a header that is a damaged literal
+            with zipfile.ZipFile(request.path) as archive:
+                return _content(request, archive)
+    except InputError:
+        raise
+    except _FAILURES as failure:
+        reason = " ".join(str(failure).split())[:200] or type(failure).__name__
+        raise InputError(
+            f"{request.path}: expected an NPZ file of arrays of numbers, got: {reason}: write it "
+            f"again with numpy.savez"
+        ) from failure
+
+
+def _content(request: Request, archive: zipfile.ZipFile) -> Content:
+    members = [_member(archive, info) for info in archive.infolist()[: request.budget.names + 1]]
+    found = [member for member in members if member is not None]
+    texts = {m.name: _read(request, archive, m) for m in found if _is_text(request, m)}
+    labels = {name: tuple(map(str, array.tolist())) for name, array in texts.items()}
+    numeric = [m for m in found if m.dtype.kind in "fiubM" and m.shape and len(m.shape) <= 2]
+    total = sum(m.shape[1] if len(m.shape) == 2 else 1 for m in numeric)
+    if total > request.budget.names:
+        what = f"{request.path} has more than {request.budget.names} columns"
+        raise memory_error(what, request.budget)
+    names = {member.name: _names(member, labels) for member in numeric}
+    request.check_names([name for some in names.values() for name in some])
+    needed = [m for m in numeric if not request.wanted.isdisjoint(names[m.name])]
+    request.check_numbers(sum(prod(member.shape) for member in needed))
+    columns: dict[str, Numbers] = {}
+    for member in needed:
+        array = _read(request, archive, member).reshape(member.shape[0], -1)
+        for k, name in enumerate(names[member.name]):
+            if name in request.wanted:
+                columns[name] = as_numbers(array[:, k], exact=name == request.exact)
+    return Content([name for some in names.values() for name in some], columns)
+
+
+def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> _Member | None:
+    """Header of an array; None for a file of another kind."""
+    if not info.filename.endswith(".npy"):
+        return None
+    with archive.open(info) as file:
+        return _Member(info.filename, *_header(file))
+
+
+def _header(file: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    version = npy.read_magic(file)
+    read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+    shape, _, dtype = read(file)
+    if any(length < 0 for length in shape):
+        raise ValueError(f"an array of the shape {shape}")
+    return shape, dtype
+
+
+def _is_text(request: Request, member: _Member) -> bool:
+    few = len(member.shape) == 1 and member.shape[0] <= request.budget.names
+    return few and member.dtype.kind == "U" and member.dtype.itemsize <= 4 * 1000
+
+
+def _read(request: Request, archive: zipfile.ZipFile, member: _Member) -> NDArray[Any]:
+    if prod(member.shape) * member.dtype.itemsize > request.budget.unpacked_bytes:
+        raise memory_error(
+            f"{request.path}: the array {member.name} has the shape {member.shape}", request.budget
+        )
+    with archive.open(member.file) as file:
+        array: NDArray[Any] = npy.read_array(file, allow_pickle=False)
+        if file.read(1):  # reads to the end, where zipfile compares the checksum
+            raise ValueError(f"bytes follow the array {member.name}")
+    if array.dtype.kind == "M":
+        return array.astype("datetime64[ns]").astype(np.int64)
+    return array
+
+
+def _names(member: _Member, labels: Mapping[str, Sequence[str]]) -> tuple[str, ...]:
+    if len(member.shape) == 1:
+        return (member.name,)
+    width = member.shape[1]
+    fitting = [(name, some) for name, some in labels.items() if len(some) == width]
+    own = [some for name, some in fitting if name.startswith(member.name)]
+    known = set(own or [some for _, some in fitting])
+    if len(known) == 1:
+        return tuple(f"{member.name}.{label}" for label in known.pop())
+    return tuple(f"{member.name}.{k}" for k in range(width))

@@ -1,0 +1,63 @@
+"""Reader of Parquet files, with pyarrow."""
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from selfmodel.errors import InputError
+from selfmodel.logs.recordings.tables.content import Content, Numbers, Request, as_numbers
+
+
+def read_parquet(request: Request) -> Content:
+    """Returns the wanted columns of a Parquet file; a missing value is NaN.
+
+    Columns of lists, texts and other types than numbers, booleans and times are left out.
+
+    Raises:
+        BudgetError: The file has more columns or numbers than the budget allows.
+        InputError: The file is no Parquet file.
+        OSError: The file cannot be read.
+    """
+    try:
+        with pa.OSFile(str(request.path)) as data:
+            return _content(request, data)
+    except (pa.ArrowException, ValueError, OSError) as failure:
+        if isinstance(failure, InputError):
+            raise
+        reason = " ".join(str(failure).split())[:200] or type(failure).__name__
+        raise InputError(
+            f"{request.path}: expected a Parquet file, got: {reason}: write it again, for example "
+            f"with DataFrame.to_parquet"
+        ) from failure
+
+
+def _content(request: Request, data: pa.OSFile) -> Content:
+    # The memory of other allocators is reserved in large blocks, which exceed the limit.
+    file = pq.ParquetFile(data, memory_map=False, pre_buffer=False, page_checksum_verification=True)
+    if file.metadata.num_columns > request.budget.names:
+        request.check_names([""] * file.metadata.num_columns)
+    names = [field.name for field in file.schema_arrow if _is_numeric(field.type)]
+    request.check_names(names)
+    wanted = [name for name in names if name in request.wanted]
+    request.check_numbers(file.metadata.num_rows * len(wanted))
+    table = file.read(columns=wanted, use_threads=False)
+    return Content(
+        names, {name: _numbers(table[name], exact=name == request.exact) for name in wanted}
+    )
+
+
+def _is_numeric(kind: pa.DataType) -> bool:
+    types = pa.types
+    checks = (types.is_integer, types.is_floating, types.is_boolean, types.is_timestamp)
+    return any(check(kind) for check in checks)
+
+
+def _numbers(column: pa.ChunkedArray, *, exact: bool) -> Numbers:
+    if pa.types.is_timestamp(column.type):
+        column = column.cast(pa.timestamp("ns", column.type.tz)).cast(pa.int64())
+    elif pa.types.is_boolean(column.type):
+        column = column.cast(pa.int8())
+    return as_numbers(np.asarray(column.to_numpy()), exact=exact)
+
+
+pa.set_memory_pool(pa.system_memory_pool())

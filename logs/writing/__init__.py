@@ -1,0 +1,1 @@
+"""Writing of a trial log while the trial runs."""

@@ -1,0 +1,225 @@
+"""Writer of a trial's log, while the trial runs."""
+
+import itertools
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from selfmodel.controllers.command_source import CommandSource
+from selfmodel.controllers.playback import Playback
+from selfmodel.errors import InputError, describe
+from selfmodel.logs.atomic import partial_path
+from selfmodel.logs.errors import IncompleteError, salvage_it
+from selfmodel.logs.records import FINISHED, STOPPED, Result, TrialHeader, checked_name
+from selfmodel.logs.writing.encoder import Encoder, empty_rows, sample_rows
+from selfmodel.logs.writing.logfile import LogFile
+from selfmodel.logs.writing.preamble import write_preamble
+from selfmodel.physical.cleanup import Cleanup
+from selfmodel.physical.stop_signals import (
+    handle_stop_signals,
+    hold_stop_signals,
+    release_stop_signals,
+)
+from selfmodel.robot.robot import Robot
+from selfmodel.trials.behaviour import Sample
+from selfmodel.trials.signals import Names
+from selfmodel.trials.trial import TrialPlan
+
+FLUSH_STEPS = 50
+"""Steps between two flushes, the most that a kill can lose. The file is 1 % larger than without."""
+
+
+def write_trial(
+    path: Path,
+    robot: Robot,
+    plan: TrialPlan,
+    samples: Iterable[Sample],
+    header: TrialHeader,
+) -> Path:
+    """Writes the log of a trial while the trial runs; see ``TrialWriter``.
+
+    Args:
+        path: Name of the log; the unfinished file is ``path.part``.
+        robot: Robot as its model describes it.
+        plan: Plan of the trial.
+        samples: Samples, one per control step as they happen; at most ``plan.steps`` are read.
+            An iterable with a method ``close``, as a generator has, is closed before the log is,
+            which stops the robot. A ``map`` over a generator has no ``close``: to process samples
+            before they are logged, use ``TrialWriter``.
+        header: Other content of the log's preamble.
+
+    Returns:
+        ``path``.
+
+    Raises:
+        InputError: The file exists, or the plan or a sample does not fit the robot.
+        IncompleteError: There were fewer samples than planned; the ``.part`` contains them.
+        LogWriteError: The disk is full, or failed.
+    """
+    iterator = itertools.islice(samples, plan.steps)
+    # The robot is stopped in any case, and a signal interrupts nothing but the robot.
+    with (
+        handle_stop_signals(),
+        hold_stop_signals(),
+        TrialWriter(path, robot, plan, header) as writer,
+        Cleanup(getattr(samples, "close", lambda: None)),
+    ):
+        while (sample := _next(iterator)) is not None:
+            writer.add(sample)
+    return path
+
+
+def _next(samples: Iterator[Sample]) -> Sample | None:
+    with release_stop_signals():
+        return next(samples, None)
+
+
+class TrialWriter:
+    """Writer of one trial's log, sample by sample; a context manager that finishes the file.
+
+    A trial that ends early, by an exception or a kill, leaves a ``.part`` with all steps but at
+    most the last ``FLUSH_STEPS``. The trial of a robot with its own clock cannot be repeated:
+    there, an exception leaves a complete log with the status ``stopped``, or no file if there is no
+    step yet, so that the trial can be repeated under its name.
+
+    Args:
+        path: Name of the log.
+        robot: Robot as its model describes it.
+        plan: Plan of the trial.
+        header: Other content of the log's preamble.
+
+    Raises:
+        InputError: The plan does not fit the robot.
+    """
+
+    def __init__(self, path: Path, robot: Robot, plan: TrialPlan, header: TrialHeader) -> None:
+        checked_name(plan.name)
+        names = robot.anatomy.names
+        _check_ends(robot.name, names, plan.controller)
+        if plan.steps < 1:
+            raise InputError(f"a trial has at least 1 step, got {plan.steps}")
+        self.path = path
+        self.steps = 0
+        self._robot, self._plan, self._header = robot, plan, header
+        self._encoder = Encoder(robot, timed=header.timed)
+        self._rows = empty_rows(names, FLUSH_STEPS, timed=header.timed)
+        self._written = 0
+        self._start = self._end = 0.0
+        self._sound = False
+
+    def __enter__(self) -> Self:
+        self._log = LogFile(self.path)
+        with ExitStack() as undo:
+            undo.callback(self._log.close)  # an interrupted `__enter__` has no `__exit__`
+            write_preamble(self._log, self._robot, self._plan, self._header)
+            self._channels = [
+                self._log.channel(topic.name, topic.type) for topic in self._encoder.topics
+            ]
+            self._log.sync()  # the disk has the preamble before the robot moves
+            undo.pop_all()
+        self._sound = True
+        return self
+
+    def add(self, sample: Sample) -> None:
+        """Adds the sample of the next step.
+
+        Raises:
+            InputError: The trial has all its steps, the time is not that of the next step, or the
+                rows do not fit the robot.
+            LogWriteError: The disk is full, or failed.
+        """
+        time = self.steps * self._robot.control_timestep
+        if self.steps >= self._plan.steps or sample.time != time:
+            raise InputError(
+                f"step {self.steps} of {self._plan.steps} is due at {time!r} s, "
+                f"got a sample of {sample.time!r} s"
+            )
+        if (sample.moment is not None) != self._header.timed:
+            has, given = ("no", "True") if self._header.timed else ("a", "False")
+            raise InputError(
+                f"the sample of step {self.steps} has {has} moment, but timed is {given} in the "
+                f"header: a trial is timed if its robot has a clock of its own"
+            )
+        sampled = sample_rows(sample)
+        for part, rows in self._rows.items():
+            row = sampled.get(part)
+            if row is None or row.shape != rows.shape[1:]:
+                raise InputError(
+                    f"the sample of step {self.steps} must have {part} of shape "
+                    f"{rows.shape[1:]}, got {'nothing' if row is None else row.shape}"
+                )
+            rows[self.steps - self._written] = row
+        self._end = float(sample.values["base_position"][0])
+        if self.steps == 0:
+            self._start = self._end
+        self.steps += 1
+        # The first step is flushed at once: salvage needs one complete step.
+        if self.steps == 1 or self.steps - self._written == FLUSH_STEPS:
+            self._flush()
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        try:
+            # Not after an interrupted write, which may have left an incomplete record.
+            if self._sound:
+                self._flush()
+            if error is None and self.steps == self._plan.steps:
+                self._finish(FINISHED)
+            elif error is not None and self._header.timed and self._sound:
+                if self.steps:
+                    self._finish(STOPPED, _stop_reason(error))
+                else:
+                    self._log.abandon()
+        except (OSError, InputError) as failure:
+            if error is None:
+                raise
+            error.add_note(str(failure))  # the first error is the cause
+        finally:
+            self._log.close()
+        if error is None and self.steps < self._plan.steps:
+            raise IncompleteError(
+                partial_path(self.path),
+                f"the robot stopped after {self.steps} of {self._plan.steps} steps",
+                good=f"{self.steps} steps are in that file",
+                advice=salvage_it(partial_path(self.path)),
+            )
+
+    def _flush(self) -> None:
+        """Writes the buffered steps, and flushes them to the operating system."""
+        count = self.steps - self._written
+        if not count:
+            return
+        self._sound = False
+        rows = {part: rows[:count] for part, rows in self._rows.items()}
+        self._log.messages(self._channels, self._encoder.encode(self._written, rows))
+        self._log.flush()
+        self._written = self.steps
+        self._sound = True
+
+    def _finish(self, status: str, reason: str = "") -> None:
+        result = Result(status, self.steps, self._end - self._start, reason)
+        self._log.finish(result)
+
+
+def _stop_reason(error: BaseException) -> str:
+    text = " ".join(f"{type(error).__name__}: {describe(error)}".split()).removesuffix(":")
+    # A file name that is not UTF-8 contains surrogates, which a log cannot contain.
+    return text.encode("utf-8", "backslashreplace").decode()
+
+
+def _check_ends(robot: str, names: Names, driver: CommandSource) -> None:
+    if isinstance(driver, Playback):
+        sensors, motors = names.sensors, driver.motors
+    else:
+        sensors, motors = driver.design.sensors, driver.design.motors
+    if (sensors, motors) != (names.sensors, names.motors):
+        raise InputError(
+            f"expected a controller for {robot}, with the sensors {names.sensors} and motors "
+            f"{names.motors}, got one for {sensors} and {motors}"
+        )

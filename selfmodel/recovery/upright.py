@@ -1,0 +1,44 @@
+"""The score ``upright``: forward displacement up to the first fall."""
+
+import numpy as np
+
+from selfmodel.arrays import FloatArray, IndexArray
+from selfmodel.faults.build import build
+from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.recovery.falls import first_falls
+from selfmodel.recovery.fitness import Score
+from selfmodel.robot.robot import Robot
+from selfmodel.trials.behaviour import Behaviour
+
+
+def falls_of(robot: Robot, hypothesis: Hypothesis, behaviour: Behaviour) -> IndexArray:
+    """Returns the first step at which each run has fallen, or the number of steps without a fall.
+
+    Args:
+        robot: The healthy robot.
+        hypothesis: Faults of the robot, of which a slope tilts the ground.
+        behaviour: Position and orientation of the base, ``(..., steps, width)`` each.
+
+    Returns:
+        Step indices, ``(...)``.
+    """
+    return first_falls(behaviour, build(robot, hypothesis).normal, robot.standing_height)
+
+
+def _displacement_until_a_fall(
+    robot: Robot, hypothesis: Hypothesis, behaviour: Behaviour
+) -> FloatArray:
+    x = behaviour["base_position"][..., 0]
+    last = np.maximum(falls_of(robot, hypothesis, behaviour) - 1, 0)
+    end = np.take_along_axis(x, last[..., np.newaxis], axis=-1)[..., 0]
+    return np.asarray(end - x[..., 0])
+
+
+UPRIGHT = Score("upright", ("base_position", "base_orientation"), _displacement_until_a_fall)
+"""Forward displacement up to the last step before the robot falls, m.
+
+A robot has fallen at the first step at which its base is tilted by more than ``FALLEN_TILT`` from
+its initial orientation, or is lower than ``FALLEN_HEIGHT`` of its standing height. What follows a
+fall counts nothing: a controller that tips the robot over and crawls on its back earns what it
+walked before.
+"""

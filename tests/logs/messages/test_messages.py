@@ -1,0 +1,218 @@
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+from hypothesis.extra.numpy import arrays
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
+
+from selfmodel.arrays import FloatArray
+from selfmodel.logs import read_log
+from selfmodel.logs.mcap.contents import read_contents
+from selfmodel.logs.messages.cdr import decode_names
+from selfmodel.logs.messages.schemas import schema_text
+from selfmodel.logs.messages.topics import Topic, description, topics, transforms
+from selfmodel.logs.records import TrialHeader
+from selfmodel.logs.writing.kinematics import body_names
+from selfmodel.logs.writing.writer import write_trial
+from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.trials.signals import Names
+from tests.logs.conftest import plan_of
+
+OURS = "selfmodel_msgs/msg/SensorReadings"
+TYPES = [
+    "sensor_msgs/msg/JointState",
+    "nav_msgs/msg/Odometry",
+    "geometry_msgs/msg/Vector3Stamped",
+    "tf2_msgs/msg/TFMessage",
+    "std_msgs/msg/String",
+    OURS,
+]
+
+NAME = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=9)
+SOME = st.lists(NAME, min_size=1, max_size=5).map(tuple)
+
+
+@pytest.fixture(scope="module")
+def store() -> Typestore:
+    """Rosbags' types: the authority on what a message looks like."""
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    store.register(
+        get_types_from_msg("std_msgs/Header header\nstring[] name\nfloat64[] value", OURS)
+    )
+    return store
+
+
+def message(
+    store: Typestore,
+    topic: Topic,
+    names: Names,
+    frames: tuple[str, ...],
+    *,
+    row: FloatArray,
+    stamp: int,
+) -> object:
+    """One message of a topic, as rosbags makes it from its numbers."""
+    types = store.types
+
+    def header(frame: str) -> object:
+        time = types["builtin_interfaces/msg/Time"](stamp // 10**9, stamp % 10**9)
+        return types["std_msgs/msg/Header"](time, frame)
+
+    def vector(values: FloatArray) -> object:
+        return types["geometry_msgs/msg/Vector3"](*values)
+
+    def quaternion(values: FloatArray) -> object:
+        return types["geometry_msgs/msg/Quaternion"](*values)
+
+    none = np.zeros(0)
+    if topic.name == "/joint_states":
+        return types[topic.type](header(""), list(names.hinges), *row.reshape(3, -1))
+    if topic.name == "/joint_commands":
+        return types[topic.type](header(""), list(names.motors), row, none, none)
+    if topic.name == "/sensors":
+        return types[topic.type](header(""), list(names.sensors), row)
+    if topic.name == "/base_linear_velocity":
+        return types[topic.type](header("world"), vector(row))
+    if topic.name == "/odom":
+        point = types["geometry_msgs/msg/Point"](*row[:3])
+        pose = types["geometry_msgs/msg/Pose"](point, quaternion(row[3:7]))
+        twist = types["geometry_msgs/msg/Twist"](vector(row[7:10]), vector(row[10:]))
+        return types[topic.type](
+            header("world"),
+            frames[0],
+            types["geometry_msgs/msg/PoseWithCovariance"](pose, np.zeros(36)),
+            types["geometry_msgs/msg/TwistWithCovariance"](twist, np.zeros(36)),
+        )
+    transform = types["geometry_msgs/msg/Transform"]
+    stamped = types["geometry_msgs/msg/TransformStamped"]
+    return types[topic.type](
+        [
+            stamped(header(parent), frame, transform(vector(pose[:3]), quaternion(pose[3:])))
+            for frame, parent, pose in zip(frames, frames[::-1], row.reshape(-1, 7), strict=True)
+        ]
+    )
+
+
+@settings(max_examples=60, deadline=None)
+@given(data=st.data(), names=st.builds(Names, SOME, SOME, SOME), frames=SOME)
+def test_messages_are_rosbags_messages_to_the_byte(
+    store: Typestore, data: st.DataObject, names: Names, frames: tuple[str, ...]
+):
+    steps = 3
+    for topic in (*topics(names, frames[0]), transforms(frames, frames[::-1])):
+        values = data.draw(arrays(np.float64, (steps, topic.template.width)))
+        stamps = data.draw(st.lists(st.integers(0, 2**31 * 10**9 - 1), min_size=3, max_size=3))
+        payloads = topic.template.encode(np.array(stamps), values)
+        for payload, row, stamp in zip(payloads, values, stamps, strict=True):
+            made = message(store, topic, names, frames, row=row, stamp=stamp)
+            assert payload == bytes(store.serialize_cdr(made, topic.type)), topic.name
+        read_stamps, read_values = topic.template.decode(payloads)
+        assert read_stamps.tolist() == stamps
+        assert read_values.tobytes() == values.tobytes()
+        if topic.name in ("/joint_states", "/sensors"):
+            expected = names.hinges if topic.name == "/joint_states" else names.sensors
+            assert decode_names(payloads[0]) == expected
+
+
+@given(text=NAME)
+def test_the_description_is_rosbags_string_to_the_byte(store: Typestore, text: str):
+    made = store.types["std_msgs/msg/String"](text)
+    assert description(text) == bytes(store.serialize_cdr(made, "std_msgs/msg/String"))
+
+
+@pytest.mark.parametrize("name", TYPES)
+def test_schemas_are_rosbags_schemas(store: Typestore, name: str):
+    assert schema_text(name) == store.generate_msgdef(name, ros_version=2)[0]
+
+
+@pytest.mark.parametrize("where", ["name", "frame", "length", "covariance"])
+def test_a_message_of_another_layout_is_not_decoded(where: str):
+    names = Names(("touch",), ("motor",), ("hinge",))
+    topic = topics(names, "torso")[3 if where == "covariance" else 0]
+    values = np.ones((4, topic.template.width))
+    payloads = topic.template.encode(np.arange(4), values)
+    third = bytearray(payloads[2])
+    if where == "length":
+        third += b"\0"
+    else:
+        third[{"name": 24, "frame": 12, "covariance": 120}[where]] ^= 1
+    payloads[2] = bytes(third)
+    with pytest.raises(ValueError, match="message 2 has"):
+        topic.template.decode(payloads)
+
+
+def test_any_bytes_in_the_place_of_names_are_refused_or_read():
+    rng = np.random.default_rng(0)
+    for size in rng.integers(0, 60, 500):
+        payload = b"\0\1\0\0" + rng.integers(0, 3, size, dtype=np.uint8).tobytes()
+        try:
+            decode_names(payload)
+        except ValueError:
+            continue
+
+
+def test_rosbags_reads_a_log_as_the_reader_does(store: Typestore, log: Path, biped: Robot):
+    contents, behaviour = read_contents(log), read_log(log).trial.behaviour
+    assert contents.profile == "ros2"
+
+    for step in (0, 55, 115):
+        states, odom, frames = (
+            store.deserialize_cdr(contents.topics[topic].payloads[k], contents.topics[topic].type)
+            for topic, k in (("/joint_states", step), ("/odom", step), ("/tf", step // 5))
+        )
+        assert tuple(states.name) == biped.anatomy.hinges
+        assert states.effort.tolist() == behaviour["joint_efforts"][step].tolist()
+        turn = odom.pose.pose.orientation
+        assert [turn.w, turn.x, turn.y, turn.z] == behaviour["base_orientation"][step].tolist()
+        assert (odom.header.frame_id, odom.child_frame_id) == ("world", "torso")
+        stamp = odom.header.stamp
+        assert stamp.sec * 10**9 + stamp.nanosec == round(behaviour.time[step] * 1e9)
+        assert [t.child_frame_id for t in frames.transforms] == list(body_names(biped.model))
+
+
+def test_viewers_are_told_where_each_body_is_and_how_the_base_moves(
+    store: Typestore, biped: Robot, tmp_path: Path
+):
+    plan = plan_of(biped, 80)
+    samples = list(SimulatedRobot(biped).run(plan.controller, 80))
+    path = write_trial(tmp_path / "b.mcap", biped, plan, samples, TrialHeader(Settings()))
+    topics_read = read_contents(path).topics
+    data = mujoco.MjData(biped.model)
+    for step in (5, 40, 75):
+        values = samples[step].values
+        odom = store.deserialize_cdr(topics_read["/odom"].payloads[step], "nav_msgs/msg/Odometry")
+        linear = odom.twist.twist.linear
+        back = np.zeros(3)
+        told = np.array([linear.x, linear.y, linear.z])
+        mujoco.mju_rotVecQuat(back, told, values["base_orientation"])
+        np.testing.assert_allclose(back, values["base_linear_velocity"], atol=2e-6)
+        data.qpos[:7] = [*values["base_position"], *values["base_orientation"]]
+        data.qpos[7:] = values["joint_positions"]
+        mujoco.mj_kinematics(biped.model, data)
+        frames = store.deserialize_cdr(
+            topics_read["/tf"].payloads[step // 5], "tf2_msgs/msg/TFMessage"
+        )
+        where = {"world": (np.zeros(3), np.array([1.0, 0, 0, 0]))}
+        for body, frame in enumerate(frames.transforms, start=1):
+            where[frame.child_frame_id] = composed(where[frame.header.frame_id], frame.transform)
+            place, turn = where[frame.child_frame_id]
+            np.testing.assert_allclose(place, data.xpos[body], atol=5e-6)
+            np.testing.assert_allclose(turn, data.xquat[body], atol=5e-6)
+
+
+def composed(
+    parent: tuple[FloatArray, FloatArray],
+    transform: Any,  # noqa: ANN401  # rosbags makes its class
+) -> tuple[FloatArray, FloatArray]:
+    """Where a frame is whose pose is told in its parent's, as a viewer computes it."""
+    place, turn = transform.translation, transform.rotation
+    moved, turned = np.zeros(3), np.zeros(4)
+    mujoco.mju_rotVecQuat(moved, np.array([place.x, place.y, place.z]), parent[1])
+    mujoco.mju_mulQuat(turned, parent[1], np.array([turn.w, turn.x, turn.y, turn.z]))
+    return parent[0] + moved, turned

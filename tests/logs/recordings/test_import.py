@@ -1,0 +1,347 @@
+"""What an import says is what was recorded, and nothing more."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+
+from selfmodel.controllers.playback import Playback
+from selfmodel.errors import InputError
+from selfmodel.logs import read_log
+from selfmodel.logs.recordings.importer import import_recording, write_recording
+from selfmodel.logs.recordings.mapping.mapping_file import parse_mapping
+from selfmodel.robot.robot import Robot
+from selfmodel.sandbox.budget import Budget
+from tests.logs.conftest import MJCF
+from tests.logs.recordings.conftest import JOINTS, MAPPING, angle, imported, recorded
+from tests.logs.recordings.rosbag.bags import (
+    ROS,
+    T0,
+    Item,
+    array,
+    imu,
+    joint_state,
+    odometry,
+    pose_stamped,
+    storage,
+    trajectory,
+    write_bag,
+)
+
+SYNTHETIC = Path(__file__).parents[4] / "shared/samples/synthetic_rosbag2_humble_jitter_gap.mcap"
+
+
+def without(topic: str, items: list[Item]) -> list[Item]:
+    return [item for item in items if item[0] != topic]
+
+
+def test_a_recording_is_told_in_the_model_s_terms(bag: Path, biped: Robot):
+    recording = imported(bag, biped)
+    behaviour = recording.behaviour
+    seconds = behaviour.time
+    assert behaviour.steps == 99  # the odometry ends at 0.98 s
+    truth = np.array([[angle(j, t) for j in range(4)] for t in seconds])
+    truth[:, 1] = 0.1 - truth[:, 1]
+    assert np.allclose(behaviour["joint_positions"], truth, rtol=0, atol=1e-12)
+    assert np.allclose(behaviour["commands"], truth, rtol=0, atol=1e-12)
+    moving = np.array([[angle(j, t) for j in range(4)] for t in seconds]) * [1, -1, 1, 1]
+    assert np.allclose(behaviour["joint_velocities"], moving, rtol=0, atol=1e-12)
+    assert np.isnan(behaviour["joint_efforts"]).all()
+    touch = [float(k % 20 >= 10) for k in range(99)]
+    sensors = behaviour["sensors"]
+    assert np.array_equal(sensors[:, 0], touch)
+    assert np.isnan(sensors[:, 1]).all()  # nobody tells of the right foot
+    assert np.allclose(sensors[:, 2], truth[:, 1] / np.deg2rad(30))
+    # The base drove along +y of the odometry, heading 1 rad from its +x: seen from the start.
+    assert np.allclose(behaviour["base_position"][0], [0, 0, 0.5])
+    travelled = seconds / 2
+    assert np.allclose(behaviour["base_position"][:, 0], travelled * np.sin(1))
+    assert np.allclose(behaviour["base_position"][:, 1], travelled * np.cos(1))
+    half = seconds / 10
+    turned = np.stack([np.cos(half), 0 * half, 0 * half, np.sin(half)], axis=1)
+    assert np.allclose(behaviour["base_orientation"], turned)
+    heading = np.stack([np.cos(2 * half), np.sin(2 * half), 0 * half], axis=1)
+    assert np.allclose(behaviour["base_linear_velocity"], 0.5 * heading)
+    assert np.allclose(behaviour["base_angular_velocity"][:, 2], seconds)  # the imu's
+    assert recording.valid["joint_efforts"] == 0
+    assert recording.valid["joint_positions"] == 1
+
+
+def test_a_frame_as_recorded_stays(bag: Path, biped: Robot):
+    text = MAPPING.replace('"/odom"', '"/odom"\nframe = "recorded"\nunit = "cm"')
+    behaviour = imported(bag, biped, text).behaviour
+    assert np.allclose(behaviour["base_position"][0], [0.02, 0.03, 0.005])
+    assert np.allclose(behaviour["base_orientation"][0], [np.cos(0.5), 0, 0, np.sin(0.5)])
+
+
+def test_degrees_become_radians(bag: Path, biped: Robot):
+    degrees = imported(bag, biped, MAPPING.replace('"rad"', '"deg"')).behaviour
+    radians = imported(bag, biped).behaviour
+    for signal in ("joint_positions", "joint_velocities", "commands"):
+        assert np.allclose(np.rad2deg(degrees[signal]), radians[signal])
+
+
+def test_start_and_duration_choose_a_part(bag: Path, biped: Robot):
+    whole = imported(bag, biped).behaviour
+    part = imported(bag, biped, "start = 0.2\nduration = 0.5\n" + MAPPING).behaviour
+    assert part.steps == 50
+    assert part.time[0] == 0
+    assert np.array_equal(part["commands"], whole["commands"][20:70])
+    for wrong, line in (("duration = 5.0", 1), ("start = 2.0", 1)):
+        with pytest.raises(
+            InputError, match=rf"MAP\.toml:{line}: every role has data for 0\.980 s"
+        ):
+            imported(bag, biped, f"{wrong}\n{MAPPING}")
+
+
+def test_a_trial_longer_than_its_log_may_be_is_refused(biped: Robot, tmp_path: Path):
+    stretched = [
+        (topic, stamp, joint_state(stamp, JOINTS, [0.0] * 4))
+        for topic in ("/joint_states", "/commands")
+        for stamp in range(T0, T0 + 61 * 10**9, 10**9)
+    ]
+    text = MAPPING[: MAPPING.index("[base]")].replace('order = ["RHY", "RHX", "LHY", "LHX"]\n', "")
+    mapping = parse_mapping(text, "MAP.toml")
+    bag = write_bag(tmp_path / "bag", stretched)
+
+    assert import_recording(bag, mapping, biped).behaviour.steps == 6001
+    with pytest.raises(InputError, match=r"2 to 5000 steps, got 6001: .* --budget memory="):
+        import_recording(bag, mapping, biped, Budget(memory=5 * 10**7))
+
+
+def test_messages_may_be_partial_and_in_any_order(biped: Robot, tmp_path: Path):
+    items = without("/joint_states", recorded())
+    for k in range(200):
+        stamp = T0 + k * 5_000_000
+        at = [angle(j, k / 200) for j in range(4)]
+        for some in ([3, 0], [1, 2]):
+            names, values = [JOINTS[j] for j in some], [at[j] for j in some]
+            late = stamp + 3_000_000 * (1 + some[0])
+            items.append(("/joint_states", late, joint_state(stamp, names, values)))
+    behaviour = imported(write_bag(tmp_path / "bag", items), biped).behaviour
+    truth = np.array([[angle(j, t) for j in range(4)] for t in behaviour.time])
+    truth[:, 1] = 0.1 - truth[:, 1]
+    assert np.allclose(behaviour["joint_positions"], truth, rtol=0, atol=1e-12)
+    assert np.isnan(behaviour["joint_velocities"]).all()
+
+
+def test_messages_that_contradict_themselves_are_left_out_and_counted(biped: Robot, tmp_path: Path):
+    items = recorded()
+    for k, message in enumerate(
+        [
+            joint_state(T0 + 7, JOINTS, [9.0] * 3),
+            joint_state(T0 + 7, [*JOINTS[:3], JOINTS[0]], [9.0] * 4),
+            joint_state(T0, JOINTS, [9.0] * 4),  # its stamp is the first message's
+            joint_state(T0 + 900 * 10**9, JOINTS, [9.0] * 4),
+            joint_state(T0 + 500_000_001, JOINTS, [np.nan] * 4),
+        ]
+    ):
+        items.append(("/joint_states", T0 + 600_000_000 + k, message))
+    recording = imported(write_bag(tmp_path / "bag", items), biped)
+    found = recording.qualities["/joint_states"]
+    assert sum(found.refused.values()) == 2
+    assert (found.repeated, found.strays, found.reordered) == (1, 1, 2)
+    assert "messages left out: 1 with more or fewer numbers than names, 1 with a name twice" in (
+        " ".join(recording.notes)
+    )
+    assert np.nanmax(np.abs(recording.behaviour["joint_positions"])) < 1
+
+
+@pytest.mark.parametrize("kind", ["JointState", "JointTrajectory"])
+def test_commands_come_in_several_types(kind: str, biped: Robot, tmp_path: Path):
+    items = without("/commands", recorded())
+    for k in range(100):
+        stamp, at = T0 + k * 10**7, [angle(j, k / 100) for j in range(4)]
+        # A trajectory that is to start at once has no stamp.
+        told = joint_state(stamp, JOINTS, at) if kind == "JointState" else trajectory(0, JOINTS, at)
+        items.append(("/commands", stamp, told))
+    text = MAPPING.replace('order = ["RHY", "RHX", "LHY", "LHX"]\n', "")
+    recording = imported(write_bag(tmp_path / "bag", items), biped, text)
+    truth = [[angle(j, t) for j in (0, 2, 3)] for t in recording.behaviour.time]
+    assert np.allclose(recording.behaviour["commands"][:, [0, 2, 3]], truth)
+    assert ("no time stamp" in " ".join(recording.notes)) == (kind == "JointTrajectory")
+
+
+def test_a_pose_without_velocities_gets_none(biped: Robot, tmp_path: Path):
+    items = without("/imu", without("/odom", recorded()))
+    for k in range(50):
+        stamp = T0 + k * 20_000_000
+        items.append(("/odom", stamp, pose_stamped(stamp, (k, 0, 0), (1, 0, 0, 0))))
+    text = MAPPING.replace('[imu]\ntopic = "/imu"\n', "")
+    behaviour = imported(write_bag(tmp_path / "bag", items), biped, text).behaviour
+    assert np.isfinite(behaviour["base_position"]).all()
+    assert np.isnan(behaviour["base_linear_velocity"]).all()
+    assert np.isnan(behaviour["base_angular_velocity"]).all()
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_without_odometry_the_imu_tells_the_orientation_if_it_knows_it(
+    *, known: bool, biped: Robot, tmp_path: Path
+):
+    items = without("/imu", without("/odom", recorded()))
+    for k in range(100):
+        stamp = T0 + k * 10**7
+        turned = (np.cos(0.2), 0, 0, np.sin(0.2))
+        items.append(("/imu", stamp, imu(stamp, turned, (0, 0, 1), known=known)))
+    text = MAPPING.replace('[base]\ntopic = "/odom"\n', "")
+    recording = imported(write_bag(tmp_path / "bag", items), biped, text)
+    orientation = recording.behaviour["base_orientation"]
+    assert np.allclose(orientation, [1, 0, 0, 0]) if known else np.isnan(orientation).all()
+    assert np.allclose(recording.behaviour["base_angular_velocity"], [0, 0, 1])
+    assert np.isnan(recording.behaviour["base_position"]).all()
+    assert "where the base was is not known" in " ".join(recording.notes)
+
+
+def test_stamps_of_another_clock_are_refused_unless_told_so(biped: Robot, tmp_path: Path):
+    late = [(topic, time + 10**12, message) for topic, time, message in recorded()]
+    folder = write_bag(tmp_path / "bag", late)
+    with pytest.raises(InputError, match=r'MAP\.toml:5: .* 1000 s apart .* clock = "log"'):
+        imported(folder, biped)
+    recording = imported(folder, biped, 'clock = "log"\n' + MAPPING)
+    assert "all times are log times" in " ".join(recording.notes)
+    assert recording.origin == T0 + 10**12 + 15_000_000
+
+
+def test_a_log_of_an_import_reads_as_what_was_imported(bag: Path, biped: Robot, tmp_path: Path):
+    mapping = parse_mapping(MAPPING, "MAP.toml")
+    recording = import_recording(bag, mapping, biped)
+    path = write_recording(tmp_path / "trial.mcap", biped, recording, mapping, None)
+    trial = read_log(path).trial
+    for signal, values in recording.behaviour.signals.items():
+        assert np.array_equal(trial.behaviour[signal], values, equal_nan=True)
+    assert isinstance(trial.plan.controller, Playback)
+    with path.open("rb") as file:
+        reader = make_reader(file)
+        (told,) = [r.metadata for r in reader.iter_metadata() if r.name == "selfmodel.import"]
+        (attached,) = [a.data for a in reader.iter_attachments() if a.name == "mapping.toml"]
+    assert attached.decode() == MAPPING
+    assert json.loads(told["sources_sha256"]).keys() == {"bag.mcap"}
+    assert json.loads(told["topics"])["/odom"]["latency"] == pytest.approx(0.015)
+
+
+@pytest.mark.parametrize(("line", "stage"), [("", "single"), ('stage = "before"', "before")])
+def test_a_mapping_says_whether_anything_was_wrong(
+    line: str, stage: str, bag: Path, biped: Robot, tmp_path: Path
+):
+    mapping = parse_mapping(f"{line}\n{MAPPING}", "MAP.toml")
+
+    recording = import_recording(bag, mapping, biped)
+    path = write_recording(tmp_path / "trial.mcap", biped, recording, mapping, None)
+
+    assert read_log(path).trial.plan.stage == stage
+
+
+SIX = ["LF_HAA", "LF_HFE", "LF_KFE", "RF_HAA", "RF_HFE", "RF_KFE"]
+
+
+def jittery() -> list[Item]:
+    """Joints at 200 Hz with jitter, of which ten samples in a row are lost; no velocities."""
+    rng = np.random.default_rng(3)
+    items: list[Item] = []
+    for k in range(600):
+        stamp = T0 + k * 5_000_000 + round(rng.normal(0, 300_000))
+        angles = np.sin(k / 40 + np.arange(6))
+        if not 300 <= k < 310:
+            state = joint_state(stamp, SIX[::-1], angles[::-1], np.full(6, np.nan))
+            items.append(("/joint_states", stamp + 2_000_000, state))
+        if k % 4 == 0:
+            stamp = T0 + k * 5_000_000
+            items.append(("/odom", stamp + 15_000_000, odometry(stamp, (k / 600, 0, 0.5))))
+            items.append(("/joint_group_position_controller/commands", stamp, array(angles)))
+        items.append(("/imu/data", stamp, imu(stamp, (1, 0, 0, 0), (0, 0, 0), known=False)))
+    return items
+
+
+@pytest.mark.parametrize("sample", [None, *filter(Path.exists, [SYNTHETIC])])
+def test_a_recording_with_jitter_has_its_gap_marked_and_its_angles_right(
+    sample: Path | None, tmp_path: Path
+):
+    bag = sample or storage(write_bag(tmp_path / "bag", jittery()))
+    links = "".join(f'{name} = "{name}"\n' for name in SIX)
+    text = (
+        'robot = "six"\n[joints]\ntopic = "/joint_states"\nunit = "rad"\n'
+        f"[joints.names]\n{links}[commands]\nunit = 'rad'\n"
+        'topic = "/joint_group_position_controller/commands"\n'
+        'order = ["RF_HAA", "RF_HFE", "LF_HAA", "LF_HFE", "LF_KFE", "RF_KFE"]\n'
+        f'[commands.names]\n{links}[base]\ntopic = "/odom"\n[imu]\ntopic = "/imu/data"\n'
+    )
+    legs = "".join(
+        f'<body name="{name}"><joint name="{name}" range="-1 1"/><geom size="0.1"/></body>'
+        for name in SIX
+    )
+    motors = "".join(f'<position name="{name}" joint="{name}"/>' for name in SIX)
+    robot = Robot(
+        "six",
+        '<mujoco><compiler angle="radian"/><option timestep="0.005"/><worldbody><body name="base">'
+        f'<freejoint/><geom size="0.1"/>{legs}</body></worldbody><actuator>{motors}</actuator>'
+        "</mujoco>",
+        0.01,
+    )
+    recording = import_recording(bag, parse_mapping(text, "MAP.toml"), robot)
+    behaviour = recording.behaviour
+
+    stamps, positions = [], []
+    with bag.open("rb") as file:
+        for schema, _, message in make_reader(file).iter_messages("/joint_states"):
+            told = ROS.deserialize_cdr(message.data, schema.name)
+            stamps.append(told.header.stamp.sec * 10**9 + told.header.stamp.nanosec)
+            positions.append(told.position[[told.name.index(name) for name in SIX]])
+    at = recording.origin + np.arange(behaviour.steps) * 10_000_000
+    before = np.searchsorted(stamps, at, side="right") - 1
+    periods = np.diff(stamps)
+    unknown = (periods[before] > 1.5 * np.median(periods)) & (np.array(stamps)[before] != at)
+    assert unknown.sum() == 5
+    assert np.array_equal(np.isnan(behaviour["joint_positions"]).all(axis=1), unknown)
+    assert np.array_equal(np.isnan(behaviour["joint_positions"]).any(axis=1), unknown)
+    seconds = (np.array(stamps) - recording.origin) / 1e9
+    for column in range(6):
+        expected = np.interp(behaviour.time, seconds, np.array(positions)[:, column])
+        found = behaviour["joint_positions"][:, column]
+        assert np.allclose(found[~unknown], expected[~unknown], rtol=0, atol=1e-12)
+    assert np.isnan(behaviour["joint_velocities"]).any()
+    assert np.isfinite(behaviour["base_position"]).all()
+    silent = f"/joint_states: silent for {periods.max() / 1e6:.0f} ms"
+    assert any(note.startswith(silent) for note in recording.notes)
+
+
+def test_a_gap_of_the_odometry_leaves_the_rest_known(biped: Robot, tmp_path: Path):
+    items = [
+        item
+        for item in recorded()
+        if item[0] != "/odom" or not 0.4 < (item[1] - T0) / 1e9 - 0.015 < 0.6
+    ]
+    recording = imported(write_bag(tmp_path / "bag", items), biped)
+    lost = np.isnan(recording.behaviour["base_position"]).any(axis=1)
+    assert np.array_equal(
+        lost, (recording.behaviour.time > 0.401) & (recording.behaviour.time < 0.599)
+    )
+    assert np.isfinite(recording.behaviour["joint_positions"]).all()
+    assert any("/odom: silent for 200 ms at 0.400 s" in note for note in recording.notes)
+
+
+def test_a_command_stands_through_silence(biped: Robot, tmp_path: Path):
+    items = without("/commands", recorded())
+    items += [("/commands", T0, array([0.1] * 4)), ("/commands", T0 + 5 * 10**8, array([0.2] * 4))]
+    behaviour = imported(write_bag(tmp_path / "bag", items), biped).behaviour
+    assert np.array_equal(behaviour["commands"][:, 0], np.where(behaviour.time < 0.5, 0.1, 0.2))
+
+
+@pytest.mark.parametrize("limited", [True, False])
+def test_only_a_hinge_without_limits_goes_round(*, limited: bool, tmp_path: Path):
+    items = without("/joint_states", recorded())
+    for k in range(200):
+        stamp, turn = T0 + k * 5_000_000, (k / 40 + np.pi) % (2 * np.pi) - np.pi
+        items.append(("/joint_states", stamp, joint_state(stamp, JOINTS, [turn, 0, 0, 0])))
+    mjcf = (
+        MJCF
+        if limited
+        else MJCF.replace(
+            'name="left_hip_x" axis="1 0 0" range="-30 30"', ('name="left_hip_x" axis="1 0 0"')
+        )
+    )
+    robot = Robot("biped", mjcf, 0.01)
+    behaviour = imported(write_bag(tmp_path / "bag", items), robot).behaviour
+    angles = behaviour["joint_positions"][:, 0]
+    assert angles.max() < np.pi if limited else np.allclose(angles, behaviour.time * 5)

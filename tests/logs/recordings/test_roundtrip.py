@@ -1,0 +1,195 @@
+"""A simulated trial, recorded as a driver would and imported again, still tells what is wrong."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from selfmodel.comparators import DEFAULT
+from selfmodel.controllers.controller import Controller
+from selfmodel.diagnosis.diagnose import DiagnosticSearch
+from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.faults.notation import parse
+from selfmodel.logs import read_log, save_controller
+from selfmodel.logs.recordings.importer import import_recording
+from selfmodel.logs.recordings.mapping.mapping_file import parse_mapping
+from selfmodel.logs.recordings.mapping.suggest import suggest
+from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.behaviour import Behaviour, collect
+from tests.helpers.drivers import random_controllers
+from tests.logs.recordings.rosbag.driver import mapping, record
+
+STEPS = 400
+TRUTH = "break:front_left_knee"
+
+
+@pytest.fixture(scope="module")
+def gait(quadruped: Robot) -> Controller:
+    return random_controllers(quadruped, 3, seed=5)[0]
+
+
+@pytest.fixture(scope="module")
+def truth(quadruped: Robot) -> Hypothesis:
+    return parse(TRUTH, quadruped.anatomy)
+
+
+@pytest.fixture(scope="module")
+def simulated(quadruped: Robot, truth: Hypothesis, gait: Controller) -> Behaviour:
+    """The trial as it was."""
+    samples = SimulatedRobot(quadruped, truth).run(gait, STEPS)
+    return collect(quadruped.anatomy.names, samples)
+
+
+@pytest.fixture(scope="module")
+def driven(
+    quadruped: Robot, truth: Hypothesis, gait: Controller, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
+    """The trial as a driver recorded it, beside its mapping and its controller."""
+    folder = tmp_path_factory.mktemp("driven")
+    save_controller(folder / "gait.npz", gait)
+    (folder / "map.toml").write_text(mapping(quadruped, STEPS, "gait.npz"))
+    return record(folder / "bag", quadruped, truth, gait, STEPS)
+
+
+def selfmodel(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "selfmodel", *arguments], capture_output=True, text=True, check=False
+    )
+
+
+def test_what_is_imported_is_what_was_simulated(
+    quadruped: Robot, driven: Path, simulated: Behaviour
+):
+    text = mapping(quadruped, STEPS, None)
+    found = import_recording(driven, parse_mapping(text, "map.toml"), quadruped).behaviour
+    assert found.steps == STEPS
+    for signal, tolerance in (
+        ("commands", 0),
+        ("joint_positions", 2e-3),  # rad: a line between samples 5 ms apart
+        ("base_position", 2e-3),  # m: between samples 20 ms apart
+        ("base_orientation", 1e-2),
+    ):
+        error = np.abs(found[signal] - simulated[signal])
+        assert np.median(error) <= tolerance / 20, signal
+        assert np.max(error) <= 20 * tolerance, signal  # while a foot hits the ground
+    touch = [k for k, name in enumerate(found.names.sensors) if name.endswith("touch")]
+    assert np.array_equal(found["sensors"][:, touch], simulated["sensors"][:, touch])
+    displacement = [
+        b["base_position"][-1, 0] - b["base_position"][0, 0] for b in (found, simulated)
+    ]
+    assert displacement[0] == pytest.approx(displacement[1], abs=1e-3)  # m
+
+
+@pytest.mark.search
+def test_the_right_fault_is_found_in_an_imported_trial(
+    quadruped: Robot, driven: Path, truth: Hypothesis, tmp_path: Path
+):
+    log = tmp_path / "trial.mcap"
+    done = selfmodel(
+        "logs", "import", driven, "--mapping", driven.parent / "map.toml", "-o", log, "--json"
+    )
+    assert done.returncode == 0, done.stderr
+    facts = json.loads(done.stdout)
+    assert facts["valid"]["joint_positions"] == facts["valid"]["base_position"] == 1
+    assert facts["topics"]["/odom"]["latency"] == pytest.approx(0.015)
+    trial = read_log(log).trial
+    diagnose = DiagnosticSearch(
+        Simulator(quadruped, threads=2),
+        DEFAULT,
+        Settings(generations=12).scaled(50),
+    )
+    diagnosis = diagnose([trial], [], np.random.default_rng(0), lambda _: None)
+    assert diagnosis.best == truth
+
+
+def test_the_suggested_mapping_needs_only_what_is_marked(quadruped: Robot, driven: Path):
+    text = suggest(driven, quadruped, "quadruped", with_timestep=False)
+    assert "CHANGE must" in text
+    assert text.count("CHANGE") == 1  # nothing else
+    suggested = parse_mapping(text, "map.toml")
+    right = parse_mapping(mapping(quadruped, STEPS, None), "map.toml")
+    for ours, theirs in (
+        (suggested.joints, right.joints),
+        (suggested.commands, right.commands),
+    ):
+        assert ours.topic == theirs.topic
+        assert {k: link.name for k, link in ours.links.items()} == {
+            k: link.name for k, link in theirs.links.items()
+        }
+    assert suggested.base is not None
+    assert suggested.base.topic == "/odom"
+    assert {k: touch.topic for k, touch in suggested.touch.items()} == {
+        k: touch.topic for k, touch in right.touch.items()
+    }
+    assert import_recording(driven, suggested, quadruped).behaviour.steps > STEPS
+
+
+@pytest.mark.process
+def test_the_command_suggests_imports_and_reports(driven: Path, tmp_path: Path):
+    done = selfmodel("logs", "import", driven, "--suggest", "--robot", "quadruped")
+    assert done.returncode == 0, done.stderr
+    path = tmp_path / "map.toml"
+    path.write_text(done.stdout)
+    log = tmp_path / "trial.mcap"
+    arguments = ("logs", "import", driven, "--mapping", path, "-o", log)
+    done = selfmodel(*arguments)
+    assert done.returncode == 0, done.stderr
+    assert max(map(len, done.stdout.partition("note:")[0].splitlines())) <= 80
+    assert "start pose" in done.stdout  # the suggestion knows no offsets
+    again = selfmodel(*arguments)
+    assert again.returncode == 2
+    assert again.stderr == f"error: {log} exists, and is not overwritten: choose another name\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('robot = "quadrupet"', "map.toml:1: unknown robot 'quadrupet': did you mean"),
+        (
+            'robot = "quadruped"\ncontrol_timestep = 0.01',
+            "map.toml:2: quadruped has a control time step of its own",
+        ),
+        ('robot = "r.xml"', "map.toml:1: r.xml has no control time step"),
+        (
+            'robot = "r.xml"\ncontrol_timestep = 0.01',
+            "map.toml:1: .*r.xml: the model has no actuators",
+        ),
+        ('robot = "quadruped"\ncontroller = "g.npz"', "map.toml:2: .*g.npz: expected a controller"),
+    ],
+)
+def test_what_a_mapping_names_must_be_there(
+    text: str, message: str, quadruped: Robot, driven: Path, tmp_path: Path
+):
+    (tmp_path / "r.xml").write_text("<mujoco/>")
+    path = tmp_path / "map.toml"
+    rest = mapping(quadruped, STEPS, None).partition("\n")[2]
+    path.write_text(f"{text}\n{rest}")
+    done = selfmodel("logs", "import", driven, "--mapping", path, "-o", tmp_path / "t.mcap")
+    assert done.returncode == 2
+    assert not (tmp_path / "t.mcap").exists()
+    first, _, second = message.partition(".*")
+    assert first in done.stderr
+    assert second in done.stderr
+
+
+@pytest.mark.process
+def test_options_that_do_not_go_together_are_told(driven: Path):
+    for arguments, message in (
+        ((), "an import needs --out TRIAL.mcap and --mapping MAP.toml"),
+        (("--suggest",), "--suggest needs --robot"),
+        (("--robot", "quadruped"), "--robot is for --suggest"),
+    ):
+        done = selfmodel("logs", "import", driven, *arguments)
+        assert done.returncode == 2
+        assert message in done.stderr
+
+
+def test_help_does_not_wait_for_ros_messages():
+    code = "import sys, selfmodel.cli; assert not {'rosbags', 'ruamel'} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)
