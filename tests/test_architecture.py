@@ -180,6 +180,7 @@ BY_THEME = {
     "cli/test_controllers": "one option of many commands",
     "cli/test_hostile_logs": "many commands, given hostile logs",
     "cli/test_kinds": "one option of many commands",
+    "cli/test_tables": "the commands that write and read tables",
     "faults/test_graded": "all kinds with a severity, each a file of its own",
     "faults/test_kinds": "the contract of every kind, each a file of its own",
     "logs/recordings/rosbag/test_bags": "a reader of recordings that are made here",
