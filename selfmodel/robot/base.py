@@ -111,8 +111,7 @@ def find_root_body(model: mujoco.MjModel, driven: frozenset[int]) -> int:
 
     Raises:
         ValueError: The model has several floating bases; or none, and slide joints on a body of the
-            world, or no static body below the world that carries all driven joints, or no driven
-            joints.
+            world, or no static body below the world that carries all driven joints.
     """
     floating = floating_bodies(model, driven)
     if len(floating) > 1:
@@ -125,11 +124,6 @@ def find_root_body(model: mujoco.MjModel, driven: frozenset[int]) -> int:
         return floating[0]
     if not driven:
         raise ValueError("the motors drive no joint: give the joints of the limbs motors")
-    if not driven:
-        raise ValueError(
-            "the base is fixed, and no motor drives a joint: give the joints motors in <actuator>, "
-            "or the robot a <freejoint/>"
-        )
     _check_hinged(model)
     carrier = common_carrier(model, driven)
     if not carrier:

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, strategies as st
 from scipy.spatial.transform import Rotation
 
-from selfmodel.robot.base import find_root_body, read_base
+from selfmodel.robot.base import read_base
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sliding_base import SlidingBase
 from selfmodel.robot.state_access import bind_data, current_value, signal_fields, state_writer
@@ -158,11 +158,3 @@ def test_the_signals_of_a_free_base_are_views_of_the_state(quadruped: Robot):
             signal_fields(quadruped)[signal].reader(bind_data(data))(),
             data.qvel if "velocity" in signal else data.qpos,
         )
-
-
-def test_a_fixed_base_without_driven_joints_is_no_robot():
-    text = MJCF.format(pos="0 0 1", quat="1 0 0 0", joints="").partition("<actuator>")[0]
-    model = mujoco.MjModel.from_xml_string(f"{text}</mujoco>")
-
-    with pytest.raises(ValueError, match="no motor drives a joint"):
-        find_root_body(model, frozenset())
