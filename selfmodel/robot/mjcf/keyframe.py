@@ -12,6 +12,9 @@ from selfmodel.robot.mjcf.expand import format_numbers
 from selfmodel.robot.mjcf.mujoco_errors import compile_model, loading_a_model
 from selfmodel.robot.mjcf.settings import NO_KEYFRAME, MjcfSettings
 
+STANDING_KEYFRAMES = ("home", "stand", "standing")
+"""Usual names of the keyframe in which a robot stands, in the order in which they are tried."""
+
 _POSE_TOLERANCE = 1e-9
 """Largest difference of the new reference pose from the keyframe, m and unit quaternions."""
 
@@ -64,7 +67,8 @@ def _keyframe(model: mujoco.MjModel, wanted: str) -> int | None:
     if wanted == NO_KEYFRAME:
         return None
     if not wanted:
-        return 0 if names else None
+        usual = next((names.index(name) for name in STANDING_KEYFRAMES if name in names), 0)
+        return usual if names else None
     if wanted not in names:
         raise unknown_name("keyframe", wanted, [*filter(None, names), NO_KEYFRAME])
     return names.index(wanted)
