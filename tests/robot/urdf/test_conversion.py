@@ -12,7 +12,7 @@ from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import Budget
 from tests.helpers.command import selfmodel
-from tests.robot.urdf.samples import WALKER, joint, link, urdf, written
+from tests.robot.urdf.samples import BALL, WALKER, joint, link, urdf, written
 
 DEEP = "<robot>" + "<link>" * 5000 + "</link>" * 5000 + "</robot>"
 BOMB = '<!DOCTYPE r [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;&a;">]><robot name="&b;"/>'
@@ -89,6 +89,10 @@ def test_the_initial_pose_becomes_the_reference_pose_also_of_coupled_joints(tmp_
         (WALKER.replace('effort="10.0"', 'effort="1e400"'), "1 number in effort"),
         (WALKER.replace('type="revolute"', 'type="fixed"'), "no actuators"),
         (urdf(link("a", 0), link("b", 0), joint("j", "a", "b")), "no link has a <collision>"),
+        (
+            urdf(link("a", 0, BALL), link("b"), joint("j", "a", "b")),
+            "with a mass and moments above",
+        ),
     ],
 )
 def test_a_hostile_or_unusable_urdf_is_refused_in_one_sentence(
