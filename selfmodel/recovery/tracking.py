@@ -106,4 +106,4 @@ def _score(
     count = observed.sum(axis=(1, 2))
     total = np.where(observed, squares, 0.0).sum(axis=(1, 2))
     mean = np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0)
-    return 0.0 - np.sqrt(mean)  # not -sqrt: a perfect score is 0, not -0
+    return np.asarray(0.0 - np.sqrt(mean))  # not -sqrt: a perfect score is 0, not -0
