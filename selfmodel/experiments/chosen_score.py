@@ -61,7 +61,7 @@ def choose_score(
             another score.
     """
     robot = entry.robot()
-    check_motion(name, robot.name, fixed=robot.has_fixed_base)
+    check_score(name, entry)
     if name != TRACKING:
         if reference is not None:
             raise InputError(f"--reference is a trajectory for --score {TRACKING}, got {name}")
@@ -72,20 +72,23 @@ def choose_score(
     return ChosenScore(tracking(simulated_reference(robot, first, steps), robot), first)
 
 
-def check_motion(name: str, robot: str, *, fixed: bool) -> None:
-    """Checks that the score of a robot can differ between controllers.
+def check_score(name: str, entry: Entry) -> None:
+    """Checks that a robot has a score of that name.
 
     Args:
         name: Name of the score.
-        robot: Name of the robot.
-        fixed: Whether its base is fixed.
+        entry: The robot.
 
     Raises:
-        InputError: The score is a displacement, and the base is fixed.
+        InputError: The name is unknown, the robot has no task with rewards, or the score is a
+            displacement and the base is fixed.
     """
-    if fixed and name in (DISPLACEMENT.name, UPRIGHT.name):
+    robot = entry.robot()
+    if robot.has_fixed_base and name in (DISPLACEMENT.name, UPRIGHT.name):
         raise InputError(
-            f"the base of {robot} is fixed, so its {name} is always 0: give --score {TRACKING}, "
-            f"and --reference FILE with a joint trajectory, or no --reference for the motion of a "
-            f"first controller"
+            f"the base of {robot.name} is fixed, so its {name} is always 0: give --score "
+            f"{TRACKING}, and --reference FILE with a joint trajectory, or no --reference for the "
+            f"motion of a first controller"
         )
+    if name != TRACKING:
+        plugins.score(name, robot.name, entry)

@@ -39,7 +39,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_faults_are_found_in_the_logs_of_a_robot_with_a_fixed_base(
     folder: Path, robot: str, fault: str
 ):
-    drive = (f"{robot}.xml", "--steps", "300", "--controller", "cpg", "--gap", "0.02")
+    drive = (f"{robot}.xml", "--steps", "200", "--controller", "cpg", "--gap", "0.02")
     before, after = f"{robot}-before.mcap", f"{robot}-after.mcap"
     run(folder, "trial", *drive, "--stage", "before", "-o", before)
     run(folder, "trial", *drive, "--stage", "after", "--damage", fault, "-o", after)
@@ -80,19 +80,19 @@ def test_an_arm_learns_to_follow_a_table(folder: Path):
     )
     assert found["correct"]
     assert -1 < found["score"]["before"] < 0
-    assert found["score"]["after"] <= found["score"]["before"]
+    assert found["score"]["recovered"] < 0
 
 
 def test_recover_names_the_score_of_a_fixed_base(folder: Path):
     done = selfmodel("recover", "arm.xml", "--damage", "jam:joint3", cwd=folder)
-    assert done.returncode == 1
+    assert done.returncode == 2
     assert "give --score tracking" in done.stderr
 
 
 def test_the_papers_comparator_refuses_a_fixed_base(folder: Path):
     run(folder, "trial", "arm.xml", "--steps", "100", "-o", "still.mcap")
     done = selfmodel("diagnose", "still.mcap", "--comparator", "forward-displacement", cwd=folder)
-    assert done.returncode == 1
+    assert done.returncode == 2
     assert "is fixed: give the comparator segment-prediction" in done.stderr
 
 

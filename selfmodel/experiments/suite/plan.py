@@ -9,7 +9,7 @@ from typing import Any
 
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.experiments import plugins, robots
-from selfmodel.experiments.chosen_score import check_motion
+from selfmodel.experiments.chosen_score import check_score
 from selfmodel.experiments.gaits import check_not_evolved, gait_settings
 from selfmodel.experiments.grid import Job, check_shared
 from selfmodel.experiments.study_files import check_keys, key_of
@@ -17,7 +17,6 @@ from selfmodel.faults.neuron import silent_neurons
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.physical.reality_gap import MAX_GAP_LEVEL
-from selfmodel.recovery.tracking import TRACKING
 from selfmodel.settings import Settings
 from selfmodel.tasks import Entry
 from selfmodel.version import __version__
@@ -81,10 +80,7 @@ def check(study: Study) -> None:
     for body in study.bodies:
         entry = robots.robot_entry(body)
         plugins.design(study.controller, entry.robot(), study.neurons)
-        robot = entry.robot()
-        check_motion(study.score, robot.name, fixed=robot.has_fixed_base)
-        if study.score != TRACKING:
-            plugins.score(study.score, body, entry)
+        check_score(study.score, entry)
     if not 0 <= study.gap <= MAX_GAP_LEVEL:
         raise InputError(f"expected a gap from 0 to {MAX_GAP_LEVEL}, such as 0.05, got {study.gap}")
     known = known_cases(study.bodies)
