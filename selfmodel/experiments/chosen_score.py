@@ -14,6 +14,7 @@ from selfmodel.experiments.references import (
 from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.tracking import TRACKING, tracking
 from selfmodel.recovery.upright import UPRIGHT
+from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.tasks import Entry
 
@@ -84,11 +85,24 @@ def check_score(name: str, entry: Entry) -> None:
             displacement and the base is fixed.
     """
     robot = entry.robot()
+    check_motion(name, robot)
+    if name != TRACKING:
+        plugins.score(name, robot.name, entry)
+
+
+def check_motion(name: str, robot: Robot) -> None:
+    """Checks that the base of a robot moves if its score is a displacement.
+
+    Args:
+        name: Name of the score.
+        robot: The robot.
+
+    Raises:
+        InputError: The score is a displacement and the base is fixed.
+    """
     if robot.has_fixed_base and name in (DISPLACEMENT.name, UPRIGHT.name):
         raise InputError(
             f"the base of {robot.name} is fixed, so its {name} is always 0: give --score "
             f"{TRACKING}, and --reference FILE with a joint trajectory, or no --reference for the "
             f"motion of a first controller"
         )
-    if name != TRACKING:
-        plugins.score(name, robot.name, entry)

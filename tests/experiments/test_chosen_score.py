@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+import selfmodel
 from selfmodel.errors import InputError
 from selfmodel.experiments.chosen_score import ChosenScore, choose_score
 from selfmodel.faults.hypothesis import INTACT
@@ -46,3 +47,11 @@ def test_a_reference_for_another_score_is_refused(quadruped: Robot):
 def test_an_unknown_score_names_the_known_ones(quadruped: Robot):
     with pytest.raises(InputError, match="did you mean tracking"):
         chosen("traking", quadruped)
+
+
+def test_the_public_functions_refuse_the_displacement_of_a_fixed_base(tmp_path: Path):
+    with pytest.raises(InputError, match="give --score tracking"):
+        selfmodel.evolve_controller(arm())
+    physical = selfmodel.simulated_robot(arm())
+    with pytest.raises(InputError, match="give --score tracking"):
+        selfmodel.recover(physical, physical, arm(), tmp_path / "run")
