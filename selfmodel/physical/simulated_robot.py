@@ -17,6 +17,7 @@ from selfmodel.physical.initial_pose import randomize_initial_pose
 from selfmodel.physical.measurement_noise import ExactMeasurement, Measurement, NoisyMeasurement
 from selfmodel.physical.reality_gap import RealityGap, perturbed_model
 from selfmodel.physical.structural_mismatch import StructuralMismatch, add_structural_mismatch
+from selfmodel.robot.control_delay import split_delay
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.known_base import BASE_SIGNALS
 from selfmodel.robot.mjcf.mujoco_errors import mujoco_errors_as_input_errors
@@ -88,10 +89,8 @@ class SimulatedRobot:
         robot = self._robot
         model, data = embodiment.model, mujoco.MjData(embodiment.model)
         measurement: Measurement = ExactMeasurement()
-        delay, substeps = (
-            robot.control_delay,
-            round(robot.control_timestep / float(model.opt.timestep)),
-        )
+        delay = robot.control_delay
+        substeps = round(robot.control_timestep / float(model.opt.timestep))
         if self._gap is not None:
             measurement = NoisyMeasurement(self._gap.level, robot.anatomy, embodiment, rng)
             delay += self._gap.delay
@@ -104,7 +103,8 @@ class SimulatedRobot:
             [controller], [embodiment.silent_neurons], len(robot.anatomy.sensors)
         )
         commands = np.zeros((1, model.nu))
-        delay_line = deque(np.zeros((delay, model.nu)))
+        whole, part = split_delay(delay, substeps)
+        delay_line = deque(np.zeros((whole + bool(part), model.nu)))
         # Logged commands are the controller's outputs, before the control delay.
         state_fields = signal_fields(robot, model)
         live = {signal: field.reader(bind_data(data)) for signal, field in state_fields.items()}
@@ -128,7 +128,11 @@ class SimulatedRobot:
                     for signal in SIGNALS
                 },
             )
-            if k + 1 < steps and not _advanced(model, data, substeps):
+            moves = k + 1 < steps
+            if moves and part:
+                moves = _advanced(model, data, part)
+                data.ctrl[:] = delay_line[0]
+            if k + 1 < steps and not (moves and _advanced(model, data, substeps - part)):
                 raise TrialError(
                     f"the simulation of the physical robot diverged after step {k}: its model "
                     f"is unstable under this controller; try a smaller physics time step"
