@@ -100,6 +100,16 @@ def test_every_module_has_a_room_or_is_vocabulary():
     assert sorted(homeless) == ["selfmodel", "selfmodel.__main__"]
 
 
+def test_one_module_imports_gymnasium_which_is_no_dependency():
+    others = [
+        module
+        for module, path in modules().items()
+        if {"gymnasium", "shimmy"} & {name.split(".")[0] for name in imports(path)}
+    ]
+
+    assert others == ["selfmodel.tasks.gymnasium_env"]
+
+
 def test_few_files_lie_flat_in_the_package():
     assert len(list((ROOT / "selfmodel").glob("*.py"))) <= 8
 
