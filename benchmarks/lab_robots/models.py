@@ -41,7 +41,7 @@ class Model:
         """The settings file without the folder of the assets."""
         lines = [f"reach = {REACH}", *self.settings]
         if self.servo is not None:
-            lines.append(f"servo = {{kp = {self.servo[0]:g}, kd = {self.servo[1]:g}}}")
+            lines += [f"kp = {self.servo[0]:g}", f"kd = {self.servo[1]:g}"]
         return "\n".join(lines) + "\n"
 
 

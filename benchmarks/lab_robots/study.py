@@ -42,7 +42,7 @@ def _run(models: Sequence[Path], seed: int, gap: float, folder: Path) -> None:
     what = ("--domains", ",".join(map(str, models)), "--case", ",".join(map(str, CASES)))
     where = ("--seed", str(seed), "--gap", str(gap), "--out", str(folder))
     command = (sys.executable, "-m", "selfmodel", "suite", "run", *what, *DESIGN, *BUDGET, *where)
-    subprocess.run(command, check=False)  # noqa: S603  # arguments of this file
+    subprocess.run(command, check=False)  # arguments of this file
 
 
 def _copy_gaits(out: Path, gap: float) -> None:

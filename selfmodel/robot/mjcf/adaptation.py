@@ -35,7 +35,6 @@ from selfmodel.robot.mjcf.visuals import drop_textures, reduce_meshes
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.urdf.conversion import convert
 from selfmodel.robot.urdf.reading import read_urdf
-from selfmodel.robot.urdf.settings import URDF_SETTINGS, UrdfSettings
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.sandbox.message import Message
 
@@ -101,10 +100,10 @@ def _read(data: bytes, files: Files, name: str, settings: MjcfSettings, budget: 
     root = parse_xml(data)
     if root.tag == "robot":
         return read_urdf(root, files, budget)
-    if settings.urdf != UrdfSettings():
+    if settings.effort or settings.pose:
         raise InputError(
-            f"{', '.join(URDF_SETTINGS)} are settings for a URDF: in an MJCF, motors have gains "
-            f"and forces, and a <key> in <keyframe> has the pose"
+            "effort and pose are settings for a URDF: in an MJCF, motors have a forcerange, and a "
+            "<key> in <keyframe> has the pose"
         )
     return read_document(data, files, name, budget)
 
@@ -115,10 +114,10 @@ def adapt_message(message: Message, budget: Budget, _scratch: Path) -> Message:
     root = ET.fromstring(facts["model"])  # noqa: S314  # checked
     document = Document(root, dict(message.blobs), list(facts["notes"]), facts["missing"])
     given = {name: value for name, value in facts["settings"].items() if value is not None}
-    of_urdf = given.pop("urdf")
-    settings = checked_settings({**given, **of_urdf})
+    settings = checked_settings(given)
     if root.tag == "robot":
-        document = convert(document, settings.urdf, settings.base)
+        document = convert(document, settings)
+        settings = replace(settings, kp={}, kd={})  # its motors are servos with these gains
     adapted = _adapted(facts["name"], document, settings, budget)
     with mujoco_errors_as_input_errors("use the model"):
         Robot(adapted.name, adapted.mjcf, adapted.control_timestep, adapted.assets)
@@ -178,10 +177,9 @@ def _adapted(name: str, document: Document, settings: MjcfSettings, budget: Budg
         fix_base(document, compile_model(document.text, document.assets), settings.base_height)
     add_ground(document, compile_model(document.text, document.assets))
     add_sensors(document, compile_model(document.text, document.assets), settings)
-    if settings.servo is not None:
-        model = compile_model(document.text, document.assets)
-        add_servos(document, model, settings.servo, settings.reach)
-    if settings.reach is not None:
+    if settings.kp or settings.kd:
+        add_servos(document, compile_model(document.text, document.assets), settings)
+    if settings.reach:
         limit_reach(document, compile_model(document.text, document.assets), settings.reach)
     add_command_ranges(document, compile_model(document.text, document.assets), settings)
     try:

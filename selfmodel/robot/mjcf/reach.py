@@ -7,6 +7,7 @@ from selfmodel.errors import InputError
 from selfmodel.robot.actuator_ranges import command_ranges
 from selfmodel.robot.mjcf.document import Document
 from selfmodel.robot.mjcf.expand import format_numbers
+from selfmodel.robot.mjcf.joint_values import JointValues, check_patterns, value_of
 
 _JOINT = int(mujoco.mjtTrn.mjTRN_JOINT)
 _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
@@ -14,7 +15,7 @@ _INHERITING = ("position", "intvelocity")
 """Actuators that may have the range of their joint as command range."""
 
 
-def limit_reach(document: Document, model: mujoco.MjModel, reach: float) -> None:
+def limit_reach(document: Document, model: mujoco.MjModel, reach: JointValues) -> None:
     """Limits the command range of each position servo of a hinge.
 
     The new range is the part of the old range within ``reach`` of the angle of the hinge in the
@@ -23,32 +24,38 @@ def limit_reach(document: Document, model: mujoco.MjModel, reach: float) -> None
     Args:
         document: The MJCF, edited in place.
         model: The compiled document, with the initial pose as reference pose.
-        reach: Largest distance of a command from the initial pose, rad.
+        reach: Largest distances of commands from the initial pose by hinge, rad.
 
     Raises:
-        InputError: The model has no position servo of a hinge.
+        InputError: A distance is for no hinge with a position servo.
     """
-    limited = 0
+    hinges = [model.joint(int(joint)).name for joint in np.flatnonzero(model.jnt_type == _HINGE)]
+    check_patterns({"reach": reach}, hinges)
+    limited: dict[float, int] = {}
     for motor, element in enumerate(document.children("actuator")):
         if not _is_position_servo(model, motor):
+            continue
+        distance = value_of(reach, model.joint(int(model.actuator_trnid[motor, 0])).name)
+        if distance is None:
             continue
         centre, half = command_ranges(model)[motor]
         initial = float(model.qpos0[model.jnt_qposadr[model.actuator_trnid[motor, 0]]])
         initial = min(max(initial, centre - half), centre + half)
-        ends = max(initial - reach, centre - half), min(initial + reach, centre + half)
+        ends = max(initial - distance, centre - half), min(initial + distance, centre + half)
         element.set("ctrlrange", format_numbers(np.array(ends)))
         element.set("ctrllimited", "true")
         if element.tag in _INHERITING:
             element.set("inheritrange", "0")  # MuJoCo refuses both ranges, also if one is a default
-        limited += 1
+        limited[distance] = limited.get(distance, 0) + 1
     if not limited:
         raise InputError(
-            "expected a position servo of a hinge for reach, got none: set servo={kp=40, kd=1} to "
+            "expected a position servo of a hinge for reach, got none: set kp=40 and kd=1 to "
             "make position servos of torque motors, or remove the setting reach"
         )
-    document.notes.append(
-        f"the commands of {limited} position servos are limited to {reach:g} rad from the initial "
+    document.notes.extend(
+        f"the commands of {count} position servos are limited to {distance:g} rad from the initial "
         f"pose"
+        for distance, count in limited.items()
     )
 
 

@@ -10,59 +10,74 @@ import numpy as np
 from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.document import Document
 from selfmodel.robot.mjcf.expand import format_numbers
-from selfmodel.robot.mjcf.settings import Servo
+from selfmodel.robot.mjcf.joint_values import check_patterns, value_of
+from selfmodel.robot.mjcf.settings import MjcfSettings
 
 _JOINT = int(mujoco.mjtTrn.mjTRN_JOINT)
 _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 
 
-def add_servos(
-    document: Document, model: mujoco.MjModel, servo: Servo, reach: float | None
-) -> None:
-    """Makes a position servo of each torque motor that drives a hinge.
+def add_servos(document: Document, model: mujoco.MjModel, settings: MjcfSettings) -> None:
+    """Makes a position servo of each torque motor that drives a hinge with gains in the settings.
 
-    A torque motor has a torque proportional to its command. The servo has the same torque limits.
-    Its command range is the range of the hinge.
+    A torque motor has a torque proportional to its command. The torque of the servo is
+    kp (command - angle) - kd (angular velocity), within the same limits. Its command range is the
+    range of the hinge, or ``reach`` on both sides of the initial pose for a hinge without a range.
 
     Args:
         document: The MJCF, edited in place.
         model: The compiled document, with the initial pose as reference pose.
-        servo: Gains of all servos.
-        reach: Command range of a hinge without a range, on both sides of the initial pose, rad;
-            None to require a range.
+        settings: Settings with kp and kd by hinge, and reach.
 
     Raises:
-        InputError: The model has no torque motor, or a hinge of one has no range.
+        InputError: A gain is for no hinge with a torque motor, a hinge has one gain only, or the
+            commands of a hinge have no range.
     """
-    converted = 0
+    hinges = [model.joint(int(joint)).name for joint in np.flatnonzero(model.jnt_type == _HINGE)]
+    check_patterns({"kp": settings.kp, "kd": settings.kd}, hinges)
+    converted: dict[tuple[float, float], int] = {}
     for motor, element in enumerate(document.children("actuator")):
         if not _is_torque_motor(model, motor):
             continue
         joint = int(model.actuator_trnid[motor, 0])
-        attributes = servo_attributes(
-            servo, _travel(model, joint, reach), _torque_limits(model, motor)
-        )
-        kept = {"name": element.get("name", ""), "joint": model.joint(joint).name}
-        element.tag, element.attrib = "general", kept | attributes
-        converted += 1
+        name = model.joint(joint).name
+        gains = value_of(settings.kp, name), value_of(settings.kd, name)
+        if gains == (None, None):
+            continue
+        kp, kd = gains
+        if kp is None or kd is None:
+            raise InputError(
+                f"expected kp and kd for the joint {name}, got one of them: a position servo needs "
+                f"both, such as kp = 40 and kd = 1"
+            )
+        travel = _travel(model, joint, value_of(settings.reach, name))
+        element.attrib = {
+            "name": element.get("name", ""),
+            "joint": name,
+            **_attributes(kp, kd, travel, _torque_limits(model, motor)),
+        }
+        element.tag = "general"
+        converted[kp, kd] = converted.get((kp, kd), 0) + 1
     if not converted:
         raise InputError(
-            "expected a motor with a torque as its command for servo, got none: the motors of this "
-            "model are servos already, or drive no hinge; remove the setting servo"
+            "expected a motor with a torque as its command for kp and kd, got none: the motors of "
+            "these joints are servos already, or drive no hinge; remove kp and kd"
         )
-    document.notes.append(
-        f"{converted} torque motors are position servos with kp={servo.kp:g} and kd={servo.kd:g}, "
-        f"and the same torque limits"
+    document.notes.extend(
+        f"{count} torque motors are position servos with kp={kp:g} and kd={kd:g}, and the same "
+        f"torque limits"
+        for (kp, kd), count in converted.items()
     )
 
 
-def servo_attributes(
-    servo: Servo, travel: tuple[float, float], torque: tuple[float, float] | None
+def _attributes(
+    kp: float, kd: float, travel: tuple[float, float], torque: tuple[float, float] | None
 ) -> dict[str, str]:
-    """Returns the attributes of a ``<general>`` actuator of a hinge that is a position servo.
+    """Returns the attributes of a ``<general>`` actuator that is a position servo.
 
     Args:
-        servo: Gains.
+        kp: Proportional gain, N m/rad.
+        kd: Derivative gain, N m s/rad.
         travel: Lowest and highest command, rad.
         torque: Lowest and highest torque, N m; None without limits.
     """
@@ -74,8 +89,8 @@ def servo_attributes(
         "dyntype": "none",
         "gaintype": "fixed",
         "biastype": "affine",
-        "gainprm": format_numbers(np.array((servo.kp, 0.0, 0.0))),
-        "biasprm": format_numbers(np.array((0.0, -servo.kp, -servo.kd))),
+        "gainprm": format_numbers(np.array((kp, 0.0, 0.0))),
+        "biasprm": format_numbers(np.array((0.0, -kp, -kd))),
         "ctrllimited": "true",
         "ctrlrange": format_numbers(np.array(travel)),
         **limits,

@@ -9,7 +9,7 @@ from typing import Any
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.files import load_toml, read_file
 from selfmodel.robot.mjcf.files import is_around_home
-from selfmodel.robot.urdf.settings import URDF_SETTINGS, UrdfSettings, checked_urdf_settings
+from selfmodel.robot.mjcf.joint_values import JointValues, checked_joint_values
 
 MAX_SETTINGS_BYTES = 2**16
 """Largest settings file, in bytes."""
@@ -29,19 +29,6 @@ BASES = ("free", "fixed")
 
 
 @dataclass(frozen=True)
-class Servo:
-    """Gains of a position servo: torque = kp (command - angle) - kd (angular velocity).
-
-    Attributes:
-        kp: Stiffness, N m/rad; above 0.
-        kd: Damping, N m s/rad; at least 0.
-    """
-
-    kp: float
-    kd: float
-
-
-@dataclass(frozen=True)
 class MjcfSettings:
     """Settings for the conversion of an MJCF to a robot.
 
@@ -54,10 +41,14 @@ class MjcfSettings:
         touch: Bodies that get a touch sensor; None for the end of each limb.
         angle: Joints that get an angle sensor; None for every hinge that a motor drives.
         ctrlrange: Lowest and highest command of motors without a command range.
-        urdf: Settings for a URDF; in a settings file they are beside the others.
-        servo: Gains of position servos that replace the torque motors; None to keep the motors.
-        reach: Largest distance of a servo's command from the initial pose, rad; None for the
-            servo's command range.
+        kp: Proportional gains of position servos, N m/rad. In an MJCF, the torque motors of these
+            hinges become position servos.
+        kd: Derivative gains of the same servos, N m s/rad.
+        effort: Largest torques instead of the effort limits of a URDF, N m.
+        pose: Joint angles of the initial pose of a URDF, rad; of other joints, the angle in the
+            range of the joint that is nearest to 0.
+        reach: Largest distances of the commands of position servos from the initial pose, rad; the
+            commands of other joints span their ranges.
         base: ``free`` for a base with a free joint, ``fixed`` for a base that is fixed to the
             world, as on a stand; None for the base of the file.
         base_height: Height of the root body with ``base="fixed"``, m; None for the height of the
@@ -71,12 +62,14 @@ class MjcfSettings:
     touch: tuple[str, ...] | None = None
     angle: tuple[str, ...] | None = None
     ctrlrange: tuple[float, float] | None = None
-    servo: Servo | None = None
-    reach: float | None = None
+    kp: JointValues = field(default_factory=dict)
+    kd: JointValues = field(default_factory=dict)
+    effort: JointValues = field(default_factory=dict)
+    pose: JointValues = field(default_factory=dict)
+    reach: JointValues = field(default_factory=dict)
     base: str | None = None
     base_height: float | None = None
     assets: str = ""
-    urdf: UrdfSettings = field(default_factory=UrdfSettings)
 
 
 def read_settings(path: Path, extra: Mapping[str, Any] | None = None) -> MjcfSettings:
@@ -183,17 +176,15 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
         touch=_names(given, "touch"),
         angle=_names(given, "angle"),
         ctrlrange=_range(given),
-        servo=_servo(given),
-        reach=_reach(given),
         base=base,
         base_height=None if height is None else float(height),
         assets=assets,
-        urdf=checked_urdf_settings(given),
+        **checked_joint_values(given),
     )
 
 
-_KEYS = [key.name for key in fields(MjcfSettings) if key.name != "urdf"] + list(URDF_SETTINGS)
-"""Names of the settings in a file."""
+_KEYS = [key.name for key in fields(MjcfSettings)]
+"""Names of the settings."""
 
 
 def _is_number(value: object) -> bool:
@@ -211,28 +202,6 @@ def _range(given: Mapping[str, Any]) -> tuple[float, float] | None:
     if not ends[0] < ends[1]:
         raise InputError(f"ctrlrange needs its lower end first, got {ends!r}")
     return float(ends[0]), float(ends[1])
-
-
-def _servo(given: Mapping[str, Any]) -> Servo | None:
-    gains = given.get("servo")
-    if gains is None:
-        return None
-    valid = isinstance(gains, dict) and set(gains) == {"kp", "kd"}
-    if not (valid and all(map(_is_number, gains.values())) and gains["kp"] > 0 <= gains["kd"]):
-        raise InputError(
-            f"servo needs kp above 0 and kd of at least 0, such as {{kp = 40, kd = 1}}, "
-            f"got {gains!r}"
-        )
-    return Servo(float(gains["kp"]), float(gains["kd"]))
-
-
-def _reach(given: Mapping[str, Any]) -> float | None:
-    reach = given.get("reach")
-    if reach is None:
-        return None
-    if not (_is_number(reach) and reach > 0):
-        raise InputError(f"reach needs an angle above 0 rad, such as 0.5, got {reach!r}")
-    return float(reach)
 
 
 def _names(given: Mapping[str, Any], key: str) -> tuple[str, ...] | None:

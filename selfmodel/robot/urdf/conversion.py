@@ -7,11 +7,12 @@ import mujoco
 from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.document import Document
 from selfmodel.robot.mjcf.expand import format_numbers
+from selfmodel.robot.mjcf.joint_values import check_patterns
 from selfmodel.robot.mjcf.mujoco_errors import compile_model, loading_a_model
+from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.robot.urdf.bodies import is_rigid, meshes, world_elements
 from selfmodel.robot.urdf.reading import number
-from selfmodel.robot.urdf.servos import check_patterns, servo
-from selfmodel.robot.urdf.settings import UrdfSettings
+from selfmodel.robot.urdf.servos import servo
 from selfmodel.robot.urdf.stance import stance
 from selfmodel.robot.urdf.tree import HINGE_TYPES, quoted
 
@@ -24,14 +25,14 @@ KEYFRAME = "stance"
 _MAX_LISTED = 6
 
 
-def convert(document: Document, settings: UrdfSettings, base: str | None = None) -> Document:
+def convert(document: Document, settings: MjcfSettings) -> Document:
     """Returns the MJCF of a URDF, with position servos and a keyframe.
 
     Args:
         document: The URDF, as returned by ``read_urdf``.
-        settings: Settings with the gains and the pose.
-        base: ``free`` for a free joint of the root and a ground, ``fixed`` for none; None for
-            ``fixed`` if the root link is named ``world``, and otherwise ``free``.
+        settings: Settings with the gains and the pose. With ``base="free"`` the root has a free
+            joint and there is a ground, with ``base="fixed"`` neither; without ``base`` the base is
+            fixed if the root link is named ``world``.
 
     Raises:
         InputError: The URDF cannot be a robot; the message has the reason and the remedy.
@@ -39,7 +40,8 @@ def convert(document: Document, settings: UrdfSettings, base: str | None = None)
     urdf = document.root
     hinges = [j for j in urdf.findall("joint") if j.get("type") in HINGE_TYPES]
     driven = [j for j in hinges if j.find("mimic") is None]
-    check_patterns(settings, [j.get("name", "") for j in hinges])
+    by_joint = {name: getattr(settings, name) for name in ("kp", "kd", "effort", "pose")}
+    check_patterns(by_joint, [j.get("name", "") for j in hinges])
     spec = _imported(document)
     root = ET.Element("mujoco", {"model": urdf.get("name", "robot")})
     made = Document(root, document.assets, list(document.notes))
@@ -51,7 +53,7 @@ def convert(document: Document, settings: UrdfSettings, base: str | None = None)
     made.section("asset").extend(meshes(spec))
     made.section("worldbody").extend(world_elements(spec))
     in_world = any(link.get("name") == "world" for link in urdf.findall("link"))
-    if base == "free" or (base is None and not in_world):
+    if settings.base == "free" or (settings.base is None and not in_world):
         _free_base(made)
     _add_couplings(made, hinges)
     _add_servos(made, driven, settings)
@@ -122,7 +124,7 @@ def _add_couplings(made: Document, hinges: list[ET.Element]) -> None:
         made.notes.append(f"{joint.get('name')} mimics {leader}, and gets no motor")
 
 
-def _add_servos(made: Document, driven: list[ET.Element], settings: UrdfSettings) -> None:
+def _add_servos(made: Document, driven: list[ET.Element], settings: MjcfSettings) -> None:
     servos = [servo(joint, settings) for joint in driven]
     made.section("actuator").extend([element for element, _ in servos])
     names: dict[str, list[str]] = {}
@@ -132,7 +134,7 @@ def _add_servos(made: Document, driven: list[ET.Element], settings: UrdfSettings
         made.notes.append(f"position servos with {gains}: {_listed(joints)}")
 
 
-def _add_stance(made: Document, settings: UrdfSettings) -> None:
+def _add_stance(made: Document, settings: MjcfSettings) -> None:
     """Adds the initial pose as a keyframe, and excludes the contacts of bodies that overlap."""
     found = stance(_compiled(made), settings.pose)
     for first, second in found.overlapping:

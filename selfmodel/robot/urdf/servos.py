@@ -1,13 +1,12 @@
 """Position servos for the hinges of a URDF, from the limits of effort and velocity."""
 
 import math
-from collections.abc import Sequence
-from fnmatch import fnmatchcase
 from xml.etree import ElementTree as ET  # of checked texts
 
-from selfmodel.errors import InputError, unknown_name
+from selfmodel.errors import InputError
+from selfmodel.robot.mjcf.joint_values import value_of
+from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.robot.urdf.reading import number
-from selfmodel.robot.urdf.settings import URDF_SETTINGS, UrdfSettings, value_of
 from selfmodel.robot.urdf.tree import quoted
 
 FULL_EFFORT_ERROR = 0.5
@@ -22,7 +21,7 @@ UNLIMITED_RANGE = (-math.pi, math.pi)
 """Command range of a continuous joint, rad."""
 
 
-def servo(joint: ET.Element, settings: UrdfSettings) -> tuple[ET.Element, str]:
+def servo(joint: ET.Element, settings: MjcfSettings) -> tuple[ET.Element, str]:
     """Returns the position servo of a joint as MJCF, and a note.
 
     Args:
@@ -46,7 +45,6 @@ def servo(joint: ET.Element, settings: UrdfSettings) -> tuple[ET.Element, str]:
     low, high = UNLIMITED_RANGE
     if joint.get("type") == "revolute":
         low, high = number(limit, "lower", 0.0), number(limit, "upper", 0.0)
-    first, last = _commands(name, (low, high), settings)
     kp = value_of(settings.kp, name)
     if kp is None:
         kp = effort / min(FULL_EFFORT_ERROR, (high - low) / 2)
@@ -60,31 +58,9 @@ def servo(joint: ET.Element, settings: UrdfSettings) -> tuple[ET.Element, str]:
         "joint": name,
         "kp": repr(kp),
         "kv": repr(kd),
-        "ctrlrange": f"{first!r} {last!r}",
+        "ctrlrange": f"{low!r} {high!r}",
         "ctrllimited": "true",
         "forcerange": f"{-effort!r} {effort!r}",
         "forcelimited": "true",
     }
     return ET.Element("position", attributes), f"kp {kp:.3g}, kd {kd:.3g}, {effort:.3g} N m"
-
-
-def _commands(joint: str, ends: tuple[float, float], settings: UrdfSettings) -> tuple[float, float]:
-    """Returns the lowest and highest command of a joint, given the ends of its range, rad."""
-    swing = value_of(settings.swing, joint)
-    if not swing:
-        return ends
-    angle = value_of(settings.pose, joint)
-    centre = min(max(0.0, ends[0]), ends[1]) if angle is None else angle
-    return max(ends[0], centre - swing), min(ends[1], centre + swing)
-
-
-def check_patterns(settings: UrdfSettings, joints: Sequence[str]) -> None:
-    """Checks that each name or pattern in the settings fits a joint.
-
-    Raises:
-        InputError: One fits none.
-    """
-    for name in URDF_SETTINGS:
-        for pattern in getattr(settings, name):
-            if not any(fnmatchcase(joint, pattern) for joint in joints):
-                raise unknown_name("joint", pattern, list(joints))

@@ -9,7 +9,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.contacts import ground_contact_geoms
 from selfmodel.robot.mjcf.ground import lowest_point
-from selfmodel.robot.urdf.settings import ByJoint, value_of
+from selfmodel.robot.mjcf.joint_values import JointValues, value_of
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Stance:
     overlapping: list[tuple[str, str]]
 
 
-def stance(model: mujoco.MjModel, pose: ByJoint) -> Stance:
+def stance(model: mujoco.MjModel, pose: JointValues) -> Stance:
     """Returns the initial pose of a robot.
 
     Args:
@@ -51,7 +51,7 @@ def stance(model: mujoco.MjModel, pose: ByJoint) -> Stance:
     return Stance(data.qpos.copy(), _overlapping(model, data))
 
 
-def _angle(model: mujoco.MjModel, joint: int, pose: ByJoint) -> float:
+def _angle(model: mujoco.MjModel, joint: int, pose: JointValues) -> float:
     name = model.joint(joint).name
     low, high = model.jnt_range[joint] if model.jnt_limited[joint] else (-np.inf, np.inf)
     angle = value_of(pose, name)

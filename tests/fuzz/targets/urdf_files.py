@@ -19,7 +19,7 @@ pose = {"*_hip" = 0.2, left_knee = -0.7}
 kp = 40
 kd = {"*" = 1.5}
 effort = 20
-swing = 0.5
+reach = {"*" = 0.5}
 base = "free"
 """
 

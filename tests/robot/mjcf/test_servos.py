@@ -16,6 +16,7 @@ from tests.robot.mjcf.test_adaptation import written
 
 TORQUE_MOTORS = """<motor name="left" joint="left_hip" gear="-4" ctrlrange="-2 1"/>
 <motor name="right" joint="right_hip" ctrlrange="-9 9" forcerange="-7 7"/>"""
+GAINS = ("kp=30", "kd=2")
 CLASS = '<default><position kp="7" inheritrange="1"/></default>'
 
 
@@ -27,7 +28,7 @@ def loaded(folder: Path, text: str, *given: str) -> mujoco.MjModel:
 
 
 def test_a_torque_motor_becomes_a_servo_with_its_torque_limits(tmp_path: Path):
-    model = loaded(tmp_path, mjcf(motors=TORQUE_MOTORS), "servo={kp=30, kd=2}")
+    model = loaded(tmp_path, mjcf(motors=TORQUE_MOTORS), *GAINS)
 
     assert [model.actuator(motor).name for motor in range(model.nu)] == ["left", "right"]
     assert model.actuator_gear[:, 0].tolist() == [1, 1]
@@ -38,7 +39,7 @@ def test_a_torque_motor_becomes_a_servo_with_its_torque_limits(tmp_path: Path):
 @pytest.fixture(scope="module")
 def servos(tmp_path_factory: pytest.TempPathFactory) -> mujoco.MjModel:
     folder = tmp_path_factory.mktemp("servos")
-    return loaded(folder, mjcf(motors=TORQUE_MOTORS), "servo={kp=30, kd=2}")
+    return loaded(folder, mjcf(motors=TORQUE_MOTORS), *GAINS)
 
 
 @given(angle=st.floats(-0.5, 0.5), speed=st.floats(-3, 3), command=st.floats(-0.5, 0.5))
@@ -57,8 +58,8 @@ def test_the_torque_of_a_servo_is_that_of_its_gains(
 
 def test_attributes_of_a_class_do_not_change_a_servo(tmp_path: Path):
     text = mjcf(motors=TORQUE_MOTORS)
-    plain = loaded(tmp_path, text, "servo={kp=30, kd=2}")
-    of_class = loaded(tmp_path, text.replace("<mujoco>", f"<mujoco>{CLASS}"), "servo={kp=30, kd=2}")
+    plain = loaded(tmp_path, text, *GAINS)
+    of_class = loaded(tmp_path, text.replace("<mujoco>", f"<mujoco>{CLASS}"), *GAINS)
 
     for field in ("gainprm", "biasprm", "gear", "ctrlrange", "forcerange", "dyntype"):
         name = f"actuator_{field}"
@@ -67,7 +68,7 @@ def test_attributes_of_a_class_do_not_change_a_servo(tmp_path: Path):
 
 def test_servos_of_the_file_stay(tmp_path: Path):
     motors = TORQUE_MOTORS.replace('<motor name="left"', '<position kp="5" name="left"')
-    model = loaded(tmp_path, mjcf(motors=motors), "servo={kp=30, kd=2}")
+    model = loaded(tmp_path, mjcf(motors=motors), *GAINS)
 
     assert model.actuator_gainprm[:, 0].tolist() == [5, 30]
 
@@ -76,20 +77,44 @@ def test_a_joint_without_a_range_needs_the_reach(tmp_path: Path):
     text = mjcf(motors=TORQUE_MOTORS, legs=LEGS.replace('range="-40 40"', ""))
 
     with pytest.raises(InputError, match=r"range of the joint left_hip.*reach=0\.5"):
-        loaded(tmp_path, text, "servo={kp=30, kd=2}")
-    model = loaded(tmp_path, text, "servo={kp=30, kd=2}", "reach=0.5")
+        loaded(tmp_path, text, *GAINS)
+    model = loaded(tmp_path, text, *GAINS, "reach=0.5")
     assert model.actuator_ctrlrange.tolist() == [[-0.5, 0.5], [-0.5, 0.5]]
+
+
+def test_gains_are_for_the_joints_that_their_patterns_fit(tmp_path: Path):
+    text = mjcf(motors=TORQUE_MOTORS)
+    model = loaded(tmp_path, text, 'kp={"left_*" = 30, right_hip = 9}', "kd=2")
+
+    assert model.actuator_gainprm[:, 0].tolist() == [30, 9]
+
+
+def test_motors_without_gains_stay(tmp_path: Path):
+    text = mjcf(motors=TORQUE_MOTORS)
+    model = loaded(tmp_path, text, "kp={left_hip=30}", "kd={left_hip=2}")
+
+    assert model.actuator_gainprm[:, 0].tolist() == [30, 1]
+
+
+def test_one_gain_alone_is_refused(tmp_path: Path):
+    with pytest.raises(InputError, match="expected kp and kd for the joint left_hip"):
+        loaded(tmp_path, mjcf(motors=TORQUE_MOTORS), "kp=30")
+
+
+def test_a_gain_for_no_joint_is_refused_with_the_nearest_name(tmp_path: Path):
+    with pytest.raises(InputError, match="left_hip"):
+        loaded(tmp_path, mjcf(motors=TORQUE_MOTORS), "kp={left_hop=30}", "kd=1")
 
 
 def test_a_model_without_torque_motors_is_refused(tmp_path: Path):
     motors = TORQUE_MOTORS.replace("<motor", '<position kp="5"')
 
     with pytest.raises(InputError, match="servos already"):
-        loaded(tmp_path, mjcf(motors=motors), "servo={kp=30, kd=2}")
+        loaded(tmp_path, mjcf(motors=motors), *GAINS)
 
 
 def test_the_conversion_is_noted(tmp_path: Path):
     path = written(tmp_path, mjcf(motors=TORQUE_MOTORS))
-    found = adapt(path, read_settings(path, parse_setting("servo={kp=30, kd=2}")))
+    found = adapt(path, read_settings(path, {"kp": 30, "kd": 2}))
 
     assert any("2 torque motors are position servos with kp=30" in note for note in found.notes)

@@ -5,9 +5,9 @@ from xml.etree import ElementTree as ET
 
 from selfmodel.robot.mjcf.document import Document, parse_xml
 from selfmodel.robot.mjcf.files import InMemory
+from selfmodel.robot.mjcf.settings import checked_settings
 from selfmodel.robot.urdf.conversion import convert
 from selfmodel.robot.urdf.reading import read_urdf
-from selfmodel.robot.urdf.settings import checked_urdf_settings
 
 CUBE = """v 0 0 0\nv .1 0 0\nv 0 .1 0\nv 0 0 .1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"""
 """A tetrahedron as OBJ."""
@@ -73,12 +73,11 @@ def read(text: str, files: dict[str, str | bytes] | None = None) -> Document:
 
 def converted(
     text: str,
-    base: str | None = None,
     files: dict[str, str | bytes] | None = None,
     **settings: object,
 ) -> Document:
     """Returns the MJCF of a URDF in memory."""
-    return convert(read(text, files), checked_urdf_settings(settings), base)
+    return convert(read(text, files), checked_settings(settings))
 
 
 def elements(document: Document, path: str) -> dict[str, ET.Element]:

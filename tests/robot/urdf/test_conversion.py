@@ -120,7 +120,7 @@ def test_thousands_of_links_end_within_the_budget(tmp_path: Path):
 
 @pytest.mark.process
 def test_every_command_with_a_robot_takes_a_urdf(tmp_path: Path):
-    before = written(tmp_path, toml='pose = {"*_hip" = 0.25}\nswing = 0.3').read_bytes()
+    before = written(tmp_path, toml='pose = {"*_hip" = 0.25}\nreach = 0.3').read_bytes()
     robot = ("--robot", "walker.urdf")
 
     listed = selfmodel("robots", "walker.urdf", "--json", cwd=tmp_path)

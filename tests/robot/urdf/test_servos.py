@@ -56,12 +56,6 @@ def test_settings_override_gains_and_effort():
     assert (found["kp"], found["kd"], found["effort"]) == (5, 0.5, 3)
 
 
-def test_with_a_swing_commands_are_near_the_initial_pose_and_within_the_range():
-    found = servo(low=-1, high=1, settings={"swing": 0.4, "pose": {"knee": 0.75}})
-
-    assert (found["low"], found["high"]) == (0.35, 1)
-
-
 def test_a_joint_without_an_effort_limit_is_refused_unless_the_settings_have_one():
     with pytest.raises(InputError, match=r"'knee' has no effort limit above 0.*effort = "):
         servo(effort=0)
