@@ -30,6 +30,7 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.logs import physical_trial
 from selfmodel.logs.journal import create_journal
 from selfmodel.logs.records import TrialHeader
+from selfmodel.logs.writing.writer import write_trial
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery import recover as loop
 from selfmodel.recovery.events import Event
@@ -47,6 +48,7 @@ from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.threads import thread_count
 from selfmodel.simulation.trial_replay import Replay
+from selfmodel.trials.behaviour import samples_of
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
 
 
@@ -142,6 +144,34 @@ def run_trial(
     path = Path(path)
     plan = TrialPlan(path.stem, stage, controller, steps, seed)
     return physical_trial.run_trial(physical, plan, path, robot_of(robot), TrialHeader(Settings()))
+
+
+def write_log(trial: Trial, path: str | Path, robot: RobotSource) -> Path:
+    """Writes a trial, such as one of ``Trial.from_arrays``, as a new log.
+
+    Example:
+        >>> import selfmodel
+        >>> trial = selfmodel.read_log("after.mcap").trial
+        >>> log = selfmodel.write_log(trial, "copy.mcap", "quadruped")
+        >>> selfmodel.read_log(log).trial.behaviour.steps
+        60
+
+    Args:
+        trial: The trial; its step timing is not written.
+        path: Name of the log, ``NAME.mcap``; it must not exist.
+        robot: The nominal robot, its name, or the path of its MJCF file.
+
+    Raises:
+        InputError: The log exists, or the trial does not fit the robot.
+        LogWriteError: The disk is full, or failed.
+    """
+    return write_trial(
+        Path(path),
+        robot_of(robot),
+        trial.plan,
+        samples_of(trial.behaviour),
+        TrialHeader(Settings()),
+    )
 
 
 def calibrate(

@@ -14,6 +14,9 @@ from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.tasks import Entry, entry
 
+_MODEL_ENDINGS = (".xml", ".urdf", ".xacro")
+"""Endings of models; a xacro is refused with the remedy."""
+
 
 def robot_entry(name: str, settings: Iterable[str] = (), budget: Budget = DEFAULT_BUDGET) -> Entry:
     """Returns a robot, its cases and its tasks, by name or by MJCF file.
@@ -52,8 +55,38 @@ def _settings(name: str, given: Iterable[str]) -> MjcfSettings:
 
 
 def is_model(name: str) -> bool:
-    """Returns whether a robot's name is the path of an MJCF file."""
-    return Path(name).suffix.lower() == ".xml"
+    """Returns whether a robot's name is the path of an MJCF or URDF file."""
+    return Path(name).suffix.lower() in _MODEL_ENDINGS
+
+
+def recorded_robot(
+    name: str, control_timestep: float | None, budget: Budget = DEFAULT_BUDGET
+) -> Robot:
+    """Returns the robot of a recording: by name, or of a model file, adapted as for a trial.
+
+    A model that a calibration wrote is a robot already, and is not adapted.
+
+    Args:
+        name: Name of a robot of selfmodel, or the path of a model file.
+        control_timestep: Duration of a control step of a model file, s; None for that of its
+            settings.
+        budget: Memory and time that the model may take.
+
+    Raises:
+        InputError: The name is unknown, or the model is unusable.
+    """
+    if not is_model(name):
+        return robot_entry(name).robot()
+    path = Path(name)
+    if control_timestep is not None and path.suffix.lower() == ".xml":
+        try:
+            raw = robot(name, control_timestep, budget)
+        except InputError:
+            raw = None
+        if raw is not None and raw.is_calibrated:
+            return raw
+    step = {} if control_timestep is None else {"control_timestep": control_timestep}
+    return load_mjcf(path, read_settings(path, step), budget)
 
 
 def robot(name: str, control_timestep: float, budget: Budget = DEFAULT_BUDGET) -> Robot:

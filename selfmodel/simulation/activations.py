@@ -8,14 +8,12 @@ are zero at the start of a trial, so they follow from the commands since.
 import mujoco
 import numpy as np
 
-from selfmodel.arrays import BoolArray, FloatArray, IndexArray
+from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.requests import Segments
 
-_INTEGRATOR = int(mujoco.mjtDyn.mjDYN_INTEGRATOR)
-_FILTER = int(mujoco.mjtDyn.mjDYN_FILTER)
-_RUNGE_KUTTA = int(mujoco.mjtIntegrator.mjINT_RK4)
-_UNCLAMPED = int(mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL)
+_SAME_OPTIONS = ("timestep", "integrator", "disableflags", "disableactuator")
+_SAME_MOTORS = ("dynprm", "ctrllimited", "ctrlrange", "actlimited", "actrange", "group")
 
 
 def initial_activations(robot: Robot, segments: Segments, delay: int) -> FloatArray:
@@ -32,32 +30,27 @@ def initial_activations(robot: Robot, segments: Segments, delay: int) -> FloatAr
     Returns:
         ``(segments, na)``; ``(segments, 0)`` for a robot without activations.
     """
-    model = robot.model
-    motors: IndexArray = np.flatnonzero(model.actuator_dyntype != mujoco.mjtDyn.mjDYN_NONE)
-    activations = np.zeros((len(segments.commands), model.na))
-    if not len(motors):
-        return activations
-    dynamics = _ActivationDynamics(robot, motors)
+    if not robot.model.na:
+        return np.zeros((len(segments.commands), 0))
+    dynamics = _ActivationDynamics(robot)
     if segments.past is None:
-        effective = segments.commands[:, : max(segments.lead - delay, 0), motors]
-        state = dynamics.settled(segments.commands[:, 0, motors])
-        for k in range(effective.shape[1]):
-            state = dynamics.next(state, effective[:, k])
-        activations[:, model.actuator_actadr[motors]] = state
-        return activations
-    commands, starts = segments.past.commands[:, motors], segments.past.starts
+        known = segments.commands[:, : max(segments.lead - delay, 0)]
+        return np.array(
+            [
+                dynamics.run(dynamics.settled(own[0]), before)[-1]
+                for own, before in zip(segments.commands, known, strict=True)
+            ]
+        )
+    commands, starts = segments.past.commands, segments.past.starts
     # An unknown command is assumed to be the last known command before it; 0 at first.
     last_known = np.maximum.accumulate(
         np.where(np.isfinite(commands), np.arange(len(commands))[:, np.newaxis] + 1, 0)
     )
-    from_rest = np.concatenate([np.zeros((1, len(motors))), commands])
+    from_rest = np.concatenate([np.zeros((1, commands.shape[1])), commands])
     filled = np.take_along_axis(from_rest, last_known, axis=0)
-    states = np.zeros((int(starts.max(initial=0)) + 1, len(motors)))
-    for k in range(len(states) - 1):
-        command = filled[k - delay] if k >= delay else np.zeros(len(motors))
-        states[k + 1] = dynamics.next(states[k], command)
-    activations[:, model.actuator_actadr[motors]] = states[starts]
-    return activations
+    arrived = np.concatenate([np.zeros((delay, commands.shape[1])), filled])
+    end = int(starts.max(initial=0))
+    return dynamics.run(np.zeros(robot.model.na), arrived[:end])[starts]
 
 
 def activations_since_rest(robot: Robot, commands: FloatArray) -> FloatArray:
@@ -70,70 +63,80 @@ def activations_since_rest(robot: Robot, commands: FloatArray) -> FloatArray:
     Returns:
         Activations before the command of each row, ``(steps, na)``.
     """
-    model = robot.model
-    motors: IndexArray = np.flatnonzero(model.actuator_dyntype != mujoco.mjtDyn.mjDYN_NONE)
-    activations = np.zeros((len(commands), model.na))
-    if not len(motors):
-        return activations
-    dynamics, state = _ActivationDynamics(robot, motors), np.zeros(len(motors))
+    if not robot.model.na:
+        return np.zeros((len(commands), 0))
     # The last command has no row after it.
-    for row, command in zip(activations[1:], commands[:, motors], strict=False):
-        state = dynamics.next(state, command)
-        row[model.actuator_actadr[motors]] = state
-    return activations
+    return _ActivationDynamics(robot).run(np.zeros(robot.model.na), commands[:-1])
 
 
 class _ActivationDynamics:
-    """Activation dynamics over one control step.
+    """Activation dynamics of a robot, on a model that has only its motors.
 
-    A command is constant during a control step, so the update is linear and each activation changes
-    monotonically: clamping at the end of the step equals clamping at each physics step.
-
-    Source: MuJoCo's documentation, "Activation dynamics"; ``mj_nextActivation``.
+    MuJoCo computes the activations, so that they are those of the robot's own model to the bit:
+    where a solver switches its active constraints, a rounding error has visible effects.
 
     Args:
-        robot: The healthy robot.
-        motors: Indices of the motors with activations, ``(motors,)``.
+        robot: The healthy robot, with activations.
     """
 
-    def __init__(self, robot: Robot, motors: IndexArray) -> None:
-        model = robot.model
-        timestep, kind = float(model.opt.timestep), model.actuator_dyntype[motors]
-        ratio = timestep / np.maximum(model.actuator_dynprm[motors, 0], mujoco.mjMINVAL)
-        runge_kutta = model.opt.integrator == _RUNGE_KUTTA
-        correction = 1 - ratio / 2 + ratio**2 / 6 - ratio**3 / 24 if runge_kutta else 1.0
-        substep_gain = np.where(kind == _FILTER, ratio, -np.expm1(-ratio)) * correction
-        decay = (1 - substep_gain) ** robot.substeps
-        integrates = kind == _INTEGRATOR
-        self._integrates = integrates
-        self._decay = np.where(integrates, 1.0, decay)
-        self._gain = np.where(integrates, timestep * robot.substeps, 1 - decay)
-        limited = model.actuator_ctrllimited[motors].astype(bool)
-        clamps = limited & (not model.opt.disableflags & _UNCLAMPED)
-        self._command_bounds = _bounds(clamps, model.actuator_ctrlrange[motors])
-        limited = model.actuator_actlimited[motors].astype(bool)
-        self._activation_bounds = _bounds(limited, model.actuator_actrange[motors])
+    def __init__(self, robot: Robot) -> None:
+        own = robot.model
+        self._substeps = robot.substeps
+        self._model = model = _motors_only(own)
+        for name in _SAME_OPTIONS:
+            setattr(model.opt, name, getattr(own.opt, name))
+        for name in _SAME_MOTORS:
+            getattr(model, f"actuator_{name}")[:] = getattr(own, f"actuator_{name}")
+        kinds = own.actuator_dyntype
+        self._motors: IndexArray = np.flatnonzero(kinds != mujoco.mjtDyn.mjDYN_NONE)
+        self._integrates = kinds[self._motors] == mujoco.mjtDyn.mjDYN_INTEGRATOR
+        self._clamps = not own.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL
+        self._data = mujoco.MjData(model)
 
-    def next(self, state: FloatArray, command: FloatArray) -> FloatArray:
-        """Returns the activations after a control step, ``(..., motors)``.
+    def run(self, state: FloatArray, commands: FloatArray) -> FloatArray:
+        """Returns the activations before each control step and after the last.
 
         Args:
-            state: Activations before the step, ``(..., motors)``.
-            command: Commands of the step, ``(..., motors)``.
+            state: Activations before the first step, ``(na,)``.
+            commands: Commands of the steps, ``(steps, motors)``.
+
+        Returns:
+            ``(steps + 1, na)``.
         """
-        clamped = np.clip(command, *self._command_bounds)
-        after = self._decay * state + self._gain * clamped
-        return np.asarray(np.clip(after, *self._activation_bounds))
+        model, data = self._model, self._data
+        states = np.empty((len(commands) + 1, model.na))
+        data.act[:] = states[0] = state
+        for after, command in zip(states[1:], commands, strict=True):
+            data.ctrl[:] = command
+            mujoco.mj_step(model, data, self._substeps)
+            after[:] = data.act
+        return states
 
     def settled(self, command: FloatArray) -> FloatArray:
-        """Returns the steady state under a constant command; 0 for an integrator."""
-        clamped = np.clip(command, *self._command_bounds)
+        """Returns the steady state under a constant command, ``(na,)``; 0 for an integrator."""
+        model, motors = self._model, self._motors
+        known = command[motors]
+        clamps = model.actuator_ctrllimited[motors].astype(bool) & self._clamps
+        clamped = np.where(clamps, _clipped(known, model.actuator_ctrlrange[motors]), known)
         steady = np.where(self._integrates, 0.0, clamped)
-        return np.asarray(np.clip(steady, *self._activation_bounds))
+        limited = model.actuator_actlimited[motors].astype(bool)
+        return np.where(limited, _clipped(steady, model.actuator_actrange[motors]), steady)
 
 
-def _bounds(limited: BoolArray, ranges: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Returns the lower and the upper bound of each motor, infinite if not limited."""
-    unbounded = np.array([[-np.inf, np.inf]])
-    low, high = np.where(limited[:, np.newaxis], ranges, unbounded).T
-    return low, high
+def _clipped(values: FloatArray, ranges: FloatArray) -> FloatArray:
+    return np.clip(values, ranges[:, 0], ranges[:, 1])
+
+
+def _motors_only(model: mujoco.MjModel) -> mujoco.MjModel:
+    """Returns a model with as many motors, of the same dynamics, that move nothing."""
+    spec = mujoco.MjSpec()
+    body = spec.worldbody.add_body(mass=1.0, inertia=[1.0, 1.0, 1.0])
+    body.add_joint(name="joint")
+    for kind in model.actuator_dyntype:
+        spec.add_actuator(
+            dyntype=mujoco.mjtDyn(int(kind)),
+            trntype=mujoco.mjtTrn.mjTRN_JOINT,
+            target="joint",
+            gainprm=np.zeros(10),
+        )
+    return spec.compile()

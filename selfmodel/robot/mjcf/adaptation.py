@@ -8,28 +8,36 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree as ET  # of checked texts
+
+import mujoco
 
 from selfmodel.errors import InputError
 from selfmodel.files import encodable, read_file
 from selfmodel.robot.mjcf.base import carry_hinges, fix_base, free_base
 from selfmodel.robot.mjcf.command_ranges import add_command_ranges
-from selfmodel.robot.mjcf.document import Document, read_document
+from selfmodel.robot.mjcf.document import Document, parse_xml, read_document
 from selfmodel.robot.mjcf.expand import check_loggable, expand
-from selfmodel.robot.mjcf.files import InMemory, robot_folder
+from selfmodel.robot.mjcf.files import Files, InMemory, robot_folder
 from selfmodel.robot.mjcf.forward import turn_forward
 from selfmodel.robot.mjcf.ground import add_ground
+from selfmodel.robot.mjcf.hidden_state import remove_hidden_state
 from selfmodel.robot.mjcf.keyframe import bake_keyframe
+from selfmodel.robot.mjcf.missing_meshes import replace_missing_meshes
 from selfmodel.robot.mjcf.mujoco_errors import compile_model, mujoco_errors_as_input_errors
 from selfmodel.robot.mjcf.names import name_parts
+from selfmodel.robot.mjcf.reach import limit_reach
 from selfmodel.robot.mjcf.rehearsal import run_on_model
 from selfmodel.robot.mjcf.sensors import add_sensors
-from selfmodel.robot.mjcf.settings import MAX_CONTROL_TIMESTEP, MjcfSettings
+from selfmodel.robot.mjcf.servos import add_servos
+from selfmodel.robot.mjcf.settings import MAX_CONTROL_TIMESTEP, MjcfSettings, checked_settings
 from selfmodel.robot.mjcf.untrusted import checked_model
 from selfmodel.robot.mjcf.usability import check_usable
-from selfmodel.robot.mjcf.visuals import drop_visuals
+from selfmodel.robot.mjcf.visuals import drop_textures, reduce_meshes
 from selfmodel.robot.robot import Robot
+from selfmodel.robot.urdf.conversion import convert
+from selfmodel.robot.urdf.reading import read_urdf
+from selfmodel.robot.urdf.settings import URDF_SETTINGS, UrdfSettings
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.sandbox.message import Message
 
@@ -74,12 +82,15 @@ def adapt(path: Path, settings: MjcfSettings, budget: Budget = DEFAULT_BUDGET) -
     data = read_file(path, "an MJCF file", budget.model_text)
     try:
         files = robot_folder(path.parent, settings.assets)
-        document = read_document(data, files, path.name, budget=budget)
-        read = asdict(replace(settings, assets=""))  # the files are read
-        request = Message(
-            {"name": encodable(path.stem), "mjcf": document.text, "settings": read},
-            document.assets,
-        )
+        document = _read(data, files, path.name, settings, budget)
+        facts = {
+            "name": encodable(path.stem),
+            "model": document.text,
+            "settings": asdict(replace(settings, assets="")),  # the files are read
+            "notes": document.notes,
+            "missing": document.missing,
+        }
+        request = Message(facts, document.assets)
         found = run_on_model("selfmodel.robot.mjcf.adaptation:adapt_message", request, budget)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
@@ -87,15 +98,30 @@ def adapt(path: Path, settings: MjcfSettings, budget: Budget = DEFAULT_BUDGET) -
     return AdaptedMjcf(**{**found.facts, "notes": notes, "assets": found.blobs})
 
 
+def _read(data: bytes, files: Files, name: str, settings: MjcfSettings, budget: Budget) -> Document:
+    """Returns the document of an MJCF or of a URDF; see ``read_document`` and ``read_urdf``."""
+    root = parse_xml(data)
+    if root.tag == "robot":
+        return read_urdf(root, files, budget)
+    if settings.urdf != UrdfSettings():
+        raise InputError(
+            f"{', '.join(URDF_SETTINGS)} are settings for a URDF: in an MJCF, motors have gains "
+            f"and forces, and a <key> in <keyframe> has the pose"
+        )
+    return read_document(data, files, name, budget)
+
+
 def adapt_message(message: Message, budget: Budget, _scratch: Path) -> Message:
     """Task of a child process: adapts the document in a message, and checks the robot of it."""
     facts = message.facts
-    document = Document(ET.fromstring(facts["mjcf"]), dict(message.blobs))  # noqa: S314  # checked
-    settings: dict[str, Any] = {
-        name: tuple(value) if isinstance(value, list) else value
-        for name, value in facts["settings"].items()
-    }
-    adapted = _adapted(facts["name"], document, MjcfSettings(**settings), budget)
+    root = ET.fromstring(facts["model"])  # noqa: S314  # checked
+    document = Document(root, dict(message.blobs), list(facts["notes"]), facts["missing"])
+    given = {name: value for name, value in facts["settings"].items() if value is not None}
+    of_urdf = given.pop("urdf")
+    settings = checked_settings({**given, **of_urdf})
+    if root.tag == "robot":
+        document = convert(document, settings.urdf, settings.base)
+    adapted = _adapted(facts["name"], document, settings, budget)
     with mujoco_errors_as_input_errors("use the model"):
         Robot(adapted.name, adapted.mjcf, adapted.control_timestep, adapted.assets)
     result = {
@@ -132,17 +158,9 @@ def _adapted(name: str, document: Document, settings: MjcfSettings, budget: Budg
     check_loggable(document, budget)
     expand(document)
     name_parts(document)
-    for body in document.bodies():
-        if body.attrib.pop("mocap", "false") == "true":
-            document.notes.append(f"the mocap body {body.get('name')} is static")
-    if settings.base == "free":
-        free_base(document, compile_model(document.text, document.assets))
-    model = compile_model(document.text, document.assets)
-    if carry_hinges(document, model):
-        model = compile_model(document.text, document.assets)
-    if drop_visuals(document, model):
-        model = compile_model(document.text, document.assets)
+    model = _with_base_and_meshes(document, settings)
     check_usable(model)
+    remove_hidden_state(document, model)
     timestep = _control_timestep(float(model.opt.timestep), settings.control_timestep)
     bake_keyframe(document, model, settings)
     turn_forward(document, compile_model(document.text, document.assets), settings)
@@ -150,7 +168,12 @@ def _adapted(name: str, document: Document, settings: MjcfSettings, budget: Budg
         fix_base(document, compile_model(document.text, document.assets), settings.base_height)
     add_ground(document, compile_model(document.text, document.assets))
     add_sensors(document, compile_model(document.text, document.assets), settings)
-    add_command_ranges(document, model, settings)
+    if settings.servo is not None:
+        model = compile_model(document.text, document.assets)
+        add_servos(document, model, settings.servo, settings.reach)
+    if settings.reach is not None:
+        limit_reach(document, compile_model(document.text, document.assets), settings.reach)
+    add_command_ranges(document, compile_model(document.text, document.assets), settings)
     try:
         checked = checked_model(document.text, document.assets, budget)
     except ValueError as error:
@@ -162,6 +185,24 @@ def _adapted(name: str, document: Document, settings: MjcfSettings, budget: Budg
         assets=checked.files,
         notes=tuple(document.notes),
     )
+
+
+def _with_base_and_meshes(document: Document, settings: MjcfSettings) -> mujoco.MjModel:
+    """Completes the base and the meshes of a document, and returns its compiled model."""
+    for body in document.bodies():
+        if body.attrib.pop("mocap", "false") == "true":
+            document.notes.append(f"the mocap body {body.get('name')} is static")
+    drop_textures(document)
+    if settings.base == "free":
+        free_base(document, compile_model(document.text, document.assets))
+    model = compile_model(document.text, document.assets)
+    if carry_hinges(document, model):
+        model = compile_model(document.text, document.assets)
+    if replace_missing_meshes(document, model):
+        model = compile_model(document.text, document.assets)
+    if reduce_meshes(document, model):
+        model = compile_model(document.text, document.assets)
+    return model
 
 
 def _control_timestep(physics: float, wanted: float | None) -> float:

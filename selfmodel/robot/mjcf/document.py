@@ -15,6 +15,7 @@ from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 
 _FOLDER_ATTRIBUTES = {"meshdir": ("mesh", "skin", "flex", "hfield"), "texturedir": ("texture",)}
 _NAMED_BY_FILE = ("mesh", "texture", "hfield")
+_TETRAHEDRON = "0 0 0 1 0 0 0 1 0 0 0 1"
 _SPECIAL_CHARACTERS = re.compile(r"[^A-Za-z0-9_.-]")
 
 
@@ -26,11 +27,13 @@ class Document:
         root: The ``<mujoco>`` element.
         assets: Contents of the files that the MJCF names, by names without folders.
         notes: Descriptions of the changes, one sentence each.
+        missing: Error messages of the meshes without files, by name; they have placeholders.
     """
 
     root: ET.Element
     assets: dict[str, bytes] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    missing: dict[str, str] = field(default_factory=dict)
 
     @property
     def text(self) -> str:
@@ -73,25 +76,21 @@ def read_document(
     """
     if len(mjcf) > budget.model_text:
         raise InputError(f"expected an MJCF of at most {budget.model_text} bytes, got {len(mjcf)}")
-    root = _parse(mjcf)
+    root = parse_xml(mjcf)
     if root.tag != "mujoco":
-        raise InputError(_no_mjcf_message(root.tag))
+        raise InputError(f"expected an MJCF, which begins with <mujoco>, got <{root.tag[:40]}>")
     _include(root, files, "", {normpath(name)}, budget.model_text)
     document = Document(root)
     _read_assets(document, files, budget.file_bytes)
     return document
 
 
-def _no_mjcf_message(tag: str) -> str:
-    if tag == "robot":
-        return (
-            "expected <mujoco>, got a URDF: save it as MJCF first, with "
-            "mujoco.MjSpec.from_file(URDF).to_xml(), and give it a free joint and motors"
-        )
-    return f"expected an MJCF, which begins with <mujoco>, got <{tag[:40]}>"
+def parse_xml(data: bytes) -> ET.Element:
+    """Returns the root element of an XML text.
 
-
-def _parse(data: bytes) -> ET.Element:
+    Raises:
+        InputError: The text is no XML, has a document type, or is nested too deeply.
+    """
     _check_xml(data)
     try:
         return ET.fromstring(data)  # noqa: S314  # _check_xml refuses unsafe XML
@@ -148,7 +147,7 @@ def _include(parent: ET.Element, files: Files, folder: str, included: set[str], 
         if path in included:
             raise InputError(f"the MJCF includes {name!r} twice: name each file once")
         included.add(path)
-        inner = _parse(data)
+        inner = parse_xml(data)
         _include(inner, files, dirname(path), included, limit)
         parent[index : index + 1] = list(inner)
 
@@ -162,6 +161,9 @@ def _read_assets(document: Document, files: Files, limit: int) -> None:
             if not attribute.startswith("file") or not name:
                 continue
             path = str(PurePosixPath(folders.get(element.tag, ""), name))
+            if element.tag == "mesh" and not files.has(path):
+                _add_placeholder(document, element, files, path)
+                continue
             if path not in names:
                 what = f"the file of a <{element.tag}> ({name!r})"
                 data = files.read(path, what, limit)
@@ -169,11 +171,22 @@ def _read_assets(document: Document, files: Files, limit: int) -> None:
                     raise InputError(
                         f"the files of the MJCF have over {limit} bytes: simplify them"
                     )
-                names[path] = _plain_name(path, document.assets)
+                names[path] = plain_name(path, document.assets)
                 document.assets[names[path]] = data
             element.set(attribute, names[path])
             if element.tag in _NAMED_BY_FILE and attribute == "file" and not element.get("name"):
                 element.set("name", PurePosixPath(name).stem)
+
+
+def _add_placeholder(document: Document, mesh: ET.Element, files: Files, path: str) -> None:
+    """Makes a mesh without a file a tetrahedron, and keeps the error of the file."""
+    name = mesh.attrib.pop("file", path)
+    try:
+        files.read(path, f"the file of a <mesh> ({name!r})", limit=0)
+    except InputError as error:
+        document.missing[mesh.get("name") or PurePosixPath(name).stem] = str(error)
+    mesh.set("name", mesh.get("name") or PurePosixPath(name).stem)
+    mesh.set("vertex", _TETRAHEDRON)
 
 
 def _pop_asset_folders(root: ET.Element) -> dict[str, str]:
@@ -197,7 +210,7 @@ def _strip_paths(root: ET.Element) -> None:
             element.set(attribute, PurePosixPath(name).name)
 
 
-def _plain_name(path: str, taken: Collection[str]) -> str:
+def plain_name(path: str, taken: Collection[str]) -> str:
     """Returns a unique name for an attachment of a log: no folders, no special characters."""
     name = _SPECIAL_CHARACTERS.sub("_", PurePosixPath(path).name).lstrip(".-") or "file"
     stem, dot, ending = name.rpartition(".")

@@ -56,7 +56,10 @@ def add_ground(document: Document, model: mujoco.MjModel) -> None:
     }
     element = ET.Element("geom", plane)
     document.section("worldbody").insert(0, element)
-    height = _lowest_point(compile_model(document.text, document.assets))
+    grounded = compile_model(document.text, document.assets)
+    data = mujoco.MjData(grounded)
+    mujoco.mj_kinematics(grounded, data)
+    height = lowest_point(grounded, data)
     element.set("pos", format_numbers(np.array([0.0, 0.0, height])))
     document.notes.append(f"a ground plane is added at a height of {height:.3g} m")
 
@@ -65,10 +68,13 @@ def _swims(model: mujoco.MjModel) -> bool:
     return bool(model.opt.density or model.opt.viscosity)
 
 
-def _lowest_point(model: mujoco.MjModel) -> float:
-    """Returns the height of the lowest geom above geom 0, a plane at height 0, in m."""
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
+def lowest_point(model: mujoco.MjModel, data: mujoco.MjData) -> float:
+    """Returns the height of the lowest moving geom above geom 0, a plane at height 0, in m.
+
+    Args:
+        model: A model with geoms that can touch the plane.
+        data: Positions of the geoms.
+    """
     distances = (
         mujoco.mj_geomDistance(model, data, 0, geom, _MAX_DISTANCE, None)
         for geom in ground_contact_geoms(model)

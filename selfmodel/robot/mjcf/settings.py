@@ -2,13 +2,14 @@
 
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.files import load_toml, read_file
 from selfmodel.robot.mjcf.files import is_around_home
+from selfmodel.robot.urdf.settings import URDF_SETTINGS, UrdfSettings, checked_urdf_settings
 
 MAX_SETTINGS_BYTES = 2**16
 """Largest settings file, in bytes."""
@@ -28,18 +29,35 @@ BASES = ("free", "fixed")
 
 
 @dataclass(frozen=True)
+class Servo:
+    """Gains of a position servo: torque = kp (command - angle) - kd (angular velocity).
+
+    Attributes:
+        kp: Stiffness, N m/rad; above 0.
+        kd: Damping, N m s/rad; at least 0.
+    """
+
+    kp: float
+    kd: float
+
+
+@dataclass(frozen=True)
 class MjcfSettings:
     """Settings for the conversion of an MJCF to a robot.
 
     Attributes:
         forward: Forward direction of the robot, in the world frame of the file.
-        keyframe: Keyframe of the initial pose; "" for the first keyframe, ``none`` for the
-            reference pose.
+        keyframe: Keyframe of the initial pose; "" for ``home``, ``stand`` or ``standing``, or else
+            the first keyframe; ``none`` for the reference pose.
         control_timestep: Time between two commands, s; None for the smallest multiple of the
             physics time step that is at least 0.01 s.
         touch: Bodies that get a touch sensor; None for the end of each limb.
         angle: Joints that get an angle sensor; None for every hinge that a motor drives.
         ctrlrange: Lowest and highest command of motors without a command range.
+        urdf: Settings for a URDF; in a settings file they are beside the others.
+        servo: Gains of position servos that replace the torque motors; None to keep the motors.
+        reach: Largest distance of a servo's command from the initial pose, rad; None for the
+            servo's command range.
         base: ``free`` for a base with a free joint, ``fixed`` for a base that is fixed to the
             world, as on a stand; None for the base of the file.
         base_height: Height of the root body with ``base="fixed"``, m; None for the height of the
@@ -53,9 +71,12 @@ class MjcfSettings:
     touch: tuple[str, ...] | None = None
     angle: tuple[str, ...] | None = None
     ctrlrange: tuple[float, float] | None = None
+    servo: Servo | None = None
+    reach: float | None = None
     base: str | None = None
     base_height: float | None = None
     assets: str = ""
+    urdf: UrdfSettings = field(default_factory=UrdfSettings)
 
 
 def read_settings(path: Path, extra: Mapping[str, Any] | None = None) -> MjcfSettings:
@@ -131,8 +152,8 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
                 "neurons is a setting of a controller, not of a robot: leave neurons out, and give "
                 "--neurons N to the command"
             )
-        if key not in {field.name for field in fields(MjcfSettings)}:
-            raise unknown_name("setting", key, [field.name for field in fields(MjcfSettings)])
+        if key not in _KEYS:
+            raise unknown_name("setting", key, _KEYS)
     step = given.get("control_timestep")
     if step is not None and not (_is_number(step) and 0 < step <= MAX_CONTROL_TIMESTEP):
         raise InputError(
@@ -162,10 +183,17 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
         touch=_names(given, "touch"),
         angle=_names(given, "angle"),
         ctrlrange=_range(given),
+        servo=_servo(given),
+        reach=_reach(given),
         base=base,
         base_height=None if height is None else float(height),
         assets=assets,
+        urdf=checked_urdf_settings(given),
     )
+
+
+_KEYS = [key.name for key in fields(MjcfSettings) if key.name != "urdf"] + list(URDF_SETTINGS)
+"""Names of the settings in a file."""
 
 
 def _is_number(value: object) -> bool:
@@ -183,6 +211,28 @@ def _range(given: Mapping[str, Any]) -> tuple[float, float] | None:
     if not ends[0] < ends[1]:
         raise InputError(f"ctrlrange needs its lower end first, got {ends!r}")
     return float(ends[0]), float(ends[1])
+
+
+def _servo(given: Mapping[str, Any]) -> Servo | None:
+    gains = given.get("servo")
+    if gains is None:
+        return None
+    valid = isinstance(gains, dict) and set(gains) == {"kp", "kd"}
+    if not (valid and all(map(_is_number, gains.values())) and gains["kp"] > 0 <= gains["kd"]):
+        raise InputError(
+            f"servo needs kp above 0 and kd of at least 0, such as {{kp = 40, kd = 1}}, "
+            f"got {gains!r}"
+        )
+    return Servo(float(gains["kp"]), float(gains["kd"]))
+
+
+def _reach(given: Mapping[str, Any]) -> float | None:
+    reach = given.get("reach")
+    if reach is None:
+        return None
+    if not (_is_number(reach) and reach > 0):
+        raise InputError(f"reach needs an angle above 0 rad, such as 0.5, got {reach!r}")
+    return float(reach)
 
 
 def _names(given: Mapping[str, Any], key: str) -> tuple[str, ...] | None:

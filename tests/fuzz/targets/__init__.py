@@ -14,6 +14,9 @@ from tests.fuzz.targets import (
     sealed_logs,
     settings,
     study_folders,
+    tables_csv,
+    tables_npz,
+    tables_parquet,
 )
 
 TARGETS: dict[str, Target] = {
@@ -24,6 +27,9 @@ TARGETS: dict[str, Target] = {
         bags_mcap,
         bags_sqlite,
         bags_ros1,
+        tables_csv,
+        tables_npz,
+        tables_parquet,
         mappings,
         mjcf_files,
         controllers,

@@ -16,6 +16,7 @@ from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings, parse_setting, read_settings
 from selfmodel.simulation.simulator import Simulator
 from tests.helpers.drivers import random_controllers
+from tests.helpers.exactness import remove_warm_start
 from tests.robot.mjcf.awkward import GROUND, LEGS, MOTORS, TORSO, mjcf
 from tests.robot.mjcf.samples import SAMPLES
 
@@ -52,6 +53,7 @@ def test_a_robot_moves_as_its_file_says(name: str):
     model, robot = theirs(SAMPLES[name]), load_mjcf(SAMPLES[name])
 
     if not model.nkey:
+        remove_warm_start(model)
         before, after = (moved(m, m.qpos0) for m in (model, robot.model))
         if "cheetah" in name:  # its masses are scaled to a sum, which is written out
             assert np.allclose(before.qpos, after.qpos, atol=1e-6)
@@ -129,6 +131,29 @@ def test_a_keyframe_is_chosen_by_name_or_none(tmp_path: Path):
     assert heights == [1, 1, 2, 0.35]
     with pytest.raises(InputError, match=r"unknown keyframe 'c'.* a, b, none"):
         load_mjcf(path, MjcfSettings(keyframe="c"))
+
+
+@pytest.mark.parametrize(
+    ("names", "chosen"),
+    [
+        (("down", "home"), "home"),
+        (("standing", "stand"), "stand"),
+        (("down", "standing"), "standing"),
+        (("down", "up"), "down"),
+    ],
+)
+def test_a_robot_starts_in_the_usual_keyframe_or_the_first(
+    names: tuple[str, ...], chosen: str, tmp_path: Path
+):
+    keys = "".join(
+        f'<key name="{name}" qpos="0 0 .35 1 0 0 0 .{number} 0"/>'
+        for number, name in enumerate(names)
+    )
+    path = written(tmp_path, mjcf(more=f"<keyframe>{keys}</keyframe>"))
+
+    notes = adapt(path, MjcfSettings()).notes
+
+    assert f"the initial pose is the keyframe {chosen}" in notes
 
 
 def test_a_keyframe_that_breaks_an_equality_is_refused(tmp_path: Path):

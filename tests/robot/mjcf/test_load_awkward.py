@@ -14,9 +14,16 @@ from selfmodel.sandbox.budget import Budget
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.signals import SIGNALS
 from tests.helpers.drivers import random_controllers
+from tests.helpers.exactness import exactness
 from tests.robot.mjcf.awkward import AWKWARD
 
 SECONDS_EACH = 5
+
+STEPS = 20
+
+ROUNDING = 1e-9
+"""Largest error of a prediction from a logged state: the base of a planar robot is logged as a
+position and a quaternion."""
 
 SHORT = Budget(time=9)
 """Half a second of processor time for a model."""
@@ -32,8 +39,11 @@ def test_an_awkward_but_valid_file_gives_a_robot_that_moves(what: str, tmp_path:
 
     robot = load_mjcf(path)
     runs = [(INTACT, controller) for controller in random_controllers(robot, 2)]
-    outcome = Simulator(robot, 1).run(runs, 20, SIGNALS)
+    outcome = Simulator(robot, 1).run(runs, STEPS, SIGNALS)
+    found = exactness(robot, INTACT, runs[0][1], STEPS)
 
+    assert found.prediction <= ROUNDING
+    assert found.displacement == 0.0
     assert not outcome.diverged.any()
     assert np.isfinite(outcome.behaviour["base_position"]).all()
     assert before == {file: file.read_bytes() for file in tmp_path.rglob("*") if file.is_file()}

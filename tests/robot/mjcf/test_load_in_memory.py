@@ -1,5 +1,6 @@
 """Tests of models in memory: dm_control's domains, and visual meshes."""
 
+import struct
 from collections.abc import Mapping
 from typing import Any
 
@@ -30,7 +31,7 @@ def test_domains_of_the_suite_are_robots():
     assert sum(sensor.kind == "touch" for sensor in four_legs.anatomy.sensors) == 4
 
 
-def test_visual_meshes_are_removed_and_the_masses_stay():
+def test_visual_meshes_are_reduced_and_the_masses_stay():
     mjcf_text, files = dog.get_model_and_assets(floor_size=10, remove_ball=True)
     theirs = mujoco.MjModel.from_xml_string(mjcf_text, files)
     robot = made("dog", mjcf_text, files)
@@ -43,13 +44,24 @@ def test_visual_meshes_are_removed_and_the_masses_stay():
         assert np.allclose(mine.ipos, other.ipos, atol=1e-9)
 
 
-def test_too_large_colliding_meshes_are_refused():
+def test_a_mesh_with_many_bytes_and_a_small_hull_is_no_reason_to_refuse():
     text = mjcf(more=MESH.format("m", "m.obj"), torso=TORSO + '<geom type="mesh" mesh="m"/>')
     large = CUBE + "# a comment of many bytes\n" * (MAX_ASSET_BYTES // 20)
 
-    with pytest.raises(InputError, match=r"every trial's log contains them.*: simplify the meshes"):
-        made("cube", text, {"m.obj": large})
+    assert not made("cube", text, {"m.obj": large}).assets
     assert made("cube", text, {"m.obj": CUBE}).assets.keys() == {"m.obj"}
+
+
+def test_too_large_height_fields_are_refused():
+    side = 1100
+    field = struct.pack("<2i", side, side) + bytes(4 * side**2)
+    text = mjcf(
+        more='<asset><hfield name="h" file="h.bin" size="2 2 .1 .1"/></asset>',
+        world='<geom type="hfield" hfield="h"/>',
+    )
+
+    with pytest.raises(InputError, match=r"every trial's log contains them.*height fields"):
+        made("hilly", text, {"h.bin": field})
 
 
 def test_a_missing_file_is_refused_by_name():

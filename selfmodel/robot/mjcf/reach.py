@@ -1,0 +1,64 @@
+"""Limits the commands of the position servos of an MJCF to poses near the initial pose."""
+
+import mujoco
+import numpy as np
+
+from selfmodel.errors import InputError
+from selfmodel.robot.actuator_ranges import command_ranges
+from selfmodel.robot.mjcf.document import Document
+from selfmodel.robot.mjcf.expand import format_numbers
+
+_JOINT = int(mujoco.mjtTrn.mjTRN_JOINT)
+_HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
+_INHERITING = ("position", "intvelocity")
+"""Actuators that may have the range of their joint as command range."""
+
+
+def limit_reach(document: Document, model: mujoco.MjModel, reach: float) -> None:
+    """Limits the command range of each position servo of a hinge.
+
+    The new range is the part of the old range within ``reach`` of the angle of the hinge in the
+    initial pose, or of the end of the old range that is closest to this angle.
+
+    Args:
+        document: The MJCF, edited in place.
+        model: The compiled document, with the initial pose as reference pose.
+        reach: Largest distance of a command from the initial pose, rad.
+
+    Raises:
+        InputError: The model has no position servo of a hinge.
+    """
+    limited = 0
+    for motor, element in enumerate(document.children("actuator")):
+        if not _is_position_servo(model, motor):
+            continue
+        centre, half = command_ranges(model)[motor]
+        initial = float(model.qpos0[model.jnt_qposadr[model.actuator_trnid[motor, 0]]])
+        initial = min(max(initial, centre - half), centre + half)
+        ends = max(initial - reach, centre - half), min(initial + reach, centre + half)
+        element.set("ctrlrange", format_numbers(np.array(ends)))
+        element.set("ctrllimited", "true")
+        if element.tag in _INHERITING:
+            element.set("inheritrange", "0")  # MuJoCo refuses both ranges, also if one is a default
+        limited += 1
+    if not limited:
+        raise InputError(
+            "expected a position servo of a hinge for reach, got none: set servo={kp=40, kd=1} to "
+            "make position servos of torque motors, or remove the setting reach"
+        )
+    document.notes.append(
+        f"the commands of {limited} position servos are limited to {reach:g} rad from the initial "
+        f"pose"
+    )
+
+
+def _is_position_servo(model: mujoco.MjModel, motor: int) -> bool:
+    """Returns whether the command of a motor is the angle of its hinge, rad."""
+    return (
+        int(model.actuator_trntype[motor]) == _JOINT
+        and int(model.jnt_type[model.actuator_trnid[motor, 0]]) == _HINGE
+        and int(model.actuator_gaintype[motor]) == int(mujoco.mjtGain.mjGAIN_FIXED)
+        and int(model.actuator_biastype[motor]) == int(mujoco.mjtBias.mjBIAS_AFFINE)
+        and model.actuator_gear[motor, 0] == 1.0
+        and model.actuator_biasprm[motor, 1] == -model.actuator_gainprm[motor, 0] != 0.0
+    )
