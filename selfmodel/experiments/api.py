@@ -81,7 +81,7 @@ def evolve_controller(
         <Controller: a network of 3 hidden neurons>
 
     Args:
-        robot: The nominal robot, its name, or the path of its MJCF file.
+        robot: The nominal robot, its name, or the path of its MJCF or URDF file.
         hypothesis: The faults of the robot in simulation, or their notation.
         design: Name of a controller design, such as ``network`` or ``cpg``, or a design.
         seeds: Controllers of the first generation, in addition to random controllers.
@@ -129,7 +129,7 @@ def run_trial(
         physical: The physical robot.
         controller: Controller or playback that drives the robot.
         path: Name of the log, ``NAME.mcap``; the trial is called NAME.
-        robot: The nominal robot, its name, or the path of its MJCF file.
+        robot: The nominal robot, its name, or the path of its MJCF or URDF file.
         steps: Control steps of the trial.
         stage: Stage of the trial within a recovery.
         seed: Seed of the trial, for the record.
@@ -159,7 +159,7 @@ def write_log(trial: Trial, path: str | Path, robot: RobotSource) -> Path:
     Args:
         trial: The trial; its step timing is not written.
         path: Name of the log, ``NAME.mcap``; it must not exist.
-        robot: The nominal robot, its name, or the path of its MJCF file.
+        robot: The nominal robot, its name, or the path of its MJCF or URDF file.
 
     Raises:
         InputError: The log exists, or the trial does not fit the robot.
@@ -196,7 +196,7 @@ def calibrate(
 
     Args:
         trials: Trials of the healthy robot, or paths of their logs, at least one.
-        robot: The nominal robot, its name, or the path of its MJCF file.
+        robot: The nominal robot, its name, or the path of its MJCF or URDF file.
         threads: Threads of the physics; 0 for all processors.
         budget: Memory that each log may take.
 
@@ -226,7 +226,7 @@ def replay(
     Args:
         trial: A logged trial, or the path of its log.
         hypothesis: The faults of the robot in simulation, or their notation.
-        robot: The nominal robot, its name, or the path of its MJCF file.
+        robot: The nominal robot, its name, or the path of its MJCF or URDF file.
         tolerance: Largest difference of two numbers that count as equal, in their unit.
         threads: Threads of the physics; 0 for all processors.
         budget: Memory that each log may take.
@@ -271,7 +271,7 @@ def diagnose(
             other stages.
         healthy: Trials of the healthy robot, or paths of their logs: the self-model is fitted to
             them, and the verdict compares with them.
-        robot: The nominal robot, its name, or the path of its MJCF file; None for the
+        robot: The nominal robot, its name, or the path of its MJCF or URDF file; None for the
             model in the logs.
         comparator: A comparator, its name, or ``package.module:object``.
         kinds: Fault kinds to search, or their names, in a sequence or separated by commas.
@@ -337,8 +337,8 @@ def recover(
     Args:
         healthy: The physical robot before its failure.
         damaged: The physical robot after its failure; on hardware, the same object.
-        robot: The nominal robot, its name, or the path of its MJCF file; the self-model is made
-            from it.
+        robot: The nominal robot, its name, or the path of its MJCF or URDF file; the self-model is
+            made from it.
         folder: Folder of the run, new or empty: every trial's log and every diagnosis.
         comparator: A comparator, its name, or ``package.module:object``.
         kinds: Fault kinds to search, or their names, in a sequence or separated by commas.

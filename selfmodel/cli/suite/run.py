@@ -52,7 +52,7 @@ def run(
         str,
         typer.Option(
             metavar="A,B|all",
-            help="Domains that `selfmodel suite list` lists, or MJCF files, ROBOT.xml.",
+            help="Domains that `selfmodel suite list` lists, or MJCF and URDF files.",
             rich_help_panel=STUDY,
         ),
     ] = "all",
