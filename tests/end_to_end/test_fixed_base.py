@@ -107,3 +107,13 @@ def test_suite_run_recovers_arms_and_records_that_they_stayed_upright(folder: Pa
     (row,) = found["rows"]
     assert row["upright"]
     assert row["before"] == 0 > row["after"]
+
+
+def test_the_rows_of_an_ablation_have_its_score(folder: Path):
+    found = run(
+        folder,
+        *("ablate", "--robots", "quadruped", "--case", "2", "--comparator", "segment-prediction"),
+        *("--score", "tracking", "--next-trial", "repair", "--steps", "60", "--trials", "2"),
+        *("--population", "8", "--generations", "2", "--workers", "1", "--out", "ablation"),
+    )
+    assert found["rows"][-1]["before"] == 0 > found["rows"][-1]["after"]

@@ -10,6 +10,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from xml.etree import ElementTree as ET  # of checked texts
 
+import mujoco
+
 from selfmodel.errors import InputError
 from selfmodel.files import encodable, read_file
 from selfmodel.robot.mjcf.base import carry_hinges, fix_base, free_base
@@ -155,19 +157,7 @@ def _adapted(name: str, document: Document, settings: MjcfSettings, budget: Budg
     check_loggable(document, budget)
     expand(document)
     name_parts(document)
-    for body in document.bodies():
-        if body.attrib.pop("mocap", "false") == "true":
-            document.notes.append(f"the mocap body {body.get('name')} is static")
-    drop_textures(document)
-    if settings.base == "free":
-        free_base(document, compile_model(document.text, document.assets))
-    model = compile_model(document.text, document.assets)
-    if carry_hinges(document, model):
-        model = compile_model(document.text, document.assets)
-    if replace_missing_meshes(document, model):
-        model = compile_model(document.text, document.assets)
-    if reduce_meshes(document, model):
-        model = compile_model(document.text, document.assets)
+    model = _with_base_and_meshes(document, settings)
     check_usable(model)
     remove_hidden_state(document, model)
     timestep = _control_timestep(float(model.opt.timestep), settings.control_timestep)
@@ -193,6 +183,24 @@ def _adapted(name: str, document: Document, settings: MjcfSettings, budget: Budg
         assets=checked.files,
         notes=tuple(document.notes),
     )
+
+
+def _with_base_and_meshes(document: Document, settings: MjcfSettings) -> mujoco.MjModel:
+    """Completes the base and the meshes of a document, and returns its compiled model."""
+    for body in document.bodies():
+        if body.attrib.pop("mocap", "false") == "true":
+            document.notes.append(f"the mocap body {body.get('name')} is static")
+    drop_textures(document)
+    if settings.base == "free":
+        free_base(document, compile_model(document.text, document.assets))
+    model = compile_model(document.text, document.assets)
+    if carry_hinges(document, model):
+        model = compile_model(document.text, document.assets)
+    if replace_missing_meshes(document, model):
+        model = compile_model(document.text, document.assets)
+    if reduce_meshes(document, model):
+        model = compile_model(document.text, document.assets)
+    return model
 
 
 def _control_timestep(physics: float, wanted: float | None) -> float:
