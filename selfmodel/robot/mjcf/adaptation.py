@@ -10,6 +10,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from xml.etree import ElementTree as ET  # of checked texts
 
+import mujoco
+
 from selfmodel.errors import InputError
 from selfmodel.files import encodable, read_file
 from selfmodel.robot.mjcf.base import carry_hinges, fix_base, free_base
@@ -159,16 +161,9 @@ def _adapted(name: str, document: Document, settings: MjcfSettings, budget: Budg
     for body in document.bodies():
         if body.attrib.pop("mocap", "false") == "true":
             document.notes.append(f"the mocap body {body.get('name')} is static")
-    drop_textures(document)
     if settings.base == "free":
         free_base(document, compile_model(document.text, document.assets))
-    model = compile_model(document.text, document.assets)
-    if carry_hinges(document, model):
-        model = compile_model(document.text, document.assets)
-    if replace_missing_meshes(document, model):
-        model = compile_model(document.text, document.assets)
-    if reduce_meshes(document, model):
-        model = compile_model(document.text, document.assets)
+    model = _compiled_for_a_log(document)
     check_usable(model)
     remove_hidden_state(document, model)
     timestep = _control_timestep(float(model.opt.timestep), settings.control_timestep)
@@ -195,6 +190,16 @@ def _adapted(name: str, document: Document, settings: MjcfSettings, budget: Budg
         assets=checked.files,
         notes=tuple(document.notes),
     )
+
+
+def _compiled_for_a_log(document: Document) -> mujoco.MjModel:
+    """Returns the compiled document, after the changes to bodies and files that a log needs."""
+    drop_textures(document)
+    model = compile_model(document.text, document.assets)
+    for change in (carry_hinges, replace_missing_meshes, reduce_meshes):
+        if change(document, model):
+            model = compile_model(document.text, document.assets)
+    return model
 
 
 def _control_timestep(physics: float, wanted: float | None) -> float:
