@@ -1,4 +1,4 @@
-"""Robots by name or by MJCF file."""
+"""Robots by name, or by MJCF or URDF file."""
 
 import os
 from collections.abc import Iterable
@@ -22,7 +22,7 @@ def robot_entry(name: str, settings: Iterable[str] = (), budget: Budget = DEFAUL
     """Returns a robot, its cases and its tasks, by name or by MJCF file.
 
     Args:
-        name: Name of a robot of selfmodel, or a path that ends in ``.xml``.
+        name: Name of a robot of selfmodel, or the path of an MJCF or URDF file.
         settings: Settings of the MJCF file, such as ``forward=-x``; they override those of the
             TOML file beside it.
         budget: Memory and time that the model may take.
@@ -103,6 +103,8 @@ def robot(name: str, control_timestep: float, budget: Budget = DEFAULT_BUDGET) -
     path = Path(name)
     if not is_model(name):
         return robot_entry(name).robot()
+    if path.suffix.lower() != ".xml":
+        raise InputError(f"{path}: expected an MJCF file, ROBOT.xml, that needs no adaptation")
     data = read_file(path, "an MJCF file", budget.model_text)
     try:
         rehearse(data.decode(), {}, control_timestep, budget)

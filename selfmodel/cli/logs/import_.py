@@ -45,7 +45,9 @@ def import_(
     ] = False,
     robot: Annotated[
         str | None,
-        typer.Option(metavar="ROBOT", help="Robot of --suggest: a robot's name, or MODEL.xml."),
+        typer.Option(
+            metavar="ROBOT", help="Robot of --suggest: a robot's name, or its MJCF or URDF."
+        ),
     ] = None,
     budget: FileBudget = DEFAULT_BUDGET,
     as_json: Json = False,

@@ -95,7 +95,7 @@ def parse_xml(data: bytes) -> ET.Element:
     try:
         return ET.fromstring(data)  # noqa: S314  # _check_xml refuses unsafe XML
     except (ET.ParseError, ValueError) as error:
-        raise InputError(f"expected an MJCF file, got no XML: {error}") from error
+        raise InputError(f"expected an MJCF or URDF file, got no XML: {error}") from error
 
 
 def _check_xml(data: bytes) -> None:
@@ -123,7 +123,7 @@ def _check_xml(data: bytes) -> None:
     except (expat.ExpatError, ValueError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(f"expected an MJCF file, got no XML: {error}") from error
+        raise InputError(f"expected an MJCF or URDF file, got no XML: {error}") from error
 
 
 def _include(parent: ET.Element, files: Files, folder: str, included: set[str], limit: int) -> None:

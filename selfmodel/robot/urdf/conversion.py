@@ -134,13 +134,30 @@ def _add_servos(made: Document, driven: list[ET.Element], settings: UrdfSettings
 
 def _add_stance(made: Document, settings: UrdfSettings) -> None:
     """Adds the initial pose as a keyframe, and excludes the contacts of bodies that overlap."""
-    found = stance(compile_model(made.text, made.assets), settings.pose)
+    found = stance(_compiled(made), settings.pose)
     for first, second in found.overlapping:
         pair = {"body1": first, "body2": second}
         ET.SubElement(made.section("contact"), "exclude", pair)
         made.notes.append(f"{first} and {second} overlap in the initial pose, and never touch")
     key = {"name": KEYFRAME, "qpos": format_numbers(found.qpos)}
     ET.SubElement(made.section("keyframe"), "key", key)
+
+
+def _compiled(made: Document) -> mujoco.MjModel:
+    """Returns the compiled model.
+
+    Raises:
+        InputError: MuJoCo cannot compile the model, such as a link that moves without mass.
+    """
+    try:
+        return compile_model(made.text, made.assets)
+    except InputError as error:
+        if "mjMINVAL" not in str(error):
+            raise
+        raise InputError(
+            f"{error}: give this link, or a link that is fixed to it, an <inertial> with a mass "
+            f'and moments above 0, or fix the base with base = "fixed" if it is the root'
+        ) from error
 
 
 def _listed(names: list[str]) -> str:

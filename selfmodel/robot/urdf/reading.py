@@ -83,6 +83,7 @@ def read_urdf(root: ET.Element, files: Files, budget: Budget = DEFAULT_BUDGET) -
     _drop_floating_joint(document, main)
     check_types(document.root)
     _fix_rangeless(document)
+    _drop_empty_shapes(document)
     _read_meshes(document, Meshes(files, budget.file_bytes, document))
     return document
 
@@ -97,13 +98,19 @@ def _refuse_xacro(root: ET.Element) -> None:
 
 
 def _kept(element: ET.Element) -> ET.Element:
-    """Returns a copy of an element with the known attributes and children only."""
+    """Returns a copy of an element with the known attributes and children only.
+
+    Of children that URDF has once, the first counts.
+    """
     attributes = {
         name: element.get(name, "") for name in _KEPT[element.tag] if name in element.attrib
     }
     copy = ET.Element(element.tag, attributes)
     _check_numbers(copy)
-    copy.extend([_kept(child) for child in element if child.tag in _KEPT])
+    for child in element:
+        once = child.tag not in ("visual", "collision")
+        if child.tag in _KEPT and not (once and copy.find(child.tag) is not None):
+            copy.append(_kept(child))
     return copy
 
 
@@ -170,6 +177,23 @@ def _is_number(word: str) -> bool:
 def _link_of(joint: ET.Element, end: str) -> str:
     element = joint.find(end)
     return "" if element is None else element.get("link", "")
+
+
+def _drop_empty_shapes(document: Document) -> None:
+    """Removes visuals and collisions without a shape, or with a shape of size 0."""
+    dropped = 0
+    for link in document.root.findall("link"):
+        for part in [e for e in link if e.tag in ("visual", "collision")]:
+            shape = part.find("geometry/*")
+            if shape is None or any(
+                float(size) == 0
+                for name in ("size", "radius", "length")
+                for size in shape.get(name, "").split()
+            ):
+                link.remove(part)
+                dropped += 1
+    if dropped:
+        document.notes.append(f"{dropped} shapes of size 0 are left out")
 
 
 def _read_meshes(document: Document, meshes: Meshes) -> None:

@@ -68,9 +68,7 @@ def servo(joint: ET.Element, settings: UrdfSettings) -> tuple[ET.Element, str]:
     return ET.Element("position", attributes), f"kp {kp:.3g}, kd {kd:.3g}, {effort:.3g} N m"
 
 
-def _commands(
-    joint: str, ends: tuple[float, float], settings: UrdfSettings
-) -> tuple[float, float]:
+def _commands(joint: str, ends: tuple[float, float], settings: UrdfSettings) -> tuple[float, float]:
     """Returns the lowest and highest command of a joint, given the ends of its range, rad."""
     swing = value_of(settings.swing, joint)
     if not swing:

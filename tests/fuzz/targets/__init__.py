@@ -17,6 +17,7 @@ from tests.fuzz.targets import (
     tables_csv,
     tables_npz,
     tables_parquet,
+    urdf_files,
 )
 
 TARGETS: dict[str, Target] = {
@@ -32,6 +33,7 @@ TARGETS: dict[str, Target] = {
         tables_parquet,
         mappings,
         mjcf_files,
+        urdf_files,
         controllers,
         journals,
         study_folders,

@@ -1,5 +1,6 @@
 """Tests of robots from URDF files, loaded as a user does: they stand, and are refused clearly."""
 
+import json
 from pathlib import Path
 
 import mujoco
@@ -10,7 +11,8 @@ from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import Budget
-from tests.robot.urdf.samples import WALKER, joint, link, urdf, written
+from tests.helpers.command import selfmodel
+from tests.robot.urdf.samples import BALL, WALKER, joint, link, urdf, written
 
 DEEP = "<robot>" + "<link>" * 5000 + "</link>" * 5000 + "</robot>"
 BOMB = '<!DOCTYPE r [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;&a;">]><robot name="&b;"/>'
@@ -87,6 +89,10 @@ def test_the_initial_pose_becomes_the_reference_pose_also_of_coupled_joints(tmp_
         (WALKER.replace('effort="10.0"', 'effort="1e400"'), "1 number in effort"),
         (WALKER.replace('type="revolute"', 'type="fixed"'), "no actuators"),
         (urdf(link("a", 0), link("b", 0), joint("j", "a", "b")), "no link has a <collision>"),
+        (
+            urdf(link("a", 0, BALL), link("b"), joint("j", "a", "b")),
+            "with a mass and moments above",
+        ),
     ],
 )
 def test_a_hostile_or_unusable_urdf_is_refused_in_one_sentence(
@@ -110,3 +116,26 @@ def test_thousands_of_links_end_within_the_budget(tmp_path: Path):
 
     with pytest.raises(InputError, match=r"walker\.urdf: "):
         load_mjcf(written(tmp_path, urdf(*parts)), budget=Budget(time=9, memory=3 * 10**9))
+
+
+@pytest.mark.process
+def test_every_command_with_a_robot_takes_a_urdf(tmp_path: Path):
+    before = written(tmp_path, toml='pose = {"*_hip" = 0.25}\nswing = 0.3').read_bytes()
+    robot = ("--robot", "walker.urdf")
+
+    listed = selfmodel("robots", "walker.urdf", "--json", cwd=tmp_path)
+    trial = selfmodel("trial", "walker.urdf", "--steps", "60", "--out", "t.mcap", cwd=tmp_path)
+    done = [
+        listed,
+        trial,
+        selfmodel("replay", "t.mcap", *robot, "--json", cwd=tmp_path),
+        selfmodel("render", "t.mcap", *robot, "--out", "t.png", cwd=tmp_path),
+        selfmodel("calibrate", "t.mcap", *robot, "--out", "c.xml", cwd=tmp_path),
+    ]
+
+    assert [one.returncode for one in done] == [0] * len(done), [one.stderr for one in done]
+    found = json.loads(listed.stdout)
+    assert found["robot"] == "walker"
+    assert any("position servos" in note for note in found["notes"])
+    assert json.loads(done[2].stdout)["rms"] is not None
+    assert (tmp_path / "walker.urdf").read_bytes() == before

@@ -3,7 +3,7 @@
 import pytest
 
 from selfmodel.errors import InputError
-from tests.robot.urdf.samples import WALKER, joint, link, read, urdf
+from tests.robot.urdf.samples import BALL, WALKER, joint, link, read, urdf
 
 
 def test_elements_of_simulators_are_left_out_with_a_note():
@@ -58,6 +58,19 @@ def test_a_floating_joint_elsewhere_is_refused():
 
     with pytest.raises(InputError, match="only the root link moves freely"):
         read(text)
+
+
+def test_of_elements_that_a_urdf_has_once_the_first_counts():
+    text = WALKER.replace('<axis xyz="0 1 0"/>', '<axis xyz="0 1 0"/><axis xyz="1 0 0"/>')
+
+    assert read(text).text == read(WALKER).text
+
+
+def test_shapes_of_size_zero_are_left_out_with_a_note():
+    document = read(WALKER.replace(BALL, BALL + BALL.replace("0.03", "0.0")))
+
+    assert document.text == read(WALKER).text
+    assert "2 shapes of size 0 are left out" in document.notes
 
 
 def test_a_revolute_joint_with_a_range_of_zero_width_is_fixed_with_a_note():
