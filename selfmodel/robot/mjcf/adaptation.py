@@ -157,7 +157,12 @@ def _adapted(name: str, document: Document, settings: MjcfSettings, budget: Budg
     check_loggable(document, budget)
     expand(document)
     name_parts(document)
-    model = _with_base_and_meshes(document, settings)
+    for body in document.bodies():
+        if body.attrib.pop("mocap", "false") == "true":
+            document.notes.append(f"the mocap body {body.get('name')} is static")
+    if settings.base == "free":
+        free_base(document, compile_model(document.text, document.assets))
+    model = _compiled_for_a_log(document)
     check_usable(model)
     remove_hidden_state(document, model)
     timestep = _control_timestep(float(model.opt.timestep), settings.control_timestep)
@@ -185,21 +190,13 @@ def _adapted(name: str, document: Document, settings: MjcfSettings, budget: Budg
     )
 
 
-def _with_base_and_meshes(document: Document, settings: MjcfSettings) -> mujoco.MjModel:
-    """Completes the base and the meshes of a document, and returns its compiled model."""
-    for body in document.bodies():
-        if body.attrib.pop("mocap", "false") == "true":
-            document.notes.append(f"the mocap body {body.get('name')} is static")
+def _compiled_for_a_log(document: Document) -> mujoco.MjModel:
+    """Returns the compiled document, after the changes to bodies and files that a log needs."""
     drop_textures(document)
-    if settings.base == "free":
-        free_base(document, compile_model(document.text, document.assets))
     model = compile_model(document.text, document.assets)
-    if carry_hinges(document, model):
-        model = compile_model(document.text, document.assets)
-    if replace_missing_meshes(document, model):
-        model = compile_model(document.text, document.assets)
-    if reduce_meshes(document, model):
-        model = compile_model(document.text, document.assets)
+    for change in (carry_hinges, replace_missing_meshes, reduce_meshes):
+        if change(document, model):
+            model = compile_model(document.text, document.assets)
     return model
 
 
