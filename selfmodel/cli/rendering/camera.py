@@ -19,6 +19,12 @@ WIDTH, HEIGHT = 480, 360
 CAMERA_DISTANCE = 2.7
 """Distance of the camera, in sizes of the robot."""
 
+LIGHT_DIRECTION = (0.2, 0.3, -0.93)
+"""Direction of the light of a model without directional lights, a unit vector."""
+
+LIGHT = (0.15, 0.45, 0.1)
+"""Ambient, diffuse and specular intensity of that light."""
+
 HIDDEN_GROUP = VISUAL_GROUPS
 """Group of the geoms that are not drawn."""
 
@@ -43,6 +49,7 @@ def filmed(film: Film) -> Iterator[NDArray[np.uint8]]:
     camera.azimuth, camera.elevation = azimuth(film), ELEVATION
     camera.distance = CAMERA_DISTANCE * size(film)
     targets = [gaze(film, shot) for shot in film.shots]
+    lacks_light = not np.any(model.light_type == mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
     with mujoco.Renderer(model, HEIGHT, WIDTH) as renderer:
         for frame in range(len(film.time)):
             pictures = []
@@ -50,6 +57,8 @@ def filmed(film: Film) -> Iterator[NDArray[np.uint8]]:
                 _set_pose(model, data, shot.qpos[frame])
                 camera.lookat[:] = target[frame]
                 renderer.update_scene(data, camera)
+                if lacks_light:
+                    _add_light(renderer.scene)
                 pictures.append(captioned(renderer.render(), film, shot, frame))
             yield np.concatenate(pictures, axis=1)
 
@@ -60,6 +69,16 @@ def _set_pose(model: mujoco.MjModel, data: mujoco.MjData, qpos: FloatArray) -> N
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
     mujoco.mj_camlight(model, data)
+
+
+def _add_light(scene: mujoco.MjvScene) -> None:
+    """Adds light from above to a scene with the light of the camera and spotlights only."""
+    light = scene.lights[scene.nlight]
+    light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
+    light.dir[:] = LIGHT_DIRECTION
+    light.ambient[:], light.diffuse[:], light.specular[:] = LIGHT
+    light.castshadow, light.headlight = 0, 0
+    scene.nlight += 1
 
 
 def painted(film: Film) -> mujoco.MjModel:

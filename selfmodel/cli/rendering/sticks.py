@@ -10,6 +10,7 @@ from matplotlib.collections import LineCollection
 from selfmodel.arrays import FloatArray
 from selfmodel.cli.rendering.film import Film
 from selfmodel.cli.rendering.view import axes as axes_of_view
+from selfmodel.cli.rendering.visible import stick_geoms
 
 LONG = (mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_CYLINDER)
 FLAT = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
@@ -60,9 +61,8 @@ def lines_of(film: Film, data: mujoco.MjData, centre: FloatArray, plane: FloatAr
     model = film.model
     ends: list[FloatArray] = []
     bodies: list[int] = []
-    for geom in np.flatnonzero(
-        model.body_rootid[model.geom_bodyid] == model.body_rootid[film.root]
-    ):
+    own = model.body_rootid[model.geom_bodyid] == model.body_rootid[film.root]
+    for geom in np.flatnonzero(own & stick_geoms(model)):
         kind = mujoco.mjtGeom(int(model.geom_type[geom]))
         if kind in FLAT:
             continue

@@ -1,4 +1,4 @@
-"""The geoms of a model that a picture shows: of every body the visual ones, or else all."""
+"""The geoms of a model that a picture shows: a choice for each body, so that the robot is seen."""
 
 import mujoco
 import numpy as np
@@ -11,27 +11,27 @@ VISUAL_GROUPS = 3
 _DEFAULT_RGBA = (0.5, 0.5, 0.5, 1.0)
 """Colour of a geom that leaves the colour to its material."""
 
+_ENOUGH = 0.5
+"""Smallest size of the chosen geoms of a body, as a fraction of the size of all of them."""
+
 
 def visible_geoms(model: mujoco.MjModel) -> BoolArray:
     """Returns whether each geom is drawn, ``(ngeom,)``.
 
-    The geoms of a body in the visual groups are drawn if there are any; a body without them is
-    drawn with its other geoms. If a body has colliding geoms in one visual group and
-    meshes without contacts in another, only the meshes are drawn.
+    The geoms of a body in the visual groups are drawn, without those for contacts if there are
+    visual meshes in another group. All geoms of a body are drawn if these are less than half as
+    large as the body: a limb without visual geoms, or a head of which only the eyes would be seen.
     """
     seen = (model.geom_group < VISUAL_GROUPS) & (opacity(model) > 0)
-    seen &= ~_covered(model, seen)
-    bare = np.ones(model.nbody, dtype=bool)
-    bare[model.geom_bodyid[seen]] = False
-    return np.asarray(seen | bare[model.geom_bodyid])
+    return _or_whole_bodies(model, seen & ~_covered(model, seen))
 
 
-def colliding_geoms(model: mujoco.MjModel) -> BoolArray:
-    """Returns whether each geom has a contact mask or a contact pair, ``(ngeom,)``."""
-    collides = (model.geom_contype | model.geom_conaffinity) != 0
-    collides[model.pair_geom1] = True
-    collides[model.pair_geom2] = True
-    return np.asarray(collides)
+def stick_geoms(model: mujoco.MjModel) -> BoolArray:
+    """Returns whether each geom is drawn in a stick figure, ``(ngeom,)``.
+
+    A mesh, whose bounding box would be drawn, is left out if the body has other geoms.
+    """
+    return _or_whole_bodies(model, model.geom_type != mujoco.mjtGeom.mjGEOM_MESH)
 
 
 def opacity(model: mujoco.MjModel) -> FloatArray:
@@ -42,9 +42,21 @@ def opacity(model: mujoco.MjModel) -> FloatArray:
     return own
 
 
+def _or_whole_bodies(model: mujoco.MjModel, chosen: BoolArray) -> BoolArray:
+    """Returns the chosen geoms, and all geoms of bodies with too few of them."""
+    size = np.linalg.norm(model.geom_pos, axis=1) + model.geom_rbound
+    size[model.geom_rbound == 0] = np.inf  # a plane
+    whole, part = np.zeros(model.nbody), np.full(model.nbody, -1.0)
+    np.maximum.at(whole, model.geom_bodyid, size)
+    np.maximum.at(part, model.geom_bodyid[chosen], size[chosen])
+    return np.asarray(chosen | (part < _ENOUGH * whole)[model.geom_bodyid])
+
+
 def _covered(model: mujoco.MjModel, seen: BoolArray) -> BoolArray:
     """Returns whether each geom is the collision geom of a body with a mesh to be drawn instead."""
-    collides = colliding_geoms(model)
+    collides = (model.geom_contype | model.geom_conaffinity) != 0
+    collides[model.pair_geom1] = True
+    collides[model.pair_geom2] = True
     covered = np.zeros(model.ngeom, dtype=bool)
     meshes = (model.geom_type == mujoco.mjtGeom.mjGEOM_MESH) & ~collides
     for geom in np.flatnonzero(meshes & seen):

@@ -10,6 +10,8 @@ from selfmodel.robot.mjcf.expand import format_numbers
 
 _JOINT = int(mujoco.mjtTrn.mjTRN_JOINT)
 _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
+_INHERITING = ("position", "intvelocity")
+"""Actuators that may have the range of their joint as command range."""
 
 
 def limit_reach(document: Document, model: mujoco.MjModel, reach: float) -> None:
@@ -36,7 +38,8 @@ def limit_reach(document: Document, model: mujoco.MjModel, reach: float) -> None
         ends = max(initial - reach, centre - half), min(initial + reach, centre + half)
         element.set("ctrlrange", format_numbers(np.array(ends)))
         element.set("ctrllimited", "true")
-        element.attrib.pop("inheritrange", None)
+        if element.tag in _INHERITING:
+            element.set("inheritrange", "0")  # MuJoCo refuses both ranges, also if one is a default
         limited += 1
     if not limited:
         raise InputError(

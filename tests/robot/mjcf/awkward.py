@@ -70,7 +70,9 @@ AWKWARD: dict[str, Awkward] = {
     "an empty file": Awkward("", "no XML"),
     "binary junk": Awkward(bytes(range(256)) * 40, "no XML"),
     "cut off": Awkward(mjcf()[:200], "no XML"),
-    "a URDF": Awkward('<robot name="r"><link name="l"/></robot>', "got a URDF"),
+    "a URDF of one link": Awkward(
+        '<robot name="r"><link name="l"/></robot>', "no link has a <collision>"
+    ),
     "other XML": Awkward("<html><body/></html>", "got <html>"),
     "an entity bomb": Awkward(BOMB, "<!DOCTYPE>"),
     "deep nesting": Awkward(_deep(5000), "200 elements within each other"),

@@ -133,6 +133,29 @@ def test_a_keyframe_is_chosen_by_name_or_none(tmp_path: Path):
         load_mjcf(path, MjcfSettings(keyframe="c"))
 
 
+@pytest.mark.parametrize(
+    ("names", "chosen"),
+    [
+        (("down", "home"), "home"),
+        (("standing", "stand"), "stand"),
+        (("down", "standing"), "standing"),
+        (("down", "up"), "down"),
+    ],
+)
+def test_a_robot_starts_in_the_usual_keyframe_or_the_first(
+    names: tuple[str, ...], chosen: str, tmp_path: Path
+):
+    keys = "".join(
+        f'<key name="{name}" qpos="0 0 .35 1 0 0 0 .{number} 0"/>'
+        for number, name in enumerate(names)
+    )
+    path = written(tmp_path, mjcf(more=f"<keyframe>{keys}</keyframe>"))
+
+    notes = adapt(path, MjcfSettings()).notes
+
+    assert f"the initial pose is the keyframe {chosen}" in notes
+
+
 def test_a_keyframe_that_breaks_an_equality_is_refused(tmp_path: Path):
     equality = '<equality><joint joint1="left_hip" joint2="right_hip"/></equality>'
     key = '<keyframe><key qpos="0 0 .4 1 0 0 0 {}"/></keyframe>'

@@ -7,7 +7,7 @@ import pytest
 
 from selfmodel.errors import InputError
 from tests.robot.mjcf.awkward import KEY, mjcf
-from tests.robot.mjcf.test_servos import TORQUE_MOTORS, loaded
+from tests.robot.mjcf.test_servos import CLASS, TORQUE_MOTORS, loaded
 
 SERVOS = """<position name="left" joint="left_hip" kp="5" inheritrange="1"/>
 <position name="right" joint="right_hip" kp="5" ctrlrange="-.2 .6"/>"""
@@ -19,6 +19,14 @@ def test_commands_are_within_reach_of_the_initial_pose_and_in_their_range(tmp_pa
     model = loaded(tmp_path, mjcf(motors=SERVOS, more=key), "reach=0.5")
 
     assert model.actuator_ctrlrange.ravel() == pytest.approx([-0.1, END, -0.2, 0.4])
+
+
+def test_a_range_that_a_class_inherits_from_the_joint_is_limited(tmp_path: Path):
+    text = mjcf(motors=SERVOS.replace('inheritrange="1"', "").replace('ctrlrange="-.2 .6"', ""))
+    text = text.replace("<mujoco>", f"<mujoco>{CLASS}")
+    model = loaded(tmp_path, text, "reach=0.5")
+
+    assert model.actuator_ctrlrange.ravel() == pytest.approx([-0.5, 0.5, -0.5, 0.5])
 
 
 def test_an_initial_pose_outside_the_range_counts_as_the_nearest_end(tmp_path: Path):

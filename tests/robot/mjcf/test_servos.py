@@ -16,7 +16,7 @@ from tests.robot.mjcf.test_adaptation import written
 
 TORQUE_MOTORS = """<motor name="left" joint="left_hip" gear="-4" ctrlrange="-2 1"/>
 <motor name="right" joint="right_hip" ctrlrange="-9 9" forcerange="-7 7"/>"""
-CLASS = '<default><position kp="7" inheritrange="1" timeconst="0.1"/></default>'
+CLASS = '<default><position kp="7" inheritrange="1"/></default>'
 
 
 def loaded(folder: Path, text: str, *given: str) -> mujoco.MjModel:

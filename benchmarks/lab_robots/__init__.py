@@ -1,0 +1,1 @@
+"""Study of the robots that laboratories have: models, recoveries, exactness, table and films."""
