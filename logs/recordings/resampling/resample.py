@@ -62,7 +62,7 @@ def slerp(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -
         limit: See ``reach``.
 
     Returns:
-        Unit quaternions, ``(steps, 4)``; exactly the sample at the time of a sample.
+        Unit quaternions, ``(steps, 4)``; the sample to rounding at the time of a sample.
     """
     before, after, share, valid = _bracket(times, at, limit)
     result = np.full((len(at), 4), np.nan)
@@ -81,9 +81,17 @@ def slerp(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -
         (1 - part) * np.sinc((1 - part) * 2 * half / np.pi) * low
         + part * np.sinc(part * 2 * half / np.pi) * high
     ) / sine
-    turned /= np.linalg.norm(turned, axis=1, keepdims=True)
-    result[valid] = np.where(part == 0, low, turned)
+    result[valid] = turned / np.linalg.norm(turned, axis=1, keepdims=True)
     return result
+
+
+def slerp_or_sample(
+    times: FloatArray, values: FloatArray, at: FloatArray, limit: float
+) -> FloatArray:
+    """Returns orientations as ``slerp``, with the bits of the sample at the time of a sample."""
+    before = np.clip(np.searchsorted(times, at, side="right") - 1, 0, None)
+    exact = times[before] == at
+    return np.where(exact[:, np.newaxis], values[before], slerp(times, values, at, limit))
 
 
 def hold(

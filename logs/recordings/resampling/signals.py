@@ -8,7 +8,14 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.logs.recordings.mapping.mapping import Base
 from selfmodel.logs.recordings.resampling.clock import Track
-from selfmodel.logs.recordings.resampling.resample import angles, hold, linear, reach, slerp
+from selfmodel.logs.recordings.resampling.resample import (
+    angles,
+    hold,
+    linear,
+    reach,
+    slerp,
+    slerp_or_sample,
+)
 from selfmodel.logs.recordings.resampling.start_frame import heading_removal, rotate_world
 from selfmodel.logs.recordings.resampling.tracks import Tracks
 from selfmodel.logs.recordings.series import IntArray
@@ -90,7 +97,9 @@ def base_signals(tracks: Tracks, steps: Steps, base: Base | None) -> dict[Signal
         ValueError: The initial pose, which the transform needs, is unknown.
     """
     position = _wide(_at(tracks.base_position, steps, linear), 3)
-    orientation = _wide(_at(tracks.base_orientation, steps, slerp), 4)
+    # The orientations of a bag keep the bits that earlier versions imported.
+    method = slerp_or_sample if base is not None and base.columns else slerp
+    orientation = _wide(_at(tracks.base_orientation, steps, method), 4)
     velocity = _wide(_at(tracks.base_linear_velocity, steps, linear), 3)
     in_world = base is not None and base.velocity_frame == "world"
     if base is None or base.frame == "start":

@@ -89,7 +89,9 @@ def converted(mapping: RecordingMapping, raw: RawTracks) -> Tracks:
         for name, found in raw.touch.items()
     }
     length = 1.0 if mapping.base is None else mapping.base.scale
-    orientation = _unit(raw.base.get("orientation", NOTHING))
+    # The orientations of a bag keep the bits that earlier versions imported.
+    rounding = _ROUNDING if mapping.base is not None and mapping.base.columns else 0.0
+    orientation = _unit(raw.base.get("orientation", NOTHING), rounding)
     angular = raw.base.get("angular_velocity", NOTHING)
     if mapping.base is None:
         orientation = _unit(raw.imu.get("orientation", NOTHING))
@@ -133,12 +135,12 @@ def _scaled(track: Track, scale: float, offset: float = 0.0) -> Track:
     return Track(track.times, track.values * scale + offset)
 
 
-def _unit(track: Track) -> Track:
+def _unit(track: Track, rounding: float = 0.0) -> Track:
     """Normalised quaternions; unset ones, of length 0, are left out."""
     lengths: FloatArray = np.linalg.norm(track.values, axis=1)
     known = np.abs(lengths - 1) < 0.1
     # A quaternion that is normalised already keeps its bits.
-    divisors = np.where(np.abs(lengths - 1) < _ROUNDING, 1.0, lengths)
+    divisors = np.where(np.abs(lengths - 1) < rounding, 1.0, lengths)
     return Track(track.times[known], track.values[known] / divisors[known, np.newaxis])
 
 
