@@ -47,7 +47,9 @@ def _difference(log: Path, robot: Robot, truth: Hypothesis) -> float:
     trial = read_log(log).trial
     hidden = INTACT if log.name == HEALTHY else truth
     steps = trial.behaviour.steps
-    run = Simulator(robot, threads=1).run([(hidden, trial.plan.controller)], steps, ["base_position"])
+    run = Simulator(robot, threads=1).run(
+        [(hidden, trial.plan.controller)], steps, ["base_position"]
+    )
     physical = forward_displacement(trial.behaviour)
     return float(np.abs(forward_displacement(run.behaviour)[0] - physical))
 
