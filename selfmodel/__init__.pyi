@@ -10,6 +10,7 @@ from .experiments.api import (
     recover as recover,
     replay as replay,
     run_trial as run_trial,
+    write_log as write_log,
 )
 from .experiments.arguments import load_robot as load_robot, parse_hypothesis as parse_hypothesis
 from .experiments.reality import simulated_robot as simulated_robot

@@ -1,10 +1,13 @@
 """The registry of robots and of their dm_control tasks, by name."""
 
 from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.tasks import suite_bodies
+from selfmodel.robot.mjcf.load import load_mjcf
+from selfmodel.tasks import suite_bodies, suite_tasks
 from selfmodel.tasks.entry import Entry
 from selfmodel.tasks.hexapod import HEXAPOD
 from selfmodel.tasks.quadruped import QUADRUPED
@@ -17,30 +20,48 @@ ROBOTS: Mapping[str, Entry] = {"quadruped": QUADRUPED, "hexapod": HEXAPOD}
 """The built-in robots by name."""
 
 SUITE: Mapping[str, Mapping[str, Callable[..., "control.Environment"]]] = {
-    domain: entry.suite for domain, entry in ROBOTS.items()
+    **{domain: entry.suite for domain, entry in ROBOTS.items()},
+    **{
+        f"{suite_bodies.PREFIX}{domain}": {
+            task: partial(suite_tasks.environment, domain, task) for task in tasks
+        }
+        for domain, tasks in suite_tasks.TASKS.items()
+    },
 }
-"""Tasks by domain; each value is the counterpart of ``SUITE`` in a dm_control domain."""
+"""Tasks by domain: of our robots, and of dm_control's suite with the prefix ``suite-``; each value
+is the counterpart of ``SUITE`` in a dm_control domain."""
 
 ALL_TASKS: tuple[tuple[str, str], ...] = tuple(
     (domain, task) for domain, tasks in SUITE.items() for task in tasks
 )
-"""Every ``(domain, task)`` that ``load`` accepts."""
+"""Every ``(domain, task)`` that ``load`` accepts, without those of files."""
 
 TASKS_BY_DOMAIN: Mapping[str, tuple[str, ...]] = {
     domain: tuple(tasks) for domain, tasks in SUITE.items()
 }
 """Task names by domain."""
 
+FILE_TASKS: tuple[str, ...] = ("walk",)
+"""Tasks of a robot from an MJCF file."""
+
 
 def entry(name: str) -> Entry:
     """Returns the entry of a robot: one of ``ROBOTS``, or a body of dm_control's suite.
 
     Raises:
-        InputError: The name is unknown; the message contains the nearest one.
+        InputError: The name is unknown, with the nearest one in the message, or the body of the
+            task cannot be a self-model.
     """
     if name in ROBOTS:
         return ROBOTS[name]
-    if name.removeprefix(suite_bodies.PREFIX).partition("-")[0] in suite_bodies.DOMAINS:
+    domain, _, task = name.removeprefix(suite_bodies.PREFIX).partition("-")
+    reason = suite_tasks.WITHOUT_SELF_MODEL.get(domain, {}).get(task)
+    if reason is not None:
+        raise InputError(
+            f"{name} is a task, and its body is no robot of selfmodel: {reason}; "
+            f"selfmodel.tasks.load({suite_bodies.PREFIX + domain!r}, {task!r}) makes the task"
+        )
+    if domain in suite_bodies.DOMAINS:
         return suite_bodies.entry(*suite_bodies.parse_name(name))
     raise unknown_name("robot", name, (*ROBOTS, "suite-DOMAIN-TASK"))
 
@@ -55,31 +76,74 @@ def load(
     """Returns a dm_control environment, as ``dm_control.suite.load`` does for its own.
 
     Args:
-        domain_name: Name of a robot, such as ``"quadruped"``.
+        domain_name: Name of a robot, such as ``"quadruped"``; of a domain or a body of dm_control's
+            suite, such as ``"suite-walker"`` or ``"suite-walker-walk"``; or path of an MJCF file.
         task_name: Name of one of its tasks, such as ``"walk"``.
         task_kwargs: Arguments of the task: ``hypothesis``, the robot's faults, in notation or as a
             ``Hypothesis``, which may have faults of third-party kinds; ``time_limit`` in seconds;
-            ``random``, a seed or a numpy ``RandomState``.
+            ``random``, a seed, a numpy ``RandomState`` or a ``Generator``; ``gap``, the level of
+            the reality gap; ``start_noise``, the standard deviation of the initial joint angles,
+            rad. See ``walking.environment`` and ``suite_tasks.environment``.
         environment_kwargs: Arguments of ``dm_control.rl.control.Environment``.
-        visualize_reward: Must be ``False``: the rewards are speeds, which dm_control cannot map to
-            colours.
+        visualize_reward: Whether colours show the reward, in tasks of the suite. Must be ``False``
+            otherwise: the rewards are speeds, which dm_control cannot map to colours.
 
     Raises:
-        InputError: The robot or the task is unknown, the hypothesis cannot be parsed, or
-            ``visualize_reward`` is true.
+        InputError: The robot or the task is unknown, the file cannot be a robot, the hypothesis
+            cannot be parsed, or ``visualize_reward`` is true for a speed.
     """
-    if domain_name not in SUITE:
-        raise unknown_name("robot", domain_name, SUITE)
-    if task_name not in SUITE[domain_name]:
-        raise unknown_name(f"task of {domain_name}", task_name, SUITE[domain_name])
-    if visualize_reward:
+    make = constructor(domain_name, task_name)
+    is_suite = domain_name.startswith(suite_bodies.PREFIX)
+    if visualize_reward and not is_suite:
         raise InputError(
             f"{domain_name} {task_name}: the reward is a speed and has no colours to be shown in: "
             f"leave visualize_reward at False"
         )
-    return SUITE[domain_name][task_name](
-        **(task_kwargs or {}), environment_kwargs=environment_kwargs
-    )
+    environment = make(**(task_kwargs or {}), environment_kwargs=environment_kwargs)
+    if is_suite:
+        environment.task.visualize_reward = visualize_reward
+    return environment
 
 
-__all__ = ["ALL_TASKS", "ROBOTS", "SUITE", "TASKS_BY_DOMAIN", "Entry", "entry", "load"]
+def constructor(domain_name: str, task_name: str) -> Callable[..., "control.Environment"]:
+    """Returns the function that makes the environments of a task; a file is read once.
+
+    Args:
+        domain_name: As for ``load``.
+        task_name: As for ``load``.
+
+    Raises:
+        InputError: The robot or the task is unknown, or the file cannot be a robot.
+    """
+    if Path(domain_name).suffix:
+        if task_name not in FILE_TASKS:
+            raise unknown_name(f"task of {domain_name}", task_name, FILE_TASKS)
+        # Imported here, because dm_control's physics initialises a display when imported.
+        from selfmodel.tasks import walking  # noqa: PLC0415  # see the line above
+
+        return partial(walking.environment, load_mjcf(domain_name))
+    if domain_name in SUITE:
+        if task_name not in SUITE[domain_name]:
+            raise unknown_name(f"task of {domain_name}", task_name, SUITE[domain_name])
+        return SUITE[domain_name][task_name]
+    domain = domain_name.removesuffix(f"-{task_name}")
+    if domain in SUITE and domain.startswith(suite_bodies.PREFIX) and task_name in SUITE[domain]:
+        return SUITE[domain][task_name]
+    body, _, own = domain_name.removeprefix(suite_bodies.PREFIX).partition("-")
+    known = SUITE.get(f"{suite_bodies.PREFIX}{body}", {})
+    if domain_name.startswith(suite_bodies.PREFIX) and own in known:
+        raise unknown_name(f"task of {domain_name}", task_name, (own,))
+    raise unknown_name("robot", domain_name, (*SUITE, "a path that ends in .xml"))
+
+
+__all__ = [
+    "ALL_TASKS",
+    "FILE_TASKS",
+    "ROBOTS",
+    "SUITE",
+    "TASKS_BY_DOMAIN",
+    "Entry",
+    "constructor",
+    "entry",
+    "load",
+]

@@ -2,13 +2,14 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.table_one import cases_of
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery.fitness import Score
+from selfmodel.robot.legs import reaches_ground
 from selfmodel.robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -34,4 +35,5 @@ class Entry:
     @cached_property
     def cases(self) -> Mapping[int, str]:
         """Failures by their number in Table I of the paper, in notation."""
-        return cases_of(self.robot().anatomy)
+        robot = self.robot()
+        return cases_of(robot.anatomy, partial(reaches_ground, robot))

@@ -11,10 +11,7 @@ from selfmodel.tasks.entry import Entry
 from selfmodel.tasks.walking_return import WALKING_RETURN
 
 if TYPE_CHECKING:
-    import numpy as np
     from dm_control.rl import control
-
-    from selfmodel.faults.hypothesis import Hypothesis
 
 CONTROL_TIMESTEP = 0.01
 """Seconds between two commands."""
@@ -29,17 +26,12 @@ def paper_robot(name: str) -> Entry:
     suite = containers.TaggedTasks()
 
     @suite.add("walking")
-    def walk(
-        hypothesis: "str | Hypothesis" = "intact",
-        time_limit: float = 10.0,
-        random: "int | np.random.RandomState | None" = None,
-        environment_kwargs: dict[str, Any] | None = None,
-    ) -> "control.Environment":
+    def walk(**task_kwargs: Any) -> "control.Environment":  # noqa: ANN401  # see walking.environment
         """Returns the task of walking forward; see ``walking.environment``."""
         # Imported here, because dm_control's physics initialises a display when imported.
         from selfmodel.tasks import walking  # noqa: PLC0415  # see the line above
 
-        return walking.environment(_robot(name), hypothesis, time_limit, random, environment_kwargs)
+        return walking.environment(_robot(name), **task_kwargs)
 
     return Entry(robot=partial(_robot, name), suite=suite, episode_return=WALKING_RETURN)
 

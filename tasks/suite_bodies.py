@@ -6,9 +6,14 @@ from collections.abc import Mapping
 from functools import lru_cache, partial
 from typing import Any
 
+import mujoco
+
 from selfmodel.errors import unknown_name
 from selfmodel.robot.mjcf.adaptation import adapt_text
+from selfmodel.robot.mjcf.document import read_document
+from selfmodel.robot.mjcf.files import InMemory
 from selfmodel.robot.mjcf.load import robot_from
+from selfmodel.robot.mjcf.mujoco_errors import loading_a_model
 from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks.entry import Entry
@@ -85,6 +90,20 @@ def robot(domain: str, task: str) -> Robot:
     settings = MjcfSettings(keyframe=keyframe, control_timestep=control_timestep(domain))
     named = name(domain, task)
     return robot_from(adapt_text(named, text, assets, settings), named)
+
+
+def specification(domain: str, task: str) -> mujoco.MjSpec:
+    """Returns the suite's own model of a task, as an editable specification.
+
+    Args:
+        domain: One of ``DOMAINS``.
+        task: One of its tasks.
+    """
+    mjcf, assets = _model(domain, task)
+    text = mjcf if isinstance(mjcf, bytes) else mjcf.encode()
+    document = read_document(text, InMemory(assets))
+    with loading_a_model():
+        return mujoco.MjSpec.from_string(document.text, assets=dict(document.assets))
 
 
 def control_timestep(domain: str) -> float | None:

@@ -1,6 +1,7 @@
 """The walking task as a dm_control task: the reward is the forward speed."""
 
-from collections import OrderedDict
+import dataclasses
+from collections import OrderedDict, deque
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -11,41 +12,83 @@ from dm_control.rl import control
 from dm_control.suite import base
 
 from selfmodel.arrays import FloatArray
-from selfmodel.faults.build import build
+from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.notation import parse
+from selfmodel.physical.debris import detached_limbs, place_debris
+from selfmodel.physical.initial_pose import randomize_initial_pose
+from selfmodel.physical.measurement_noise import ExactMeasurement, Measurement, NoisyMeasurement
+from selfmodel.physical.reality_gap import RealityGap, draw_gap
+from selfmodel.physical.simulated_robot import physical_embodiment
+from selfmodel.robot.control_delay import CONTROL_DELAY, split_delay
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
 from selfmodel.robot.state_access import current_value, signal_fields
+from selfmodel.tasks.randomness import Seed, construction_numbers, episode_numbers, next_seed
+from selfmodel.tasks.start_noise import start_level
 from selfmodel.trials.signals import Signal
+
+TIME_LIMIT = 10.0
+"""Default length of an episode, s."""
 
 
 def environment(
     robot: Robot,
-    hypothesis: str | Hypothesis,
-    time_limit: float,
-    random: int | np.random.RandomState | None,
-    environment_kwargs: dict[str, Any] | None,
+    *,
+    hypothesis: str | Hypothesis = "intact",
+    time_limit: float = TIME_LIMIT,
+    random: Seed = None,
+    gap: float = 0.0,
+    start_noise: float | None = None,
+    environment_kwargs: Mapping[str, Any] | None = None,
 ) -> control.Environment:
     """Returns the dm_control environment of the walking task.
 
-    The physics, the readings and their timing equal the simulator's to the bit.
+    Without a gap and start noise, the physics, the readings and their timing equal the simulator's
+    to the bit.
 
     Args:
         robot: The healthy robot.
         hypothesis: Faults of the robot, or their notation with built-in kinds. Silent neurons have
             no effect, because they belong to the controller.
         time_limit: Length of an episode, s.
-        random: Seed or generator of dm_control's tasks; walking uses no random numbers.
+        random: Seed or generator of the gap and the terrain, which are drawn once, and of the
+            initial pose and the sensor noise, which are drawn for each episode.
+        gap: Level of the reality gap, 0 to ``MAX_GAP_LEVEL``.
+        start_noise: Standard deviation of the initial joint angles, rad, with half of it for roll
+            and pitch of the base; None for that of the gap.
         environment_kwargs: Arguments of ``control.Environment``.
+
+    Raises:
+        InputError: The base of the robot is fixed, its control delay has a part of a control step,
+            the hypothesis cannot be parsed or does not apply, or the gap or the start noise is out
+            of range.
     """
+    if robot.has_fixed_base:
+        raise InputError(
+            f"the reward of walk is the forward speed, and the base of {robot.name} is fixed: "
+            f"give the model a <freejoint/>"
+        )
+    _, part = split_delay(robot.control_delay, robot.substeps)
+    if part:
+        raise InputError(
+            f"dm_control applies commands at control steps, and the control delay of {robot.name} "
+            f"is {robot.control_delay:g} of them: set {CONTROL_DELAY} to a whole number"
+        )
     if isinstance(hypothesis, str):
         hypothesis = parse(hypothesis, robot.anatomy)
-    embodiment = build(robot, hypothesis)
+    episodes = episode_numbers(random)
+    construction = construction_numbers(episodes)
+    drawn = draw_gap(robot, gap, construction)
+    own = drawn if gap > 0 else None
+    seed = int(construction.integers(2**32))
+    embodiment = physical_embodiment(robot, hypothesis, seed, own)
+    limbs = () if own is None else detached_limbs(robot, hypothesis)
+    start = start_level(start_noise, gap)
     return control.Environment(
         mujoco.Physics.from_model(core.MjModel(embodiment.model)),
-        Walk(robot, embodiment, random),
+        Walk(robot, embodiment, episodes, gap=own, limbs=limbs, start=start),
         time_limit=time_limit,
         control_timestep=robot.control_timestep,
         **(environment_kwargs or {}),
@@ -80,29 +123,59 @@ class Walk(base.Task):
 
     Args:
         robot: The healthy robot.
-        embodiment: The robot with its faults.
-        random: A seed or a numpy ``RandomState``.
+        embodiment: The robot with its faults and its gap.
+        random: Generator of the episodes.
+        gap: Reality gap, for its delay and its measurement noise; None for no gap.
+        limbs: Root body of each detached limb that the model has debris of.
+        start: Noise of the initial pose, as a gap level.
     """
 
     def __init__(
-        self, robot: Robot, embodiment: Embodiment, random: int | np.random.RandomState | None
+        self,
+        robot: Robot,
+        embodiment: Embodiment,
+        random: np.random.RandomState,
+        *,
+        gap: RealityGap | None,
+        limbs: tuple[str, ...],
+        start: float,
     ) -> None:
         super().__init__(random=random)
-        self._robot = robot
-        self._embodiment = embodiment
-        self._reader = SensorReader(embodiment.model, robot.anatomy, [embodiment])
+        self._robot, self._embodiment = robot, embodiment
+        self._gap, self._limbs, self._start_level = gap, limbs, start
         self._fields = signal_fields(robot, embodiment.model)
         self._start = self._end = 0.0
+        self._begin(np.random.default_rng(0))  # for the specs, before the first episode
+
+    def _begin(self, rng: np.random.Generator) -> None:
+        """Starts the random number streams and the delay line of an episode."""
+        embodiment = dataclasses.replace(self._embodiment, seed=int(rng.integers(2**32)))
+        self._reader = SensorReader(embodiment.model, self._robot.anatomy, [embodiment])
+        self._measurement: Measurement = ExactMeasurement()
+        delay = int(self._robot.control_delay)
+        if self._gap is not None:
+            self._measurement = NoisyMeasurement(
+                self._gap.level, self._robot.anatomy, embodiment, rng
+            )
+            delay += self._gap.delay
+        self._delayed = deque(np.zeros((delay, embodiment.model.nu)))
 
     def initialize_episode(self, physics: mujoco.Physics) -> None:
-        """Resets the position for the reward."""
+        """Sets the initial pose, with its noise, and the position for the reward."""
+        rng = np.random.default_rng(next_seed(self.random))
+        self._begin(rng)
+        model, data = physics.model.ptr, physics.data.ptr
+        if self._start_level > 0:
+            randomize_initial_pose(self._robot, model, data, self._start_level, rng)
+        place_debris(model, data, self._limbs)
         super().initialize_episode(physics)
         self._start = self._end = self._forward(physics)
 
     def before_step(self, action: FloatArray, physics: mujoco.Physics) -> None:
-        """Records the position before the step, and applies the motor commands."""
+        """Records the position before the step, and applies the delayed motor commands."""
         self._start = self._forward(physics)
-        super().before_step(action, physics)
+        self._delayed.append(np.array(action, dtype=np.float64))
+        super().before_step(self._delayed.popleft(), physics)
 
     def after_step(self, physics: mujoco.Physics) -> None:
         """Records the position after the step."""
@@ -118,6 +191,7 @@ class Walk(base.Task):
         readings = np.empty((1, len(self._robot.anatomy.sensors)))
         data = physics.data
         self._reader.read(data.sensordata[np.newaxis], data.qpos[np.newaxis], readings)
+        self._measurement.corrupt_readings(readings[0])
         observation = OrderedDict(sensors=readings[0])
         signals: tuple[Signal, ...] = (
             "joint_positions",
@@ -132,9 +206,9 @@ class Walk(base.Task):
         return observation
 
     def observe(self, physics: mujoco.Physics, signal: Signal) -> FloatArray:
-        """Returns a signal of the state, ``(width,)``."""
-        return current_value(self._fields[signal], physics.data)
+        """Returns a signal of the state as it is measured, ``(width,)``."""
+        return self._measurement.measure(signal, current_value(self._fields[signal], physics.data))
 
     def _forward(self, physics: mujoco.Physics) -> float:
         """Position of the root body along the world's x axis, m."""
-        return float(self.observe(physics, "base_position")[0])
+        return float(current_value(self._fields["base_position"], physics.data)[0])

@@ -1,7 +1,7 @@
 """Import of a recording: behaviour and quality from a bag or table, a mapping and a robot."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,7 +38,7 @@ from selfmodel.logs.writing.writer import write_trial
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget, more_memory
 from selfmodel.settings import Settings
-from selfmodel.trials.behaviour import Behaviour, Sample
+from selfmodel.trials.behaviour import Behaviour, samples_of
 from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.trial import TrialPlan
 
@@ -196,7 +196,7 @@ def write_recording(
         path,
         robot,
         TrialPlan("imported", mapping.stage, driver, behaviour.steps, seed=0),
-        _samples(behaviour),
+        samples_of(behaviour),
         TrialHeader(Settings(), imported=Imported(recording.facts(), mapping.document.text)),
     )
 
@@ -276,8 +276,3 @@ def _qualities(mapping: RecordingMapping, found: Found, origin: int) -> dict[str
         topic: quality(found.series[topic], found.clocks[topic], origin, played)
         for topic, played in roles.items()
     }
-
-
-def _samples(behaviour: Behaviour) -> Iterator[Sample]:
-    for k, time in enumerate(behaviour.time.tolist()):
-        yield Sample(time, {signal: values[k] for signal, values in behaviour.signals.items()})

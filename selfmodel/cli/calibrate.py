@@ -28,6 +28,7 @@ from selfmodel.robot.parameters import factor_names
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import Budget
 from selfmodel.simulation.calibration import calibrate as fit_to
+from selfmodel.simulation.joints.sets import NOMINAL
 from selfmodel.simulation.threads import thread_count
 
 
@@ -47,6 +48,8 @@ def calibrate(
     as_json: Json = False,
 ) -> None:
     """Fit masses, friction, damping, motors and delay of the self-model to logged trials.
+
+    Of a robot with a fixed base, gain, damping, dry friction and armature of each joint are fitted.
 
     Give trials of the healthy robot: a fault in them would become part of the model. Commands
     that read logs take the new model as --robot MODEL.xml.
@@ -82,6 +85,7 @@ def calibrate(
         "error_before": fit.error_before,
         "error": fit.error,
         "as_it_was": fit.robot is before,
+        "joints": fit.joints.to_dict() if fit.joints else None,
         "seconds": perf_counter() - start,
     }
     if as_json:
@@ -100,6 +104,44 @@ def _refuse_assets(robot: Robot, where: str) -> None:
 
 
 def _print(result: dict[str, Any]) -> None:
+    if result["joints"] is None:
+        _print_factors(result)
+    else:
+        _print_joints(result["joints"])
+    print_lines(
+        f"{result['model']}: {result['robot']} as fitted to "
+        f"{counted(len(result['logs']), 'log')} in {result['seconds']:.1f} s"
+    )
+
+
+def _print_joints(fit: dict[str, Any]) -> None:
+    """Prints the fit of the joints of a robot with a fixed base; see ``JointCalibration``."""
+    rows = [
+        (
+            f"{one['quantity']} of {one['name']}",
+            f"{one['before']:.3g}",
+            f"{one['value']:.3g}",
+            f"± {100 * one['deviation']:.0f} %" if one["determined"] else "not determined",
+        )
+        for one in fit["parameters"]
+    ]
+    if fit["set"] != NOMINAL:
+        show(("parameter", "before", "fitted", "uncertainty"), rows)
+    print_lines(f"set of parameters: {fit['set']}; delay, control steps: {fit['delay']:g}")
+    print_lines(
+        f"error of predicted motion: {fit['error']:.3f} ({fit['error_before']:.3f} before); in "
+        f"segments that were left out of the fit {fit['held_out_error']:.3f} "
+        f"({fit['held_out_error_before']:.3f} before)"
+    )
+    print_lines(f"largest error: {fit['worst_joint']}, {1e3 * fit['worst_joint_error']:.1f} mrad")
+    if fit["set"] == NOMINAL:
+        print_lines(
+            "No set of parameters predicts left-out segments significantly better: the model is "
+            "written unchanged."
+        )
+
+
+def _print_factors(result: dict[str, Any]) -> None:
     rows = [
         (one["name"], "1", f"{one['factor']:.3f}", f"± {100 * one['deviation']:.1f} %")
         for one in result["parameters"]
@@ -112,7 +154,3 @@ def _print(result: dict[str, Any]) -> None:
     )
     if result["as_it_was"]:
         print_lines("The model already predicts the logs exactly: it is written unchanged.")
-    print_lines(
-        f"{result['model']}: {result['robot']} as fitted to "
-        f"{counted(len(result['logs']), 'log')} in {result['seconds']:.1f} s"
-    )

@@ -27,7 +27,7 @@ RobotName = Annotated[
     str,
     typer.Argument(
         metavar="ROBOT",
-        help="Name that `selfmodel robots` lists, or path of an MJCF file, ROBOT.xml.",
+        help="Name that `selfmodel robots` lists, or path of an MJCF or URDF file.",
     ),
 ]
 LogFile = Annotated[Path, typer.Argument(metavar="LOG", help="Trial log, NAME.mcap.")]
@@ -79,7 +79,7 @@ ModelSettings = Annotated[
     typer.Option(
         "--set",
         metavar="KEY=VALUE",
-        help="Setting that ROBOT.xml lacks, such as forward=-x; as in ROBOT.toml beside it.",
+        help="Setting that an MJCF or URDF lacks, such as forward=-x; as in ROBOT.toml.",
     ),
 ]
 GapLevel = Annotated[
@@ -187,7 +187,7 @@ SelfModel = Annotated[
     typer.Option(
         "--robot",
         metavar="ROBOT",
-        help="Self-model to use instead of the one in the logs: a robot's name, or MODEL.xml.",
+        help="Self-model instead of that in the logs: a robot's name, MODEL.xml or ROBOT.urdf.",
     ),
 ]
 ComparatorName = Annotated[
@@ -233,6 +233,28 @@ NamedKinds = Annotated[
         help="Third-party fault kinds that notation may name, package.module:object, in addition "
         "to all of selfmodel's.",
         show_default=False,
+    ),
+]
+
+ScoreName = Annotated[
+    str,
+    typer.Option(
+        "--score",
+        metavar="NAME",
+        help="Fitness of controllers: displacement; upright, the displacement until the first "
+        "fall; return, the sum of the task's rewards; or tracking, the error of the joints from a "
+        "trajectory.",
+        rich_help_panel=CONTROLLER,
+    ),
+]
+Reference = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="Trajectory to follow with --score tracking: LOG.mcap, or a table (.csv, .npz, "
+        ".parquet) with the columns time and joints.",
+        show_default="the motion of the first controller",
+        rich_help_panel=CONTROLLER,
     ),
 ]
 

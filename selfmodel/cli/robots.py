@@ -17,9 +17,7 @@ from selfmodel.tasks import ROBOTS, Entry
 def robots(
     robot: Annotated[
         str | None,
-        typer.Argument(
-            metavar="[ROBOT]", help="Name of a robot, or path of an MJCF file, ROBOT.xml."
-        ),
+        typer.Argument(metavar="[ROBOT]", help="Name of a robot, or path of an MJCF or URDF file."),
     ] = None,
     *,
     model_settings: ModelSettings = None,

@@ -22,6 +22,7 @@ from selfmodel.experiments.arguments import (
     sources_of,
     trials_of,
 )
+from selfmodel.experiments.chosen_score import check_motion
 from selfmodel.experiments.fitting import fitted
 from selfmodel.experiments.log_diagnosis import set_up_diagnosis
 from selfmodel.faults import PAPER_KINDS
@@ -29,9 +30,11 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.logs import physical_trial
 from selfmodel.logs.journal import create_journal
 from selfmodel.logs.records import TrialHeader
+from selfmodel.logs.writing.writer import write_trial
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery import recover as loop
 from selfmodel.recovery.events import Event
+from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.next_trial import NextTrial, by_repair
 from selfmodel.recovery.random_streams import repair_stream
 from selfmodel.recovery.recover import Recovery
@@ -45,6 +48,7 @@ from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.threads import thread_count
 from selfmodel.simulation.trial_replay import Replay
+from selfmodel.trials.behaviour import samples_of
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
 
 
@@ -63,11 +67,12 @@ def evolve_controller(
     design: str | Design = "network",
     seeds: Sequence[Controller] = (),
     settings: Settings | None = None,
+    score: Score = DISPLACEMENT,
     seed: int = 0,
     threads: int = 0,
     on_event: Callable[[Event], None] = _ignore,
 ) -> Controller:
-    """Returns the controller with the largest forward displacement that the repair EA finds.
+    """Returns the controller with the largest score that the repair EA finds.
 
     Example:
         >>> import selfmodel
@@ -76,23 +81,25 @@ def evolve_controller(
         <Controller: a network of 3 hidden neurons>
 
     Args:
-        robot: The nominal robot, its name, or the path of its MJCF file.
+        robot: The nominal robot, its name, or the path of its MJCF or URDF file.
         hypothesis: The faults of the robot in simulation, or their notation.
         design: Name of a controller design, such as ``network`` or ``cpg``, or a design.
         seeds: Controllers of the first generation, in addition to random controllers.
         settings: Parameters of the search; the paper's by default.
+        score: Fitness; the forward displacement by default.
         seed: Seed of all random numbers.
         threads: Threads of the physics; 0 for all processors.
         on_event: Called with the progress of the search.
 
     Raises:
-        InputError: The design or the robot is unknown, the notation is invalid, or a motor has no
-            command range.
+        InputError: The design or the robot is unknown, the notation is invalid, a motor has no
+            command range, or the base is fixed and the score is a displacement.
     """
     check_seed(seed)
     robot = robot_of(robot)
+    check_motion(score.name, robot)
     chosen = _design(design, robot)
-    search = RepairSearch(Simulator(robot, threads), settings or Settings(), chosen)
+    search = RepairSearch(Simulator(robot, threads), settings or Settings(), chosen, score=score)
     return search(hypothesis_of(hypothesis, robot), seeds, repair_stream(seed, 0), on_event)
 
 
@@ -122,7 +129,7 @@ def run_trial(
         physical: The physical robot.
         controller: Controller or playback that drives the robot.
         path: Name of the log, ``NAME.mcap``; the trial is called NAME.
-        robot: The nominal robot, its name, or the path of its MJCF file.
+        robot: The nominal robot, its name, or the path of its MJCF or URDF file.
         steps: Control steps of the trial.
         stage: Stage of the trial within a recovery.
         seed: Seed of the trial, for the record.
@@ -137,6 +144,34 @@ def run_trial(
     path = Path(path)
     plan = TrialPlan(path.stem, stage, controller, steps, seed)
     return physical_trial.run_trial(physical, plan, path, robot_of(robot), TrialHeader(Settings()))
+
+
+def write_log(trial: Trial, path: str | Path, robot: RobotSource) -> Path:
+    """Writes a trial, such as one of ``Trial.from_arrays``, as a new log.
+
+    Example:
+        >>> import selfmodel
+        >>> trial = selfmodel.read_log("after.mcap").trial
+        >>> log = selfmodel.write_log(trial, "copy.mcap", "quadruped")
+        >>> selfmodel.read_log(log).trial.behaviour.steps
+        60
+
+    Args:
+        trial: The trial; its step timing is not written.
+        path: Name of the log, ``NAME.mcap``; it must not exist.
+        robot: The nominal robot, its name, or the path of its MJCF or URDF file.
+
+    Raises:
+        InputError: The log exists, or the trial does not fit the robot.
+        LogWriteError: The disk is full, or failed.
+    """
+    return write_trial(
+        Path(path),
+        robot_of(robot),
+        trial.plan,
+        samples_of(trial.behaviour),
+        TrialHeader(Settings()),
+    )
 
 
 def calibrate(
@@ -161,7 +196,7 @@ def calibrate(
 
     Args:
         trials: Trials of the healthy robot, or paths of their logs, at least one.
-        robot: The nominal robot, its name, or the path of its MJCF file.
+        robot: The nominal robot, its name, or the path of its MJCF or URDF file.
         threads: Threads of the physics; 0 for all processors.
         budget: Memory that each log may take.
 
@@ -191,7 +226,7 @@ def replay(
     Args:
         trial: A logged trial, or the path of its log.
         hypothesis: The faults of the robot in simulation, or their notation.
-        robot: The nominal robot, its name, or the path of its MJCF file.
+        robot: The nominal robot, its name, or the path of its MJCF or URDF file.
         tolerance: Largest difference of two numbers that count as equal, in their unit.
         threads: Threads of the physics; 0 for all processors.
         budget: Memory that each log may take.
@@ -236,7 +271,7 @@ def diagnose(
             other stages.
         healthy: Trials of the healthy robot, or paths of their logs: the self-model is fitted to
             them, and the verdict compares with them.
-        robot: The nominal robot, its name, or the path of its MJCF file; None for the
+        robot: The nominal robot, its name, or the path of its MJCF or URDF file; None for the
             model in the logs.
         comparator: A comparator, its name, or ``package.module:object``.
         kinds: Fault kinds to search, or their names, in a sequence or separated by commas.
@@ -281,6 +316,7 @@ def recover(
     design: str | Design = "network",
     calibrate: bool = True,
     next_trial: NextTrial = by_repair,
+    score: Score = DISPLACEMENT,
     seed: int = 0,
     threads: int = 0,
     on_event: Callable[[Event], None] = _ignore,
@@ -301,8 +337,8 @@ def recover(
     Args:
         healthy: The physical robot before its failure.
         damaged: The physical robot after its failure; on hardware, the same object.
-        robot: The nominal robot, its name, or the path of its MJCF file; the self-model is made
-            from it.
+        robot: The nominal robot, its name, or the path of its MJCF or URDF file; the self-model is
+            made from it.
         folder: Folder of the run, new or empty: every trial's log and every diagnosis.
         comparator: A comparator, its name, or ``package.module:object``.
         kinds: Fault kinds to search, or their names, in a sequence or separated by commas.
@@ -310,16 +346,19 @@ def recover(
         design: Name of a controller design, such as ``network`` or ``cpg``, or a design.
         calibrate: Whether the self-model is fitted to the trial before the failure.
         next_trial: Chooses the controller of each trial after the failing one.
+        score: Fitness of the repair EA; the forward displacement by default.
         seed: Seed of all random numbers.
         threads: Threads of the physics; 0 for all processors.
         on_event: Called with the progress of the recovery.
 
     Raises:
-        InputError: The folder contains files, or an argument is invalid.
+        InputError: The folder contains files, an argument is invalid, or the base is fixed and the
+            score is a displacement.
         TrialError: A physical robot could not finish a trial.
     """
     check_seed(seed)
     robot, count = robot_of(robot), thread_count(threads)
+    check_motion(score.name, robot)
     chosen, searched = settings or Settings(), kinds_of(kinds)
     journal = create_journal(Path(folder), robot.anatomy, searched)
     return loop.recover(
@@ -336,4 +375,5 @@ def recover(
         kinds=searched,
         calibrate=partial(fitted, robot, threads=count) if calibrate else None,
         next_trial=next_trial,
+        score=score,
     )

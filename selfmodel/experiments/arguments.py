@@ -17,7 +17,7 @@ from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.trials.trial import Trial
 
 RobotSource = Robot | str | Path
-"""A robot, its name, or the path of its MJCF file."""
+"""A robot, its name, or the path of its MJCF or URDF file."""
 
 TrialSource = Trial | str | Path
 """A trial, or the path of its log."""
@@ -29,7 +29,7 @@ KindSource = str | Sequence[str | FaultKind]
 def load_robot(
     name: str | Path, settings: MjcfSettings | None = None, budget: Budget = DEFAULT_BUDGET
 ) -> Robot:
-    """Returns a robot by name, or the robot of an MJCF file.
+    """Returns a robot by name, or the robot of an MJCF or URDF file.
 
     Example:
         >>> import selfmodel
@@ -37,7 +37,8 @@ def load_robot(
         ('front_left_knee',)
 
     Args:
-        name: ``quadruped``, ``hexapod``, ``suite-DOMAIN-TASK``, or the path of an MJCF file.
+        name: ``quadruped``, ``hexapod``, ``suite-DOMAIN-TASK``, or the path of an MJCF or URDF
+            file.
         settings: Settings of the MJCF file; None for those of the TOML file beside it.
         budget: Memory and time that the model of an MJCF file may take.
 
@@ -65,7 +66,7 @@ def parse_hypothesis(
     Args:
         text: Terms ``kind:part``, ``kind:part=severity`` or ``kind=severity`` joined by ``+``, or
             ``intact``.
-        robot: The robot whose parts the text names, its name, or the path of its MJCF file.
+        robot: The robot whose parts the text names, its name, or the path of its MJCF or URDF file.
         kinds: The fault kinds that the text may name.
 
     Raises:
@@ -83,7 +84,9 @@ def robot_of(source: RobotSource) -> Robot:
     if isinstance(source, Robot):
         return source
     if not isinstance(source, str | Path):
-        raise _unexpected('a Robot, a name such as "quadruped" or the path of an MJCF file', source)
+        raise _unexpected(
+            'a Robot, a name such as "quadruped" or the path of an MJCF or URDF file', source
+        )
     return load_robot(source)
 
 

@@ -55,7 +55,7 @@ def simulated_robot(
         >>> physical = selfmodel.simulated_robot("quadruped", "break:front_left_knee", gap=0.05)
 
     Args:
-        robot: The nominal robot, its name, or the path of its MJCF file.
+        robot: The nominal robot, its name, or the path of its MJCF or URDF file.
         hypothesis: The faults of the physical robot, or their notation.
         gap: Level of the reality gap, the relative standard deviation of its factors; 0 is none.
         structure: Whether the physical robot also differs in structure from its model.

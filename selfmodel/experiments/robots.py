@@ -1,4 +1,4 @@
-"""Robots by name or by MJCF file."""
+"""Robots by name, or by MJCF or URDF file."""
 
 import os
 from collections.abc import Iterable
@@ -22,7 +22,7 @@ def robot_entry(name: str, settings: Iterable[str] = (), budget: Budget = DEFAUL
     """Returns a robot, its cases and its tasks, by name or by MJCF file.
 
     Args:
-        name: Name of a robot of selfmodel, or a path that ends in ``.xml``.
+        name: Name of a robot of selfmodel, or the path of an MJCF or URDF file.
         settings: Settings of the MJCF file, such as ``forward=-x``; they override those of the
             TOML file beside it.
         budget: Memory and time that the model may take.
@@ -59,6 +59,36 @@ def is_model(name: str) -> bool:
     return Path(name).suffix.lower() in _MODEL_ENDINGS
 
 
+def recorded_robot(
+    name: str, control_timestep: float | None, budget: Budget = DEFAULT_BUDGET
+) -> Robot:
+    """Returns the robot of a recording: by name, or of a model file, adapted as for a trial.
+
+    A model that a calibration wrote is a robot already, and is not adapted.
+
+    Args:
+        name: Name of a robot of selfmodel, or the path of a model file.
+        control_timestep: Duration of a control step of a model file, s; None for that of its
+            settings.
+        budget: Memory and time that the model may take.
+
+    Raises:
+        InputError: The name is unknown, or the model is unusable.
+    """
+    if not is_model(name):
+        return robot_entry(name).robot()
+    path = Path(name)
+    if control_timestep is not None and path.suffix.lower() == ".xml":
+        try:
+            raw = robot(name, control_timestep, budget)
+        except InputError:
+            raw = None
+        if raw is not None and raw.is_calibrated:
+            return raw
+    step = {} if control_timestep is None else {"control_timestep": control_timestep}
+    return load_mjcf(path, read_settings(path, step), budget)
+
+
 def robot(name: str, control_timestep: float, budget: Budget = DEFAULT_BUDGET) -> Robot:
     """Returns a robot by name, or the robot of an unadapted MJCF file.
 
@@ -73,6 +103,8 @@ def robot(name: str, control_timestep: float, budget: Budget = DEFAULT_BUDGET) -
     path = Path(name)
     if not is_model(name):
         return robot_entry(name).robot()
+    if path.suffix.lower() != ".xml":
+        raise InputError(f"{path}: expected an MJCF file, ROBOT.xml, that needs no adaptation")
     data = read_file(path, "an MJCF file", budget.model_text)
     try:
         rehearse(data.decode(), {}, control_timestep, budget)

@@ -1,6 +1,6 @@
 """The failures of the paper's Table I, derived for any robot from its anatomy."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from selfmodel.robot.anatomy import Anatomy, Joint, Sensor
@@ -21,16 +21,23 @@ class _Limb:
     angle: tuple[str, ...]
 
 
-def cases_of(anatomy: Anatomy) -> Mapping[int, str]:
+def cases_of(anatomy: Anatomy, is_leg: Callable[[Sequence[Joint]], bool]) -> Mapping[int, str]:
     """Returns a robot's failures by their number in Table I, in notation.
 
-    A limb is a chain of joints without branches; limbs with touch sensors come first, then the
-    order is the model's. Cases that a robot cannot have are omitted: 3 and 4 without touch sensors;
-    4, 7 and 8 with one limb; 8 with two limbs.
+    A limb is a chain of joints without branches. If some limbs are legs, only these count; all
+    limbs of a robot without legs do, such as those of a swimmer. Limbs with touch sensors come
+    first, then the order is the model's. Cases that a robot cannot have are omitted: 3 and 4
+    without touch sensors; 4, 7 and 8 with one limb; 8 with two limbs.
 
     Source: the paper, Table I; for the paper's two robots the cases equal the paper's.
+
+    Args:
+        anatomy: The robot's parts.
+        is_leg: Function from the joints of a limb, the one nearest to the root body first, to
+            whether the limb is a leg, such as ``reaches_ground``.
     """
     limbs = _limbs(anatomy)
+    limbs = [limb for limb in limbs if is_leg(limb.joints)] or limbs
     by_number: dict[int, str | None] = dict.fromkeys(range(1, 9))
     if limbs:
         first, others = limbs[0], limbs[1:]

@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.physical.measurement_noise import rotated_by_vector
+from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.embodiment import WELD_ARMATURE
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state_access import bind_data, current_value, signal_fields, state_writer
@@ -32,15 +33,7 @@ def randomize_initial_pose(
     """
     fields, write = signal_fields(robot, model), state_writer(robot, bind_data(data), model)
     reference_depth = _penetration_depth(robot, model, data)
-    angles = level * ANGLE_DEVIATION * rng.standard_normal(len(robot.anatomy.hinges))
-    for name, angle in zip(robot.anatomy.hinges, angles, strict=True):
-        hinge = model.joint(name)
-        if model.dof_armature[hinge.dofadr[0]] == WELD_ARMATURE:
-            continue
-        shifted = data.qpos[hinge.qposadr[0]] + angle
-        data.qpos[hinge.qposadr[0]] = (
-            np.clip(shifted, *hinge.range) if hinge.limited[0] else shifted
-        )
+    randomize_joint_angles(robot.anatomy, model, data, level, rng)
     tilt = np.append(level * TILT_DEVIATION * rng.standard_normal(2), 0.0)
     base = rotated_by_vector(current_value(fields["base_orientation"], data), tilt)
     write({"base_orientation": base[np.newaxis]})
@@ -48,6 +41,33 @@ def randomize_initial_pose(
     depth = _penetration_depth(robot, model, data)
     lift = [0.0, 0.0, max(0.0, depth - reference_depth)]
     write({"base_position": (current_value(fields["base_position"], data) + lift)[np.newaxis]})
+
+
+def randomize_joint_angles(
+    anatomy: Anatomy,
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    level: float,
+    rng: np.random.Generator,
+) -> None:
+    """Adds normal noise to the joint angles of a robot, within their limits.
+
+    Args:
+        anatomy: Parts of the robot.
+        model: Compiled model of the physical robot; its welded joints keep their angles.
+        data: State of the model; it is changed.
+        level: Level of the reality gap.
+        rng: Random numbers of the angles.
+    """
+    angles = level * ANGLE_DEVIATION * rng.standard_normal(len(anatomy.hinges))
+    for name, angle in zip(anatomy.hinges, angles, strict=True):
+        hinge = model.joint(name)
+        if model.dof_armature[hinge.dofadr[0]] == WELD_ARMATURE:
+            continue
+        shifted = data.qpos[hinge.qposadr[0]] + angle
+        data.qpos[hinge.qposadr[0]] = (
+            np.clip(shifted, *hinge.range) if hinge.limited[0] else shifted
+        )
 
 
 def _penetration_depth(robot: Robot, model: mujoco.MjModel, data: mujoco.MjData) -> float:

@@ -13,6 +13,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
 from selfmodel.faults.build import compile_model
 from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.scaling import scale_model
 
@@ -59,7 +60,23 @@ class RealityGap:
 
 
 def draw_gap(robot: Robot, level: float, rng: np.random.Generator) -> RealityGap:
-    """Returns a random reality gap for a robot.
+    """Returns a random reality gap for a robot; see ``draw_gap_of``.
+
+    Args:
+        robot: The robot as its model describes it.
+        level: 0 to ``MAX_GAP_LEVEL``; at 0 every factor is 1.
+        rng: Random numbers of the gap.
+
+    Raises:
+        InputError: The level is out of range.
+    """
+    return draw_gap_of(robot.model, robot.anatomy, level, rng)
+
+
+def draw_gap_of(
+    model: mujoco.MjModel, anatomy: Anatomy, level: float, rng: np.random.Generator
+) -> RealityGap:
+    """Returns a random reality gap for a model.
 
     Every mass, moment of inertia and motor has a factor of 1 + level N. Friction and damping are
     known less precisely: each has one factor of 1 + 2 level N for the whole robot. The delay is
@@ -70,7 +87,8 @@ def draw_gap(robot: Robot, level: float, rng: np.random.Generator) -> RealityGap
     the reality gap" (ECAL 1995).
 
     Args:
-        robot: The robot as its model describes it.
+        model: The model of the healthy robot.
+        anatomy: Its parts.
         level: 0 to ``MAX_GAP_LEVEL``; at 0 every factor is 1.
         rng: Random numbers of the gap.
 
@@ -82,7 +100,6 @@ def draw_gap(robot: Robot, level: float, rng: np.random.Generator) -> RealityGap
             f"expected a reality gap with a level from 0 (none) to {MAX_GAP_LEVEL}, such as 0.05, "
             f"got {level}"
         )
-    model = robot.model
 
     def factors(names: list[str]) -> dict[str, float]:
         drawn = _factor(level, rng.standard_normal(len(names)))
@@ -91,7 +108,7 @@ def draw_gap(robot: Robot, level: float, rng: np.random.Generator) -> RealityGap
     bodies = [model.body(b).name for b in range(1, model.nbody)]
     mass, inertia = factors(bodies), factors(bodies)
     friction, damping = _factor(2 * level, rng.standard_normal(2)).tolist()
-    motors = factors(list(robot.anatomy.motors))
+    motors = factors(list(anatomy.motors))
     delay = int(rng.integers(MAX_EXTRA_DELAY + 1))
     return RealityGap(
         level=level,

@@ -17,6 +17,7 @@ from selfmodel.physical.initial_pose import randomize_initial_pose
 from selfmodel.physical.measurement_noise import ExactMeasurement, Measurement, NoisyMeasurement
 from selfmodel.physical.reality_gap import RealityGap, perturbed_model
 from selfmodel.physical.structural_mismatch import StructuralMismatch, add_structural_mismatch
+from selfmodel.robot.control_delay import split_delay
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.known_base import BASE_SIGNALS
 from selfmodel.robot.mjcf.mujoco_errors import mujoco_errors_as_input_errors
@@ -56,18 +57,7 @@ class SimulatedRobot:
         self._gap = gap if gap is not None and gap.level > 0 else None
         self._limbs = detached_limbs(robot, hidden) if self._gap is not None else ()
         seed = gap.seed if gap else OWN_SEED
-        edits = (
-            [partial(add_structural_mismatch, structure=structure)] if structure is not None else []
-        )
-        if self._limbs:
-            edits.append(partial(add_debris, limbs=self._limbs))
-        self._embodiment = build(
-            robot,
-            hidden,
-            seed,
-            edits=edits,
-            perturb=None if self._gap is None else partial(perturbed_model, gap=self._gap),
-        )
+        self._embodiment = physical_embodiment(robot, hidden, seed, self._gap, structure)
         self._noise = np.random.SeedSequence(seed, spawn_key=(stream,))
 
     def run(self, controller: CommandSource, steps: int) -> Iterator[Sample]:
@@ -99,10 +89,8 @@ class SimulatedRobot:
         robot = self._robot
         model, data = embodiment.model, mujoco.MjData(embodiment.model)
         measurement: Measurement = ExactMeasurement()
-        delay, substeps = (
-            robot.control_delay,
-            round(robot.control_timestep / float(model.opt.timestep)),
-        )
+        delay = robot.control_delay
+        substeps = round(robot.control_timestep / float(model.opt.timestep))
         if self._gap is not None:
             measurement = NoisyMeasurement(self._gap.level, robot.anatomy, embodiment, rng)
             delay += self._gap.delay
@@ -115,7 +103,8 @@ class SimulatedRobot:
             [controller], [embodiment.silent_neurons], len(robot.anatomy.sensors)
         )
         commands = np.zeros((1, model.nu))
-        delay_line = deque(np.zeros((delay, model.nu)))
+        whole, part = split_delay(delay, substeps)
+        delay_line = deque(np.zeros((whole + bool(part), model.nu)))
         # Logged commands are the controller's outputs, before the control delay.
         state_fields = signal_fields(robot, model)
         live = {signal: field.reader(bind_data(data)) for signal, field in state_fields.items()}
@@ -139,11 +128,39 @@ class SimulatedRobot:
                     for signal in SIGNALS
                 },
             )
-            if k + 1 < steps and not _advanced(model, data, substeps):
+            moves = k + 1 < steps
+            if moves and part:
+                moves = _advanced(model, data, part)
+                data.ctrl[:] = delay_line[0]
+            if k + 1 < steps and not (moves and _advanced(model, data, substeps - part)):
                 raise TrialError(
                     f"the simulation of the physical robot diverged after step {k}: its model "
                     f"is unstable under this controller; try a smaller physics time step"
                 )
+
+
+def physical_embodiment(
+    robot: Robot,
+    hidden: Hypothesis,
+    seed: int,
+    gap: RealityGap | None = None,
+    structure: StructuralMismatch | None = None,
+) -> Embodiment:
+    """Returns the model of a physical robot, with the debris of its detached limbs if it has a gap.
+
+    Args:
+        robot: The robot as its model describes it.
+        hidden: Hidden faults of the physical robot, as a hypothesis.
+        seed: Seed of the random parts of the faults.
+        gap: Reality gap with a level above 0; None for no gap.
+        structure: Structural mismatch; None for the structure of the model.
+    """
+    edits = [partial(add_structural_mismatch, structure=structure)] if structure is not None else []
+    limbs = () if gap is None else detached_limbs(robot, hidden)
+    if limbs:
+        edits.append(partial(add_debris, limbs=limbs))
+    perturb = None if gap is None else partial(perturbed_model, gap=gap)
+    return build(robot, hidden, seed, edits=edits, perturb=perturb)
 
 
 def _advanced(model: mujoco.MjModel, data: mujoco.MjData, substeps: int) -> bool:

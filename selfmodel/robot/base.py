@@ -122,6 +122,8 @@ def find_root_body(model: mujoco.MjModel, driven: frozenset[int]) -> int:
         )
     if floating:
         return floating[0]
+    if not driven:
+        raise ValueError("the motors drive no joint: give the joints of the limbs motors")
     _check_hinged(model)
     carrier = common_carrier(model, driven)
     if not carrier:

@@ -1,4 +1,6 @@
-"""Control delay of a robot: control steps from a command to its effect.
+"""Control delay of a robot: time from a command to its effect, in control steps.
+
+A control delay may be a part of a control step, as long as it is a whole number of physics steps.
 
 A calibration writes the control delay into the MJCF, as a custom numeric. Logs of version 0.1 may
 contain a further custom numeric, ``selfmodel_hidden_neurons``. Readers ignore it: the controller in
@@ -18,19 +20,54 @@ start."""
 CONTROL_DELAY = "selfmodel_control_delay"
 """Name of the custom numeric that contains the control delay, in control steps; 0 by default."""
 
+_TOLERANCE = 1e-4
+"""Rounding error of a control delay in an MJCF of six digits, in physics steps."""
 
-def control_delay(model: "MjModel") -> int:
-    """Returns the control delay of a model.
+
+def control_delay(model: "MjModel", substeps: int) -> float:
+    """Returns the control delay of a model, in control steps.
+
+    Args:
+        model: A compiled model.
+        substeps: Physics steps per control step.
+
+    Returns:
+        A multiple of ``1 / substeps``; an ``int`` if it is a whole number of control steps.
 
     Raises:
-        ValueError: The custom numeric is not a whole number from 0 to ``MAX_CONTROL_DELAY``.
+        ValueError: The custom numeric is not from 0 to ``MAX_CONTROL_DELAY``, not a whole number of
+            physics steps, or not a whole number of control steps in a model with activations.
     """
     delay = float(model.numeric(CONTROL_DELAY).data[0]) if has_control_delay(model) else 0.0
-    if not (delay.is_integer() and 0 <= delay <= MAX_CONTROL_DELAY):
+    allowed = 1 if model.na else substeps
+    if not 0 <= delay <= MAX_CONTROL_DELAY or abs(delay * allowed - round(delay * allowed)) > (
+        _TOLERANCE
+    ):
+        parts = "a whole number" if allowed == 1 else f"a multiple of 1/{allowed}"
         raise ValueError(
-            f"{CONTROL_DELAY} must be a whole number from 0 to {MAX_CONTROL_DELAY}, got {delay:g}"
+            f"{CONTROL_DELAY} must be {parts} from 0 to {MAX_CONTROL_DELAY}, got {delay:g}"
         )
-    return int(delay)
+    return as_delay(round(delay * allowed), allowed)
+
+
+def as_delay(parts: int, substeps: int) -> float:
+    """Returns a control delay in control steps; an ``int`` if it is a whole number of them.
+
+    Args:
+        parts: The control delay in physics steps.
+        substeps: Physics steps per control step.
+    """
+    return parts // substeps if parts % substeps == 0 else parts / substeps
+
+
+def split_delay(delay: float, substeps: int) -> tuple[int, int]:
+    """Returns a control delay as whole control steps and the physics steps beyond them.
+
+    Args:
+        delay: Control delay, in control steps.
+        substeps: Physics steps per control step.
+    """
+    return divmod(round(delay * substeps), substeps)
 
 
 def has_control_delay(model: "MjModel") -> bool:

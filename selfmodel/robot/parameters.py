@@ -22,7 +22,7 @@ class Parameters:
         friction: Factor of the sliding friction of all geoms and contact pairs.
         damping: Factor of the damping of all joints.
         motor_gains: Factor of the torque per motor, in the model's order.
-        delay: Control delay, in control steps.
+        delay: Control delay, in control steps; a multiple of a physics step.
     """
 
     root_mass: float
@@ -30,7 +30,7 @@ class Parameters:
     friction: float
     damping: float
     motor_gains: tuple[float, ...]
-    delay: int = 0
+    delay: float = 0
 
     @property
     def factors(self) -> FloatArray:
@@ -50,7 +50,7 @@ def nominal(robot: Robot) -> Parameters:
     return Parameters(1.0, 1.0, 1.0, 1.0, (1.0,) * robot.model.nu, robot.control_delay)
 
 
-def from_factors(factors: FloatArray, delay: int) -> Parameters:
+def from_factors(factors: FloatArray, delay: float) -> Parameters:
     """Returns parameters from their factors.
 
     Args:
@@ -83,12 +83,13 @@ def with_parameters(robot: Robot, parameters: Parameters) -> Robot:
     return with_model(robot, model_with_parameters(robot, parameters), parameters.delay)
 
 
-def with_model(robot: Robot, model: mujoco.MjModel, delay: int) -> Robot:
+def with_model(robot: Robot, model: mujoco.MjModel, delay: float) -> Robot:
     """Returns a robot whose MJCF has the parameters of an edited copy of its compiled model.
 
     Args:
         robot: The robot.
-        model: A copy of the robot's model, with other masses, friction, damping or motor gains.
+        model: A copy of the robot's model, with other masses, friction, motor gains, or damping, dry
+            friction and armature of joints.
         delay: Control delay, in control steps.
     """
     spec = robot.specification()
@@ -109,6 +110,8 @@ def with_model(robot: Robot, model: mujoco.MjModel, delay: int) -> Robot:
     for joint in spec.joints:
         dof = model.jnt_dofadr[joint.id]
         joint.damping = [model.dof_damping[dof], *model.dof_dampingpoly[dof]]
+        joint.armature = model.dof_armature[dof]
+        joint.frictionloss = model.dof_frictionloss[dof]
     for motor in spec.actuators:
         motor.gainprm = model.actuator_gainprm[motor.id]
         motor.biasprm = model.actuator_biasprm[motor.id]

@@ -52,12 +52,12 @@ class Robot:
         object.__setattr__(self, "model", model)
         object.__setattr__(self, "anatomy", read_anatomy(model, root))
         object.__setattr__(self, "root", str(model.body(root).name))
-        control_delay(model)  # raises ValueError
         if not np.isclose(self.substeps * model.opt.timestep, self.control_timestep, rtol=1e-9):
             raise ValueError(
                 f"the control time step {self.control_timestep} s must be a multiple of the "
                 f"physics time step {model.opt.timestep} s"
             )
+        control_delay(model, self.substeps)  # raises ValueError
 
     def __repr__(self) -> str:
         names = self.anatomy
@@ -72,9 +72,9 @@ class Robot:
         return max(1, round(self.control_timestep / float(self.model.opt.timestep)))
 
     @property
-    def control_delay(self) -> int:
+    def control_delay(self) -> float:
         """Control delay of the model, in control steps; see ``CONTROL_DELAY``."""
-        return control_delay(self.model)
+        return control_delay(self.model, self.substeps)
 
     @property
     def is_calibrated(self) -> bool:

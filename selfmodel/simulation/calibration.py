@@ -3,6 +3,8 @@
 The fit is a box-constrained nonlinear least squares over short predictions from logged states
 (``mujoco.minimize``), with a Gaussian prior for parameters that the trials do not determine. The
 control delay, an integer, is found by exhaustive search.
+
+The joints of a robot with a fixed base are fitted one by one; see ``joint_calibration``.
 """
 
 from collections.abc import Callable, Sequence
@@ -34,6 +36,13 @@ from selfmodel.simulation.calibration_segments import (
     CalibrationSegments,
     calibration_segments_of,
 )
+from selfmodel.simulation.joints.calibration import (
+    JointCalibration,
+    calibrated_joints,
+    nominal_error,
+    simulated_joint_steps,
+)
+from selfmodel.simulation.joints.segments import JointSegments, joint_segments_of
 from selfmodel.simulation.outcome import SimulationStats
 from selfmodel.simulation.prediction import predict
 from selfmodel.simulation.requests import Segments
@@ -87,6 +96,7 @@ class Calibration:
         error_before: Root mean square error of the predictions with the nominal parameters, in
             units of ``CALIBRATION_ERROR_SCALES``.
         error: Root mean square error with the fitted parameters, in the same units.
+        joints: Fit of the joints of a robot with a fixed base; None for other robots.
     """
 
     robot: Robot
@@ -94,6 +104,7 @@ class Calibration:
     deviations: FloatArray
     error_before: float
     error: float
+    joints: JointCalibration | None = None
 
     def __repr__(self) -> str:
         lines = [
@@ -108,7 +119,7 @@ class Calibration:
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the JSON values: factors, control delay, deviations and errors."""
-        return {
+        return ({} if self.joints is None else {"joints": self.joints.to_dict()}) | {
             **asdict(self.parameters),
             "deviations": [float(deviation) for deviation in self.deviations],
             "error_before": self.error_before,
@@ -142,6 +153,10 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
     there on. After a late step, an unknown command, or an unknown state at the beginning of a
     segment (every tenth step), the rest of such a trial is not used.
 
+    With a fixed base, gain, damping, dry friction and armature are fitted to joint positions, and
+    the model remains as it is, to the bit, unless the fit predicts segments that were left out of
+    it significantly better; see ``joint_calibration``.
+
     Args:
         robot: The robot as its model describes it.
         trials: At least one trial with commands and state; the base's position and linear velocity
@@ -154,6 +169,8 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
     """
     if not trials:
         raise InputError("expected at least one trial of the healthy robot, got none")
+    if robot.has_fixed_base:
+        return _with_fitted_joints(robot, trials, threads)
     data = _segments(robot, trials)
     start = nominal(robot)
     stats = SimulationStats()
@@ -212,6 +229,8 @@ def simulated_steps(robot: Robot, trials: Sequence[Trial]) -> int:
     Raises:
         InputError: Too little of a trial was observed.
     """
+    if robot.has_fixed_base:
+        return simulated_joint_steps(robot, _joint_segments(robot, trials))
     cut = [own.segments for own in _segments(robot, trials)]
     slopes = 2 * len(nominal(robot).factors)
     # Errors before and after, each delay, then slopes and a new point per iteration.
@@ -234,8 +253,27 @@ def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> flo
     Raises:
         InputError: Too little of a trial was observed.
     """
+    if robot.has_fixed_base:
+        return nominal_error(robot, _joint_segments(robot, trials), threads)
     data = _segments(robot, trials)
     return _error(robot, nominal(robot), data, threads, SimulationStats())
+
+
+def _with_fitted_joints(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibration:
+    fit = calibrated_joints(robot, _joint_segments(robot, trials), threads)
+    gains = tuple(map(float, fit.parameters.values["gain"]))
+    return Calibration(
+        robot=fit.robot,
+        parameters=replace(nominal(robot), motor_gains=gains, delay=fit.best.delay),
+        deviations=np.append(np.full(4, PRIOR_DEVIATION), fit.best.deviations["gain"]),
+        error_before=fit.nominal.error,
+        error=fit.best.error,
+        joints=fit,
+    )
+
+
+def _joint_segments(robot: Robot, trials: Sequence[Trial]) -> list[JointSegments]:
+    return [joint_segments_of(trial_with_known_base(robot, trial)) for trial in trials]
 
 
 Residual = Callable[[FloatArray], FloatArray]

@@ -8,7 +8,7 @@ import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.errors import InputError
-from selfmodel.robot.control_delay import MAX_CONTROL_DELAY
+from selfmodel.robot.control_delay import MAX_CONTROL_DELAY, split_delay
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
@@ -28,7 +28,7 @@ def predict(
     same_dynamics_as: Sequence[int] | None = None,
     threads: int,
     stats: SimulationStats,
-    delay: int | None = None,
+    delay: float | None = None,
 ) -> SimulationResult:
     """Predicts segments of a trial with several models of a robot.
 
@@ -57,10 +57,11 @@ def predict(
     Raises:
         InputError: The segments do not include all commands that are in the delay line.
     """
-    delay_steps = robot.control_delay if delay is None else delay
-    if segments.lead < delay_steps:
+    lag = robot.control_delay if delay is None else delay
+    delay_steps, part = split_delay(lag, robot.substeps)
+    if segments.lead < lag:
         raise InputError(
-            f"the robot's commands take effect {delay_steps} steps late, and segments have a lead "
+            f"the robot's commands take effect {lag} steps late, and segments have a lead "
             f"of {segments.lead}: a comparator needs a lead of {MAX_CONTROL_DELAY}"
         )
     n, count, horizon = len(embodiments), len(segments.commands), segments.horizon
@@ -104,9 +105,12 @@ def predict(
             for signal, read in live.items():
                 kept[signal][:, stage, k] = read()[batch_rows].reshape(n, together, -1)
             if k < horizon:
-                inputs.write_commands(segments.commands[stage, first + k])
                 clock = perf_counter()
-                alive.step(robot.substeps)
+                if part:
+                    inputs.write_commands(segments.commands[stage, first + k - 1])
+                    alive.step(part)
+                inputs.write_commands(segments.commands[stage, first + k])
+                alive.step(robot.substeps - part)
                 stats.physics_seconds += perf_counter() - clock
     diverged: BoolArray = np.any(alive.diverged()[batch_rows].reshape(n, together), axis=1)
     stats.runs += n

@@ -13,6 +13,7 @@ from selfmodel.controllers.command_source import CommandSource, make_batch
 from selfmodel.faults.build import apply_faults, build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.physical.reality_gap import perturbed_models
+from selfmodel.robot.control_delay import split_delay
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
@@ -188,7 +189,8 @@ class Simulator:
             len(robot.anatomy.sensors),
         )
         sensordata, qpos, ctrl = (batch.bind(field) for field in ("sensordata", "qpos", "ctrl"))
-        motors = _DelayLine(ctrl, robot.control_delay)
+        whole, part = split_delay(robot.control_delay, robot.substeps)
+        motors = _DelayLine(ctrl, whole + bool(part))
         live = live_signals(robot, batch, embodiments, record)
         live |= {"sensors": lambda: controllers.readings, "commands": lambda: motors.inlet}
         # Steps first during the run, so that each step is written to contiguous memory.
@@ -206,7 +208,10 @@ class Simulator:
                 rows[k] = live[signal]()
             if k + 1 < steps:
                 start = perf_counter()
-                alive.step(robot.substeps)
+                if part:
+                    alive.step(part)
+                    motors.release()
+                alive.step(robot.substeps - part)
                 self.stats.physics_seconds += perf_counter() - start
         diverged = alive.diverged()
         self.stats.runs += n
@@ -224,7 +229,7 @@ class _DelayLine:
 
     Args:
         outlet: Commands at the motors, ``(n, motors)``; written.
-        delay: Control delay, control steps.
+        delay: Control delay, control steps, rounded up.
     """
 
     def __init__(self, outlet: FloatArray, delay: int) -> None:
@@ -241,3 +246,7 @@ class _DelayLine:
             self._outlet[:] = self._line[slot]
             self._line[slot] = self.inlet
             self._step += 1
+
+    def release(self) -> None:
+        """Moves the oldest command of the line to the outlet, where it would be a step later."""
+        self._outlet[:] = self._line[self._step % len(self._line)]

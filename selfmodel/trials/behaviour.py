@@ -1,6 +1,6 @@
 """Behaviour: the recorded signals of one run or a batch of runs (in the field: a trajectory)."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -136,6 +136,12 @@ class Behaviour:
             signals={name: values[..., :steps, :] for name, values in self.signals.items()},
             late=None if self.late is None else self.late[:steps],
         )
+
+
+def samples_of(behaviour: Behaviour) -> Iterator[Sample]:
+    """Yields the samples of the behaviour of one run, without its step timing."""
+    for k, time in enumerate(behaviour.time.tolist()):
+        yield Sample(time, {signal: values[k] for signal, values in behaviour.signals.items()})
 
 
 def collect(names: Names, samples: Iterable[Sample]) -> Behaviour:

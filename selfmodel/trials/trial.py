@@ -1,11 +1,22 @@
 """A trial: one logged run of the physical robot with one command source."""
 
+import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+from numpy.typing import ArrayLike
 
 from selfmodel.controllers.command_source import CommandSource
+from selfmodel.controllers.playback import played_back
 from selfmodel.errors import InputError
+from selfmodel.trials.arrays import Described, behaviour_of_arrays
 from selfmodel.trials.behaviour import Behaviour, forward_displacement
+from selfmodel.trials.columns import columns_of
+from selfmodel.trials.data_frame import data_frame
+
+if TYPE_CHECKING:
+    from selfmodel.trials.signals import Signal
 
 Stage = Literal["before", "after", "recovery", "single"]
 """Stage of a recovery: ``before`` (healthy robot), ``after`` (failed robot, old controller),
@@ -68,7 +79,7 @@ class Trial:
         robot: Name of the robot.
         behaviour: Observed signals: ``plan.steps`` steps, or fewer if the trial was interrupted;
             NaN for values that were not observed.
-        path: Path of the log.
+        path: Path of the log; for a trial without one, its name and the digest of its signals.
     """
 
     plan: TrialPlan
@@ -85,7 +96,109 @@ class Trial:
             f"\n  {self.path}>"
         )
 
+    @classmethod
+    def from_arrays(
+        cls,
+        robot: Described,
+        joint_positions: ArrayLike,
+        commands: ArrayLike,
+        *,
+        time: ArrayLike | None = None,
+        joint_names: Sequence[str] | None = None,
+        motor_names: Sequence[str] | None = None,
+        joint_velocities: ArrayLike | None = None,
+        joint_efforts: ArrayLike | None = None,
+        sensors: ArrayLike | None = None,
+        base_position: ArrayLike | None = None,
+        base_orientation: ArrayLike | None = None,
+        base_linear_velocity: ArrayLike | None = None,
+        base_angular_velocity: ArrayLike | None = None,
+        controller: CommandSource | None = None,
+        stage: Stage = "single",
+        name: str = "arrays",
+    ) -> "Trial":
+        """Returns a trial of measured arrays, one row per control step.
+
+        Numbers that were not measured are NaN; a signal that is left out is NaN as a whole.
+
+        Example:
+            >>> import selfmodel
+            >>> robot = selfmodel.load_robot("quadruped")
+            >>> logged = selfmodel.read_log("after.mcap").trial.behaviour
+            >>> selfmodel.Trial.from_arrays(
+            ...     robot, logged["joint_positions"], logged["commands"], name="mine"
+            ... ).behaviour.steps
+            60
+
+        Args:
+            robot: Robot of the trial, such as ``selfmodel.load_robot("quadruped")``.
+            joint_positions: Joint angles, ``(steps, hinges)`` rad.
+            commands: Commands, ``(steps, motors)``, each in its motor's unit.
+            time: Times of the rows, ``(steps,)`` s, which are checked to be control steps.
+            joint_names: Hinges of the columns of the joints' arrays; None for the order of
+                ``robot.anatomy.hinges``.
+            motor_names: Motors of the columns of ``commands``; None for the order of
+                ``robot.anatomy.motors``.
+            joint_velocities: Joint velocities, ``(steps, hinges)`` rad/s.
+            joint_efforts: Joint torques, ``(steps, hinges)`` N m.
+            sensors: Readings of the controller's sensors, ``(steps, sensors)``; touch is 0 or 1.
+            base_position: Position of the root body, ``(steps, 3)`` m, world frame.
+            base_orientation: Unit quaternions of the root body, ``(steps, 4)``, w x y z.
+            base_linear_velocity: Velocity of the root body, ``(steps, 3)`` m/s, world frame.
+            base_angular_velocity: Angular velocity, ``(steps, 3)`` rad/s, in the root body's frame.
+            controller: Controller that computed the commands; None to play the commands back.
+            stage: Stage of the trial: ``before`` for a healthy robot.
+            name: Name of the trial: letters, digits, ``-``.
+
+        Raises:
+            InputError: An array has another shape or type, the rows are not control steps, the
+                first commands are missing, or a name is unknown.
+        """
+        joints: tuple[Signal, ...] = ("joint_positions", "joint_velocities", "joint_efforts")
+        arrays: dict[Signal, ArrayLike | None] = {
+            "sensors": sensors,
+            "commands": commands,
+            "joint_positions": joint_positions,
+            "joint_velocities": joint_velocities,
+            "joint_efforts": joint_efforts,
+            "base_position": base_position,
+            "base_orientation": base_orientation,
+            "base_linear_velocity": base_linear_velocity,
+            "base_angular_velocity": base_angular_velocity,
+        }
+        orders = {**dict.fromkeys(joints, joint_names), "commands": motor_names}
+        behaviour = behaviour_of_arrays(robot, arrays, time, orders)
+        try:
+            played = played_back(behaviour.names.motors, behaviour["commands"])
+        except ValueError as error:
+            raise InputError(
+                f"{error}: begin the arrays at the first row with all commands"
+            ) from error
+        plan = TrialPlan(name, stage, controller or played, behaviour.steps, seed=0)
+        return cls(plan, robot.name, behaviour, f"{name} ({_digest(behaviour)})")
+
+    def to_pandas(self) -> Any:  # noqa: ANN401  # pandas is optional
+        """Returns the signals as a ``pandas.DataFrame``, with the columns of ``logs export``.
+
+        Example:
+            >>> import selfmodel
+            >>> selfmodel.read_log("after.mcap").trial.to_pandas()["base_position.x"].shape
+            (60,)
+
+        Raises:
+            InputError: pandas is not installed.
+        """
+        return data_frame(columns_of(self.behaviour))
+
     @property
     def displacement(self) -> float:
         """Forward displacement, m."""
         return float(forward_displacement(self.behaviour))
+
+
+def _digest(behaviour: Behaviour) -> str:
+    """Digest of the signals: losses are looked up by the path of a trial."""
+    digest = hashlib.sha256()
+    for values in behaviour.signals.values():
+        digest.update(values.tobytes())
+    return digest.hexdigest()[:16]

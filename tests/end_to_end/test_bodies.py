@@ -89,7 +89,7 @@ def test_it_walks_in_dm_control_s_world_like_in_the_simulator_to_the_bit(body: R
     told = ("base_position", "base_orientation", "base_linear_velocity", "joint_positions")
     runs = [(INTACT, swung(body, 20))]
     truth = Simulator(body, 1).run(runs, 20, told).behaviour
-    environment = walking.environment(body, "intact", 9.0, None, None)
+    environment = walking.environment(body, time_limit=9.0)
     rows = [environment.reset()]
     rows += [environment.step(commands) for commands in swinging(body, 20)[:-1]]
 

@@ -101,7 +101,7 @@ def test_delays_and_silence_are_marked_and_the_trial_goes_on(tmp_path: Path):
 
 def observed(commands: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
     """What the robot observes that follows some targets."""
-    env = environment(slow_quadruped(), "intact", 1e3, None, None)
+    env = environment(slow_quadruped(), time_limit=1e3)
     observe = motion_capture(env)
     yield observe(env.reset().observation)
     for targets in commands[:-1]:

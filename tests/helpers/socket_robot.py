@@ -47,7 +47,7 @@ class Body:
 
     def __init__(self, heard: Path, failures: dict[str, float | str]) -> None:
         self._heard, self._failures = heard, failures
-        self._env = environment(slow_quadruped(), "intact", 1e3, None, None)
+        self._env = environment(slow_quadruped(), time_limit=1e3)
         self._observe = motion_capture(self._env)
         self._lock = threading.Lock()  # a stop comes by another connection
 

@@ -168,10 +168,10 @@ def test_the_robot_stays_as_it_was(quadruped: Robot):
     np.testing.assert_array_equal(quadruped.model.dof_damping, before[1])
 
 
-@pytest.mark.parametrize("said", ["-3", "nan", "1e300", "2.5", "6"])
+@pytest.mark.parametrize("said", ["-3", "nan", "1e300", "2.3", "6"])
 def test_an_invalid_delay_is_refused(quadruped: Robot, said: str):
     numeric = f'<custom><numeric name="{CONTROL_DELAY}" data="{said}"/></custom></mujoco>'
     mjcf = quadruped.mjcf.replace("</mujoco>", numeric)
 
-    with pytest.raises(ValueError, match="must be a whole number from 0 to 5"):
+    with pytest.raises(ValueError, match="must be a multiple of 1/2 from 0 to 5"):
         Robot(quadruped.name, mjcf, quadruped.control_timestep)

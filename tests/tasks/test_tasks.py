@@ -43,8 +43,9 @@ def damages(domain: str) -> Iterator[str]:
         yield text.format(joint=anatomy.joints[0].name, sensor=anatomy.sensors[0].name)
 
 
-EVERY = [(domain, task, text) for domain, task in ALL_TASKS for text in damages(domain)]
-every_task = pytest.mark.parametrize(("domain", "task"), ALL_TASKS)
+OWN_TASKS = [(domain, task) for domain, task in ALL_TASKS if domain in ROBOTS]
+EVERY = [(domain, task, text) for domain, task in OWN_TASKS for text in damages(domain)]
+every_task = pytest.mark.parametrize(("domain", "task"), OWN_TASKS)
 every_body = pytest.mark.parametrize(("domain", "task", "hypothesis"), EVERY)
 
 
@@ -70,7 +71,7 @@ def episodes(
 
 def test_the_suite_names_each_task_once_and_loads_it():
     assert len(set(ALL_TASKS)) == len(ALL_TASKS) == sum(map(len, TASKS_BY_DOMAIN.values())) > 0
-    assert set(TASKS_BY_DOMAIN) == set(SUITE) == set(ROBOTS)
+    assert set(TASKS_BY_DOMAIN) == set(SUITE) > set(ROBOTS)
     for domain, task in ALL_TASKS:
         assert callable(SUITE[domain][task])
         assert task in TASKS_BY_DOMAIN[domain]

@@ -50,11 +50,9 @@ def check_names(
         InputError: The mapping names an unknown part, or omits a required part.
     """
     document = mapping.document
-    for angles, what, known in (
-        (mapping.joints, "hinge", hinges),
-        (mapping.commands, "motor", motors),
-    ):
-        path = (angles.role, "names")
+    required = ((mapping.joints, "hinge", hinges), (mapping.commands, "motor", motors))
+    for angles, what, known in required:
+        path: tuple[str, ...] = (angles.role, "names")
         _check_known(document, path, angles.links, what, known)
         if missing := [name for name in known if name not in angles.links]:
             raise document.error(

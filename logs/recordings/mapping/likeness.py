@@ -94,7 +94,7 @@ def likeness(ours: str, theirs: str) -> float:
     """
     if max(len(ours), len(theirs)) > LONGEST:
         return 0.0
-    if "".join(word[0] for word in _parts(ours)) == theirs.lower():
+    if "".join(word[0] for word in parts_of(ours)) == theirs.lower():
         return 1.0
     first, second = _words(ours), _words(theirs)
     if any((first & sides) and (second & sides) and not first & second & sides for sides in _SIDES):
@@ -106,9 +106,9 @@ def likeness(ours: str, theirs: str) -> float:
 
 
 def _words(name: str) -> frozenset[str]:
-    return frozenset(word for part in _parts(name) for word in _WORDS.get(part, (part,)))
+    return frozenset(word for part in parts_of(name) for word in _WORDS.get(part, (part,)))
 
 
-def _parts(name: str) -> list[str]:
-    """Words of a name: ``FLKnee_2`` has ``fl``, ``knee`` and ``2``."""
+def parts_of(name: str) -> list[str]:
+    """Returns the words of a name: ``FLKnee_2`` has ``fl``, ``knee`` and ``2``."""
     return [part.lower() for part in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", name)]

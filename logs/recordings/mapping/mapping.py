@@ -216,7 +216,7 @@ class RecordingMapping:
         """Columns of a table, each with the path of its entry in the mapping."""
         if self.time is None:
             return []
-        found = [(("time", "column"), self.time.column)]
+        found: list[tuple[tuple[str, ...], str]] = [(("time", "column"), self.time.column)]
         for angles in (self.joints, self.commands):
             path = angles.role
             found += [((path, "names", part), link.name) for part, link in angles.links.items()]

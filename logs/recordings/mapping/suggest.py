@@ -1,28 +1,16 @@
-"""Suggestion of a mapping from a bag and a robot.
+"""Suggestion of a mapping from a recording and a robot.
 
 Comments mark uncertain entries: ``CHECK`` marks a guess, ``CHANGE`` an entry to fill in.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from selfmodel.logs.recordings.mapping.checks import TYPES
-from selfmodel.logs.recordings.mapping.likeness import NameMatch, matched
-from selfmodel.logs.recordings.mapping.mapping import UNKNOWN, RoleKind
-from selfmodel.logs.recordings.rosbag.bag import Bag, read_bag
-from selfmodel.logs.recordings.rosbag.message_types import (
-    ARRAY,
-    ENCODINGS,
-    JOINT_STATE,
-    NUMBERS,
-    ODOMETRY,
-    WRENCH,
-)
-from selfmodel.logs.recordings.series import Series, Topic
+from selfmodel.logs.recordings.mapping.quoting import quoted
+from selfmodel.logs.recordings.mapping.suggest_bag import suggest_for_bag
+from selfmodel.logs.recordings.mapping.suggest_table import suggest_for_table
+from selfmodel.logs.recordings.tables.table import is_table
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
-
-_COMMANDED = ("command", "cmd", "target", "desired", "setpoint", "goal", "reference")
 
 
 def suggest(
@@ -31,28 +19,20 @@ def suggest(
     """Returns the suggestion of a mapping, as TOML.
 
     Args:
-        path: Folder or file of the bag.
+        path: Folder or file of a bag, or a table.
         robot: Robot of the recording.
         name: Name of the robot in the mapping, or its MJCF file.
         with_timestep: Whether the mapping must contain the control time step.
-        budget: Memory and time for the bag.
+        budget: Memory and time for the recording.
 
     Raises:
-        LogError: The bag is damaged.
-        BudgetError: The bag takes more than the budget allows.
-        InputError: The bag cannot be read.
+        LogError: The recording is damaged.
+        BudgetError: The recording takes more than the budget allows.
+        InputError: The recording cannot be read.
     """
-    bag = read_bag(path, (), budget)
-    hinges, motors = robot.anatomy.hinges, robot.anatomy.motors
-    joints, commands = _able(bag, "joints"), _able(bag, "commands")
-    series = read_bag(path, {topic.name for topic in (*joints, *commands)}, budget).series
-    joints = [topic for topic in joints if not _is_command(topic)]
-    joints.sort(key=lambda topic: -_fit(series[topic.name], hinges))
-    commands = [topic for topic in commands if topic not in joints[:1]]
-    commands.sort(key=lambda topic: (not _is_command(topic), -_fit(series[topic.name], motors)))
     lines = [
         "# A suggestion. CHECK marks a guess; CHANGE must be filled in before it can be used.",
-        f"robot = {_quoted(name)}",
+        f"robot = {quoted(name)}",
     ]
     if with_timestep:
         lines.append(
@@ -62,150 +42,6 @@ def suggest(
     lines += [
         '# controller = "gait.npz"  # controller of the robot, if known',
         '# stage = "before"  # of the healthy robot',
-        'clock = "header"  # or "log", if the time stamps are of another clock',
-        "# start = 0.0      # s after the first moment at which every role has data",
-        "# duration = 10.0  # s",
-        "",
-        *_angles("joints", joints, series, hinges, ()),
-        "",
-        *_angles("commands", commands, series, motors, _names(series, joints[:1])),
-        "",
-        *_base(bag),
-        *_imu(bag),
-        *_touches(bag, [s.name for s in robot.anatomy.sensors if s.kind == "touch"]),
+        *(suggest_for_table if is_table(path) else suggest_for_bag)(path, robot, budget),
     ]
     return "\n".join(lines).rstrip() + "\n"
-
-
-def _able(bag: Bag, kind: RoleKind) -> list[Topic]:
-    """Topics that can play a role, in the order of the role's types."""
-    able = [
-        topic
-        for topic in bag.topics.values()
-        if topic.type in TYPES[kind] and topic.encoding in ENCODINGS and topic.count
-    ]
-    return sorted(able, key=lambda topic: TYPES[kind].index(topic.type))
-
-
-def _is_command(topic: Topic) -> bool:
-    return topic.type != JOINT_STATE or any(word in topic.name.lower() for word in _COMMANDED)
-
-
-def _fit(series: Series, parts: Sequence[str]) -> int:
-    """Number of parts of the robot with a matching name on a topic."""
-    if series.topic.type == ARRAY:
-        return len(parts) if len(series.columns) == len(parts) else 0
-    return len(matched(parts, list(series.columns)))
-
-
-def _names(series: Mapping[str, Series], topics: Sequence[Topic]) -> tuple[str, ...]:
-    return tuple(name for topic in topics for name in series[topic.name].columns)
-
-
-def _angles(
-    table: str,
-    topics: Sequence[Topic],
-    series: Mapping[str, Series],
-    parts: Sequence[str],
-    order: tuple[str, ...],
-) -> Iterator[str]:
-    """Table of the joints or of the commands.
-
-    Args:
-        table: Name of the table.
-        topics: Topics that can play the role, most likely first.
-        series: Messages by topic.
-        parts: Hinges or motors of the robot.
-        order: Likely names of the columns of a Float64MultiArray, in order.
-    """
-    yield f"[{table}]"
-    yield _topic(topics)
-    yield 'unit = "rad"  # CHECK: rad or deg'
-    offered: tuple[str, ...] = ()
-    if topics:
-        offered = _names(series, topics[:1])
-        if topics[0].type == ARRAY:
-            offered = _order(len(offered), order)
-            yield f"order = [{', '.join(map(_quoted, offered))}]  # CHECK: the bag has no names"
-    yield f"[{table}.names]  # each may also be {{ name = ..., sign = -1, offset = 0.1 }}"
-    found = matched(parts, offered)
-    for part in parts:
-        yield f"{_key(part)} = {_link(found.get(part), offered)}"
-
-
-def _order(width: int, order: tuple[str, ...]) -> tuple[str, ...]:
-    return order if len(order) == width else tuple(f"column_{k}" for k in range(width))
-
-
-def _link(guess: NameMatch | None, offered: Sequence[str]) -> str:
-    if guess is None:
-        known = ", ".join(map(_escaped, offered)) or "nothing"
-        return f'"{UNKNOWN}"  # CHANGE: the bag has {known}'
-    return _quoted(guess.name) + ("" if guess.sure else "  # CHECK: not sure")
-
-
-def _topic(topics: Sequence[Topic]) -> str:
-    if not topics:
-        return f'topic = "{UNKNOWN}"  # CHANGE: the bag has none of a type that fits'
-    others = ", ".join(_escaped(topic.name) for topic in topics[1:])
-    return f"topic = {_quoted(topics[0].name)}" + (f"  # CHECK: or {others}" if others else "")
-
-
-def _base(bag: Bag) -> Iterator[str]:
-    topics = _able(bag, "base")
-    if not topics:
-        yield "# No topic has the position of the base: the trial has no displacement."
-        yield ""
-        return
-    yield "[base]"
-    yield _topic(topics)
-    yield 'frame = "start"'
-    yield 'unit = "m"'
-    if topics[0].type != ODOMETRY:
-        yield "# It has no velocities, and none are derived."
-    yield ""
-
-
-def _imu(bag: Bag) -> Iterator[str]:
-    if topics := _able(bag, "imu"):
-        yield "[imu]  # CHECK: its axes must be those of the root body"
-        yield _topic(topics)
-        yield ""
-
-
-def _touches(bag: Bag, sensors: Sequence[str]) -> Iterator[str]:
-    topics = {
-        topic.name: topic for topic in _able(bag, "touch") if topic.type in (WRENCH, *NUMBERS)
-    }
-    found = matched(sensors, list(topics))
-    for sensor in sensors:
-        if sensor not in found:
-            yield f"# No topic is similar to {_escaped(sensor)}: it is not observed."
-            continue
-        topic = topics[found[sensor].name]
-        unsure = "" if found[sensor].sure else "  # CHECK: not sure"
-        yield f"[touch.{_key(sensor)}]"
-        yield f"topic = {_quoted(topic.name)}{unsure}"
-        if not topic.type.endswith("Bool"):
-            yield "threshold = 5.0  # CHECK: it reads 1 above this"
-        yield ""
-
-
-def _quoted(text: str) -> str:
-    """TOML string of a text."""
-    return f'"{_escaped(text)}"'
-
-
-def _escaped(text: str) -> str:
-    """Text in a TOML string or comment; names in a bag or a model may contain any character."""
-    return "".join(
-        char if char.isprintable() and char not in '"\\' else f"\\U{ord(char):08X}" for char in text
-    )
-
-
-def _key(name: str) -> str:
-    return (
-        name
-        if name.replace("_", "").replace("-", "").isalnum() and name.isascii()
-        else _quoted(name)
-    )

@@ -1,9 +1,10 @@
 """Content of a table's file, within the limits of the budget."""
 
 import os
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +45,7 @@ class Request:
     """
 
     path: Path
-    wanted: Collection[str]
+    wanted: frozenset[str]
     exact: str
     budget: Budget
 
@@ -114,7 +115,7 @@ def answer(message: Message, budget: Budget, read: Callable[[Request], Content])
     return Message({"names": list(found.names), "kinds": kinds, "sha256": digest}, blobs)
 
 
-def as_numbers(values: NDArray[np.generic], *, exact: bool) -> Numbers:
+def as_numbers(values: NDArray[Any], *, exact: bool) -> Numbers:
     """Returns an array of numbers as float64, or its integers as int64.
 
     Args:

@@ -33,7 +33,7 @@ def read_parquet(request: Request) -> Content:
 
 def _content(request: Request, data: pa.OSFile) -> Content:
     # The memory of other allocators is reserved in large blocks, which exceed the limit.
-    file = pq.ParquetFile(data, memory_map=False, pre_buffer=False)
+    file = pq.ParquetFile(data, memory_map=False, pre_buffer=False, page_checksum_verification=True)
     if file.metadata.num_columns > request.budget.names:
         request.check_names([""] * file.metadata.num_columns)
     names = [field.name for field in file.schema_arrow if _is_numeric(field.type)]

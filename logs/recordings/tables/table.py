@@ -11,15 +11,13 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from selfmodel.errors import InputError
 from selfmodel.logs.recordings.series import Source
+from selfmodel.logs.recordings.tables.content import Numbers
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.sandbox.isolation import run_isolated
 from selfmodel.sandbox.message import Message
-
-Numbers = NDArray[np.float64] | NDArray[np.int64]
 
 FORMATS: Mapping[str, str] = MappingProxyType(
     {".csv": "CSV", ".tsv": "CSV", ".npz": "NPZ", ".parquet": "Parquet"}
@@ -84,9 +82,14 @@ def read_table(
         what=str(path),
         budget=budget,
     )
-    columns: dict[str, Numbers] = {
-        name: np.frombuffer(found.blobs[name], dtype=np.int64 if kind == "i" else np.float64)
-        for name, kind in found.facts["kinds"].items()
+    columns = {
+        name: _numbers(found.blobs[name], kind) for name, kind in found.facts["kinds"].items()
     }
     source = Source(path.name, found.facts["sha256"])
     return Table(path, form, tuple(found.facts["names"]), columns, (source,))
+
+
+def _numbers(data: bytes, kind: str) -> Numbers:
+    if kind == "i":
+        return np.frombuffer(data, dtype=np.int64)
+    return np.frombuffer(data, dtype=np.float64)

@@ -10,6 +10,7 @@ from selfmodel.logs.recordings.mapping.mapping import TABLE, RecordingMapping, T
 from selfmodel.logs.recordings.resampling.clock import Clocked, Track, track
 from selfmodel.logs.recordings.resampling.tracks import RawTracks
 from selfmodel.logs.recordings.series import Column, IntArray, Series, Topic
+from selfmodel.logs.recordings.tables.content import Numbers
 from selfmodel.logs.recordings.tables.table import Table
 
 MAX_TIME = 2**62
@@ -58,8 +59,7 @@ def rows_of(table: Table, time: TimeColumn) -> Rows:
             f"{time.column}, got {known[far[0]]:.6g} in row {index[far[0]] + 1}: check the unit in "
             f"[time]"
         )
-    exact = known.dtype.kind == "i"
-    times = known * time.unit if exact else np.rint(known * time.unit).astype(np.int64)
+    times = _nanoseconds(known, time.unit)
     missing = len(values) - len(index)
     series = Series(
         topic=Topic(TABLE, table.format, "", len(values)),
@@ -70,6 +70,12 @@ def rows_of(table: Table, time: TimeColumn) -> Rows:
     )
     everything = np.ones(len(times), dtype=bool)
     return Rows(index, series, Clocked(times, everything, 0, np.zeros(0)))
+
+
+def _nanoseconds(values: Numbers, unit: int) -> IntArray:
+    if values.dtype.kind == "i":  # an integer of ns has more digits than float64
+        return values.astype(np.int64) * unit
+    return np.rint(values * unit).astype(np.int64)
 
 
 def table_tracks(mapping: RecordingMapping, table: Table, rows: Rows) -> RawTracks:

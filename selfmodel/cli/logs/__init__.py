@@ -4,11 +4,12 @@ from selfmodel.cli.lazy import group
 
 app = group(
     "logs",
-    "Inspect and verify trial logs, salvage damaged ones, import recordings.",
+    "Inspect and verify trial logs, salvage damaged ones, import recordings, export tables.",
     {
         "info": ("selfmodel.cli.logs.info:info", "Show what logs contain."),
         "verify": ("selfmodel.cli.logs.verify:verify", "Check every checksum, count and digest."),
         "salvage": ("selfmodel.cli.logs.salvage:salvage", "Save the complete data of a bad log."),
-        "import": ("selfmodel.cli.logs.import_:import_", "Import a rosbag2 recording as a log."),
+        "import": ("selfmodel.cli.logs.import_:import_", "Import a recording as a log."),
+        "export": ("selfmodel.cli.logs.export:export", "Write a log's signals as a table."),
     },
 )

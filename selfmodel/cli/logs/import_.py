@@ -1,4 +1,4 @@
-"""``selfmodel logs import``: a ROS 1 or ROS 2 recording of a robot as a trial log."""
+"""``selfmodel logs import``: a recording of a robot, a bag or a table, as a trial log."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -14,23 +14,22 @@ from selfmodel.controllers.controller import Controller
 from selfmodel.errors import InputError
 from selfmodel.experiments import robots, trial_logs
 from selfmodel.experiments.robots import is_model
-from selfmodel.files import read_file
 from selfmodel.logs.files import refuse_existing
 from selfmodel.logs.recordings.importer import Recording, import_recording, write_recording
 from selfmodel.logs.recordings.mapping.mapping import RecordingMapping
 from selfmodel.logs.recordings.mapping.mapping_file import read_mapping
 from selfmodel.logs.recordings.mapping.suggest import suggest as suggest_mapping
-from selfmodel.robot.mjcf.rehearsal import physics_timestep
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import Budget
 
-TIMESTEP = 0.01
-"""Approximate control time step that ``--suggest`` assumes for an MJCF file, s."""
-
 
 def import_(
-    bag: Annotated[
-        Path, typer.Argument(metavar="BAG", help="Folder of a bag, .mcap, .db3 or .bag.")
+    recording: Annotated[
+        Path,
+        typer.Argument(
+            metavar="RECORDING",
+            help="A bag of ROS (folder, .mcap, .db3, .bag) or a table (.csv, .npz, .parquet).",
+        ),
     ],
     *,
     out: Annotated[
@@ -39,26 +38,28 @@ def import_(
     ] = None,
     mapping: Annotated[
         Path | None,
-        typer.Option(metavar="MAP.toml", help="Topics and message fields per signal and joint."),
+        typer.Option(metavar="MAP.toml", help="Topics or columns per signal and joint."),
     ] = None,
     suggest: Annotated[
         bool, typer.Option("--suggest", help="Print a mapping to edit, and import nothing.")
     ] = False,
     robot: Annotated[
         str | None,
-        typer.Option(metavar="ROBOT", help="Robot of --suggest: a robot's name, or MODEL.xml."),
+        typer.Option(
+            metavar="ROBOT", help="Robot of --suggest: a robot's name, or its MJCF or URDF."
+        ),
     ] = None,
     budget: FileBudget = DEFAULT_BUDGET,
     as_json: Json = False,
 ) -> None:
-    """Import a ROS 1 or ROS 2 recording of a robot as a trial log, without ROS."""
+    """Import a recording of a robot as a trial log: a bag of ROS, without ROS, or a table."""
     allowed = Budget.parse(budget)
     if suggest:
         if robot is None or out or mapping or as_json:
             raise InputError(
                 "--suggest needs --robot NAME|MODEL.xml, and excludes --out, --mapping and --json"
             )
-        lines = _suggestion(bag, robot, allowed).removesuffix("\n").split("\n")
+        lines = _suggestion(recording, robot, allowed).removesuffix("\n").split("\n")
         print_lines(*lines)
         return
     if robot is not None:
@@ -69,32 +70,20 @@ def import_(
             "--suggest --robot NAME|MODEL.xml prints a mapping to edit"
         )
     check_log_name(out)
-    _import(bag, out, mapping, allowed, as_json=as_json)
+    _import(recording, out, mapping, allowed, as_json=as_json)
 
 
-def _suggestion(bag: Path, name: str, budget: Budget) -> str:
-    own = not is_model(name)
-    made = robots.robot(name, TIMESTEP if own else _timestep(Path(name), budget), budget)
-    return suggest_mapping(bag, made, name, with_timestep=not own, budget=budget)
+def _suggestion(recording: Path, name: str, budget: Budget) -> str:
+    made = robots.recorded_robot(name, None, budget)
+    return suggest_mapping(recording, made, name, with_timestep=is_model(name), budget=budget)
 
 
-def _timestep(path: Path, budget: Budget) -> float:
-    """Returns the multiple of a model's physics time step nearest to ``TIMESTEP``, s."""
-    data = read_file(path, "an MJCF file", budget.model_text)
-    try:
-        physics = physics_timestep(data.decode(), budget)
-    except ValueError as error:
-        what = " ".join(str(error).split())
-        raise InputError(f"{path}: expected an MJCF file of a robot: {what}") from error
-    return max(1, round(TIMESTEP / physics)) * physics
-
-
-def _import(bag: Path, out: Path, path: Path, budget: Budget, *, as_json: bool) -> None:
+def _import(source: Path, out: Path, path: Path, budget: Budget, *, as_json: bool) -> None:
     refuse_existing(out)
     mapping = read_mapping(path)
     made = _mapped_robot(mapping, path.parent, budget)
     controller = _controller(mapping, path.parent, made)
-    recording = import_recording(bag, mapping, made, budget)
+    recording = import_recording(source, mapping, made, budget)
     write_recording(out, made, recording, mapping, controller)
     if as_json:
         print_json(_facts(out, mapping, recording))
@@ -103,7 +92,7 @@ def _import(bag: Path, out: Path, path: Path, budget: Budget, *, as_json: bool) 
 
 
 def _mapped_robot(mapping: RecordingMapping, folder: Path, budget: Budget) -> Robot:
-    """Returns the robot of a mapping: one of selfmodel's, or an MJCF file beside the mapping."""
+    """Returns the robot of a mapping: one of selfmodel's, or of a model file beside the mapping."""
     name, timestep = mapping.robot, mapping.control_timestep
     own = not is_model(name)
     if own and timestep is not None:
@@ -115,7 +104,7 @@ def _mapped_robot(mapping: RecordingMapping, folder: Path, budget: Budget) -> Ro
             ("robot",), f"{name} has no control time step: add control_timestep, s"
         )
     try:
-        return robots.robot(name if own else str(folder / name), timestep or TIMESTEP, budget)
+        return robots.recorded_robot(name if own else str(folder / name), timestep, budget)
     except InputError as error:
         raise mapping.document.error(("robot",), str(error)) from error
 

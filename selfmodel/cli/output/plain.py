@@ -23,6 +23,6 @@ def figure_text(text: str) -> str:
     return plain(text).replace("$", r"\$")
 
 
-def counted(number: int, noun: str) -> str:
+def counted(number: float, noun: str) -> str:
     """Returns a number and its noun, such as ``1 log`` or ``2 logs``."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

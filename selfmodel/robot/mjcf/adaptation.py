@@ -21,6 +21,7 @@ from selfmodel.robot.mjcf.forward import turn_forward
 from selfmodel.robot.mjcf.ground import add_ground
 from selfmodel.robot.mjcf.hidden_state import remove_hidden_state
 from selfmodel.robot.mjcf.keyframe import bake_keyframe
+from selfmodel.robot.mjcf.missing_meshes import replace_missing_meshes
 from selfmodel.robot.mjcf.mujoco_errors import compile_model, mujoco_errors_as_input_errors
 from selfmodel.robot.mjcf.names import name_parts
 from selfmodel.robot.mjcf.reach import limit_reach
@@ -85,6 +86,7 @@ def adapt(path: Path, settings: MjcfSettings, budget: Budget = DEFAULT_BUDGET) -
             "model": document.text,
             "settings": asdict(replace(settings, assets="")),  # the files are read
             "notes": document.notes,
+            "missing": document.missing,
         }
         request = Message(facts, document.assets)
         found = run_on_model("selfmodel.robot.mjcf.adaptation:adapt_message", request, budget)
@@ -111,12 +113,12 @@ def adapt_message(message: Message, budget: Budget, _scratch: Path) -> Message:
     """Task of a child process: adapts the document in a message, and checks the robot of it."""
     facts = message.facts
     root = ET.fromstring(facts["model"])  # noqa: S314  # checked
-    document = Document(root, dict(message.blobs), list(facts["notes"]))
+    document = Document(root, dict(message.blobs), list(facts["notes"]), facts["missing"])
     given = {name: value for name, value in facts["settings"].items() if value is not None}
     of_urdf = given.pop("urdf")
     settings = checked_settings({**given, **of_urdf})
     if root.tag == "robot":
-        document = convert(document, settings.urdf)
+        document = convert(document, settings.urdf, settings.base)
     adapted = _adapted(facts["name"], document, settings, budget)
     with mujoco_errors_as_input_errors("use the model"):
         Robot(adapted.name, adapted.mjcf, adapted.control_timestep, adapted.assets)
@@ -162,6 +164,8 @@ def _adapted(name: str, document: Document, settings: MjcfSettings, budget: Budg
         free_base(document, compile_model(document.text, document.assets))
     model = compile_model(document.text, document.assets)
     if carry_hinges(document, model):
+        model = compile_model(document.text, document.assets)
+    if replace_missing_meshes(document, model):
         model = compile_model(document.text, document.assets)
     if reduce_meshes(document, model):
         model = compile_model(document.text, document.assets)

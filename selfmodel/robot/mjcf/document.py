@@ -15,6 +15,7 @@ from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 
 _FOLDER_ATTRIBUTES = {"meshdir": ("mesh", "skin", "flex", "hfield"), "texturedir": ("texture",)}
 _NAMED_BY_FILE = ("mesh", "texture", "hfield")
+_TETRAHEDRON = "0 0 0 1 0 0 0 1 0 0 0 1"
 _SPECIAL_CHARACTERS = re.compile(r"[^A-Za-z0-9_.-]")
 
 
@@ -26,11 +27,13 @@ class Document:
         root: The ``<mujoco>`` element.
         assets: Contents of the files that the MJCF names, by names without folders.
         notes: Descriptions of the changes, one sentence each.
+        missing: Error messages of the meshes without files, by name; they have placeholders.
     """
 
     root: ET.Element
     assets: dict[str, bytes] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    missing: dict[str, str] = field(default_factory=dict)
 
     @property
     def text(self) -> str:
@@ -92,7 +95,7 @@ def parse_xml(data: bytes) -> ET.Element:
     try:
         return ET.fromstring(data)  # noqa: S314  # _check_xml refuses unsafe XML
     except (ET.ParseError, ValueError) as error:
-        raise InputError(f"expected an MJCF file, got no XML: {error}") from error
+        raise InputError(f"expected an MJCF or URDF file, got no XML: {error}") from error
 
 
 def _check_xml(data: bytes) -> None:
@@ -120,7 +123,7 @@ def _check_xml(data: bytes) -> None:
     except (expat.ExpatError, ValueError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(f"expected an MJCF file, got no XML: {error}") from error
+        raise InputError(f"expected an MJCF or URDF file, got no XML: {error}") from error
 
 
 def _include(parent: ET.Element, files: Files, folder: str, included: set[str], limit: int) -> None:
@@ -158,6 +161,9 @@ def _read_assets(document: Document, files: Files, limit: int) -> None:
             if not attribute.startswith("file") or not name:
                 continue
             path = str(PurePosixPath(folders.get(element.tag, ""), name))
+            if element.tag == "mesh" and not files.has(path):
+                _add_placeholder(document, element, files, path)
+                continue
             if path not in names:
                 what = f"the file of a <{element.tag}> ({name!r})"
                 data = files.read(path, what, limit)
@@ -170,6 +176,17 @@ def _read_assets(document: Document, files: Files, limit: int) -> None:
             element.set(attribute, names[path])
             if element.tag in _NAMED_BY_FILE and attribute == "file" and not element.get("name"):
                 element.set("name", PurePosixPath(name).stem)
+
+
+def _add_placeholder(document: Document, mesh: ET.Element, files: Files, path: str) -> None:
+    """Makes a mesh without a file a tetrahedron, and keeps the error of the file."""
+    name = mesh.attrib.pop("file", path)
+    try:
+        files.read(path, f"the file of a <mesh> ({name!r})", limit=0)
+    except InputError as error:
+        document.missing[mesh.get("name") or PurePosixPath(name).stem] = str(error)
+    mesh.set("name", mesh.get("name") or PurePosixPath(name).stem)
+    mesh.set("vertex", _TETRAHEDRON)
 
 
 def _pop_asset_folders(root: ET.Element) -> dict[str, str]:

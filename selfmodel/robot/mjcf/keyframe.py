@@ -12,11 +12,17 @@ from selfmodel.robot.mjcf.expand import format_numbers
 from selfmodel.robot.mjcf.mujoco_errors import compile_model, loading_a_model
 from selfmodel.robot.mjcf.settings import NO_KEYFRAME, MjcfSettings
 
+STANDING_KEYFRAMES = ("home", "stand", "standing")
+"""Usual names of the keyframe in which a robot stands, in the order in which they are tried."""
+
 _POSE_TOLERANCE = 1e-9
 """Largest difference of the new reference pose from the keyframe, m and unit quaternions."""
 
 _EQUALITY_TOLERANCE = 1e-6
 """Largest violation of an equality constraint in the keyframe, m or rad."""
+
+_COUPLINGS = (int(mujoco.mjtEq.mjEQ_JOINT), int(mujoco.mjtEq.mjEQ_TENDON))
+"""Equality constraints with a polynomial of the distances from the reference pose."""
 
 _OTHER_KEYFRAME = (
     f"start the robot in another keyframe with keyframe=NAME, or in the reference pose with "
@@ -48,6 +54,7 @@ def bake_keyframe(document: Document, model: mujoco.MjModel, settings: MjcfSetti
             mujoco.mj_fwdPosition(model, before)
         _check_equalities(model, before)
         _write_spring_lengths(document, model)
+        _write_couplings(document, model)
         write_frames(document, model, _frames_at(model, qpos))
         _check_pose(before, compile_model(document.text, document.assets))
     name = model.key(number).name or f"number {number}"
@@ -60,7 +67,8 @@ def _keyframe(model: mujoco.MjModel, wanted: str) -> int | None:
     if wanted == NO_KEYFRAME:
         return None
     if not wanted:
-        return 0 if names else None
+        usual = next((names.index(name) for name in STANDING_KEYFRAMES if name in names), 0)
+        return usual if names else None
     if wanted not in names:
         raise unknown_name("keyframe", wanted, [*filter(None, names), NO_KEYFRAME])
     return names.index(wanted)
@@ -97,11 +105,10 @@ def _check_equalities(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     if not model.neq:
         return
     rows = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_EQUALITY
-    coupling = (int(mujoco.mjtEq.mjEQ_JOINT), int(mujoco.mjtEq.mjEQ_TENDON))
     nonlinear = [
         eq
         for eq in range(model.neq)
-        if int(model.eq_type[eq]) in coupling and np.any(model.eq_data[eq, 2:5])
+        if int(model.eq_type[eq]) in _COUPLINGS and np.any(model.eq_data[eq, 2:5])
     ]
     if nonlinear or np.any(np.abs(data.efc_pos[: data.nefc][rows]) > _EQUALITY_TOLERANCE):
         raise InputError(
@@ -115,6 +122,14 @@ def _write_spring_lengths(document: Document, model: mujoco.MjModel) -> None:
     for tendon, element in enumerate(document.children("tendon")):
         if model.tendon_stiffness[tendon]:
             element.set("springlength", format_numbers(model.tendon_lengthspring[tendon]))
+
+
+def _write_couplings(document: Document, model: mujoco.MjModel) -> None:
+    """Removes the offsets of linear couplings, which hold in the new reference pose without one."""
+    for eq, element in enumerate(document.children("equality")):
+        if int(model.eq_type[eq]) in _COUPLINGS and model.eq_data[eq, 0]:
+            coefficients = np.array([0.0, model.eq_data[eq, 1], 0.0, 0.0, 0.0])
+            element.set("polycoef", format_numbers(coefficients))
 
 
 def _check_pose(before: mujoco.MjData, model: mujoco.MjModel) -> None:

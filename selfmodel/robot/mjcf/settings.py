@@ -47,8 +47,8 @@ class MjcfSettings:
 
     Attributes:
         forward: Forward direction of the robot, in the world frame of the file.
-        keyframe: Keyframe of the initial pose; "" for the first keyframe, ``none`` for the
-            reference pose.
+        keyframe: Keyframe of the initial pose; "" for ``home``, ``stand`` or ``standing``, or else
+            the first keyframe; ``none`` for the reference pose.
         control_timestep: Time between two commands, s; None for the smallest multiple of the
             physics time step that is at least 0.01 s.
         touch: Bodies that get a touch sensor; None for the end of each limb.

@@ -1,6 +1,5 @@
 """Reduces the visual assets and the meshes of an MJCF, so that its files fit into a log."""
 
-from collections.abc import Iterator
 from xml.etree import ElementTree as ET  # of checked texts
 
 import mujoco
@@ -8,6 +7,7 @@ import mujoco
 from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.contacts import contact_pairs
 from selfmodel.robot.mjcf.document import Document
+from selfmodel.robot.mjcf.elements import geom_elements
 from selfmodel.robot.mjcf.expand import format_numbers, write_masses
 from selfmodel.robot.mjcf.hulls import DRAWN_POINTS, colliding_hull, drawn_hull, write_hull
 
@@ -104,23 +104,13 @@ def _colliding_meshes(model: mujoco.MjModel) -> set[int]:
 
 def _write_fitted_geoms(document: Document, model: mujoco.MjModel) -> None:
     """Writes out the geoms that MuJoCo fits to meshes: another mesh would change them."""
-    for geom, element in _geoms(document, model):
+    for geom, element in geom_elements(document, model):
         if element.get("mesh") and model.geom_type[geom] != _MESH:
             for attribute in _FRAME_ATTRIBUTES:
                 element.attrib.pop(attribute, None)
             element.set("pos", format_numbers(model.geom_pos[geom]))
             element.set("quat", format_numbers(model.geom_quat[geom]))
             element.set("size", format_numbers(model.geom_size[geom]))
-
-
-def _geoms(document: Document, model: mujoco.MjModel) -> Iterator[tuple[int, ET.Element]]:
-    """Yields the id and the element of each geom."""
-    bodies = {body.get("name"): body for body in document.bodies()}
-    worlds = [geom for world in document.root.findall("worldbody") for geom in world]
-    for body in range(model.nbody):
-        children = bodies[model.body(body).name] if body else worlds
-        geoms = (child for child in children if child.tag == "geom")
-        yield from enumerate(geoms, int(model.body_geomadr[body]))
 
 
 def _asset_bytes(document: Document) -> int:

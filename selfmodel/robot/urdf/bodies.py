@@ -85,8 +85,8 @@ class _Main:
     in_middle: bool
 
 
-def bodies(spec: mujoco.MjSpec) -> list[ET.Element]:
-    """Returns the bodies of a specification as MJCF, the roots with their descendants.
+def world_elements(spec: mujoco.MjSpec) -> list[ET.Element]:
+    """Returns the geoms and the bodies of the world as MJCF, the bodies with their descendants.
 
     A link without mass and geoms that moves and has one child becomes a further hinge of that
     child, because MuJoCo moves no massless body. The geoms of a link that is fixed to a part in the
@@ -97,7 +97,8 @@ def bodies(spec: mujoco.MjSpec) -> list[ET.Element]:
     for body in spec.bodies:
         if body.joints and body.parent is not None:
             middle.add(_main(body.parent).name)
-    return [_written(body, _NO_FRAME, [], None, middle) for body in spec.worldbody.bodies]
+    roots = [_written(body, _NO_FRAME, [], None, middle) for body in spec.worldbody.bodies]
+    return [*(_geom(geom, _NO_FRAME, seen=False) for geom in spec.worldbody.geoms), *roots]
 
 
 def _main(body: mujoco.MjsBody) -> mujoco.MjsBody:
@@ -149,7 +150,7 @@ def _written(
     element = ET.Element("body", {"name": body.name} | _placed(frame))
     if body.mass:
         ET.SubElement(element, "inertial", _inertial(body))
-    element.extend(_joint(hinge) for hinge in here)
+    element.extend([_joint(hinge) for hinge in here])
     if here or main is None:
         main = _Main(element, _NO_FRAME, in_middle=body.name in middle)
     else:
@@ -158,14 +159,14 @@ def _written(
     at = main if main.in_middle else _Main(element, _NO_FRAME, in_middle=False)
     for geom in body.geoms:
         at.element.append(_geom(geom, at.frame, seen=seen))
-    element.extend(_written(child, _NO_FRAME, [], main, middle) for child in body.bodies)
+    element.extend([_written(child, _NO_FRAME, [], main, middle) for child in body.bodies])
     return element
 
 
 def _inertial(body: mujoco.MjsBody) -> dict[str, str]:
     """Returns the attributes of an ``<inertial>``."""
     mass = {"mass": repr(float(body.mass))}
-    full = np.array(body.fullinertia)
+    full = _moments(body)
     if not is_rigid(body):
         full = np.array([*np.full(3, max(0.0, float(full[:3].mean()))), 0.0, 0.0, 0.0])
     if not np.any(full[3:]):
@@ -177,13 +178,16 @@ def _inertial(body: mujoco.MjsBody) -> dict[str, str]:
     turn = rotation.reshape(3, 3)
     matrix = turn @ _inertia_matrix(body) @ turn.T
     elements = matrix[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-    return {"pos": format_numbers(np.array(body.ipos)), "fullinertia": format_numbers(elements)} | mass
+    return {
+        "pos": format_numbers(np.array(body.ipos)),
+        "fullinertia": format_numbers(elements),
+    } | mass
 
 
 def is_rigid(body: mujoco.MjsBody) -> bool:
     """Returns whether the inertia of a body is that of a rigid body, or zero."""
     matrix = _inertia_matrix(body)
-    if not np.any(matrix) or not np.all(np.isfinite(matrix)):
+    if not np.any(matrix):
         return True
     least, middle, most = np.linalg.eigvalsh(matrix)
     return bool(least > 0 and least + middle >= most)
@@ -191,8 +195,13 @@ def is_rigid(body: mujoco.MjsBody) -> bool:
 
 def _inertia_matrix(body: mujoco.MjsBody) -> FloatArray:
     """Returns the inertia of a body in its inertial frame, ``(3, 3)`` kg m²."""
-    xx, yy, zz, xy, xz, yz = body.fullinertia
+    xx, yy, zz, xy, xz, yz = _moments(body)
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def _moments(body: mujoco.MjsBody) -> FloatArray:
+    """Returns the moments and products of inertia, ``(6,)`` kg m²; 0 if the URDF has none."""
+    return np.nan_to_num(np.array(body.fullinertia, float))
 
 
 def _joint(hinge: _Hinge) -> ET.Element:
@@ -220,7 +229,9 @@ def _geom(geom: mujoco.MjsGeom, frame: Frame, *, seen: bool) -> ET.Element:
         seen: Whether the link has visuals, so that its collisions are not drawn.
     """
     kind, sizes = _GEOMS[geom.type]
-    attributes = {"type": kind} | _placed(frame.then(Frame(np.array(geom.pos), np.array(geom.quat))))
+    attributes = {"type": kind} | _placed(
+        frame.then(Frame(np.array(geom.pos), np.array(geom.quat)))
+    )
     if sizes:
         attributes["size"] = format_numbers(geom.size[:sizes])
     else:

@@ -8,12 +8,12 @@ from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.document import Document
 from selfmodel.robot.mjcf.expand import format_numbers
 from selfmodel.robot.mjcf.mujoco_errors import compile_model, loading_a_model
-from selfmodel.robot.urdf.bodies import bodies, is_rigid, meshes
+from selfmodel.robot.urdf.bodies import is_rigid, meshes, world_elements
 from selfmodel.robot.urdf.reading import number
-from selfmodel.robot.urdf.settings import UrdfSettings
 from selfmodel.robot.urdf.servos import check_patterns, servo
+from selfmodel.robot.urdf.settings import UrdfSettings
 from selfmodel.robot.urdf.stance import stance
-from selfmodel.robot.urdf.tree import HINGE_TYPES
+from selfmodel.robot.urdf.tree import HINGE_TYPES, quoted
 
 PHYSICS_TIMESTEP = 0.002
 """Physics time step of a robot from a URDF, s."""
@@ -24,12 +24,14 @@ KEYFRAME = "stance"
 _MAX_LISTED = 6
 
 
-def convert(document: Document, settings: UrdfSettings) -> Document:
-    """Returns the MJCF of a URDF, with a free joint, position servos, ground and a keyframe.
+def convert(document: Document, settings: UrdfSettings, base: str | None = None) -> Document:
+    """Returns the MJCF of a URDF, with position servos and a keyframe.
 
     Args:
         document: The URDF, as returned by ``read_urdf``.
         settings: Settings with the gains and the pose.
+        base: ``free`` for a free joint of the root and a ground, ``fixed`` for none; None for
+            ``fixed`` if the root link is named ``world``, and otherwise ``free``.
 
     Raises:
         InputError: The URDF cannot be a robot; the message has the reason and the remedy.
@@ -47,12 +49,10 @@ def convert(document: Document, settings: UrdfSettings) -> Document:
     option = {"timestep": repr(PHYSICS_TIMESTEP), "integrator": "implicitfast"}
     ET.SubElement(root, "option", option)
     made.section("asset").extend(meshes(spec))
-    world = made.section("worldbody")
-    ground = {"name": "ground", "type": "plane", "size": "0 0 1"}
-    ET.SubElement(world, "geom", ground)
-    trees = bodies(spec)
-    world.extend(trees)
-    _add_free_joint(made, trees[0])
+    made.section("worldbody").extend(world_elements(spec))
+    in_world = any(link.get("name") == "world" for link in urdf.findall("link"))
+    if base == "free" or (base is None and not in_world):
+        _free_base(made)
     _add_couplings(made, hinges)
     _add_servos(made, driven, settings)
     _add_stance(made, settings)
@@ -79,10 +79,24 @@ def _note_inertias(made: Document, spec: mujoco.MjSpec) -> None:
         )
 
 
-def _add_free_joint(made: Document, root: ET.Element) -> None:
-    index = 1 if root.find("inertial") is not None else 0
-    root.insert(index, ET.Element("freejoint"))
-    made.notes.append(f"the root link {root.get('name')} moves freely, by a free joint")
+def _free_base(made: Document) -> None:
+    """Adds a free joint to the root link, and a ground plane."""
+    if not any(geom.get("contype") != "0" for geom in made.root.iter("geom")):
+        raise InputError(
+            "no link has a <collision>, so the robot would fall through the ground: give the "
+            'links that meet the ground a <collision>, or fix the base with base = "fixed"'
+        )
+    roots = made.bodies()[:1]
+    if len(made.section("worldbody").findall("body")) != 1:
+        raise InputError(
+            "expected one link on the link 'world', the root of the robot: keep the robot, and "
+            "remove the other links"
+        )
+    name = roots[0].get("name", "")
+    roots[0].insert(0, ET.Element("freejoint", {"name": f"{name}_root"}))
+    ground = {"name": "ground", "type": "plane", "size": "0 0 1"}
+    made.section("worldbody").insert(0, ET.Element("geom", ground))
+    made.notes.append(f"the root link {name} moves freely, on a ground plane")
 
 
 def _add_couplings(made: Document, hinges: list[ET.Element]) -> None:
@@ -95,8 +109,8 @@ def _add_couplings(made: Document, hinges: list[ET.Element]) -> None:
         leader = mimic.get("joint", "")
         if leader not in known:
             raise InputError(
-                f"the joint {joint.get('name')!r} mimics {leader!r}, which is no revolute or "
-                f"continuous joint of the URDF"
+                f"the joint {quoted(joint.get('name'))} mimics {quoted(leader)}, which is no "
+                f"revolute or continuous joint of the URDF"
             )
         factor, offset = number(mimic, "multiplier", 1.0), number(mimic, "offset", 0.0)
         coupling = {
@@ -110,7 +124,7 @@ def _add_couplings(made: Document, hinges: list[ET.Element]) -> None:
 
 def _add_servos(made: Document, driven: list[ET.Element], settings: UrdfSettings) -> None:
     servos = [servo(joint, settings) for joint in driven]
-    made.section("actuator").extend(element for element, _ in servos)
+    made.section("actuator").extend([element for element, _ in servos])
     names: dict[str, list[str]] = {}
     for joint, (_, gains) in zip(driven, servos, strict=True):
         names.setdefault(gains, []).append(joint.get("name", ""))
@@ -120,13 +134,30 @@ def _add_servos(made: Document, driven: list[ET.Element], settings: UrdfSettings
 
 def _add_stance(made: Document, settings: UrdfSettings) -> None:
     """Adds the initial pose as a keyframe, and excludes the contacts of bodies that overlap."""
-    found = stance(compile_model(made.text, made.assets), settings.pose)
+    found = stance(_compiled(made), settings.pose)
     for first, second in found.overlapping:
         pair = {"body1": first, "body2": second}
         ET.SubElement(made.section("contact"), "exclude", pair)
         made.notes.append(f"{first} and {second} overlap in the initial pose, and never touch")
     key = {"name": KEYFRAME, "qpos": format_numbers(found.qpos)}
     ET.SubElement(made.section("keyframe"), "key", key)
+
+
+def _compiled(made: Document) -> mujoco.MjModel:
+    """Returns the compiled model.
+
+    Raises:
+        InputError: MuJoCo cannot compile the model, such as a link that moves without mass.
+    """
+    try:
+        return compile_model(made.text, made.assets)
+    except InputError as error:
+        if "mjMINVAL" not in str(error):
+            raise
+        raise InputError(
+            f"{error}: give this link, or a link that is fixed to it, an <inertial> with a mass "
+            f'and moments above 0, or fix the base with base = "fixed" if it is the root'
+        ) from error
 
 
 def _listed(names: list[str]) -> str:

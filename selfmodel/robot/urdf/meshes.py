@@ -8,6 +8,7 @@ from urllib.parse import unquote
 from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.document import Document, plain_name
 from selfmodel.robot.mjcf.files import Files
+from selfmodel.robot.urdf.tree import quoted
 
 READABLE = (".stl", ".obj")
 """Endings of the meshes of a URDF that MuJoCo reads."""
@@ -58,9 +59,11 @@ class Meshes:
         """
         if path not in self._names:
             assets = self.document.assets
-            data = self.files.read(path, f"the file of a <mesh> ({uri!r})", self.limit)
+            data = self.files.read(path, f"the file of a <mesh> ({quoted(uri)})", self.limit)
             if sum(map(len, assets.values())) + len(data) > self.limit:
-                raise InputError(f"the meshes of the URDF have over {self.limit} bytes: simplify them")
+                raise InputError(
+                    f"the meshes of the URDF have over {self.limit} bytes: simplify them"
+                )
             self._names[path] = plain_name(path, assets)
             assets[self._names[path]] = data
         return self._names[path]

@@ -12,8 +12,9 @@ from xml.etree import ElementTree as ET  # of checked texts
 from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.document import Document
 from selfmodel.robot.mjcf.files import Files
+from selfmodel.robot.model_checks import MAX_NUMBER
 from selfmodel.robot.urdf.meshes import READABLE, Meshes
-from selfmodel.robot.urdf.tree import check_tree, check_types
+from selfmodel.robot.urdf.tree import check_tree, check_types, quoted
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 
 _ORIGIN = ("xyz", "rpy")
@@ -45,6 +46,14 @@ _KEPT: Mapping[str, tuple[str, ...]] = MappingProxyType(
 )
 """Elements that are kept, with the attributes that are kept."""
 
+_TEXTS = ("name", "type", "link", "joint", "filename")
+"""Attributes with text; the others have numbers."""
+
+_COUNTS: Mapping[str, int] = MappingProxyType(
+    {"xyz": 3, "rpy": 3, "size": 3, "scale": 3, "rgba": 4}
+)
+"""Numbers of an attribute with more than one."""
+
 _XACRO = "xacro"
 
 
@@ -71,9 +80,10 @@ def read_urdf(root: ET.Element, files: Files, budget: Budget = DEFAULT_BUDGET) -
             left_out[element.tag] += 1
     if left_out:
         document.notes.append(f"elements that no robot needs are left out: {_counted(left_out)}")
-    _free_the_root(document, main)
+    _drop_floating_joint(document, main)
     check_types(document.root)
     _fix_rangeless(document)
+    _drop_empty_shapes(document)
     _read_meshes(document, Meshes(files, budget.file_bytes, document))
     return document
 
@@ -88,27 +98,32 @@ def _refuse_xacro(root: ET.Element) -> None:
 
 
 def _kept(element: ET.Element) -> ET.Element:
-    """Returns a copy of an element with the known attributes and children only."""
-    attributes = {name: element.get(name, "") for name in _KEPT[element.tag] if name in element.attrib}
+    """Returns a copy of an element with the known attributes and children only.
+
+    Of children that URDF has once, the first counts.
+    """
+    attributes = {
+        name: element.get(name, "") for name in _KEPT[element.tag] if name in element.attrib
+    }
     copy = ET.Element(element.tag, attributes)
-    copy.extend(_kept(child) for child in element if child.tag in _KEPT)
+    _check_numbers(copy)
+    for child in element:
+        once = child.tag not in ("visual", "collision")
+        if child.tag in _KEPT and not (once and copy.find(child.tag) is not None):
+            copy.append(_kept(child))
     return copy
 
 
-def _free_the_root(document: Document, main: str) -> None:
-    """Removes a root link without a body that is the world: by its name, or a floating joint."""
-    links = {link.get("name"): link for link in document.root.findall("link")}
+def _drop_floating_joint(document: Document, main: str) -> None:
+    """Removes a root link without a body that carries the robot by a floating joint."""
+    link = next(link for link in document.root.findall("link") if link.get("name") == main)
     joints = [j for j in document.root.findall("joint") if _link_of(j, "parent") == main]
-    has_body = any(element.tag in ("inertial", "collision") for element in links[main])
-    if has_body or len(joints) != 1:
+    has_body = any(element.tag in ("inertial", "collision") for element in link)
+    if has_body or [joint.get("type") for joint in joints] != ["floating"]:
         return
-    if main != "world" and joints[0].get("type") != "floating":
-        return
-    document.root.remove(links[main])
+    document.root.remove(link)
     document.root.remove(joints[0])
-    document.notes.append(
-        f"the link {main} and the joint {joints[0].get('name')} are left out: the base is free"
-    )
+    document.notes.append(f"the link {main} and the joint {joints[0].get('name')} are left out")
 
 
 def _fix_rangeless(document: Document) -> None:
@@ -120,8 +135,8 @@ def _fix_rangeless(document: Document) -> None:
         ends = [] if limit is None else [number(limit, end, 0.0) for end in ("lower", "upper")]
         if not ends or ends[0] > ends[1]:
             raise InputError(
-                f"the revolute joint {joint.get('name')!r} needs a <limit> with lower below upper, "
-                f'in rad: add it, or set type="continuous"'
+                f"the revolute joint {quoted(joint.get('name'))} needs a <limit> with lower below "
+                f'upper, in rad: add it, or set type="continuous"'
             )
         if ends[0] == ends[1]:
             joint.set("type", "fixed")
@@ -132,26 +147,53 @@ def _fix_rangeless(document: Document) -> None:
 
 
 def number(element: ET.Element, attribute: str, default: float) -> float:
-    """Returns the number of an attribute.
+    """Returns the number of an attribute that ``read_urdf`` has checked."""
+    return float(element.get(attribute, default))
 
-    Raises:
-        InputError: The attribute is no finite number.
-    """
-    text = element.get(attribute)
-    if text is None:
-        return default
+
+def _check_numbers(element: ET.Element) -> None:
+    """Checks that the attributes with numbers are numbers, and that masses are not negative."""
+    for attribute, text in element.attrib.items():
+        if attribute in _TEXTS:
+            continue
+        words = text.split()
+        count = _COUNTS.get(attribute, 1)
+        if len(words) != count or not all(map(_is_number, words)):
+            raise InputError(
+                f"expected {count} number{'s' if count > 1 else ''} in {attribute} of "
+                f"<{element.tag}>, at most {MAX_NUMBER:g}, got {quoted(text)}"
+            )
+    if element.tag == "mass" and float(element.get("value", "0")) < 0:
+        raise InputError(f"expected a mass of at least 0 kg, got {quoted(element.get('value'))}")
+
+
+def _is_number(word: str) -> bool:
     try:
-        value = float(text)
+        return abs(float(word)) <= MAX_NUMBER
     except ValueError:
-        value = float("nan")
-    if not abs(value) < float("inf"):
-        raise InputError(f"expected a number in {attribute} of <{element.tag}>, got {text[:40]!r}")
-    return value
+        return False
 
 
 def _link_of(joint: ET.Element, end: str) -> str:
     element = joint.find(end)
     return "" if element is None else element.get("link", "")
+
+
+def _drop_empty_shapes(document: Document) -> None:
+    """Removes visuals and collisions without a shape, or with a shape of size 0."""
+    dropped = 0
+    for link in document.root.findall("link"):
+        for part in [e for e in link if e.tag in ("visual", "collision")]:
+            shape = part.find("geometry/*")
+            if shape is None or any(
+                float(size) == 0
+                for name in ("size", "radius", "length")
+                for size in shape.get(name, "").split()
+            ):
+                link.remove(part)
+                dropped += 1
+    if dropped:
+        document.notes.append(f"{dropped} shapes of size 0 are left out")
 
 
 def _read_meshes(document: Document, meshes: Meshes) -> None:
@@ -171,10 +213,10 @@ def _read_meshes(document: Document, meshes: Meshes) -> None:
                 left_out[_reason(uri)] += 1
             else:
                 raise InputError(
-                    f"the collision of the link {link.get('name')!r} needs the mesh {uri!r}, which "
-                    f"is missing, lies outside the folders of the model, or is no STL or OBJ: "
-                    f"save the mesh as .stl, or name a folder that contains it, with --set "
-                    f"assets=DIR"
+                    f"the collision of the link {quoted(link.get('name'))} needs the mesh "
+                    f"{quoted(uri)}, which is missing, lies outside the folders of the model, or "
+                    f"is no STL or OBJ: save the mesh as .stl, or name a folder that contains it, "
+                    f"with --set assets=DIR"
                 )
     for reason, count in left_out.items():
         document.notes.append(f"{count} visual meshes are left out: {reason}")
@@ -183,7 +225,7 @@ def _read_meshes(document: Document, meshes: Meshes) -> None:
 def _reason(uri: str) -> str:
     ending = "." + uri.rpartition(".")[2].lower()
     if ending in READABLE:
-        return f"their files were not found, such as {uri!r}"
+        return f"their files were not found, such as {quoted(uri)}"
     return f"MuJoCo reads no {ending[:10]}, expected {' or '.join(READABLE)}"
 
 

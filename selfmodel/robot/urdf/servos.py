@@ -8,6 +8,7 @@ from xml.etree import ElementTree as ET  # of checked texts
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.robot.urdf.reading import number
 from selfmodel.robot.urdf.settings import URDF_SETTINGS, UrdfSettings, value_of
+from selfmodel.robot.urdf.tree import quoted
 
 FULL_EFFORT_ERROR = 0.5
 """Position error at which a servo without the setting ``kp`` exerts its full effort, rad; half of
@@ -39,12 +40,13 @@ def servo(joint: ET.Element, settings: UrdfSettings) -> tuple[ET.Element, str]:
         effort = number(limit, "effort", 0.0)
     if effort <= 0:
         raise InputError(
-            f"the joint {name!r} has no effort limit above 0: add it to its <limit>, or set the "
-            f"torque of such joints, in N m, with effort = ..."
+            f"the joint {quoted(name)} has no effort limit above 0: add it to its <limit>, or "
+            f"set the torque of such joints, in N m, with effort = ..."
         )
     low, high = UNLIMITED_RANGE
     if joint.get("type") == "revolute":
         low, high = number(limit, "lower", 0.0), number(limit, "upper", 0.0)
+    first, last = _commands(name, (low, high), settings)
     kp = value_of(settings.kp, name)
     if kp is None:
         kp = effort / min(FULL_EFFORT_ERROR, (high - low) / 2)
@@ -58,12 +60,22 @@ def servo(joint: ET.Element, settings: UrdfSettings) -> tuple[ET.Element, str]:
         "joint": name,
         "kp": repr(kp),
         "kv": repr(kd),
-        "ctrlrange": f"{low!r} {high!r}",
+        "ctrlrange": f"{first!r} {last!r}",
         "ctrllimited": "true",
         "forcerange": f"{-effort!r} {effort!r}",
         "forcelimited": "true",
     }
     return ET.Element("position", attributes), f"kp {kp:.3g}, kd {kd:.3g}, {effort:.3g} N m"
+
+
+def _commands(joint: str, ends: tuple[float, float], settings: UrdfSettings) -> tuple[float, float]:
+    """Returns the lowest and highest command of a joint, given the ends of its range, rad."""
+    swing = value_of(settings.swing, joint)
+    if not swing:
+        return ends
+    angle = value_of(settings.pose, joint)
+    centre = min(max(0.0, ends[0]), ends[1]) if angle is None else angle
+    return max(ends[0], centre - swing), min(ends[1], centre + swing)
 
 
 def check_patterns(settings: UrdfSettings, joints: Sequence[str]) -> None:

@@ -28,12 +28,15 @@ class UrdfSettings:
         effort: Largest torque, N m, instead of the effort limits of the URDF.
         pose: Joint angles of the initial pose, rad; of other joints, the angle in the range of the
             joint that is nearest to 0.
+        swing: Largest command, as a distance from the initial pose, rad; of other joints, commands
+            span the range of the joint.
     """
 
     kp: ByJoint = field(default_factory=dict)
     kd: ByJoint = field(default_factory=dict)
     effort: ByJoint = field(default_factory=dict)
     pose: ByJoint = field(default_factory=dict)
+    swing: ByJoint = field(default_factory=dict)
 
 
 URDF_SETTINGS = tuple(field.name for field in fields(UrdfSettings))
@@ -45,6 +48,7 @@ _EXAMPLES = {
     "kd": "kd = 1 or kd = {knee = 1}",
     "effort": "effort = 20 or effort = {knee = 20}",
     "pose": "pose = {knee = -1.5}",
+    "swing": "swing = 0.5 or swing = {knee = 0.5}",
 }
 
 

@@ -29,7 +29,7 @@ def stance(model: mujoco.MjModel, pose: ByJoint) -> Stance:
     """Returns the initial pose of a robot.
 
     Args:
-        model: A model with a horizontal plane at height 0 as geom 0.
+        model: The model; if its base is free, geom 0 is a horizontal plane at height 0.
         pose: Angles of joints by name or pattern, rad; of the others, the angle of the range that
             is nearest to 0.
 

@@ -13,6 +13,8 @@ MAX_LINK_DEPTH = MAX_DEPTH - 10
 HINGE_TYPES = ("revolute", "continuous")
 JOINT_TYPES = (*HINGE_TYPES, "fixed")
 
+_MAX_QUOTED = 80
+
 _REMEDIES = {
     "prismatic": "a limb's posture is the angles of its hinges, so replace it by a revolute joint "
     'or fix it with type="fixed"',
@@ -20,6 +22,11 @@ _REMEDIES = {
     "the robot, and remove the other bodies",
     "planar": 'replace it by revolute joints, or fix it with type="fixed"',
 }
+
+
+def quoted(text: str | None) -> str:
+    """Returns a name of a URDF as part of an error message, at most 80 characters long."""
+    return repr((text or "")[:_MAX_QUOTED])
 
 
 def check_tree(root: ET.Element) -> str:
@@ -39,13 +46,14 @@ def check_tree(root: ET.Element) -> str:
         parent, child = (_end(joint, end, links) for end in ("parent", "child"))
         if child in parents:
             raise InputError(
-                f"the link {child!r} has two parents, {parents[child]!r} and {parent!r}: expected "
-                f"a tree, so remove one of the joints (the second is {name!r})"
+                f"the link {quoted(child)} has two parents, {quoted(parents[child])} and "
+                f"{quoted(parent)}: expected a tree, so remove one of the joints "
+                f"(the second is {quoted(name)})"
             )
         parents[child] = parent
     roots = [name for name in links if name not in parents]
     if len(roots) != 1:
-        found = ", ".join(map(repr, roots[:5])) or "none (the joints form a circle)"
+        found = ", ".join(map(quoted, roots[:5])) or "none (the joints form a circle)"
         raise InputError(
             f"expected one link without a parent, the root of the robot, got {found}: keep the "
             f"robot, and connect its links by joints"
@@ -60,7 +68,9 @@ def _names(root: ET.Element, tag: str) -> Counter[str]:
         raise InputError("the URDF has no <link>: expected the links of a robot")
     for name, count in counts.items():
         if not name or count > 1:
-            raise InputError(f"expected a different name for each <{tag}>, got {name!r} {count} times")
+            raise InputError(
+                f"expected a different name for each <{tag}>, got {quoted(name)} {count} times"
+            )
     return counts
 
 
@@ -74,7 +84,7 @@ def check_types(root: ET.Element) -> None:
         kind, name = joint.get("type", ""), joint.get("name", "")
         if kind not in JOINT_TYPES:
             remedy = _REMEDIES.get(kind, f"expected one of {', '.join(JOINT_TYPES)}")
-            raise InputError(f"the joint {name!r} has the type {kind[:40]!r}: {remedy}")
+            raise InputError(f"the joint {quoted(name)} has the type {quoted(kind)}: {remedy}")
 
 
 def _end(joint: ET.Element, end: str, links: Collection[str]) -> str:
@@ -82,8 +92,8 @@ def _end(joint: ET.Element, end: str, links: Collection[str]) -> str:
     link = "" if element is None else element.get("link", "")
     if link not in links:
         raise InputError(
-            f"the <{end}> of the joint {joint.get('name')!r} is the link {link!r}, which the URDF "
-            f"does not have"
+            f"the <{end}> of the joint {quoted(joint.get('name'))} is the link {quoted(link)}, "
+            f"which the URDF does not have"
         )
     return link
 
@@ -95,7 +105,7 @@ def _check_depths(links: Collection[str], parents: dict[str, str]) -> None:
         at: str | None = link
         while at is not None and at not in depths:
             if at in chain:
-                raise InputError(f"the joints form a circle through the link {at!r}")
+                raise InputError(f"the joints form a circle through the link {quoted(at)}")
             chain.append(at)
             if len(chain) > MAX_LINK_DEPTH:
                 raise InputError(f"the URDF has more than {MAX_LINK_DEPTH} links in one chain")

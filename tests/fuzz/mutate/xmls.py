@@ -2,6 +2,7 @@
 
 import copy
 import re
+from collections.abc import Mapping
 from functools import cache
 from xml.etree import ElementTree as ET
 
@@ -114,22 +115,33 @@ FRAGMENTS = {
 """New elements, by the element that they go into."""
 
 
-def mutated(data: bytes, rng: np.random.Generator) -> tuple[bytes, str]:
-    """Returns XML with one to three mutations, and their names."""
+Fragments = Mapping[str, tuple[str, ...]]
+
+
+def mutated(
+    data: bytes, rng: np.random.Generator, fragments: Fragments = FRAGMENTS
+) -> tuple[bytes, str]:
+    """Returns XML with one to three mutations, and their names.
+
+    Args:
+        data: The XML.
+        rng: Source of the mutations.
+        fragments: New elements, by the element that they go into: the root, and another.
+    """
     if rng.random() < 0.07:
         return raw.mutated(data, rng)
     try:
         root = ET.fromstring(data)  # noqa: S314  # seeds of this repository
     except ET.ParseError:  # an earlier mutation
         return raw.mutated(data, rng)
-    names = [_change(root, rng) for _ in range(int(rng.choice([1, 1, 1, 2, 3])))]
+    names = [_change(root, rng, fragments) for _ in range(int(rng.choice([1, 1, 1, 2, 3])))]
     try:
         return ET.tostring(root), ", ".join(names)
     except (ValueError, RecursionError):  # ElementTree cannot write what was made
         return raw.mutated(data, rng)
 
 
-def _change(root: ET.Element, rng: np.random.Generator) -> str:
+def _change(root: ET.Element, rng: np.random.Generator, fragments: Fragments) -> str:
     every = list(root.iter())
     parents = {child: parent for parent in every for child in parent}
     chosen = every[int(rng.integers(1, len(every)))] if len(every) > 1 else root
@@ -148,9 +160,10 @@ def _change(root: ET.Element, rng: np.random.Generator) -> str:
         chosen.set(name, _value("1 1 1"[: int(rng.integers(1, 6))], rng, every))
         return f"<{chosen.tag} {name}={chosen.get(name)!r:.60}>"
     if chosen is root or kind in (7, 8):
-        tag = "body" if rng.random() < 0.5 else "mujoco"
+        at_root, within = fragments
+        tag = within if rng.random() < 0.5 else at_root
         holders = [element for element in every if element.tag == tag] or [root]
-        pieces = FRAGMENTS[tag]
+        pieces = fragments[tag]
         piece = pieces[rng.integers(len(pieces))]
         holder = holders[rng.integers(len(holders))]
         holder.insert(int(rng.integers(len(holder) + 1)), ET.fromstring(piece))  # noqa: S314

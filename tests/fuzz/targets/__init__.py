@@ -14,6 +14,10 @@ from tests.fuzz.targets import (
     sealed_logs,
     settings,
     study_folders,
+    tables_csv,
+    tables_npz,
+    tables_parquet,
+    urdf_files,
 )
 
 TARGETS: dict[str, Target] = {
@@ -24,8 +28,12 @@ TARGETS: dict[str, Target] = {
         bags_mcap,
         bags_sqlite,
         bags_ros1,
+        tables_csv,
+        tables_npz,
+        tables_parquet,
         mappings,
         mjcf_files,
+        urdf_files,
         controllers,
         journals,
         study_folders,

@@ -71,11 +71,11 @@ def _bytes(text: str | bytes) -> bytes:
 def _check() -> str:
     path = Path(NAME)
     robot = load_mjcf(path, read_settings(path))
-    return _logged(robot)
+    return logged(robot)
 
 
-def _logged(robot: Robot) -> str:
-    """A trial of an adapted robot can be logged, read and simulated."""
+def logged(robot: Robot) -> str:
+    """Logs, reads and simulates a trial of an adapted robot, and returns the outcome."""
     out = Path("trial.mcap")
     plan = plan_of(robot, STEPS)
     write_trial(out, robot, plan, made_up(robot, STEPS), TrialHeader(SETTINGS))

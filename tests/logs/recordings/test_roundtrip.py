@@ -158,7 +158,7 @@ def test_the_command_suggests_imports_and_reports(driven: Path, tmp_path: Path):
         ('robot = "r.xml"', "map.toml:1: r.xml has no control time step"),
         (
             'robot = "r.xml"\ncontrol_timestep = 0.01',
-            "expected an MJCF file of a robot without other files",
+            "map.toml:1: .*r.xml: the model has no actuators",
         ),
         ('robot = "quadruped"\ncontroller = "g.npz"', "map.toml:2: .*g.npz: expected a controller"),
     ],

@@ -4,11 +4,17 @@ from xml.etree import ElementTree as ET
 import mujoco
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings, strategies as st
 
 from selfmodel.logs.mcap.contents import read_contents
 from selfmodel.logs.writing.kinematics import body_names
 from selfmodel.logs.writing.urdf import _roll_pitch_yaw, urdf
+from selfmodel.robot.mjcf.document import parse_xml
+from selfmodel.robot.mjcf.files import InMemory
 from selfmodel.robot.robot import Robot
+from selfmodel.robot.urdf.conversion import convert
+from selfmodel.robot.urdf.reading import read_urdf
+from selfmodel.robot.urdf.settings import UrdfSettings
 from selfmodel.tasks import ROBOTS
 
 
@@ -124,3 +130,54 @@ def test_a_turn_is_told_in_angles_even_straight_up_and_down(roll: float, pitch: 
 def test_a_log_carries_the_description(log: Path, biped: Robot):
     [payload] = read_contents(log).topics["/robot_description"].payloads
     assert payload[8:-1].decode() == urdf(biped)
+
+
+def inertia_in_body(model: mujoco.MjModel, name: str) -> np.ndarray:
+    """The inertia of a body about its centre of mass, in the body's frame."""
+    body, matrix = model.body(name), np.zeros(9)
+    mujoco.mju_quat2Mat(matrix, body.iquat)
+    turn = matrix.reshape(3, 3)
+    return turn @ np.diag(body.inertia) @ turn.T
+
+
+def from_root(model: mujoco.MjModel, data: mujoco.MjData, root: str) -> tuple[np.ndarray, ...]:
+    """Positions and rotations of all bodies in the frame of the root body, by the root's order."""
+    turn = data.body(root).xmat.reshape(3, 3)
+    first = model.body(root).id
+    places = (data.xpos[first:] - data.body(root).xpos) @ turn
+    return places, turn.T @ data.xmat[first:].reshape(-1, 3, 3)
+
+
+@settings(
+    max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_read_back_it_is_a_robot_with_the_same_bodies_in_any_pose(drawn: Robot, seed: int):
+    document = read_urdf(parse_xml(urdf(drawn).encode()), InMemory({}))
+    text = convert(document, UrdfSettings(), base="fixed").text
+    before, after = drawn.model, mujoco.MjModel.from_xml_string(text)
+    first = before.body(drawn.root).id
+    names = [before.body(body).name for body in range(first, before.nbody)]
+    hinges = drawn.anatomy.hinges
+    here, there = mujoco.MjData(before), mujoco.MjData(after)
+    for hinge, angle in zip(
+        hinges, np.random.default_rng(seed).uniform(-3, 3, len(hinges)), strict=True
+    ):
+        here.joint(hinge).qpos[0] = there.joint(hinge).qpos[0] = angle
+    mujoco.mj_kinematics(before, here)
+    mujoco.mj_kinematics(after, there)
+
+    assert [after.body(body).name for body in range(1, after.nbody)] == names
+    assert [after.joint(joint).name for joint in range(after.njnt)] == list(hinges)
+    for hinge in hinges:
+        np.testing.assert_allclose(after.joint(hinge).range, before.joint(hinge).range, atol=1e-8)
+        assert after.joint(hinge).limited == before.joint(hinge).limited
+    for name in names:
+        np.testing.assert_allclose(after.body(name).mass, before.body(name).mass, rtol=1e-8)
+        expected = inertia_in_body(before, name)
+        np.testing.assert_allclose(inertia_in_body(after, name), expected, rtol=1e-6, atol=1e-9)
+    placed, expected = (
+        from_root(model, data, drawn.root) for model, data in ((after, there), (before, here))
+    )
+    for one, other in zip(placed, expected, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-6)

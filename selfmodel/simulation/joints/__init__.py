@@ -1,0 +1,1 @@
+"""Calibration of the joints of a robot with a fixed base."""

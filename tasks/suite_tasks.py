@@ -1,0 +1,181 @@
+"""The tasks of dm_control's suite as environments, on a healthy or a damaged body."""
+
+import importlib
+import inspect
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import mujoco
+
+from selfmodel.errors import InputError
+from selfmodel.faults.build import apply_faults
+from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.faults.neuron import SILENT_NEURON
+from selfmodel.faults.notation import parse
+from selfmodel.physical.reality_gap import draw_gap_of, perturbed_model
+from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.anatomy_reader import read_anatomy
+from selfmodel.robot.mjcf.mujoco_errors import loading_a_model, mujoco_errors_as_input_errors
+from selfmodel.tasks import suite_bodies
+from selfmodel.tasks.randomness import Seed, construction_numbers, episode_numbers
+from selfmodel.tasks.start_noise import start_level
+
+if TYPE_CHECKING:
+    from dm_control.rl import control
+
+_FIXED = "its base is fixed, so that it does not walk"
+
+WITHOUT_SELF_MODEL: Mapping[str, Mapping[str, str]] = {
+    "quadruped": {
+        "escape": "its terrain is random in each episode and unknown to a self-model",
+        "fetch": "its ball is a second free body",
+    },
+    "dog": {"fetch": "its ball is a second free body"},
+    "acrobot": dict.fromkeys(("swingup", "swingup_sparse"), _FIXED),
+    "ball_in_cup": {"catch": "its ball is a second free body"},
+    "cartpole": dict.fromkeys(
+        ("balance", "balance_sparse", "swingup", "swingup_sparse", "two_poles", "three_poles"),
+        "its motor drives a slide, and no hinge",
+    ),
+    "finger": dict.fromkeys(("spin", "turn_easy", "turn_hard"), _FIXED),
+    "lqr": dict.fromkeys(("lqr_2_1", "lqr_6_2"), "its motors drive slides, and no hinge"),
+    "manipulator": dict.fromkeys(("bring_ball", "bring_peg", "insert_ball", "insert_peg"), _FIXED),
+    "pendulum": {"swingup": _FIXED},
+    "point_mass": dict.fromkeys(("easy", "hard"), "its motors drive slides, and no hinge"),
+    "reacher": dict.fromkeys(("easy", "hard"), _FIXED),
+    "stacker": dict.fromkeys(("stack_2", "stack_4"), "its boxes are further free bodies"),
+}
+"""Tasks that are environments only, by domain, and the reason why their body is no self-model."""
+
+TASKS: Mapping[str, tuple[str, ...]] = {
+    domain: (*suite_bodies.DOMAINS.get(domain, ()), *WITHOUT_SELF_MODEL.get(domain, ()))
+    for domain in (*suite_bodies.DOMAINS, *WITHOUT_SELF_MODEL)
+}
+"""All tasks of the suite by domain."""
+
+
+def environment(
+    domain: str,
+    task: str,
+    *,
+    hypothesis: str | Hypothesis = "intact",
+    time_limit: float | None = None,
+    random: Seed = None,
+    gap: float = 0.0,
+    start_noise: float | None = None,
+    environment_kwargs: Mapping[str, Any] | None = None,
+) -> "control.Environment":
+    """Returns the suite's environment of a task, with a hypothesis applied to the suite's model.
+
+    Without a hypothesis, a gap and start noise, it is the suite's own.
+
+    Args:
+        domain: Domain of the suite.
+        task: Task of the domain.
+        hypothesis: Faults of the body and of its environment, or their notation with built-in
+            kinds.
+        time_limit: Length of an episode, s; None for the suite's.
+        random: Seed or generator of the suite's initial states and of the start noise, which are
+            drawn for each episode, and of the gap and the terrain, which are drawn once.
+        gap: Level of the reality gap: factors of the model and a control delay. There is no
+            measurement noise, because the scales of the suite's observations are unknown.
+        start_noise: Standard deviation of a noise that is added to the joint angles of the suite's
+            initial state, rad; None for that of the gap.
+        environment_kwargs: Arguments of ``control.Environment``.
+
+    Raises:
+        InputError: The hypothesis cannot be parsed or does not apply, or the gap or the start noise
+            is out of range.
+    """
+    suite = importlib.import_module("dm_control.suite")
+    episodes = episode_numbers(random)
+    construction = construction_numbers(episodes)
+    limit: dict[str, Any] = {} if time_limit is None else {"time_limit": time_limit}
+    extra = dict(environment_kwargs or {})
+    with loading_a_model():  # MuJoCo warns about the cheetah
+        env = suite.load(domain, task, {"random": episodes, **limit}, extra)
+    anatomy = _anatomy(domain, task, env.physics.model.ptr)
+    if isinstance(hypothesis, str):
+        hypothesis = parse(hypothesis, anatomy)
+    drawn = draw_gap_of(env.physics.model.ptr, anatomy, gap, construction)
+    start = start_level(start_noise, gap)
+    if not hypothesis.faults and gap == 0 and start == 0:
+        return env
+    _check_effect(f"{suite_bodies.PREFIX}{domain} {task}", hypothesis)
+    seed = int(construction.integers(2**32))
+    model = _compiled(domain, task, env.physics.model.ptr, hypothesis, seed)
+    with loading_a_model():
+        embodiment = apply_faults(perturbed_model(model, drawn), anatomy, hypothesis, seed)
+    wrapper = importlib.import_module("dm_control.mujoco.wrapper.core")
+    damaged = importlib.import_module("selfmodel.tasks.damaged_task")
+    extra.pop("n_sub_steps", None)  # is in the control time step of the suite's environment
+    constructor = importlib.import_module("dm_control.rl.control").Environment
+    return constructor(
+        type(env.physics).from_model(wrapper.MjModel(embodiment.model)),
+        damaged.DamagedTask(env.task, embodiment, anatomy, drawn.delay, start),
+        **{
+            "time_limit": _default_time_limit(domain, task),
+            **limit,
+            **extra,
+            "control_timestep": env.control_timestep(),
+        },
+    )
+
+
+def _anatomy(domain: str, task: str, model: mujoco.MjModel) -> Anatomy:
+    """Returns the parts of a body, by the names of the robot if the domain has one."""
+    known = suite_bodies.DOMAINS.get(domain)
+    if known is None:
+        return read_anatomy(model, 0)
+    return suite_bodies.robot(domain, task if task in known else known[0]).anatomy
+
+
+def _check_effect(name: str, hypothesis: Hypothesis) -> None:
+    """Refuses faults of sensors and neurons, which change the controller's inputs only.
+
+    Raises:
+        InputError: The hypothesis has such a fault.
+    """
+    for fault in hypothesis.faults:
+        if not fault.kind.affects_dynamics or fault.kind is SILENT_NEURON:
+            raise InputError(
+                f"{Hypothesis((fault,))} has no effect in {name}: its observations are "
+                f"the suite's, not the readings of the robot's sensors; leave the fault out"
+            )
+
+
+def _compiled(
+    domain: str, task: str, own: mujoco.MjModel, hypothesis: Hypothesis, seed: int
+) -> mujoco.MjModel:
+    """Returns the suite's model with the faults that edit the specification.
+
+    Args:
+        domain: Domain of the suite.
+        task: Task of the domain.
+        own: The suite's compiled model, which is returned without such faults.
+        hypothesis: The hypothesis.
+        seed: Seed of the random parts of the faults.
+
+    Raises:
+        InputError: The suite's specification is not available for the task.
+    """
+    edits = [(fault, fault.kind.edit_spec) for fault in hypothesis.faults if fault.kind.edit_spec]
+    if not edits:
+        return own
+    if task not in suite_bodies.DOMAINS.get(domain, ()):
+        raise InputError(
+            f"{edits[0][0].kind.name} replaces flat ground, and {domain} {task} has other ground "
+            f"or further bodies: use it with a task of {', '.join(suite_bodies.DOMAINS)} that "
+            f"selfmodel suite list names"
+        )
+    spec = suite_bodies.specification(domain, task)
+    for fault, edit in edits:
+        edit(spec, fault, seed)
+    with mujoco_errors_as_input_errors(f"compile the model of {hypothesis}"):
+        return spec.compile()
+
+
+def _default_time_limit(domain: str, task: str) -> float:
+    """Returns the suite's length of an episode, s."""
+    module = importlib.import_module(f"dm_control.suite.{domain}")
+    return float(inspect.signature(module.SUITE[task]).parameters["time_limit"].default)

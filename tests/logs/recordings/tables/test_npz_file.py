@@ -1,0 +1,91 @@
+"""Promises of NPZ files: columns by array and label; nothing is unpickled, nothing explodes."""
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from selfmodel.errors import InputError
+from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget, BudgetError
+from tests.logs.recordings.tables.tables import read_here
+
+
+def test_an_array_of_texts_names_the_columns_of_a_matrix(tmp_path: Path):
+    path = tmp_path / "t.npz"
+    matrix = np.arange(6.0).reshape(3, 2)
+    np.savez(path, time=np.arange(3.0), joint_names=["a", "b"], q=matrix, other=np.zeros((3, 4)))
+
+    names, found = read_here(path, "q.b")
+
+    assert names == ["time", "q.a", "q.b", *(f"other.{k}" for k in range(4))]
+    assert found["q.b"].tolist() == [1, 3, 5]
+
+
+def test_the_labels_of_an_array_of_its_own_name_come_first(tmp_path: Path):
+    path = tmp_path / "t.npz"
+    np.savez(path, q=np.zeros((3, 2)), v=np.zeros((3, 2)), q_names=["a", "b"], names=["c", "d"])
+
+    assert read_here(path)[0] == ["q.a", "q.b", "v.0", "v.1"]
+
+
+def test_integers_and_dates_of_the_exact_column_are_not_rounded(tmp_path: Path):
+    path = tmp_path / "t.npz"
+    exact = np.array([1700000000123456789], dtype=np.uint64)
+    np.savez(path, t=exact, date=exact.astype("datetime64[ns]"))
+
+    assert read_here(path, "t", exact="t")[1]["t"].tolist() == exact.tolist()
+    assert read_here(path, "date", exact="date")[1]["date"].tolist() == exact.tolist()
+
+
+def test_objects_are_no_columns(tmp_path: Path):
+    path = tmp_path / "t.npz"
+    np.savez(path, q=np.zeros(2), made_by=np.array([{"a": 1}, print], dtype=object))
+
+    assert read_here(path, "q", "made_by")[0] == ["q"]
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"no archive", "expected an NPZ file of arrays of numbers, got: File is not a zip file"),
+        (b"\x93NUMPY\x01\x00", "expected an NPZ file"),
+    ],
+)
+def test_another_file_is_refused(content: bytes, message: str, tmp_path: Path):
+    path = tmp_path / "t.npz"
+    path.write_bytes(content)
+
+    with pytest.raises(InputError, match=message):
+        read_here(path, "q")
+
+
+def test_a_damaged_array_is_refused(tmp_path: Path):
+    path = tmp_path / "t.npz"
+    np.savez(path, q=np.zeros(100))
+    data = bytearray(path.read_bytes())
+    data[400] ^= 1
+    path.write_bytes(data)
+
+    with pytest.raises(InputError, match="Bad CRC-32"):
+        read_here(path, "q")
+
+
+def test_a_bomb_is_refused_by_its_header(tmp_path: Path):
+    path = tmp_path / "t.npz"
+    np.savez_compressed(path, q=np.zeros((5, 3)), bomb=np.zeros(10**6))
+    small = Budget(memory=2 * 10**6)
+
+    with pytest.raises(BudgetError, match="numbers in the wanted columns"):
+        read_here(path, "bomb", budget=small)
+    assert read_here(path, "q.1", budget=small)[1]["q.1"].tolist() == [0.0] * 5
+
+
+def test_a_header_that_promises_more_than_the_file_has_is_refused(tmp_path: Path):
+    path, header = tmp_path / "t.npz", b"{'descr': '<f8', 'fortran_order': False, 'shape': (9,)}"
+    for shape, message in ((b"(99,)", "expected an NPZ file"), (b"(9**9,)", "expected an NPZ")):
+        text = header.replace(b"(9,)", shape).ljust(117) + b"\n"
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("q.npy", b"\x93NUMPY\x01\x00\x76\x00" + text + bytes(72))
+        with pytest.raises(InputError, match=message):
+            read_here(path, "q", budget=DEFAULT_BUDGET)

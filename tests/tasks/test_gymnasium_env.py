@@ -1,0 +1,202 @@
+"""Tests of the Gymnasium environments: Gymnasium's own checks, ids, seeds, pickles and vectors."""
+
+import copy
+import pickle
+import subprocess
+import sys
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.envs.registration import EnvSpec
+from gymnasium.utils.env_checker import check_env
+
+from selfmodel import tasks
+from selfmodel.errors import InputError
+from selfmodel.tasks.gymnasium_env import FILE_ID, env_id, register
+from tests.helpers.opengl import WORKS, draws
+
+ANT = Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets" / "ant.xml"
+ID = "selfmodel/Quadruped-walk-v0"
+RANDOM = {"hypothesis": "break:front_left_knee+roughness=0.03", "gap": 0.05}
+CHECKED = {
+    "quadruped": (ID, {}),
+    "random": (ID, RANDOM),
+    "hexapod": ("selfmodel/Hexapod-walk-v0", {"hypothesis": "jam:front_left_hip"}),
+    "walker": ("selfmodel/suite-walker-walk-v0", {"hypothesis": "break:left_ankle"}),
+    "cartpole": ("selfmodel/suite-cartpole-swingup-v0", {"gap": 0.05}),
+    "reacher": ("selfmodel/suite-reacher-easy-v0", {}),
+    "file": (FILE_ID, {"robot": str(ANT), "start_noise": 0.05}),
+}
+every = pytest.mark.parametrize(
+    ("name", "kwargs"),
+    [
+        pytest.param(*what, id=name, marks=pytest.mark.bodies if "suite" in what[0] else ())
+        for name, what in CHECKED.items()
+    ],
+)
+
+
+@pytest.fixture
+def env() -> Iterator[gymnasium.Env]:
+    made = gymnasium.make(ID, **RANDOM, time_limit=0.05)
+    yield made
+    made.close()
+
+
+def same(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> bool:
+    return all(one[name].tobytes() == other[name].tobytes() for name in one)
+
+
+@every
+def test_gymnasiums_own_checks_pass_without_a_warning(name: str, kwargs: dict):
+    made = gymnasium.make(name, **kwargs)
+
+    check_env(made.unwrapped, skip_render_check=True)  # nothing is drawn without OpenGL
+    made.close()
+
+
+def test_every_task_has_an_id_once_registered():
+    ids = {env_id(domain, task) for domain, task in tasks.ALL_TASKS}
+
+    assert {ID, "selfmodel/Hexapod-walk-v0", "selfmodel/suite-dog-fetch-v0"} < ids
+    assert ids | {FILE_ID} == {name for name in gymnasium.registry if name.startswith("selfmodel/")}
+    before = dict(gymnasium.registry)
+    register()
+    assert dict(gymnasium.registry) == before
+
+
+def test_a_seed_is_one_sequence_of_episodes_whatever_came_before(env: gymnasium.Env):
+    other = gymnasium.make(ID, **RANDOM, time_limit=0.05)
+    other.reset()
+    firsts = [one.reset(seed=1)[0] for one in (env, other)]
+    nexts = [one.reset()[0] for one in (env, other)]
+
+    assert same(*firsts)
+    assert same(*nexts)
+    assert not same(firsts[0], nexts[0])
+    assert not same(firsts[0], env.reset(seed=2)[0])
+
+
+def test_a_seed_draws_the_gap_and_the_terrain(env: gymnasium.Env):
+    def drawn(seed: int) -> bytes:
+        env.reset(seed=seed)
+        model = env.unwrapped._environment.physics.model
+        return bytes(model.hfield_data.tobytes() + model.body_mass.tobytes())
+
+    assert drawn(1) == drawn(1) != drawn(2)
+
+
+def test_the_time_limit_truncates_and_the_end_of_a_task_terminates(env: gymnasium.Env):
+    env.reset(seed=0)
+    action = np.zeros(env.action_space.shape)
+    ends = [env.step(action)[2:4] for _ in range(5)]
+
+    assert ends == [(False, False)] * 4 + [(False, True)]
+    with pytest.raises(gymnasium.error.ResetNeeded, match="the episode is over"):
+        env.step(action)
+    env.reset()
+    assert env.step(action)[2:4] == (False, False)
+    done = gymnasium.make("selfmodel/suite-lqr-lqr_2_1-v0").unwrapped
+    done.reset(seed=0)
+    task = done._environment.task
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(task, "get_termination", lambda _: 0.0)
+        assert done.step(np.zeros(1))[2:4] == (True, False)
+
+
+def test_steps_are_those_of_the_dm_control_environment():
+    plain = gymnasium.make(ID, hypothesis="break:front_left_knee")
+    plain.reset(seed=0)
+    own = tasks.load("quadruped", "walk", {"hypothesis": "break:front_left_knee"})
+    own.reset()
+    for _ in range(5):
+        action = plain.action_space.sample()
+        observation, reward, *_ = plain.step(action)
+        step = own.step(action)
+        assert reward == step.reward
+        assert same(observation, dict(step.observation))
+
+
+def test_a_spec_a_pickle_and_a_copy_make_the_same_environment(env: gymnasium.Env):
+    spec = EnvSpec.from_json(env.spec.to_json())
+    others = [
+        gymnasium.make(spec),
+        pickle.loads(pickle.dumps(env.unwrapped)),  # noqa: S301  # of this test
+        copy.deepcopy(env),
+    ]
+    first = env.reset(seed=4)[0]
+    for other in others:
+        assert same(other.reset(seed=4)[0], first)
+        other.close()
+
+
+@pytest.mark.parametrize("mode", ["sync", pytest.param("async", marks=pytest.mark.process)])
+def test_a_vector_of_environments_is_that_many_single_ones(mode: str):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # fork in a process with threads
+        many = gymnasium.make_vec(ID, num_envs=2, vectorization_mode=mode, start_noise=0.05)
+        observations, _ = many.reset(seed=[1, 2])
+        many.step(many.action_space.sample())
+        many.close()
+    single = gymnasium.make(ID, start_noise=0.05)
+    for row, seed in enumerate((1, 2)):
+        alone = single.reset(seed=seed)[0]
+        for name, values in alone.items():
+            np.testing.assert_array_equal(observations[name][row], values)
+
+
+def test_wrong_arguments_are_refused():
+    with pytest.raises(gymnasium.error.Error, match="give the seed to reset"):
+        gymnasium.make(ID, random=1)
+    with pytest.raises(InputError, match="unknown part in the term 'break:knee'"):
+        gymnasium.make(ID, hypothesis="break:knee")
+    with pytest.raises(InputError, match=r"unknown task of .*ant\.xml 'run'"):
+        gymnasium.make(FILE_ID, robot=str(ANT), task="run")
+
+
+CLEAN = """
+import sys
+import selfmodel, selfmodel.tasks
+selfmodel.Settings
+assert not {"gymnasium", "shimmy"} & set(sys.modules)
+import gymnasium
+env = gymnasium.make("selfmodel.tasks.gymnasium_env:selfmodel/Quadruped-walk-v0")
+assert env.reset(seed=0)
+"""
+
+
+@pytest.mark.process
+def test_selfmodel_does_not_import_gymnasium_and_an_id_may_name_the_module():
+    subprocess.run([sys.executable, "-c", CLEAN], check=True)
+
+
+DRAWN = """
+import gymnasium, numpy as np, os, warnings
+from gymnasium.utils.env_checker import check_env
+import selfmodel.tasks.gymnasium_env
+
+warnings.simplefilter("error")
+for name in ("Quadruped-walk", "suite-walker-walk"):
+    env = gymnasium.make(f"selfmodel/{name}-v0", render_mode="rgb_array", height=48, width=64)
+    check_env(env.unwrapped)
+    env.reset(seed=0)
+    assert env.render().shape == (48, 64, 3)
+    assert np.ptp(env.render()) > 100
+print("seen", flush=True)
+os._exit(0)  # skips OpenGL's cleanup at exit, whose order is undefined
+"""
+
+
+@pytest.mark.opengl
+@draws
+def test_pictures_pass_gymnasiums_checks(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("MUJOCO_GL", str(WORKS))
+    done = subprocess.run(
+        [sys.executable, "-c", DRAWN], capture_output=True, text=True, check=False, timeout=300
+    )
+
+    assert done.stdout.endswith("seen\n"), done.stderr
