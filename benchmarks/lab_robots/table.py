@@ -115,8 +115,8 @@ def _row(values: Mapping[str, str]) -> Row:
 
 def _print_robots(rows: Sequence[Row]) -> None:
     print(
-        "| robot | gap | before, m | after, m | recovered, m | recovered ÷ before | upright | right "
-        "| 95 % interval, % | largest difference, m | s per run |"
+        "| robot | gap | before, m | after, m | recovered, m | recovered ÷ before | upright "
+        "| right | 95 % interval, % | largest difference, m | s per run |"
     )
     print("|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|")
     for robot in dict.fromkeys(row.robot for row in rows):
