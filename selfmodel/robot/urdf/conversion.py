@@ -8,7 +8,8 @@ from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.document import Document
 from selfmodel.robot.mjcf.expand import format_numbers
 from selfmodel.robot.mjcf.mujoco_errors import compile_model, loading_a_model
-from selfmodel.robot.urdf.bodies import is_rigid, meshes, world_elements
+from selfmodel.robot.urdf.bodies import meshes, world_elements
+from selfmodel.robot.urdf.inertia import is_rigid
 from selfmodel.robot.urdf.reading import number
 from selfmodel.robot.urdf.servos import check_patterns, servo
 from selfmodel.robot.urdf.settings import UrdfSettings
