@@ -1,5 +1,7 @@
 """Random numbers of an environment: of its construction and of its episodes, from one seed."""
 
+import copy
+
 import numpy as np
 
 Seed = int | np.random.RandomState | np.random.Generator | None
@@ -28,8 +30,8 @@ def construction_numbers(episodes: np.random.RandomState) -> np.random.Generator
     Args:
         episodes: Generator of the episodes.
     """
-    _, key, position, *_ = episodes.get_state(legacy=True)
-    return np.random.default_rng([*np.asarray(key).tolist(), int(position)])
+    seed = copy.deepcopy(episodes).randint(2**32, size=4, dtype=np.uint64)
+    return np.random.default_rng(seed)
 
 
 def next_seed(episodes: np.random.RandomState) -> int:

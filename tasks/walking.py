@@ -20,6 +20,7 @@ from selfmodel.physical.initial_pose import randomize_initial_pose
 from selfmodel.physical.measurement_noise import ExactMeasurement, Measurement, NoisyMeasurement
 from selfmodel.physical.reality_gap import RealityGap, draw_gap
 from selfmodel.physical.simulated_robot import physical_embodiment
+from selfmodel.robot.control_delay import CONTROL_DELAY, split_delay
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
@@ -60,13 +61,20 @@ def environment(
         environment_kwargs: Arguments of ``control.Environment``.
 
     Raises:
-        InputError: The base of the robot is fixed, the hypothesis cannot be parsed or does not
-            apply, or the gap or the start noise is out of range.
+        InputError: The base of the robot is fixed, its control delay has a part of a control step,
+            the hypothesis cannot be parsed or does not apply, or the gap or the start noise is out
+            of range.
     """
     if robot.has_fixed_base:
         raise InputError(
             f"the reward of walk is the forward speed, and the base of {robot.name} is fixed: "
             f"give the model a <freejoint/>"
+        )
+    _, part = split_delay(robot.control_delay, robot.substeps)
+    if part:
+        raise InputError(
+            f"dm_control applies commands at control steps, and the control delay of {robot.name} "
+            f"is {robot.control_delay:g} of them: set {CONTROL_DELAY} to a whole number"
         )
     if isinstance(hypothesis, str):
         hypothesis = parse(hypothesis, robot.anatomy)
@@ -144,7 +152,7 @@ class Walk(base.Task):
         embodiment = dataclasses.replace(self._embodiment, seed=int(rng.integers(2**32)))
         self._reader = SensorReader(embodiment.model, self._robot.anatomy, [embodiment])
         self._measurement: Measurement = ExactMeasurement()
-        delay = self._robot.control_delay
+        delay = int(self._robot.control_delay)
         if self._gap is not None:
             self._measurement = NoisyMeasurement(
                 self._gap.level, self._robot.anatomy, embodiment, rng

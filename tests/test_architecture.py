@@ -100,6 +100,16 @@ def test_every_module_has_a_room_or_is_vocabulary():
     assert sorted(homeless) == ["selfmodel", "selfmodel.__main__"]
 
 
+def test_one_module_imports_gymnasium_which_is_no_dependency():
+    others = [
+        module
+        for module, path in modules().items()
+        if {"gymnasium", "shimmy"} & {name.split(".")[0] for name in imports(path)}
+    ]
+
+    assert others == ["selfmodel.tasks.gymnasium_env"]
+
+
 def test_few_files_lie_flat_in_the_package():
     assert len(list((ROOT / "selfmodel").glob("*.py"))) <= 8
 
@@ -180,6 +190,7 @@ BY_THEME = {
     "cli/test_controllers": "one option of many commands",
     "cli/test_hostile_logs": "many commands, given hostile logs",
     "cli/test_kinds": "one option of many commands",
+    "cli/test_tables": "the commands that write and read tables",
     "faults/test_graded": "all kinds with a severity, each a file of its own",
     "faults/test_kinds": "the contract of every kind, each a file of its own",
     "logs/recordings/rosbag/test_bags": "a reader of recordings that are made here",

@@ -20,6 +20,7 @@ PUBLIC = {
     *("load_robot", "Robot", "Hypothesis", "FaultKind", "ALL_KINDS", "PAPER_KINDS"),
     *("parse_hypothesis", "Simulator", "simulated_robot", "EnvironmentRobot", "PhysicalRobot"),
     *("Controller", "Trial", "Behaviour", "evolve_controller", "run_trial", "read_log"),
+    "write_log",
     *("calibrate", "diagnose", "Diagnosis", "recover", "Recovery", "replay", "Settings"),
     *("Budget", "Comparator", "check_comparator", "check_fault_kind", "__version__"),
 }

@@ -21,6 +21,7 @@ from selfmodel.cli.options import (
     KindNames,
     Only,
     Population,
+    ScoreName,
     Seeds,
     Steps,
     Structural,
@@ -35,6 +36,7 @@ from selfmodel.experiments.ablation import Ablation, AblationResults, ablate as 
 from selfmodel.experiments.ablation.results import as_dict
 from selfmodel.experiments.ablation.scores import ComparatorScore
 from selfmodel.experiments.confidence_intervals import Interval
+from selfmodel.recovery.fitness import DISPLACEMENT
 from selfmodel.settings import Settings
 from selfmodel.simulation.threads import thread_count
 from selfmodel.tasks import ROBOTS
@@ -63,6 +65,7 @@ def ablate(
             rich_help_panel=CONTROLLER,
         ),
     ] = "bank",
+    score: ScoreName = DISPLACEMENT.name,
     steps: Steps = 1000,
     trials: Annotated[
         int,
@@ -109,6 +112,7 @@ def ablate(
         settings=Settings(steps=steps, trials=trials, generations=generations).scaled(population),
         next_trial=next_trial,
         bank=bank,
+        score=score,
     )
     part = inputs.share("--only", only)
     failed = grid_display.run_shown(

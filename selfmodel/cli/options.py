@@ -236,6 +236,28 @@ NamedKinds = Annotated[
     ),
 ]
 
+ScoreName = Annotated[
+    str,
+    typer.Option(
+        "--score",
+        metavar="NAME",
+        help="Fitness of controllers: displacement; upright, the displacement until the first "
+        "fall; return, the sum of the task's rewards; or tracking, the error of the joints from a "
+        "trajectory.",
+        rich_help_panel=CONTROLLER,
+    ),
+]
+Reference = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="Trajectory to follow with --score tracking: LOG.mcap, or a table (.csv, .npz, "
+        ".parquet) with the columns time and joints.",
+        show_default="the motion of the first controller",
+        rich_help_panel=CONTROLLER,
+    ),
+]
+
 Population = Annotated[
     int,
     typer.Option(

@@ -1,6 +1,7 @@
 """``selfmodel recover``: the paper's loop, from a healthy gait to one for the damaged robot."""
 
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -24,26 +25,33 @@ from selfmodel.cli.options import (
     Neurons,
     NextTrialName,
     Population,
+    Reference,
     RobotName,
+    ScoreName,
     Seed,
     Steps,
     Structural,
     Threads,
     Trials,
 )
-from selfmodel.cli.output.display import display
+from selfmodel.cli.output.display import displacement_text, display
 from selfmodel.cli.output.printing import print_json
 from selfmodel.cli.output.report import facts, print_report, result_file
 from selfmodel.comparators import DEFAULT
 from selfmodel.controllers.controller import check_silent_neurons
 from selfmodel.experiments import plugins, robots
+from selfmodel.experiments.chosen_score import choose_score
 from selfmodel.experiments.experiment import Experiment, run
+from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.neuron import silent_neurons
 from selfmodel.logs.files import replace_file
+from selfmodel.recovery.fitness import DISPLACEMENT, Score
+from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import Budget
 from selfmodel.settings import Settings
 from selfmodel.simulation.threads import thread_count
+from selfmodel.trials.trial import Trial
 
 
 def recover(
@@ -60,6 +68,8 @@ def recover(
     next_trial: NextTrialName = "repair",
     controller: ControllerKind = "network",
     neurons: Neurons = None,
+    score: ScoreName = "displacement",
+    reference: Reference = None,
     seed: Seed = 0,
     steps: Steps = 1000,
     trials: Trials = 3,
@@ -83,13 +93,18 @@ def recover(
     The physical robot is a simulated one with the failure of --case or --damage, which the
     algorithm does not read. Every physical trial becomes a log in the folder of the run.
     """
-    entry = robots.robot_entry(robot, model_settings or (), Budget.parse(budget))
+    limits = Budget.parse(budget)
+    entry = robots.robot_entry(robot, model_settings or (), limits)
     considered = plugins.kinds(kinds)
     damaged = inputs.case_notation(entry.cases, case, damage)
     made = entry.robot()
     design = plugins.design(controller, made, neurons)
     truth = HypothesisSpace(made.anatomy, considered).parse(damaged)
     check_silent_neurons(design, silent_neurons(truth))
+    settings = Settings(steps=steps, trials=trials, generations=generations).scaled(population)
+    chosen = choose_score(
+        score, entry, design, steps=steps, seed=seed, reference=reference, budget=limits
+    )
     experiment = Experiment(
         robot=made,
         case=case,
@@ -97,7 +112,7 @@ def recover(
         comparator=plugins.comparator(comparator),
         kinds=considered,
         calibrated=calibrate,
-        settings=Settings(steps=steps, trials=trials, generations=generations).scaled(population),
+        settings=settings,
         seed=seed,
         threads=thread_count(threads),
         folder=out or _new_folder(made.name),
@@ -105,10 +120,12 @@ def recover(
         structure=structure,
         next_trial=plugins.next_trial(next_trial),
         design=design,
+        gait=chosen.gait,
+        score=chosen.score,
         physical=entry.physical,
     )
     try:
-        with display() as on_event:
+        with display(partial(_described, made, chosen.score)) as on_event:
             outcome = run(experiment, on_event)
     except KeyboardInterrupt as interruption:
         interruption.add_note(f"the finished trials are in {experiment.folder}")
@@ -122,6 +139,14 @@ def recover(
             print_json(found)
         else:
             print_report(found, experiment.folder)
+
+
+def _described(robot: Robot, score: Score, trial: Trial) -> str:
+    """Returns the score of a trial as text; the physical robot's failure is taken as unknown."""
+    if score is DISPLACEMENT:
+        return displacement_text(trial)
+    value = score.of_trial(robot, INTACT, trial)
+    return f"{score.name} {value:.4f} {score.unit}".rstrip()
 
 
 def _new_folder(robot: str) -> Path:

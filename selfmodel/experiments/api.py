@@ -22,6 +22,7 @@ from selfmodel.experiments.arguments import (
     sources_of,
     trials_of,
 )
+from selfmodel.experiments.chosen_score import check_motion
 from selfmodel.experiments.fitting import fitted
 from selfmodel.experiments.log_diagnosis import set_up_diagnosis
 from selfmodel.faults import PAPER_KINDS
@@ -33,6 +34,7 @@ from selfmodel.logs.writing.writer import write_trial
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery import recover as loop
 from selfmodel.recovery.events import Event
+from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.next_trial import NextTrial, by_repair
 from selfmodel.recovery.random_streams import repair_stream
 from selfmodel.recovery.recover import Recovery
@@ -65,11 +67,12 @@ def evolve_controller(
     design: str | Design = "network",
     seeds: Sequence[Controller] = (),
     settings: Settings | None = None,
+    score: Score = DISPLACEMENT,
     seed: int = 0,
     threads: int = 0,
     on_event: Callable[[Event], None] = _ignore,
 ) -> Controller:
-    """Returns the controller with the largest forward displacement that the repair EA finds.
+    """Returns the controller with the largest score that the repair EA finds.
 
     Example:
         >>> import selfmodel
@@ -83,18 +86,20 @@ def evolve_controller(
         design: Name of a controller design, such as ``network`` or ``cpg``, or a design.
         seeds: Controllers of the first generation, in addition to random controllers.
         settings: Parameters of the search; the paper's by default.
+        score: Fitness; the forward displacement by default.
         seed: Seed of all random numbers.
         threads: Threads of the physics; 0 for all processors.
         on_event: Called with the progress of the search.
 
     Raises:
-        InputError: The design or the robot is unknown, the notation is invalid, or a motor has no
-            command range.
+        InputError: The design or the robot is unknown, the notation is invalid, a motor has no
+            command range, or the base is fixed and the score is a displacement.
     """
     check_seed(seed)
     robot = robot_of(robot)
+    check_motion(score.name, robot)
     chosen = _design(design, robot)
-    search = RepairSearch(Simulator(robot, threads), settings or Settings(), chosen)
+    search = RepairSearch(Simulator(robot, threads), settings or Settings(), chosen, score=score)
     return search(hypothesis_of(hypothesis, robot), seeds, repair_stream(seed, 0), on_event)
 
 
@@ -311,6 +316,7 @@ def recover(
     design: str | Design = "network",
     calibrate: bool = True,
     next_trial: NextTrial = by_repair,
+    score: Score = DISPLACEMENT,
     seed: int = 0,
     threads: int = 0,
     on_event: Callable[[Event], None] = _ignore,
@@ -340,16 +346,19 @@ def recover(
         design: Name of a controller design, such as ``network`` or ``cpg``, or a design.
         calibrate: Whether the self-model is fitted to the trial before the failure.
         next_trial: Chooses the controller of each trial after the failing one.
+        score: Fitness of the repair EA; the forward displacement by default.
         seed: Seed of all random numbers.
         threads: Threads of the physics; 0 for all processors.
         on_event: Called with the progress of the recovery.
 
     Raises:
-        InputError: The folder contains files, or an argument is invalid.
+        InputError: The folder contains files, an argument is invalid, or the base is fixed and the
+            score is a displacement.
         TrialError: A physical robot could not finish a trial.
     """
     check_seed(seed)
     robot, count = robot_of(robot), thread_count(threads)
+    check_motion(score.name, robot)
     chosen, searched = settings or Settings(), kinds_of(kinds)
     journal = create_journal(Path(folder), robot.anatomy, searched)
     return loop.recover(
@@ -366,4 +375,5 @@ def recover(
         kinds=searched,
         calibrate=partial(fitted, robot, threads=count) if calibrate else None,
         next_trial=next_trial,
+        score=score,
     )

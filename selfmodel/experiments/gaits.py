@@ -4,7 +4,7 @@ import dataclasses
 from pathlib import Path
 from typing import Any
 
-from selfmodel.controllers.controller import Design
+from selfmodel.controllers.controller import Controller, Design
 from selfmodel.errors import InputError
 from selfmodel.experiments.grid import PartResult, finished
 from selfmodel.faults.hypothesis import INTACT
@@ -67,5 +67,10 @@ def evolve_gait(
     """
     repair = RepairSearch(Simulator(robot, threads=1), settings, design, score=score)
     gait = repair(INTACT, (), repair_stream(seed, 0), lambda _generation: None)
+    return write_gait(path, gait, repair.evaluations)
+
+
+def write_gait(path: Path, gait: Controller, evaluations: int) -> PartResult:
+    """Writes a gait, and returns the number of evaluations, as JSON, and the file."""
     replace_file(path, controller_bytes(gait))
-    return PartResult({"evaluations": repair.evaluations}, [path])
+    return PartResult({"evaluations": evaluations}, [path])

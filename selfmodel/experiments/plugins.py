@@ -18,6 +18,7 @@ from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import ALL_KINDS, KINDS
 from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.next_trial import NextTrial, by_disagreement, by_repair
+from selfmodel.recovery.tracking import TRACKING
 from selfmodel.recovery.upright import UPRIGHT
 from selfmodel.robot.designs import DESIGNS
 from selfmodel.robot.robot import Robot
@@ -166,7 +167,7 @@ def score(name: str, robot: str, entry: Entry) -> Score:
     if name in by_name:
         return by_name[name]
     if name != RETURN:
-        raise unknown_name("score", name, (*by_name, RETURN))
+        raise unknown_name("score", name, (*by_name, RETURN, TRACKING))
     if entry.episode_return is None:
         raise InputError(
             f"{robot} has no task of dm_control, so no rewards: give --score {DISPLACEMENT.name}"

@@ -41,6 +41,9 @@ class Recovery:
         diagnostic_evaluations: Number of hypotheses that the diagnostic EA evaluated.
         distinct_hypotheses: Number of distinct hypotheses among them.
         calibration: Fit of the self-model to the trials before the failure; None without one.
+        score: Score of the repair EA.
+        scores: Score of each trial; those after the failure under the last diagnosis, which matters
+            for a score that depends on the ground or on detached limbs.
     """
 
     trials: tuple[Trial, ...]
@@ -50,6 +53,13 @@ class Recovery:
     diagnostic_evaluations: int
     distinct_hypotheses: int
     calibration: Calibration | None = None
+    score: Score = DISPLACEMENT
+    scores: tuple[float, ...] = ()
+
+    @property
+    def best_score(self) -> float:
+        """Largest score of the recovery trials; NaN if unobserved in all."""
+        return _largest(self.scores[2:])
 
     @property
     def before(self) -> float:
@@ -64,8 +74,7 @@ class Recovery:
     @property
     def recovered(self) -> float:
         """Largest forward displacement of the recovery trials, m; NaN if unobserved in all."""
-        displacements = [trial.displacement for trial in self.trials[2:]]
-        return max((value for value in displacements if not math.isnan(value)), default=math.nan)
+        return _largest([trial.displacement for trial in self.trials[2:]])
 
     def __repr__(self) -> str:
         lines = [f"<Recovery: {self.diagnosis.best}, {self.diagnosis.verdict}"]
@@ -114,6 +123,10 @@ class Recovery:
             }
             for trial, tried in zip(self.trials, self.tried, strict=True)
         ]
+
+
+def _largest(values: Sequence[float]) -> float:
+    return max((value for value in values if not math.isnan(value)), default=math.nan)
 
 
 def _observed(displacement: float) -> float | None:
@@ -229,4 +242,9 @@ def recover(
         diagnostic_evaluations=search.evaluations,
         distinct_hypotheses=search.distinct_hypotheses,
         calibration=calibration,
+        score=score,
+        scores=tuple(
+            score.of_trial(simulator.robot, diagnosis.best if number else INTACT, trial)
+            for number, trial in enumerate(database.trials)
+        ),
     )

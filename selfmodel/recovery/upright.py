@@ -34,7 +34,9 @@ def _displacement_until_a_fall(
     return np.asarray(end - x[..., 0])
 
 
-UPRIGHT = Score("upright", ("base_position", "base_orientation"), _displacement_until_a_fall)
+UPRIGHT = Score(
+    "upright", ("base_position", "base_orientation"), _displacement_until_a_fall, unit="m"
+)
 """Forward displacement up to the last step before the robot falls, m.
 
 A robot has fallen at the first step at which its base is tilted by more than ``FALLEN_TILT`` from

@@ -1,14 +1,17 @@
-"""Rows of results as a pandas data frame; pandas is optional."""
+"""Rows of results, or columns of numbers, as a pandas data frame; pandas is optional."""
 
 import importlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
 
 
-def data_frame(rows: Sequence[Mapping[str, Any]]) -> Any:  # noqa: ANN401  # pandas is optional
-    """Returns rows as a ``pandas.DataFrame``, with one column per key.
+def data_frame(
+    content: Sequence[Mapping[str, Any]] | Mapping[str, FloatArray],
+) -> Any:  # noqa: ANN401  # pandas is optional
+    """Returns a ``pandas.DataFrame`` of rows, with one column per key, or of columns by name.
 
     Raises:
         InputError: pandas is not installed.
@@ -17,6 +20,6 @@ def data_frame(rows: Sequence[Mapping[str, Any]]) -> Any:  # noqa: ANN401  # pan
         pandas = importlib.import_module("pandas")
     except ImportError as error:
         raise InputError(
-            "to_pandas() needs pandas, which is not installed: pip install pandas, or use to_dict()"
+            "to_pandas() needs pandas, which is not installed: pip install 'selfmodel[tables]'"
         ) from error
-    return pandas.DataFrame(list(rows))
+    return pandas.DataFrame(content)

@@ -3,7 +3,7 @@
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from numpy.typing import ArrayLike
 
@@ -13,10 +13,9 @@ from selfmodel.errors import InputError
 from selfmodel.trials.arrays import Described, behaviour_of_arrays
 from selfmodel.trials.behaviour import Behaviour, forward_displacement
 from selfmodel.trials.columns import columns_of
+from selfmodel.trials.data_frame import data_frame
 
 if TYPE_CHECKING:
-    import pandas  # noqa: ICN001  # the name of the extra
-
     from selfmodel.trials.signals import Signal
 
 Stage = Literal["before", "after", "recovery", "single"]
@@ -178,8 +177,8 @@ class Trial:
         plan = TrialPlan(name, stage, controller or played, behaviour.steps, seed=0)
         return cls(plan, robot.name, behaviour, f"{name} ({_digest(behaviour)})")
 
-    def to_pandas(self) -> "pandas.DataFrame":
-        """Returns the observed signals as a table, with the columns of ``logs export``.
+    def to_pandas(self) -> Any:  # noqa: ANN401  # pandas is optional
+        """Returns the signals as a ``pandas.DataFrame``, with the columns of ``logs export``.
 
         Example:
             >>> import selfmodel
@@ -189,11 +188,7 @@ class Trial:
         Raises:
             InputError: pandas is not installed.
         """
-        try:
-            import pandas  # noqa: ICN001, PLC0415  # an extra
-        except ImportError:
-            raise InputError("to_pandas needs pandas: pip install 'selfmodel[tables]'") from None
-        return pandas.DataFrame(columns_of(self.behaviour))
+        return data_frame(columns_of(self.behaviour))
 
     @property
     def displacement(self) -> float:

@@ -92,7 +92,7 @@ def test_the_shell_completes_commands_and_options(tmp_path: Path):
         done = selfmodel(cwd=tmp_path, _SELFMODEL_COMPLETE="complete_bash", **environment)
         return done.stdout.split()
 
-    assert completed("selfmodel logs ") == ["info", "verify", "salvage", "import"]
+    assert completed("selfmodel logs ") == ["info", "verify", "salvage", "import", "export"]
     assert "--kinds" in completed("selfmodel diagnose --k")
     script = selfmodel(cwd=tmp_path, _SELFMODEL_COMPLETE="source_bash").stdout
     assert "_SELFMODEL_COMPLETE=complete_bash" in script

@@ -60,7 +60,7 @@ def test_a_table_without_pandas_is_refused_with_the_remedy(
 ):
     monkeypatch.setitem(sys.modules, "pandas", None)
 
-    with pytest.raises(InputError, match=r"pip install pandas, or use to_dict\(\)"):
+    with pytest.raises(InputError, match=r"pip install 'selfmodel\[tables\]'"):
         found.to_pandas()
 
 

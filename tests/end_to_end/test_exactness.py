@@ -14,22 +14,28 @@ from selfmodel.controllers.playback import played_back
 from selfmodel.experiments import robots
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
+from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.robot import Robot
+from selfmodel.simulation.calibration import calibrate
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import collect
+from selfmodel.trials.trial import Trial, TrialPlan
+from tests.helpers.arms import arm_mjcf
 from tests.helpers.drivers import random_motion
 from tests.helpers.exactness import Exactness, exactness, prediction_error, with_options
-from tests.helpers.go1 import go1
+from tests.helpers.go1 import go1, trot
 from tests.robot.mjcf.awkward import mjcf
 from tests.robot.mjcf.samples import SAMPLES
 
-STEPS = 60
+STEPS = 40
 ROUNDING = 1e-9
 """Largest error of the prediction of a planar robot, in the units of the signals."""
 
 BODIES = {
     "go1": go1(),
+    "go1 with filters": go1().replace('kp="35"', 'kp="35" timeconst="0.03"'),
+    "arm": arm_mjcf(),
     "two legs": mjcf(),
     **{
         name: SAMPLES[f"gymnasium {name}"].read_text(encoding="utf-8")
@@ -98,6 +104,19 @@ def test_prediction_is_exact_with_every_solver_and_integrator(options: Options, 
 def test_prediction_is_exact_with_every_combination_of_options(name: str, tmp_path: Path):
     for options in ALL:
         check(name, measured(loaded(name, options, tmp_path)))
+
+
+def test_calibration_leaves_an_exact_go1_as_it_is_to_the_bit(tmp_path: Path):
+    path = tmp_path / "go1.xml"
+    path.write_text(go1(), encoding="utf-8")  # one iteration, as MJX's models have
+    robot = load_mjcf(path)
+    driver = trot(robot, STEPS)
+    log = collect(robot.anatomy.names, SimulatedRobot(robot).run(driver, STEPS))
+    plan = TrialPlan("before", "before", driver, STEPS, 0)
+    found = calibrate(robot, [Trial(plan, robot.name, log, "before.mcap")], threads=1)
+
+    assert found.error_before == found.error == 0.0
+    assert found.robot is robot
 
 
 @pytest.mark.parametrize("truth", ["break:FR_calf_joint", "motor:RL_hip_joint=0.5", "wind=20.0"])

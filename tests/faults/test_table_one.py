@@ -8,8 +8,8 @@ import pytest
 
 from selfmodel.faults.notation import parse
 from selfmodel.faults.table_one import cases_of
+from selfmodel.robot.legs import reaches_ground
 from selfmodel.robot.mjcf.load import load_mjcf
-from selfmodel.robot.reach import reaches_ground
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import ROBOTS, entry, suite_bodies
 from tests.helpers.bodies import BODIES

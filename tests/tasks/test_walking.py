@@ -10,6 +10,9 @@ import selfmodel
 from selfmodel import tasks
 from selfmodel.errors import InputError
 from selfmodel.physical.reality_gap import DEBRIS_PREFIX
+from selfmodel.robot.control_delay import CONTROL_DELAY
+from selfmodel.robot.robot import Robot
+from selfmodel.tasks import walking
 
 ANT = Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets" / "ant.xml"
 ARM = """
@@ -84,3 +87,21 @@ def test_a_gap_has_the_debris_of_a_detached_limb_where_the_limb_was():
         (debris,) = [name for name in names if name.startswith(DEBRIS_PREFIX)]
         limb = names.index(debris.removeprefix(DEBRIS_PREFIX))
         np.testing.assert_allclose(data.xpos[names.index(debris)], data.xpos[limb], atol=1e-9)
+
+
+def test_the_control_delay_of_a_calibrated_robot_delays_the_commands(quadruped: Robot):
+    def delayed(steps: float) -> Robot:
+        numeric = f'<custom><numeric name="{CONTROL_DELAY}" data="{steps}"/></custom></mujoco>'
+        mjcf = quadruped.mjcf.replace("</mujoco>", numeric)
+        return Robot("delayed", mjcf, quadruped.control_timestep)
+
+    environment = walking.environment(delayed(1))
+    environment.reset()
+    applied = []
+    for _ in range(3):
+        environment.step(np.full(environment.action_spec().shape, 0.2))
+        applied.append(environment.physics.data.ctrl[0])
+
+    assert applied == [0, 0.2, 0.2]
+    with pytest.raises(InputError, match=r"the control delay of delayed is 0\.5 of them"):
+        walking.environment(delayed(0.5))

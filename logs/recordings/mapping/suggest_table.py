@@ -40,13 +40,14 @@ def suggest_for_table(path: Path, robot: Robot, budget: Budget) -> Iterator[str]
     yield from _time(path, found, names, budget)
     yield "[joints]"
     yield f"unit = {_unit(found)}"
-    yield from _parts("joints.names", anatomy.hinges, _offered(found, "position"), names)
+    positions = found.parts.get("position") or _similar(anatomy.hinges, found.others)
+    yield from _parts("joints.names", anatomy.hinges, positions, names)
     yield from _known("joints.velocities", anatomy.hinges, found.parts.get("velocity", {}))
     yield from _known("joints.efforts", anatomy.hinges, found.parts.get("effort", {}))
     yield ""
     yield "[commands]"
     yield 'unit = "rad"  # CHECK: rad or deg; raw for the unit of a motor that is no position servo'
-    yield from _parts("commands.names", anatomy.motors, _offered(found, "command"), names)
+    yield from _parts("commands.names", anatomy.motors, found.parts.get("command", {}), names)
     yield ""
     yield from _base(found, names, robot)
     if found.imu:
@@ -92,12 +93,9 @@ def _unit(found: Classified) -> str:
     return '"rad"  # CHECK: rad or deg'
 
 
-def _offered(found: Classified, quantity: str) -> Mapping[str, str]:
-    """Columns by the part of their names that may be a joint's."""
-    for known, columns in found.parts.items():
-        if known == quantity:
-            return columns
-    return {name: name for name in found.others} if quantity == "position" else {}
+def _similar(parts: Sequence[str], names: Sequence[str]) -> Mapping[str, str]:
+    """Columns that are called like a part, without the name of a quantity."""
+    return {match.name: match.name for match in matched(parts, names).values() if match.sure}
 
 
 def _parts(

@@ -21,12 +21,23 @@ from selfmodel.simulation.calibration import Calibration
 from selfmodel.trials.trial import Trial
 
 
+def displacement_text(trial: Trial) -> str:
+    """Returns the displacement of a trial as text."""
+    return f"{trial.displacement:.3f} m forward"
+
+
 @contextmanager
-def display() -> Iterator[Callable[[Event], None]]:
-    """Yields a function that displays events on standard error."""
+def display(
+    describe: Callable[[Trial], str] = displacement_text,
+) -> Iterator[Callable[[Event], None]]:
+    """Yields a function that displays events on standard error.
+
+    Args:
+        describe: Returns the result of a trial as text.
+    """
     console = text_console(stderr=True)
     if not sys.stderr.isatty():
-        yield _Lines(console)
+        yield _Lines(console, describe)
         return
     progress = Progress(
         TextColumn("{task.description}"),
@@ -38,14 +49,15 @@ def display() -> Iterator[Callable[[Event], None]]:
         expand=True,
     )
     with progress:
-        yield _Bar(progress)
+        yield _Bar(progress, describe)
 
 
 class _Lines:
     """Prints a line per finished search, trial, calibration and diagnosis."""
 
-    def __init__(self, console: Console) -> None:
+    def __init__(self, console: Console, describe: Callable[[Trial], str]) -> None:
         self._console = console
+        self._describe = describe
         self._search = ""
 
     def __call__(self, event: Event) -> None:
@@ -67,7 +79,7 @@ class _Lines:
                 apart = ", ".join(map(str, event.hypotheses))
                 self._print_line(f"the next trial discriminates between: {apart}")
             case Trial():
-                self._print_line(f"trial {event.plan.name}: {event.displacement:.3f} m forward")
+                self._print_line(f"trial {event.plan.name}: {self._describe(event)}")
             case Diagnosis():
                 best = event.ranked[0]
                 self._print_line(
@@ -82,9 +94,9 @@ class _Lines:
 class _Bar:
     """Prints the same lines above a bar for the current search."""
 
-    def __init__(self, progress: Progress) -> None:
+    def __init__(self, progress: Progress, describe: Callable[[Trial], str]) -> None:
         self._progress = progress
-        self._lines = _Lines(progress.console)
+        self._lines = _Lines(progress.console, describe)
         self._task: TaskID | None = None
 
     def __call__(self, event: Event) -> None:

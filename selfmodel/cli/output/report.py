@@ -14,6 +14,7 @@ from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_lis
 from selfmodel.experiments.experiment import Experiment, Outcome
 from selfmodel.files import file_digest
 from selfmodel.logs.result_files import result_bytes
+from selfmodel.recovery.fitness import DISPLACEMENT
 from selfmodel.robot.designs import network_for
 
 
@@ -24,12 +25,11 @@ def print_report(found: dict[str, Any], folder: Path) -> None:
         found: Result of ``facts``.
         folder: Folder of the recovery.
     """
+    score = found["score"]
+    column, key = _column(score)
     trials = folding(
-        ("trial", "best hypothesis so far", "forward, m"),
-        [
-            (trial["stage"], trial["hypothesis"], f"{trial['displacement']:.3f}")
-            for trial in found["trials"]
-        ],
+        ("trial", "best hypothesis so far", column),
+        [(trial["stage"], trial["hypothesis"], f"{trial[key]:.3f}") for trial in found["trials"]],
         title="physical trials",
         texts=2,
     )
@@ -39,14 +39,30 @@ def print_report(found: dict[str, Any], folder: Path) -> None:
     print_lines(
         f"truth: {found['truth']}{_reality(found)}; the diagnosis is {verdict}.",
         confidence_sentence(found),
-        f"The robot went {found['displacement']['before']:.2f} m before, "
-        f"{found['displacement']['after']:.2f} m after the failure, and "
-        f"{found['displacement']['recovered']:.2f} m at best in "
-        f"{counted(trials_since, 'trial')} since.",
+        f"{_sentence(found)} at best in {counted(trials_since, 'trial')} since.",
         f"{evaluations['repair']} controllers and {evaluations['distinct_hypotheses']} distinct "
         f"hypotheses in {found['seconds']:.0f} s; diverged: {evaluations['diverged']}.",
         f"Logs: {folder}",
     )
+
+
+def _column(score: dict[str, Any]) -> tuple[str, str]:
+    """Returns the title of the column of results, and their key in the trials."""
+    if score["name"] == DISPLACEMENT.name:
+        return "forward, m", "displacement"
+    return f"{score['name']}, {score['unit']}".removesuffix(", "), "score"
+
+
+def _sentence(found: dict[str, Any]) -> str:
+    """Returns the result of the trials, up to "at best"."""
+    score = found["score"]
+    if score["name"] == DISPLACEMENT.name:
+        before, after, recovered = (f"{value:.2f} m" for value in found["displacement"].values())
+        return f"The robot went {before} before, {after} after the failure, and {recovered}"
+    before, after, recovered = (
+        f"{score[when]:.4f} {score['unit']}".rstrip() for when in ("before", "after", "recovered")
+    )
+    return f"The {score['name']} was {before} before, {after} after the failure, and {recovered}"
 
 
 def _reality(found: dict[str, Any]) -> str:
@@ -96,9 +112,12 @@ def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
                 "log": trial.path,
                 "stage": trial.plan.stage,
                 "displacement": trial.displacement,
+                "score": score,
                 "hypothesis": str(tried),
             }
-            for trial, tried in zip(recovery.trials, recovery.tried, strict=True)
+            for trial, tried, score in zip(
+                recovery.trials, recovery.tried, recovery.scores, strict=True
+            )
         ],
         "diagnosis": ranking_to_list(recovery.diagnosis.ranked),
         **confidence_to_dict(recovery.diagnosis),
@@ -108,6 +127,13 @@ def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
             "before": recovery.before,
             "after": recovery.after,
             "recovered": recovery.recovered,
+        },
+        "score": {
+            "name": recovery.score.name,
+            "unit": recovery.score.unit,
+            "before": recovery.scores[0],
+            "after": recovery.scores[1],
+            "recovered": recovery.best_score,
         },
         "recovery": recovery.recovered / recovery.before if recovery.before > 0 else None,
         "physical_trials": len(recovery.trials) - 2,

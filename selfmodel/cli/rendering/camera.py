@@ -11,7 +11,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.cli.rendering.captions import captioned
 from selfmodel.cli.rendering.film import Film
 from selfmodel.cli.rendering.view import ELEVATION, azimuth, gaze, size
-from selfmodel.cli.rendering.visible import VISUAL_GROUPS, opacity, visible_geoms
+from selfmodel.cli.rendering.visible import DEFAULT_RGBA, VISUAL_GROUPS, opacity, visible_geoms
 
 WIDTH, HEIGHT = 480, 360
 """Size of a motion's picture, pixels."""
@@ -27,6 +27,9 @@ LIGHT = (0.15, 0.45, 0.1)
 
 HIDDEN_GROUP = VISUAL_GROUPS
 """Group of the geoms that are not drawn."""
+
+GROUND = (0.42, 0.51, 0.6, 1.0)
+"""Colour of ground without a colour, from which a grey robot differs."""
 
 OPAQUE = (0.6, 0.6, 0.6, 1.0)
 """Colour of a transparent geom that is the only one of its body."""
@@ -86,6 +89,9 @@ def painted(film: Film) -> mujoco.MjModel:
     model = copy.copy(film.model)
     shown = visible_geoms(model)
     model.geom_group[:] = np.where(shown, 0, HIDDEN_GROUP)
+    plain = (model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE) & (model.geom_matid < 0)
+    plain &= (model.geom_rgba == DEFAULT_RGBA).all(axis=1)
+    model.geom_rgba[plain] = GROUND
     unseen = shown & (opacity(model) == 0)
     model.geom_rgba[unseen], model.geom_matid[unseen] = OPAQUE, -1
     # On wide ground, shadows are grainy at any affordable size of the shadow map.

@@ -8,7 +8,7 @@ from selfmodel.arrays import BoolArray, FloatArray
 VISUAL_GROUPS = 3
 """Groups 0, 1 and 2 are drawn by MuJoCo's viewer; Menagerie has collision geoms in group 3."""
 
-_DEFAULT_RGBA = (0.5, 0.5, 0.5, 1.0)
+DEFAULT_RGBA = (0.5, 0.5, 0.5, 1.0)
 """Colour of a geom that leaves the colour to its material."""
 
 _ENOUGH = 0.5
@@ -36,8 +36,8 @@ def stick_geoms(model: mujoco.MjModel) -> BoolArray:
 
 def opacity(model: mujoco.MjModel) -> FloatArray:
     """Returns the opacity of each geom, of its own colour or of its material, ``(ngeom,)``."""
-    own = model.geom_rgba[:, 3].astype(float)
-    by_material = (model.geom_matid >= 0) & (model.geom_rgba == _DEFAULT_RGBA).all(axis=1)
+    own: FloatArray = model.geom_rgba[:, 3].astype(float)
+    by_material = (model.geom_matid >= 0) & (model.geom_rgba == DEFAULT_RGBA).all(axis=1)
     own[by_material] = model.mat_rgba[model.geom_matid[by_material], 3]
     return own
 

@@ -20,6 +20,7 @@ from selfmodel.cli.options import (
     Neurons,
     Only,
     Population,
+    ScoreName,
     Seeds,
     Structural,
     StudyFolder,
@@ -70,15 +71,7 @@ def run(
     only: Only = "1/1",
     gap: GapLevel = 0.0,
     structure: Structural = False,
-    score: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME",
-            help="Fitness of controllers: displacement; upright, the displacement until the first "
-            "fall; or return, the sum of the task's rewards.",
-            rich_help_panel=CONTROLLER,
-        ),
-    ] = "displacement",
+    score: ScoreName = "displacement",
     controller: ControllerKind = "network",
     neurons: Neurons = None,
     comparator: ComparatorName = DEFAULT.name,

@@ -7,9 +7,12 @@ from pathlib import Path
 from selfmodel.controllers.controller import Controller
 from selfmodel.experiments import robots, trial_logs
 from selfmodel.experiments.ablation.plan import Ablation, Cell, model_digest
-from selfmodel.experiments.gaits import check_not_evolved, evolve_gait, gait_settings
+from selfmodel.experiments.chosen_score import choose_score
+from selfmodel.experiments.gaits import check_not_evolved, evolve_gait, gait_settings, write_gait
 from selfmodel.experiments.grid import GridBegins, Job, PartEnds, PartResult, run_grid
 from selfmodel.experiments.study_files import key_of
+from selfmodel.recovery.fitness import DISPLACEMENT
+from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
 from selfmodel.version import __version__
 
@@ -44,6 +47,7 @@ def fill(
                 "model": model_digest(robot),
                 "selfmodel": __version__,
                 "settings": gait_settings(ablation.settings),
+                **({} if ablation.score == DISPLACEMENT.name else {"score": ablation.score}),
             },
             seed=number,
             parts=("gait",),
@@ -82,13 +86,19 @@ def digests(bank: Path, cell: Cell, settings: Settings) -> list[str] | None:
 
 
 def _evolve(job: Job, _part: str, run: Path) -> PartResult:
-    robot = job.parameters["robot"]
-    return evolve_gait(
-        _path(run.parent, robot, job.seed),
-        robots.robot_entry(robot).robot(),
-        Settings(**job.parameters["settings"]),
-        job.seed,
+    name, settings = job.parameters["robot"], Settings(**job.parameters["settings"])
+    entry, path = robots.robot_entry(name), _path(run.parent, name, job.seed)
+    robot = entry.robot()
+    chosen = choose_score(
+        job.parameters.get("score", DISPLACEMENT.name),
+        entry,
+        network_for(robot),
+        steps=settings.steps,
+        seed=job.seed,
     )
+    if chosen.gait is not None:
+        return write_gait(path, chosen.gait, evaluations=0)
+    return evolve_gait(path, robot, settings, job.seed, score=chosen.score)
 
 
 def _path(bank: Path, robot: str, number: int) -> Path:

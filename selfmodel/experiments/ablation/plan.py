@@ -11,6 +11,7 @@ from urllib.parse import quote
 
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.experiments import plugins, robots
+from selfmodel.experiments.chosen_score import check_score
 from selfmodel.experiments.grid import Job, check_shared
 from selfmodel.experiments.study_files import check_keys, key_of
 from selfmodel.faults.hypothesis_space import HypothesisSpace
@@ -18,6 +19,7 @@ from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS, notation_kinds
 from selfmodel.physical.reality_gap import MAX_GAP_LEVEL
+from selfmodel.recovery.fitness import DISPLACEMENT
 from selfmodel.settings import Settings
 from selfmodel.version import __version__
 
@@ -50,6 +52,7 @@ class Ablation:
         structure: Whether the physical robots have structural mismatches.
         next_trial: One of ``NEXT_TRIAL``.
         bank: Folder of gaits, ``ROBOT-K.npz``; None to evolve them.
+        score: Name of the fitness of the repair EA, which evolves gaits and recoveries.
     """
 
     robots: Sequence[str]
@@ -64,6 +67,7 @@ class Ablation:
     structure: bool = False
     next_trial: str = "bank"
     bank: Path | None = None
+    score: str = DISPLACEMENT.name
 
 
 @dataclass(frozen=True)
@@ -99,6 +103,7 @@ class Spec:
         kinds: Fault kinds to search.
         structure: Whether the physical robot has structural mismatches.
         next_trial: Choice of the trials' controllers, one of ``NEXT_TRIAL``.
+        score: Name of the fitness of the repair EA.
     """
 
     cell: Cell
@@ -106,6 +111,7 @@ class Spec:
     kinds: str
     structure: bool
     next_trial: str
+    score: str = DISPLACEMENT.name
 
 
 def check(ablation: Ablation) -> None:
@@ -194,6 +200,7 @@ def spec(of: Job) -> Spec:
         kinds=parameters["shared"]["kinds"],
         structure=parameters["shared"]["structure"],
         next_trial=parameters["shared"]["next_trial"],
+        score=parameters["shared"].get("score", DISPLACEMENT.name),
     )
 
 
@@ -222,6 +229,7 @@ def _check_names(ablation: Ablation) -> None:
     check_keys(ablation.robots)
     for robot in ablation.robots:
         entry = robots.robot_entry(robot)
+        check_score(ablation.score, entry)
         for case in ablation.cases or ():
             if case not in entry.cases:
                 raise unknown_name(f"case of {robot}", str(case), map(str, entry.cases))
@@ -243,4 +251,6 @@ def _shared(ablation: Ablation) -> dict[str, Any]:
         "kinds": ablation.kinds,
         "structure": ablation.structure,
         "next_trial": ablation.next_trial,
+        # Left out by default, as in folders of earlier versions.
+        **({} if ablation.score == DISPLACEMENT.name else {"score": ablation.score}),
     }

@@ -25,9 +25,9 @@ class AblationRow:
         evaluations: Number of hypotheses evaluated since the first trial.
         distinct_hypotheses: Number of distinct hypotheses among the evaluations.
         seconds: Wall time of the diagnoses since the first trial, on one thread.
-        before: Forward displacement before the failure, m.
-        after: Forward displacement of the same controller after the failure, m.
-        recovered: Forward displacement of the best recovery trial so far, m.
+        before: Score before the failure; the forward displacement, m, by default.
+        after: Score of the same controller after the failure.
+        recovered: Score of the best recovery trial so far.
     """
 
     robot: str

@@ -20,10 +20,13 @@ from selfmodel.experiments.ablation.trials import (
     before_failure,
     calibrated_robot,
 )
+from selfmodel.experiments.chosen_score import choose_score
 from selfmodel.experiments.experiment import Experiment, run
+from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.recovery.events import Event
 from selfmodel.recovery.sequential_diagnosis import diagnose_trials
+from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Trial
@@ -142,19 +145,30 @@ def _in_a_recovery(setting: Setting) -> list[AblationRow]:
     rows: list[AblationRow] = []
     trials: list[Trial] = []
     cost = DiagnosisCost()
+    score = choose_score(
+        setting.spec.score,
+        robots.robot_entry(cell.robot),
+        network_for(setting.robot),
+        steps=settings.steps,
+        seed=cell.seed,
+        gait=setting.gaits[0],
+    ).score
 
     def on_event(event: Event) -> None:
         cost(event)
         if isinstance(event, Trial):
             trials.append(event)
         elif isinstance(event, Diagnosis):
-            displacements = [trial.displacement for trial in trials]
+            before, *since = (
+                score.of_trial(setting.robot, setting.truth if number else INTACT, trial)
+                for number, trial in enumerate(trials)
+            )
             rows.append(
                 dataclasses.replace(
                     row_of(setting, event, trials[1:], cost),
-                    before=displacements[0],
-                    after=displacements[1],
-                    recovered=max(displacements[2:], default=None),
+                    before=before,
+                    after=since[0],
+                    recovered=max(since[1:], default=None),
                 )
             )
 
@@ -173,6 +187,7 @@ def _in_a_recovery(setting: Setting) -> list[AblationRow]:
         structure=setting.spec.structure,
         kinds=plugins.kinds(setting.spec.kinds),
         next_trial=setting.spec.next_trial,
+        score=score,
     )
     outcome = run(experiment, on_event)
     rows[-1] = dataclasses.replace(

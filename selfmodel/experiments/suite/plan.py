@@ -9,6 +9,7 @@ from typing import Any
 
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.experiments import plugins, robots
+from selfmodel.experiments.chosen_score import check_score
 from selfmodel.experiments.gaits import check_not_evolved, gait_settings
 from selfmodel.experiments.grid import Job, check_shared
 from selfmodel.experiments.study_files import check_keys, key_of
@@ -79,7 +80,7 @@ def check(study: Study) -> None:
     for body in study.bodies:
         entry = robots.robot_entry(body)
         plugins.design(study.controller, entry.robot(), study.neurons)
-        plugins.score(study.score, body, entry)
+        check_score(study.score, entry)
     if not 0 <= study.gap <= MAX_GAP_LEVEL:
         raise InputError(f"expected a gap from 0 to {MAX_GAP_LEVEL}, such as 0.05, got {study.gap}")
     known = known_cases(study.bodies)

@@ -4,12 +4,11 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-
 from selfmodel.controllers.controller import check_silent_neurons
 from selfmodel.experiments import plugins, robots, trial_logs
+from selfmodel.experiments.chosen_score import choose_score
 from selfmodel.experiments.experiment import Experiment, run as run_experiment
-from selfmodel.experiments.gaits import evolve_gait
+from selfmodel.experiments.gaits import evolve_gait, write_gait
 from selfmodel.experiments.grid import GridBegins, Job, PartEnds, PartResult, run_grid
 from selfmodel.experiments.study_files import as_dicts
 from selfmodel.experiments.suite.plan import Study, check, gait_jobs, gait_path, recovery_jobs
@@ -18,11 +17,9 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.neuron import silent_neurons
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
-from selfmodel.recovery.fitness import Score
 from selfmodel.recovery.upright import falls_of
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.trial import Trial
 
 
@@ -65,14 +62,12 @@ def _evolve(job: Job, _part: str, run: Path) -> PartResult:
     parameters = job.parameters
     entry = robots.robot_entry(parameters["body"])
     robot = entry.robot()
-    return evolve_gait(
-        run.parent / f"{job.key}.npz",
-        robot,
-        Settings(**parameters["settings"]),
-        job.seed,
-        design=plugins.design(parameters["controller"], robot, parameters.get("neurons")),
-        score=plugins.score(parameters["score"], parameters["body"], entry),
-    )
+    path, settings = run.parent / f"{job.key}.npz", Settings(**parameters["settings"])
+    design = plugins.design(parameters["controller"], robot, parameters.get("neurons"))
+    chosen = choose_score(parameters["score"], entry, design, steps=settings.steps, seed=job.seed)
+    if chosen.gait is not None:
+        return write_gait(path, chosen.gait, evaluations=0)
+    return evolve_gait(path, robot, settings, job.seed, design=design, score=chosen.score)
 
 
 def _recover(job: Job, _part: str, run: Path) -> PartResult:
@@ -85,6 +80,11 @@ def _recover(job: Job, _part: str, run: Path) -> PartResult:
     check_silent_neurons(design, silent_neurons(truth))
     folder = run / "recovery"
     shutil.rmtree(folder, ignore_errors=True)  # files of a killed run
+    settings = Settings(**shared["settings"])
+    gait = trial_logs.controller(gait_path(run.parents[1], parameters["gait"]), robot)
+    chosen = choose_score(
+        shared["score"], entry, design, steps=settings.steps, seed=job.seed, gait=gait
+    )
     experiment = Experiment(
         robot=robot,
         case=parameters["case"],
@@ -93,18 +93,19 @@ def _recover(job: Job, _part: str, run: Path) -> PartResult:
         kinds=plugins.kinds(shared["kinds"]) if "kinds" in shared else PAPER_KINDS,
         gap=shared.get("gap", 0.0),
         structure=shared.get("structure", False),
-        settings=Settings(**shared["settings"]),
+        settings=settings,
         seed=job.seed,
         threads=1,
         folder=folder,
-        gait=trial_logs.controller(gait_path(run.parents[1], parameters["gait"]), robot),
+        gait=gait,
         design=design,
-        score=plugins.score(shared["score"], parameters["body"], entry),
+        score=chosen.score,
         physical=entry.physical,
     )
     outcome = run_experiment(experiment, on_event=lambda _: None)
     before, *since = outcome.recovery.trials
-    after, *recoveries = (_score_of(experiment.score, robot, truth, trial) for trial in since)
+    score = experiment.score
+    after, *recoveries = (score.of_trial(robot, truth, trial) for trial in since)
     diagnosis = outcome.recovery.diagnosis
     row = SuiteRow(
         robot=robot.name,
@@ -115,7 +116,7 @@ def _recover(job: Job, _part: str, run: Path) -> PartResult:
         correct=outcome.correct,
         verdict=diagnosis.verdict,
         trials=len(since),
-        before=_score_of(experiment.score, robot, INTACT, before),
+        before=score.of_trial(robot, INTACT, before),
         after=after,
         recovered=max(recoveries),
         diverged=outcome.stats.diverged,
@@ -123,13 +124,6 @@ def _recover(job: Job, _part: str, run: Path) -> PartResult:
         upright=_stayed_upright(robot, truth, since[1 + recoveries.index(max(recoveries))]),
     )
     return PartResult(as_dicts([row]), sorted((folder / "trials").glob("*.mcap")))
-
-
-def _score_of(score: Score, robot: Robot, hidden: Hypothesis, trial: Trial) -> float:
-    """Returns the score of a physical trial."""
-    logged = trial.behaviour
-    signals = {signal: logged[signal][np.newaxis] for signal in score.record}
-    return float(score.of(robot, hidden, Behaviour(logged.names, logged.time, signals))[0])
 
 
 def _stayed_upright(robot: Robot, hidden: Hypothesis, trial: Trial) -> bool:

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.errors import InputError
+from selfmodel.robot.mjcf.dissolve import dissolve_frames
 from selfmodel.robot.mjcf.document import Document
 from selfmodel.robot.mjcf.mujoco_errors import compile_model, loading_a_model
 from selfmodel.robot.mjcf.untrusted import REFUSED_ELEMENTS, checked_model
@@ -41,6 +42,7 @@ def expand(document: Document) -> None:
             spec = mujoco.MjSpec.from_string(document.text, assets=document.assets)
             spec.compile()
             document.root = ET.fromstring(spec.to_xml())  # noqa: S314  # the text is from MuJoCo
+        dissolve_frames(document)
         document.notes.append(
             f"MuJoCo wrote out the <{'>, <'.join(used)}> elements, with numbers of six digits"
         )

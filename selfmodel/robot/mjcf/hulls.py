@@ -23,7 +23,8 @@ def drawn_hull(model: mujoco.MjModel, mesh: int) -> FloatArray:
     because MuJoCo refuses meshes without volume.
     """
     points = mesh_points(model, mesh)
-    outer = points[np.unique(np.argmax(points @ directions(DRAWN_POINTS).T, axis=0))]
+    outermost = np.unique(np.argmax(points @ directions(DRAWN_POINTS).T, axis=0))
+    outer: FloatArray = points[outermost]
     _, extent, axes = np.linalg.svd(outer - outer.mean(axis=0), full_matrices=False)
     if len(extent) == 3 and extent[2] >= _FLATNESS * extent[0]:
         return outer

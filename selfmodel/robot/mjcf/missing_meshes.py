@@ -30,7 +30,7 @@ def replace_missing_meshes(document: Document, model: mujoco.MjModel) -> bool:
         Whether there were any.
 
     Raises:
-        InputError: A mesh has contacts, gives a body its mass, or is not used.
+        InputError: A mesh has contacts, or gives a body its mass.
     """
     if not document.missing:
         return False
@@ -41,7 +41,7 @@ def replace_missing_meshes(document: Document, model: mujoco.MjModel) -> bool:
         if name in used:
             used[name].append((geom, element))
     for name, geoms in used.items():
-        if not geoms or not all(_is_visual(document, model, *geom, parents) for geom in geoms):
+        if not all(_is_visual(document, model, *geom, parents) for geom in geoms):
             raise InputError(document.missing[name])
     boxed: set[int] = set()
     for geom, element in (geom for geoms in used.values() for geom in geoms):
@@ -55,8 +55,8 @@ def replace_missing_meshes(document: Document, model: mujoco.MjModel) -> bool:
         for mesh in [mesh for mesh in asset.findall("mesh") if mesh.get("name") in used]:
             asset.remove(mesh)
     document.notes.append(
-        f"{len(used)} visual meshes have no file, such as {next(iter(used))}: boxes of the same "
-        f"inertia are drawn; assets=DIR names the folder of the files"
+        f"{len(used)} visual meshes have no file, such as {next(iter(used))}: each body is drawn "
+        f"as the box of its inertia; assets=DIR names the folder of the files"
     )
     return True
 
@@ -79,7 +79,8 @@ def _is_visual(
     paired = any(geom in pair for pair in contact_pairs(model))
     fitted = model.geom_type[geom] != _MESH
     from_geoms = any(c.get("inertiafromgeom") == "true" for c in document.root.iter("compiler"))
-    massive = from_geoms or parents[element].find("inertial") is None
+    measured = from_geoms or parents[element].find("inertial") is None
+    massive = measured and model.body_mass[model.geom_bodyid[geom]] > 0
     return not (collides or paired or fitted or massive)
 
 

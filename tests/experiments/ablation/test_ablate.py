@@ -198,6 +198,17 @@ def test_repairs_are_tried_and_their_way_is_told(done: Path, tmp_path: Path):
     assert len(list(ablation.folder.glob("runs/*/forward-displacement/trials/*.mcap"))) == 3
 
 
+@pytest.mark.process
+@pytest.mark.search
+def test_the_rows_of_an_ablation_have_its_score(tmp_path: Path):
+    ablation = small(tmp_path / "out", cases=[2], score="tracking", next_trial="repair")
+    assert run(ablation) == ()
+    first, *_ = write_results(ablation.folder).rows
+    assert first.before == 0
+    assert first.after is not None
+    assert first.after < 0
+
+
 @pytest.mark.search
 @pytest.mark.parametrize("way", ["repair", "disagreement"])
 def test_trials_that_are_chosen_are_a_comparators_own(tmp_path: Path, way: str):

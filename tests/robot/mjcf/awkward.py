@@ -60,6 +60,7 @@ CUBE = """v 0 0 0\nv .1 0 0\nv 0 .1 0\nv 0 0 .1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 
 MESH = '<asset><mesh name="{0}" file="{1}"/></asset>'
 MESHED = '<geom type="mesh" mesh="m"/>'
 SEEN = '<geom type="mesh" mesh="m" contype="0" conaffinity="0" mass="0"/>'
+INERTIAL = '<inertial pos="0 0 0" mass="2" diaginertia=".02 .02 .02"/>'
 KEY = '<keyframe><key name="home" qpos="{}"/></keyframe>'
 BOMB = """<!DOCTYPE lolz [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;&a;&a;">
 <!ENTITY c "&b;&b;&b;&b;&b;&b;&b;&b;&b;&b;">]><mujoco model="&c;"/>"""
@@ -79,9 +80,33 @@ AWKWARD: dict[str, Awkward] = {
     "an element that MJCF has not": Awkward(mjcf(more="<leg/>"), "MuJoCo cannot load the model"),
     "UTF-16": Awkward(f'<?xml version="1.0" encoding="utf-16"?>{mjcf()}'.encode("utf-16")),
     # Files.
-    "a missing mesh": Awkward(mjcf(more=MESH.format("m", "m.obj")), "'m.obj'"),
+    "a missing mesh": Awkward(mjcf(more=MESH.format("m", "m.obj"), torso=MESHED), "'m.obj'"),
+    "a missing mesh that is not used": Awkward(mjcf(more=MESH.format("m", "m.obj"))),
+    "a missing mesh that is only seen": Awkward(
+        mjcf(more=MESH.format("m", "m.obj"), torso=INERTIAL + SEEN)
+    ),
+    "a missing mesh that is only seen and has the mass": Awkward(
+        mjcf(more=MESH.format("m", "m.obj"), torso=SEEN.replace('mass="0"', "")), "'m.obj'"
+    ),
+    "a missing mesh with a contact pair": Awkward(
+        mjcf(
+            more=MESH.format("m", "m.obj")
+            + '<contact><pair geom1="floor" geom2="belly"/></contact>',
+            torso=INERTIAL + SEEN.replace("<geom", '<geom name="belly"'),
+        ),
+        "'m.obj'",
+    ),
+    "a missing mesh to which a box is fitted": Awkward(
+        mjcf(
+            more=MESH.format("m", "m.obj"),
+            torso=INERTIAL + '<geom type="box" mesh="m" contype="0" conaffinity="0"/>',
+        ),
+        "'m.obj'",
+    ),
     "a mesh outside the folder": Awkward(
-        mjcf(more=MESH.format("m", "../m.obj")), "outside its own folder", {"../m.obj": CUBE}
+        mjcf(more=MESH.format("m", "../m.obj"), torso=MESHED),
+        "outside its own folder",
+        {"../m.obj": CUBE},
     ),
     "a mesh below the folder": Awkward(
         mjcf(more=MESH.format("m", "parts/m.obj"), torso=MESHED), "", {"parts/m.obj": CUBE}
@@ -110,7 +135,9 @@ AWKWARD: dict[str, Awkward] = {
         mjcf(more='<include file="../o.xml"/>'), "outside its own folder", {"../o.xml": "<mujoco/>"}
     ),
     "an include of itself": Awkward(mjcf(more='<include file="robot.xml"/>'), "twice"),
-    "a device as mesh": Awkward(mjcf(more=MESH.format("m", "/dev/zero")), "outside its own folder"),
+    "a device as mesh": Awkward(
+        mjcf(more=MESH.format("m", "/dev/zero"), torso=MESHED), "outside its own folder"
+    ),
     # The root.
     "no free joint": Awkward(mjcf(root="")),
     "limbs on the world": Awkward(

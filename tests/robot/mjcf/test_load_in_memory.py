@@ -15,7 +15,7 @@ from selfmodel.robot.mjcf.load import robot_from
 from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.robot.mjcf.visuals import MAX_ASSET_BYTES
 from selfmodel.robot.robot import Robot
-from tests.robot.mjcf.awkward import CUBE, MESH, TORSO, mjcf
+from tests.robot.mjcf.awkward import CUBE, MESH, MESHED, TORSO, mjcf
 
 
 def made(name: str, mjcf: str | bytes, files: Mapping[str, Any]) -> Robot:
@@ -66,4 +66,4 @@ def test_too_large_height_fields_are_refused():
 
 def test_a_missing_file_is_refused_by_name():
     with pytest.raises(InputError, match=r"cube: the MJCF names .*'m\.obj'.* is not given: pass"):
-        made("cube", mjcf(more=MESH.format("m", "m.obj")), {})
+        made("cube", mjcf(more=MESH.format("m", "m.obj"), torso=MESHED), {})

@@ -113,5 +113,5 @@ _EXTENTS = {
     int(mujoco.mjtGeom.mjGEOM_CYLINDER): _cylinder,
     int(mujoco.mjtGeom.mjGEOM_ELLIPSOID): _ellipsoid,
 }
-"""Distance from the centre of a geom to its lowest point, m, by the type of the geom. Boxes, and the
-bounding boxes of meshes, need none: their extent is that of ``geom_aabb``."""
+"""Distance from the centre of a geom to its lowest point, m, by the type of the geom. The extent of
+a box, and of the bounding box of a mesh, is that of ``geom_aabb``."""

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from selfmodel.robot.anatomy import Joint
+from selfmodel.robot.legs import reaches_ground
 from selfmodel.robot.mjcf.load import load_mjcf
-from selfmodel.robot.reach import reaches_ground
 from selfmodel.robot.robot import Robot
 from tests.robot.mjcf.awkward import LEGS, MOTORS, mjcf
 

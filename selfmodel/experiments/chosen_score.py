@@ -1,0 +1,108 @@
+"""The score of a recovery by name, with the first controller that the score implies."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from selfmodel.controllers.controller import Controller, Design
+from selfmodel.errors import InputError
+from selfmodel.experiments import plugins
+from selfmodel.experiments.references import (
+    random_controller,
+    read_reference,
+    simulated_reference,
+)
+from selfmodel.recovery.fitness import DISPLACEMENT, Score
+from selfmodel.recovery.tracking import TRACKING, tracking
+from selfmodel.recovery.upright import UPRIGHT
+from selfmodel.robot.robot import Robot
+from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
+from selfmodel.tasks import Entry
+
+
+@dataclass(frozen=True)
+class ChosenScore:
+    """A score and the first controller of the recovery.
+
+    Attributes:
+        score: Fitness of the repair EA.
+        gait: The controller whose motion in simulation is the reference trajectory; None if the
+            first controller is to be evolved.
+    """
+
+    score: Score
+    gait: Controller | None = None
+
+
+def choose_score(
+    name: str,
+    entry: Entry,
+    design: Design,
+    *,
+    steps: int,
+    seed: int,
+    reference: Path | None = None,
+    gait: Controller | None = None,
+    budget: Budget = DEFAULT_BUDGET,
+) -> ChosenScore:
+    """Returns the score of that name for a robot.
+
+    Args:
+        name: ``displacement``, ``upright``, ``return`` or ``tracking``.
+        entry: The robot.
+        design: Design of the controllers.
+        steps: Control steps of a trial.
+        seed: Seed of all random numbers of the recovery.
+        reference: File of the trajectory to follow; None for the motion of the first controller in
+            simulation.
+        gait: The first controller; None for one with random weights if its motion is needed.
+        budget: Memory and time that the file may take.
+
+    Raises:
+        InputError: The name is unknown or the robot has no such score, or a reference is given for
+            another score.
+    """
+    robot = entry.robot()
+    check_score(name, entry)
+    if name != TRACKING:
+        if reference is not None:
+            raise InputError(f"--reference is a trajectory for --score {TRACKING}, got {name}")
+        return ChosenScore(plugins.score(name, robot.name, entry), gait)
+    if reference is not None:
+        return ChosenScore(tracking(read_reference(reference, robot, budget), robot), gait)
+    first = gait or random_controller(design, seed)
+    return ChosenScore(tracking(simulated_reference(robot, first, steps), robot), first)
+
+
+def check_score(name: str, entry: Entry) -> None:
+    """Checks that a robot has a score of that name.
+
+    Args:
+        name: Name of the score.
+        entry: The robot.
+
+    Raises:
+        InputError: The name is unknown, the robot has no task with rewards, or the score is a
+            displacement and the base is fixed.
+    """
+    robot = entry.robot()
+    check_motion(name, robot)
+    if name != TRACKING:
+        plugins.score(name, robot.name, entry)
+
+
+def check_motion(name: str, robot: Robot) -> None:
+    """Checks that the base of a robot moves if its score is a displacement.
+
+    Args:
+        name: Name of the score.
+        robot: The robot.
+
+    Raises:
+        InputError: The score is a displacement and the base is fixed.
+    """
+    if robot.has_fixed_base and name in (DISPLACEMENT.name, UPRIGHT.name):
+        raise InputError(
+            f"the base of {robot.name} is fixed, so its {name} is always 0: give --score "
+            f"{TRACKING}, and --reference FILE with a joint trajectory, or no --reference for the "
+            f"motion of a first controller"
+        )

@@ -1,0 +1,99 @@
+"""The commands of tables: logs export, and logs import of a CSV, NPZ or Parquet file."""
+
+import json
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+
+from selfmodel.logs import read_log
+from tests.helpers.command import selfmodel
+
+pytestmark = pytest.mark.process
+
+ANT = Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets" / "ant.xml"
+STAND = Path(__file__).parents[3] / "shared" / "samples" / "go2-stand"
+SEARCH = ("--generations", "2", "--population", "10", "--seed", "1", "--json")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the model of an ant, and a log of it with a broken ankle."""
+    folder = tmp_path_factory.mktemp("ant")
+    (folder / "ant.xml").write_bytes(ANT.read_bytes())
+    done = selfmodel(
+        *("trial", "ant.xml", "--damage", "break:ankle_1", "--steps", "200", "--seed", "3"),
+        *("--stage", "after", "--out", "after.mcap"),
+        cwd=folder,
+    )
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+@pytest.mark.parametrize("form", ["csv", "npz", "parquet"])
+def test_an_exported_trial_is_imported_as_the_same_trial(form: str, folder: Path):
+    table = f"after.{form}"
+    done = selfmodel("logs", "export", "after.mcap", "-o", table, "--json", cwd=folder)
+    assert json.loads(done.stdout)["rows"] == 200
+    done = selfmodel("logs", "import", table, "--suggest", "--robot", "ant.xml", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    (folder / "map.toml").write_text(done.stdout)
+    imported = ("logs", "import", table, "--mapping", "map.toml", "--out", f"{form}.mcap")
+    done = selfmodel(*imported, cwd=folder)
+    assert done.returncode == 0, done.stderr
+
+    original, again = (
+        read_log(folder / name).trial.behaviour for name in ("after.mcap", f"{form}.mcap")
+    )
+    for signal, values in original.signals.items():
+        assert values.tobytes() == again[signal].tobytes(), signal
+
+
+@pytest.mark.search
+def test_an_imported_table_has_the_diagnosis_of_its_log(folder: Path):
+    for name in ("d.npz", "d.mcap"):
+        (folder / name).unlink(missing_ok=True)
+    selfmodel("logs", "export", "after.mcap", "-o", "d.npz", cwd=folder)
+    done = selfmodel("logs", "import", "d.npz", "--suggest", "--robot", "ant.xml", cwd=folder)
+    (folder / "d.toml").write_text(done.stdout)
+    selfmodel("logs", "import", "d.npz", "--mapping", "d.toml", "-o", "d.mcap", cwd=folder)
+
+    first, second = (
+        json.loads(selfmodel("diagnose", name, *SEARCH, cwd=folder).stdout)
+        for name in ("after.mcap", "d.mcap")
+    )
+
+    assert first["diagnosis"] == second["diagnosis"]
+    assert first["verdict"] == second["verdict"]
+
+
+def test_an_existing_table_and_an_unknown_format_are_refused(folder: Path):
+    (folder / "mine.csv").write_text("mine")
+    for name, message in (
+        ("mine.csv", "exists, and is not overwritten"),
+        ("t.xls", "ends in .csv"),
+    ):
+        done = selfmodel("logs", "export", "after.mcap", "-o", name, cwd=folder)
+        assert done.returncode == 2
+        assert message in done.stderr
+    assert (folder / "mine.csv").read_text() == "mine"
+
+
+@pytest.mark.skipif(not STAND.exists(), reason="the sample is not in the repository")
+def test_a_recording_of_a_real_robot_is_imported_without_an_edit(tmp_path: Path):
+    (tmp_path / "go2.xml").write_bytes((STAND / "go2.xml").read_bytes())
+    table = STAND / "go2-stand.npz"
+    done = selfmodel("logs", "import", table, "--suggest", "--robot", "go2.xml", cwd=tmp_path)
+    (tmp_path / "map.toml").write_text(
+        done.stdout.replace("control_timestep = 0.01 ", "control_timestep = 0.02 ")
+    )
+    done = selfmodel("logs", "import", table, "--mapping", "map.toml", "-o", "g.mcap", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+
+    behaviour = read_log(tmp_path / "g.mcap").trial.behaviour
+    with np.load(table) as recorded:
+        position = recorded["position"][::4]
+    assert behaviour.steps == 750
+    assert np.abs(behaviour["joint_positions"] - position).max() < 0.01
+    assert np.isnan(behaviour["base_position"]).all()

@@ -1,0 +1,57 @@
+"""Promises of the choice of a score: what a robot cannot have is refused with the remedy."""
+
+from pathlib import Path
+
+import pytest
+
+import selfmodel
+from selfmodel.errors import InputError
+from selfmodel.experiments.chosen_score import ChosenScore, choose_score
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.recovery.upright import UPRIGHT
+from selfmodel.robot.designs import cpg_for
+from selfmodel.robot.robot import Robot
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.tasks import Entry
+from tests.helpers.arms import arm
+
+
+def chosen(name: str, robot: Robot, reference: Path | None = None, seed: int = 0) -> ChosenScore:
+    entry = Entry(robot=lambda: robot)
+    return choose_score(name, entry, cpg_for(robot), steps=30, seed=seed, reference=reference)
+
+
+@pytest.mark.parametrize("name", ["displacement", "upright"])
+def test_a_fixed_base_has_no_displacement(name: str):
+    with pytest.raises(InputError, match=r"base of robot is fixed.*give --score tracking"):
+        chosen(name, arm())
+
+
+def test_without_a_reference_the_first_controller_follows_itself(quadruped: Robot):
+    for robot in (arm(), quadruped):
+        found = chosen("tracking", robot)
+        run = Simulator(robot, 1).run([(INTACT, found.gait)], 30, found.score.record)
+        assert found.score.of(robot, INTACT, run.behaviour)[0] == 0
+    assert chosen("tracking", arm(), seed=1).gait != chosen("tracking", arm(), seed=2).gait
+
+
+def test_another_score_evolves_the_first_controller(quadruped: Robot):
+    assert chosen("upright", quadruped) == ChosenScore(UPRIGHT, None)
+
+
+def test_a_reference_for_another_score_is_refused(quadruped: Robot):
+    with pytest.raises(InputError, match="trajectory for --score tracking, got upright"):
+        chosen("upright", quadruped, Path("walk.mcap"))
+
+
+def test_an_unknown_score_names_the_known_ones(quadruped: Robot):
+    with pytest.raises(InputError, match="did you mean tracking"):
+        chosen("traking", quadruped)
+
+
+def test_the_public_functions_refuse_the_displacement_of_a_fixed_base(tmp_path: Path):
+    with pytest.raises(InputError, match="give --score tracking"):
+        selfmodel.evolve_controller(arm())
+    physical = selfmodel.simulated_robot(arm())
+    with pytest.raises(InputError, match="give --score tracking"):
+        selfmodel.recover(physical, physical, arm(), tmp_path / "run")
