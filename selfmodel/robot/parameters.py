@@ -88,8 +88,8 @@ def with_model(robot: Robot, model: mujoco.MjModel, delay: float) -> Robot:
 
     Args:
         robot: The robot.
-        model: A copy of the robot's model, with other masses, friction, motor gains, or damping, dry
-            friction and armature of joints.
+        model: A copy of the robot's model with other masses, friction or motor gains, or other
+            damping, dry friction and armature of joints.
         delay: Control delay, in control steps.
     """
     spec = robot.specification()

@@ -10,8 +10,9 @@ from xml.etree import ElementTree as ET
 import mujoco
 import numpy as np
 
-from selfmodel.arrays import FloatArray
 from selfmodel.robot.mjcf.expand import format_numbers
+from selfmodel.robot.urdf.frame import NO_FRAME, Frame, placed
+from selfmodel.robot.urdf.inertia import inertial
 
 _GEOMS = {
     mujoco.mjtGeom.mjGEOM_SPHERE: ("sphere", 1),
@@ -24,42 +25,6 @@ _GEOMS = {
 
 _VISUAL_GROUP, _HIDDEN_GROUP = "2", "3"
 """Groups of visuals, and of collisions of a link with visuals, as in MuJoCo's Menagerie."""
-
-
-@dataclass(frozen=True)
-class Frame:
-    """A frame in another frame.
-
-    Attributes:
-        position: ``(3,)``, m.
-        orientation: ``(4,)``, unit quaternion.
-    """
-
-    position: FloatArray
-    orientation: FloatArray
-
-    def then(self, inner: "Frame") -> "Frame":
-        """Returns a frame that is given in this frame, in the outer frame."""
-        position, orientation = np.empty(3), np.empty(4)
-        mujoco.mju_rotVecQuat(position, inner.position, self.orientation)
-        mujoco.mju_mulQuat(orientation, self.orientation, inner.orientation)
-        return Frame(self.position + position, orientation)
-
-    def inverse(self) -> "Frame":
-        """Returns the outer frame in this frame."""
-        position, orientation = np.empty(3), np.empty(4)
-        mujoco.mju_negQuat(orientation, self.orientation)
-        mujoco.mju_rotVecQuat(position, -self.position, orientation)
-        return Frame(position, orientation)
-
-    def direction(self, vector: FloatArray) -> FloatArray:
-        """Returns a vector that is given in this frame, in the outer frame."""
-        result = np.empty(3)
-        mujoco.mju_rotVecQuat(result, np.asarray(vector, float), self.orientation)
-        return result
-
-
-_NO_FRAME = Frame(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,8 +62,8 @@ def world_elements(spec: mujoco.MjSpec) -> list[ET.Element]:
     for body in spec.bodies:
         if body.joints and body.parent is not None:
             middle.add(_main(body.parent).name)
-    roots = [_written(body, _NO_FRAME, [], None, middle) for body in spec.worldbody.bodies]
-    return [*(_geom(geom, _NO_FRAME, seen=False) for geom in spec.worldbody.geoms), *roots]
+    roots = [_written(body, NO_FRAME, [], None, middle) for body in spec.worldbody.bodies]
+    return [*(_geom(geom, NO_FRAME, seen=False) for geom in spec.worldbody.geoms), *roots]
 
 
 def _main(body: mujoco.MjsBody) -> mujoco.MjsBody:
@@ -143,65 +108,24 @@ def _written(
     """
     own = Frame(np.array(body.pos), np.array(body.quat))
     frame, inner = outer.then(own), own.inverse()
-    own_hinges = [_Hinge(joint, _NO_FRAME) for joint in body.joints]
+    own_hinges = [_Hinge(joint, NO_FRAME) for joint in body.joints]
     here = [_Hinge(hinge.joint, inner.then(hinge.frame)) for hinge in hinges] + own_hinges
     if here and not body.mass and not len(body.geoms) and len(body.bodies) == 1:
         return _written(body.bodies[0], frame, here, main, middle)
-    element = ET.Element("body", {"name": body.name} | _placed(frame))
+    element = ET.Element("body", {"name": body.name} | placed(frame))
     if body.mass:
-        ET.SubElement(element, "inertial", _inertial(body))
+        ET.SubElement(element, "inertial", inertial(body))
     element.extend([_joint(hinge) for hinge in here])
     if here or main is None:
-        main = _Main(element, _NO_FRAME, in_middle=body.name in middle)
+        main = _Main(element, NO_FRAME, in_middle=body.name in middle)
     else:
         main = replace(main, frame=main.frame.then(frame))
     seen = any(not geom.contype for geom in body.geoms)
-    at = main if main.in_middle else _Main(element, _NO_FRAME, in_middle=False)
+    at = main if main.in_middle else _Main(element, NO_FRAME, in_middle=False)
     for geom in body.geoms:
         at.element.append(_geom(geom, at.frame, seen=seen))
-    element.extend([_written(child, _NO_FRAME, [], main, middle) for child in body.bodies])
+    element.extend([_written(child, NO_FRAME, [], main, middle) for child in body.bodies])
     return element
-
-
-def _inertial(body: mujoco.MjsBody) -> dict[str, str]:
-    """Returns the attributes of an ``<inertial>``."""
-    mass = {"mass": repr(float(body.mass))}
-    full = _moments(body)
-    if not is_rigid(body):
-        full = np.array([*np.full(3, max(0.0, float(full[:3].mean()))), 0.0, 0.0, 0.0])
-    if not np.any(full[3:]):
-        frame = Frame(np.array(body.ipos), np.array(body.iquat))
-        return _placed(frame) | mass | {"diaginertia": format_numbers(full[:3])}
-    # MJCF has no orientation beside a full inertia.
-    rotation = np.empty(9)
-    mujoco.mju_quat2Mat(rotation, np.array(body.iquat))
-    turn = rotation.reshape(3, 3)
-    matrix = turn @ _inertia_matrix(body) @ turn.T
-    elements = matrix[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-    return {
-        "pos": format_numbers(np.array(body.ipos)),
-        "fullinertia": format_numbers(elements),
-    } | mass
-
-
-def is_rigid(body: mujoco.MjsBody) -> bool:
-    """Returns whether the inertia of a body is that of a rigid body, or zero."""
-    matrix = _inertia_matrix(body)
-    if not np.any(matrix):
-        return True
-    least, middle, most = np.linalg.eigvalsh(matrix)
-    return bool(least > 0 and least + middle >= most)
-
-
-def _inertia_matrix(body: mujoco.MjsBody) -> FloatArray:
-    """Returns the inertia of a body in its inertial frame, ``(3, 3)`` kg m²."""
-    xx, yy, zz, xy, xz, yz = _moments(body)
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-
-
-def _moments(body: mujoco.MjsBody) -> FloatArray:
-    """Returns the moments and products of inertia, ``(6,)`` kg m²; 0 if the URDF has none."""
-    return np.nan_to_num(np.array(body.fullinertia, float))
 
 
 def _joint(hinge: _Hinge) -> ET.Element:
@@ -229,9 +153,7 @@ def _geom(geom: mujoco.MjsGeom, frame: Frame, *, seen: bool) -> ET.Element:
         seen: Whether the link has visuals, so that its collisions are not drawn.
     """
     kind, sizes = _GEOMS[geom.type]
-    attributes = {"type": kind} | _placed(
-        frame.then(Frame(np.array(geom.pos), np.array(geom.quat)))
-    )
+    attributes = {"type": kind} | placed(frame.then(Frame(np.array(geom.pos), np.array(geom.quat))))
     if sizes:
         attributes["size"] = format_numbers(geom.size[:sizes])
     else:
@@ -242,7 +164,3 @@ def _geom(geom: mujoco.MjsGeom, frame: Frame, *, seen: bool) -> ET.Element:
     elif seen:
         attributes["group"] = _HIDDEN_GROUP
     return ET.Element("geom", attributes)
-
-
-def _placed(frame: Frame) -> dict[str, str]:
-    return {"pos": format_numbers(frame.position), "quat": format_numbers(frame.orientation)}

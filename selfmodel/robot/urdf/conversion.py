@@ -10,7 +10,8 @@ from selfmodel.robot.mjcf.expand import format_numbers
 from selfmodel.robot.mjcf.joint_values import check_patterns
 from selfmodel.robot.mjcf.mujoco_errors import compile_model, loading_a_model
 from selfmodel.robot.mjcf.settings import MjcfSettings
-from selfmodel.robot.urdf.bodies import is_rigid, meshes, world_elements
+from selfmodel.robot.urdf.bodies import meshes, world_elements
+from selfmodel.robot.urdf.inertia import is_rigid
 from selfmodel.robot.urdf.reading import number
 from selfmodel.robot.urdf.servos import servo
 from selfmodel.robot.urdf.stance import stance
