@@ -38,6 +38,7 @@ def test_joints_with_a_fault_and_spaces_without_weak_motors_are_left_out(quadrup
     faulty = Hypothesis((Fault(WEAK_MOTOR, "front_left_knee", 0.5),))
     named = {one.joint for one in detectable_weaknesses(faulty, space, losses)}
 
-    assert len(named) == 7 and "front_left_knee" not in named
+    assert len(named) == 7
+    assert "front_left_knee" not in named
     jams = HypothesisSpace.of([JAMMED], quadruped.anatomy)
     assert detectable_weaknesses(INTACT, jams, losses) == []

@@ -1,4 +1,4 @@
-"""Promises of the parameters of joints: nominal ones change nothing, and the MJCF has all of them."""
+"""Promises of the parameters of joints: nominal ones change nothing, the MJCF has all of them."""
 
 import numpy as np
 
