@@ -45,7 +45,7 @@ FOLDS = 3
 MIN_Z = 3.0
 """Standard errors by which a larger set must predict segments better that it was not fitted to."""
 
-ITERATIONS, FOLD_ITERATIONS, DELAY_ITERATIONS = 5, 3, 1
+ITERATIONS, FOLD_ITERATIONS, DELAY_ITERATIONS = 5, 3, 2
 """Iterations of the least-squares solver: of a fit to all segments, of a fit without some of them,
 and of the fits that compare control delays."""
 
@@ -133,8 +133,9 @@ class Experiment:
             basis = Basis.of(self._robot, name)
             if name == "shared":
                 point = self._with_best_delay(basis, start, everything)
-                folds = [replace(fold, delay=point.delay) for fold in folds]
             point = self._solved(basis, point, everything, ITERATIONS)
+            point = self._with_near_delay(basis, point, everything)
+            folds = [replace(fold, delay=point.delay) for fold in folds]
             folds = [
                 self._solved(basis, fold, self._folds != number, FOLD_ITERATIONS)
                 for number, fold in enumerate(folds)
@@ -146,6 +147,22 @@ class Experiment:
             chosen.append(self._fit(name, point, basis, held_out))
             losses = own
         return chosen
+
+    def fit_of(self, name: str) -> JointFit:
+        """Returns the fit of a set to all segments, without a test that it is better.
+
+        Its ``held_out_error`` is the error of the fit.
+
+        Args:
+            name: Name of a set of ``SETS``, not the nominal one.
+        """
+        everything = np.ones(self._segments, dtype=bool)
+        point = self._with_best_delay(Basis.of(self._robot, SETS[1]), self._start(), everything)
+        for each in SETS[1 : SETS.index(name) + 1]:
+            basis = Basis.of(self._robot, each)
+            point = self._solved(basis, point, everything, ITERATIONS)
+            point = self._with_near_delay(basis, point, everything)
+        return self._fit(name, point, basis, self._errors([point])[0])
 
     def _fit(self, name: str, point: Point, basis: Basis | None, held_out: FloatArray) -> JointFit:
         errors = self._errors([point])[0]
@@ -187,6 +204,30 @@ class Experiment:
             best = min(near, key=cost)
             step //= 2
         return solved[best][1]
+
+    def _with_near_delay(self, basis: Basis, start: Point, used: BoolArray) -> Point:
+        """Returns the fit with the best delay around that of a fit.
+
+        The delay moves by a physics step at a time, as long as the fit improves.
+        """
+        substeps = 1 if self._robot.model.na else self._robot.substeps
+
+        def cost(point: Point) -> float:
+            residuals = self._residuals(basis, [point], used)[:, 0]
+            return float(residuals @ residuals)
+
+        best, least = start, cost(start)
+        for direction in (-1, 1):
+            while True:
+                parts = round(best.delay * substeps) + direction
+                if not 0 <= parts <= MAX_CONTROL_DELAY * substeps:
+                    break
+                moved = replace(best, delay=as_delay(parts, substeps))
+                moved = self._solved(basis, moved, used, DELAY_ITERATIONS)
+                if not cost(moved) < least:
+                    break
+                best, least = moved, cost(moved)
+        return best
 
     def _solved(self, basis: Basis, start: Point, used: BoolArray, iterations: int) -> Point:
         """Returns the least-squares fit of a set to some segments."""

@@ -23,7 +23,7 @@ from selfmodel.trials.velocity_estimation import lacks_joint_velocities, with_jo
 SEGMENT_SECONDS = 1.0
 """Length of a segment, s, in a trial that is long enough."""
 
-MIN_SEGMENTS = 6
+MIN_SEGMENTS = 12
 """Smallest number of segments of a trial: a short trial has shorter segments."""
 
 MIN_HORIZON = 5
