@@ -105,7 +105,7 @@ class Experiment:
 
     def nominal_errors(self) -> FloatArray:
         """Returns the errors of the robot's own model, segment by segment, ``(errors,)``."""
-        return self._errors([self._start()])[0]
+        return np.asarray(self._errors([self._start()])[0])
 
     def chosen_sets(self) -> list[JointFit]:
         """Fits the nested sets of parameters.
