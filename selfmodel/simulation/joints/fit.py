@@ -25,6 +25,7 @@ from selfmodel.robot.joint_parameters import (
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import DEFAULT_BUDGET
 from selfmodel.simulation.batch_memory import hypothesis_bytes
+from selfmodel.simulation.joints.losses import damped, is_better, root_mean_square
 from selfmodel.simulation.joints.segments import JointSegments
 from selfmodel.simulation.joints.sets import NOMINAL, SETS, Basis, Point
 from selfmodel.simulation.outcome import SimulationStats
@@ -41,9 +42,6 @@ DIFFERENCE_STEP = 0.05
 
 FOLDS = 3
 """Parts of the segments that are left out in turn."""
-
-MIN_Z = 3.0
-"""Standard errors by which a larger set must predict segments better that it was not fitted to."""
 
 ITERATIONS, FOLD_ITERATIONS, DELAY_ITERATIONS = 5, 3, 2
 """Iterations of the least-squares solver: of a fit to all segments, of a fit without some of them,
@@ -107,7 +105,7 @@ class Experiment:
 
     def nominal_errors(self) -> FloatArray:
         """Returns the errors of the robot's own model, segment by segment, ``(errors,)``."""
-        return self._errors([self._start()])[0]
+        return np.asarray(self._errors([self._start()])[0])
 
     def chosen_sets(self) -> list[JointFit]:
         """Fits the nested sets of parameters.
@@ -142,7 +140,7 @@ class Experiment:
             ]
             held_out = self._held_out(folds)
             own = self._losses(held_out)
-            if not _is_better(own, losses):
+            if not is_better(own, losses):
                 continue
             chosen.append(self._fit(name, point, basis, held_out))
             losses = own
@@ -172,8 +170,8 @@ class Experiment:
             logarithms=point.logarithms,
             deviations=deviations,
             delay=point.delay,
-            error=_root_mean_square(errors),
-            held_out_error=_root_mean_square(held_out),
+            error=root_mean_square(errors),
+            held_out_error=root_mean_square(held_out),
             joint_errors=self._joint_errors(errors),
         )
 
@@ -282,7 +280,7 @@ class Experiment:
         errors = self._errors(points)[:, np.repeat(used, self._widths())].T
         coordinates = np.stack([basis.coordinates(point) for point in points], axis=1)
         weight = np.sqrt(len(errors)) * PRIOR_WEIGHT / basis.deviations
-        return np.concatenate([_damped(errors), weight[:, np.newaxis] * coordinates])
+        return np.concatenate([damped(errors), weight[:, np.newaxis] * coordinates])
 
     def _errors(self, points: Sequence[Point]) -> FloatArray:
         """Returns the errors of all segments, segment by segment, ``(points, errors)``.
@@ -339,7 +337,7 @@ class Experiment:
         """Returns the mean loss of each segment, ``(segments,)``."""
         widths = self._widths()
         firsts = np.concatenate([[0], np.cumsum(widths)[:-1]])
-        return np.asarray(np.add.reduceat(_damped(errors) ** 2, firsts) / widths)
+        return np.asarray(np.add.reduceat(damped(errors) ** 2, firsts) / widths)
 
     def _held_out(self, folds: Sequence[Point]) -> FloatArray:
         """Returns the errors of each segment by the fit that it was left out of, ``(errors,)``."""
@@ -386,19 +384,3 @@ class Experiment:
         unit = count * PRIOR_WEIGHT**2
         variance = np.diag(inverse @ (spread + prior * unit) @ inverse)
         return basis.spread(np.minimum(np.sqrt(variance), basis.deviations))
-
-
-def _is_better(one: FloatArray, other: FloatArray) -> bool:
-    """Returns whether the losses of segments are significantly lower, paired over the segments."""
-    gains = other - one
-    error = float(gains.std(ddof=1)) / np.sqrt(len(gains))
-    return bool(gains.mean() > MIN_Z * error and gains.mean() > 0)
-
-
-def _root_mean_square(errors: FloatArray) -> float:
-    return float(np.sqrt(np.mean(errors**2)))
-
-
-def _damped(errors: FloatArray) -> FloatArray:
-    """Returns pseudo-Huber residuals: their squares grow linearly with errors above 1."""
-    return np.asarray(np.sign(errors) * np.sqrt(2 * (np.sqrt(1 + errors**2) - 1)))
