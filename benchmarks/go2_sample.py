@@ -2,8 +2,7 @@
 
 The recording and the model are in ``../shared/samples/go2-stand`` (see its README). The model has
 motors of torque, and the robot's controller is a position servo, so the motors become servos with
-the gains of that README. The base is fixed; the hips are next to it, so their collisions with it
-are excluded, which MuJoCo does by itself only for a base that moves.
+the gains of that README.
 """
 
 import tempfile
@@ -19,7 +18,7 @@ from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.robot.control_delay import split_delay
 from selfmodel.robot.mjcf.load import load_mjcf
-from selfmodel.robot.mjcf.settings import MjcfSettings
+from selfmodel.robot.mjcf.settings import checked_settings
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import DEFAULT_BUDGET
 from selfmodel.trials.behaviour import Behaviour
@@ -30,34 +29,19 @@ SAMPLE = Path(__file__).parent.parent.parent / "shared" / "samples" / "go2-stand
 RATE = 200
 """Control steps per second."""
 
-_STIFFNESS, _DAMPING = 20.0, 1.5
+_SETTINGS = {"base": "fixed", "kp": 20, "kd": 1.5, "control_timestep": 1 / RATE}
 _PHYSICS_TIMESTEP = 0.0025
+"""Physics time step, s: a control step of the recording is a multiple of it."""
 
 
 def robot_on_stand(sample: Path = SAMPLE) -> Robot:
     """Returns the robot of the recording, with its base fixed and with position servos."""
-    spec = mujoco.MjSpec.from_file(str(sample / "go2.xml"))
-    for part in [*spec.keys, *spec.sensors]:
-        spec.delete(part)
-    free = [joint for joint in spec.joints if joint.type == mujoco.mjtJoint.mjJNT_FREE]
-    for joint in free:
-        spec.delete(joint)
-    spec.option.timestep = _PHYSICS_TIMESTEP
-    base = spec.body("base")
-    for body in base.bodies:
-        pair = spec.add_exclude()
-        pair.bodyname1, pair.bodyname2 = base.name, body.name
-    model = spec.compile()
-    for motor in spec.actuators:
-        torque = model.actuator_ctrlrange[motor.id].copy()
-        motor.set_to_position(kp=_STIFFNESS, kv=_DAMPING)
-        motor.forcerange, motor.forcelimited = torque, 1
-        motor.ctrlrange = model.jnt_range[model.actuator_trnid[motor.id, 0]]
-    spec.compile()
+    text = (sample / "go2.xml").read_text(encoding="utf-8")
+    text = text.replace("<option ", f'<option timestep="{_PHYSICS_TIMESTEP}" ', 1)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "go2-stand.xml"
-        path.write_text(spec.to_xml())
-        return load_mjcf(path, MjcfSettings(control_timestep=1 / RATE), DEFAULT_BUDGET)
+        path.write_text(text, encoding="utf-8")
+        return load_mjcf(path, checked_settings(_SETTINGS), DEFAULT_BUDGET)
 
 
 def positions_and_commands(robot: Robot, sample: Path = SAMPLE) -> tuple[FloatArray, FloatArray]:
