@@ -1,7 +1,9 @@
 """Calibration and diagnosis of a real robot: a Unitree Go2 on a stand, from 15 s of its log.
 
 Fits the model to the first 10 s, compares predictions of the last 5 s, fits three disjoint thirds,
-diagnoses the last 5 s, and puts weak motors into them. Each stage adds its numbers to the JSON.
+diagnoses the last 5 s, and puts weak motors into them; then the last two again with the times
+exchanged: the fit to the last 10 s, and the first 5 s diagnosed. Each stage adds its numbers to the
+JSON.
 
     python -m benchmarks.go2 --out benchmarks/go2.json --figure docs/figures/go2.png
 """
@@ -49,7 +51,9 @@ FITTED, ALL = 10 * RATE, 15 * RATE
 KINDS = (BROKEN, JAMMED, FAILED_SENSOR, WEAK_MOTOR)
 COMPARATOR = SegmentPrediction("segment-prediction")
 SHORTLIST = 8
-STAGES = ("fit", "thirds", "hypotheses", "verdict", "injected")
+TORQUES = (0.95, 0.9, 0.8, 0.7)
+"""Parts of the torque that remain of the motors that are weak in the recording."""
+STAGES = ("fit", "thirds", "hypotheses", "verdict", "injected", "exchanged")
 
 
 def main() -> None:
@@ -71,8 +75,16 @@ def main() -> None:
             "nominal": _hypotheses(nominal, options.threads),
             "calibrated": _hypotheses(_robot_of(nominal, found["fit"]), options.threads),
         },
-        "verdict": lambda: _verdict(_robot_of(nominal, found["fit"]), options.threads),
-        "injected": lambda: _injected(_robot_of(nominal, found["fit"]), options.threads),
+        "verdict": lambda: _verdict(
+            _robot_of(nominal, found["fit"]), (0, FITTED), (FITTED, ALL), options.threads
+        ),
+        "injected": lambda: _injected(
+            _robot_of(nominal, found["fit"]),
+            (FITTED, ALL),
+            found["verdict"]["detectable"],
+            options.threads,
+        ),
+        "exchanged": lambda: _exchanged(nominal, options.threads),
     }
     for stage in options.stages.split(","):
         start = perf_counter(), process_time()
@@ -142,10 +154,16 @@ def _hypotheses(robot: Robot, threads: int) -> dict[str, Any]:
     }
 
 
-def _verdict(robot: Robot, threads: int) -> dict[str, Any]:
+def _verdict(
+    robot: Robot, healthy_part: tuple[int, int], part: tuple[int, int], threads: int
+) -> dict[str, Any]:
+    """Returns the diagnosis of a part of the recording, given the part that the model is fitted to.
+
+    Parts are the first row and the row after the last.
+    """
     positions, commands = positions_and_commands(robot)
-    trial = trial_of(robot, positions, commands, FITTED, ALL)
-    healthy = trial_of(robot, positions, commands, 0, FITTED)
+    trial = trial_of(robot, positions, commands, *part)
+    healthy = trial_of(robot, positions, commands, *healthy_part)
     settings = Settings(generations=5).scaled(40)
     search = DiagnosticSearch(
         Simulator(robot, threads), COMPARATOR, settings, KINDS, intact=[healthy]
@@ -153,8 +171,28 @@ def _verdict(robot: Robot, threads: int) -> dict[str, Any]:
     return search([trial], [], np.random.default_rng(0), lambda _: None).to_dict()
 
 
-def _injected(robot: Robot, threads: int) -> list[dict[str, Any]]:
-    """Returns the best of all single faults for each weak motor put into the last 5 s."""
+def _exchanged(nominal: Robot, threads: int) -> dict[str, Any]:
+    """Returns fit, verdict and injected faults: the last 10 s fitted, the first 5 s tested."""
+    healthy, part = (ALL - FITTED, ALL), (0, ALL - FITTED)
+    fit = _fit(nominal, *healthy, threads)
+    robot = _robot_of(nominal, fit)
+    verdict = _verdict(robot, healthy, part, threads)
+    injected = _injected(robot, part, verdict["detectable"], threads)
+    return {"fit": fit, "verdict": verdict, "injected": injected}
+
+
+def _injected(
+    robot: Robot, part: tuple[int, int], detectable: list[dict[str, Any]], threads: int
+) -> list[dict[str, Any]]:
+    """Returns the best of all single faults for each weak motor put into a part of the recording.
+
+    Args:
+        robot: The calibrated robot.
+        part: First row, and the row after the last.
+        detectable: Smallest detectable weakness of each motor, as in the diagnosis of the part.
+        threads: Threads of MuJoCo's steps.
+    """
+    shown = {row["joint"]: row["torque"] for row in detectable}
     positions, commands = positions_and_commands(robot)
     whole = trial_of(robot, positions, commands)
     space = HypothesisSpace.of(KINDS, robot.anatomy)
@@ -172,10 +210,10 @@ def _injected(robot: Robot, threads: int) -> list[dict[str, Any]]:
     )
     rows = []
     for joint in robot.anatomy.joints:
-        for torque in (0.7, 0.9):
+        for torque in TORQUES:
             fault = Hypothesis((Fault(WEAK_MOTOR, joint.name, torque),))
             damaged = with_fault(whole, robot, positions, commands, fault)
-            trial = trial_of(robot, damaged.behaviour["joint_positions"], commands, FITTED, ALL)
+            trial = trial_of(robot, damaged.behaviour["joint_positions"], commands, *part)
             simulator = Simulator(robot, threads)
             rough = Evidence(simulator, COMPARATOR.surrogate).losses(singles, [trial])
             few = [singles[i] for i in np.argsort(rough.mean(axis=1), kind="stable")[:SHORTLIST]]
@@ -188,6 +226,7 @@ def _injected(robot: Robot, threads: int) -> list[dict[str, Any]]:
                     "best": str(few[best]),
                     "significant": significant,
                     "found": significant and few[best].faults[0].part == joint.name,
+                    "said to show": torque <= (shown[joint.name] or 0.0),
                 }
             )
             print(rows[-1], flush=True)
