@@ -99,9 +99,30 @@ def fix_base(document: Document, model: mujoco.MjModel, height: float | None) ->
     write_frames(document, model, frames)
     name = model.body(root).name
     (element,) = (body for body in document.bodies() if body.get("name") == name)
-    for joint in [child for child in element if child.tag in _JOINTS] if floating else []:
-        element.remove(joint)
+    if floating:
+        for joint in [child for child in element if child.tag in _JOINTS]:
+            element.remove(joint)
+        _keep_neighbours_apart(document, model, root)
     document.notes.append(f"the base {name} is fixed at a height of {wanted:.3g} m")
+
+
+def _keep_neighbours_apart(document: Document, model: mujoco.MjModel, root: int) -> None:
+    """Excludes the contacts between a base and the bodies that joints connect to it.
+
+    MuJoCo ignores the contacts of a body with its parent only if the parent can move.
+    """
+    if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT:
+        return
+    weld = model.body_weldid
+    base = weld[root]
+    neighbours = (weld != base) & (weld[model.body_parentid[weld]] == base)
+    touched = model.body_geomnum > 0
+    contact = document.section("contact")
+    for own in np.flatnonzero(touched & (weld == base)):
+        for other in np.flatnonzero(touched & neighbours):
+            pair = {"body1": model.body(int(own)).name, "body2": model.body(int(other)).name}
+            if not any(pair.items() <= known.attrib.items() for known in contact):
+                ET.SubElement(contact, "exclude", pair)
 
 
 def _ground_height(model: mujoco.MjModel, data: mujoco.MjData) -> float:

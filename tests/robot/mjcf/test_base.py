@@ -78,6 +78,15 @@ def test_a_stand_holds_the_robot_in_the_pose_of_its_keyframe():
     assert robot.model.qpos0.tolist() == pytest.approx([0.2, -0.2])
 
 
+def test_hips_that_overlap_the_base_do_not_touch_it_when_it_is_fixed():
+    torso = '<geom type="box" size=".2 .1 .1"/>'
+    for root in ("<freejoint/>", '<joint type="slide" axis="1 0 0"/>'):
+        model = robot_of(mjcf(torso=torso, root=root), base="fixed").model
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        assert data.ncon == 0
+
+
 def test_a_planar_base_can_be_fixed():
     root = '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>'
     assert robot_of(mjcf(root=root), base="fixed").has_fixed_base
