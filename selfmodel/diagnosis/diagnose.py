@@ -8,6 +8,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis.comparator import Comparator
+from selfmodel.diagnosis.detectable import detectable_weaknesses
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
 from selfmodel.diagnosis.evidence import Evidence
 from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
@@ -121,6 +122,9 @@ class DiagnosticSearch:
             test=TEST if is_piecewise else EQUAL_DISTANCES,
             unsearched=unsearched,
             undetectable=tuple(undetectable[:kept]),
+            detectable=tuple(detectable_weaknesses(best, self._space, losses.damaged))
+            if is_piecewise
+            else (),
         )
 
     def check(self, trials: Sequence[Trial]) -> None:

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from selfmodel.diagnosis.detectable import DetectableWeakness
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.trials.data_frame import data_frame
 
@@ -70,6 +71,8 @@ class Diagnosis:
         undetectable: The best hypothesis with one more fault, for each undetectable fault,
             smallest distance first, at most as many as are ranked; see
             ``undetectable.undetectable_faults``.
+        detectable: Smallest detectable weakness of each joint's motors, if weak motors were
+            searched; see ``detectable.detectable_weaknesses``.
         reason: Cause of the verdict and remedy, if every simulation diverged; else empty.
     """
 
@@ -82,6 +85,7 @@ class Diagnosis:
     unsearched: UnsearchedFault | None = None
     undetectable: tuple[Hypothesis, ...] = ()
     reason: str = ""
+    detectable: tuple[DetectableWeakness, ...] = ()
 
     @property
     def best(self) -> Hypothesis:
@@ -116,6 +120,11 @@ class Diagnosis:
             "outside": self.unsearched.to_dict() if self.unsearched else None,
             "ranked": [candidate.to_dict() for candidate in self.ranked],
             **({"reason": self.reason} if self.reason else {}),
+            **(
+                {"detectable": [one.to_dict() for one in self.detectable]}
+                if self.detectable
+                else {}
+            ),
         }
 
     def to_pandas(self) -> Any:  # noqa: ANN401  # pandas is optional

@@ -11,7 +11,7 @@ from selfmodel.diagnosis.comparator import Comparator, PiecewiseTrial, PreparedT
 from selfmodel.diagnosis.search_cost import steps_of
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.robot.base.known_base import BASE_SIGNALS, trial_with_known_base
+from selfmodel.robot.base.known_base import BASE_SIGNALS, completed_trial
 from selfmodel.simulation.batch_memory import largest_batch
 from selfmodel.simulation.cache import Cache
 from selfmodel.simulation.outcome import SimulationResult
@@ -112,7 +112,7 @@ class Evidence:
         if key not in self._prepared:
             # Numbers that are too large for arithmetic are refused by name, after the preparation.
             with np.errstate(over="ignore", invalid="ignore"):
-                known = trial_with_known_base(self._simulator.robot, trial)
+                known = completed_trial(self._simulator.robot, trial)
                 prepared = self._checked(self._comparator.prepare(known))
             check_magnitudes(trial, _compared_signals(prepared.request))
             self._prepared[key] = prepared

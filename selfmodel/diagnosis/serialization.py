@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, get_args
 
+from selfmodel.diagnosis.detectable import DetectableWeakness
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, UnsearchedFault, Verdict
 from selfmodel.faults.hypothesis import Hypothesis
 
@@ -20,7 +21,10 @@ def confidence_to_dict(diagnosis: Diagnosis) -> dict[str, Any]:
     extra = [_extra(hypothesis, diagnosis.best) for hypothesis in diagnosis.undetectable]
     keys = ("verdict", "rivals", "unseen", "test", "outside", "intact_distance")
     found = {key: extra if key == "unseen" else values[key] for key in keys}
-    return {**found, "reason": diagnosis.reason or None}
+    detectable = [weakness.to_dict() for weakness in diagnosis.detectable]
+    return {**found, "reason": diagnosis.reason or None} | (
+        {"detectable": detectable} if detectable else {}
+    )
 
 
 def ranking_to_list(ranked: Sequence[Candidate]) -> list[dict[str, Any]]:
@@ -33,7 +37,8 @@ def diagnosis_from_dict(values: Mapping[str, Any], parse: Callable[[str], Hypoth
 
     Args:
         values: JSON values. ``outside`` and ``unseen`` are optional: earlier files lack them.
-            ``reason`` is there only for a diagnosis with a reason.
+            ``reason`` is there only for a diagnosis with a reason, ``detectable`` only for one that
+            searched weak motors.
         parse: Reads the notation of a hypothesis.
 
     Raises:
@@ -61,7 +66,13 @@ def diagnosis_from_dict(values: Mapping[str, Any], parse: Callable[[str], Hypoth
         else UnsearchedFault(parse(outside["hypothesis"]), str(outside["kind"])),
         undetectable=tuple(parse(text) for text in values.get("unseen", ())),
         reason=str(values.get("reason", "")),
+        detectable=tuple(_weakness(item) for item in values.get("detectable", ())),
     )
+
+
+def _weakness(item: Mapping[str, Any]) -> DetectableWeakness:
+    torque = item["torque"]
+    return DetectableWeakness(str(item["joint"]), None if torque is None else _from_json(torque))
 
 
 def _extra(hypothesis: Hypothesis, best: Hypothesis) -> str:

@@ -171,7 +171,7 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
         raise InputError("expected at least one trial of the healthy robot, got none")
     if robot.has_fixed_base:
         return _with_fitted_joints(robot, trials, threads)
-    data = _segments(robot, trials)
+    data = [calibration_segments_of(trial) for trial in trials]
     start = nominal(robot)
     stats = SimulationStats()
     before = _error(robot, start, data, threads, stats)
@@ -231,7 +231,7 @@ def simulated_steps(robot: Robot, trials: Sequence[Trial]) -> int:
     """
     if robot.has_fixed_base:
         return simulated_joint_steps(robot, _joint_segments(robot, trials))
-    cut = [own.segments for own in _segments(robot, trials)]
+    cut = [calibration_segments_of(trial).segments for trial in trials]
     slopes = 2 * len(nominal(robot).factors)
     # Errors before and after, each delay, then slopes and a new point per iteration.
     models = 3 + len(CANDIDATE_DELAYS) + MAX_ITERATIONS * (slopes + 1) + slopes
@@ -255,7 +255,7 @@ def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> flo
     """
     if robot.has_fixed_base:
         return nominal_error(robot, _joint_segments(robot, trials), threads)
-    data = _segments(robot, trials)
+    data = [calibration_segments_of(trial) for trial in trials]
     return _error(robot, nominal(robot), data, threads, SimulationStats())
 
 
@@ -278,10 +278,6 @@ def _joint_segments(robot: Robot, trials: Sequence[Trial]) -> list[JointSegments
 
 Residual = Callable[[FloatArray], FloatArray]
 """Function from logarithms of factors, ``(factors, m)``, to residuals, ``(residuals, m)``."""
-
-
-def _segments(robot: Robot, trials: Sequence[Trial]) -> list[CalibrationSegments]:
-    return [calibration_segments_of(trial_with_known_base(robot, trial)) for trial in trials]
 
 
 def _slopes(residual: Residual, x: FloatArray) -> FloatArray:

@@ -1,5 +1,6 @@
 """Tests of custom numerics: the hidden neurons that a log of version 0.1 has in its MJCF."""
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -16,9 +17,12 @@ from selfmodel.robot.designs import network_for
 from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
+from selfmodel.simulation.requests import cut_segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.trial_replay import replay
+from selfmodel.trials.behaviour import collect
 from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.state_estimation import STATE
 from selfmodel.trials.trial import TrialPlan
 from tests.helpers.drivers import random_controllers, random_of
 
@@ -73,3 +77,32 @@ def test_a_calibrated_robot_of_0_1_keeps_its_controllers(quadruped: Robot):
 
     assert fitted.mjcf.count("selfmodel_hidden_neurons") == 1
     assert np.isfinite(run.behaviour["commands"]).all()
+
+
+@pytest.mark.parametrize("delay", [0.5, 1.5, 4.5])
+def test_a_part_of_a_step_is_exact_in_all_simulations(quadruped: Robot, delay: float):
+    late = with_parameters(quadruped, dataclasses.replace(nominal(quadruped), delay=delay))
+    (controller,) = random_controllers(late, 1)
+    physical = collect(late.anatomy.names, SimulatedRobot(late).run(controller, 60))
+    simulated = Simulator(late, 1).run([(INTACT, controller)], 60, SIGNALS).behaviour
+    states = {signal: physical[signal] for signal in STATE}
+    segments = cut_segments(physical, states, np.array([0, 20, 40]), 10, STATE)
+    predicted = Simulator(late, 1).predict([INTACT], segments).behaviour
+
+    assert late.control_delay == delay
+    assert all(physical[signal].tobytes() == simulated[signal][0].tobytes() for signal in SIGNALS)
+    for signal in STATE:
+        logged = physical[signal][[[0, 10], [20, 30], [40, 50]]]
+        np.testing.assert_allclose(predicted[signal][0][:, [0, 10]], logged, atol=1e-9)
+
+
+def test_a_delay_of_half_a_step_is_between_its_neighbours(quadruped: Robot):
+    (controller,) = random_controllers(quadruped, 1)
+
+    def moved(delay: float) -> np.ndarray:
+        late = with_parameters(quadruped, dataclasses.replace(nominal(quadruped), delay=delay))
+        run = Simulator(late, 1).run([(INTACT, controller)], 8, ["joint_positions"])
+        return run.behaviour["joint_positions"][0, 2]
+
+    assert not np.array_equal(moved(0.5), moved(0))
+    assert not np.array_equal(moved(0.5), moved(1))

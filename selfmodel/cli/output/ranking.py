@@ -19,6 +19,26 @@ def confidence_sentence(found: Mapping[str, Any]) -> str:
     return _verdict(found) + (f" Undetectable in these trials: {besides}." if besides else "")
 
 
+def detectable_sentences(found: Mapping[str, Any]) -> list[str]:
+    """Returns the smallest detectable weakness of the motors as a sentence, if it was measured.
+
+    Args:
+        found: Result of ``confidence_to_dict``.
+    """
+    weaknesses = found.get("detectable", ())
+    if not weaknesses:
+        return []
+    limits = ", ".join(
+        f"{one['joint']} " + ("none" if one["torque"] is None else f"{one['torque']:g}")
+        for one in weaknesses
+    )
+    sentence = (
+        f"A weak motor would have shown at this fraction of its torque or less; a smaller "
+        f"weakness is below what these trials show: {limits}."
+    )
+    return [sentence]
+
+
 def _verdict(found: Mapping[str, Any]) -> str:
     best = found["diagnosis"][0]["hypothesis"]
     match found["verdict"]:

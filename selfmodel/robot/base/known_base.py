@@ -11,6 +11,7 @@ from selfmodel.robot.state.access import current_value, signal_fields
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import Signal
 from selfmodel.trials.trial import Trial
+from selfmodel.trials.velocity_estimation import with_joint_velocities
 
 BASE_SIGNALS: tuple[Signal, ...] = (
     "base_position",
@@ -39,6 +40,22 @@ def with_known_base(robot: Robot, behaviour: Behaviour) -> Behaviour:
         observed = behaviour.signals.get(signal, np.full((behaviour.steps, len(constant)), np.nan))
         known[signal] = np.where(np.isnan(observed), constant, observed)
     return dataclasses.replace(behaviour, signals={**behaviour.signals, **known})
+
+
+def completed_trial(robot: Robot, trial: Trial) -> Trial:
+    """Returns a trial whose state is complete if the base is fixed, as far as it was logged.
+
+    The base is known, and joint velocities that were not logged are estimated. Trials of robots
+    with another base are returned unchanged.
+
+    Args:
+        robot: The robot of the trial.
+        trial: A trial.
+    """
+    if not robot.has_fixed_base:
+        return trial
+    behaviour = with_joint_velocities(with_known_base(robot, trial.behaviour))
+    return dataclasses.replace(trial, behaviour=behaviour)
 
 
 def trial_with_known_base(robot: Robot, trial: Trial) -> Trial:

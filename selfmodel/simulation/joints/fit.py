@@ -25,6 +25,7 @@ from selfmodel.robot.joint_parameters import (
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import DEFAULT_BUDGET
 from selfmodel.simulation.batch_memory import hypothesis_bytes
+from selfmodel.simulation.joints.losses import damped, is_better, root_mean_square
 from selfmodel.simulation.joints.segments import JointSegments
 from selfmodel.simulation.joints.sets import NOMINAL, SETS, Basis, Point
 from selfmodel.simulation.outcome import SimulationStats
@@ -42,10 +43,7 @@ DIFFERENCE_STEP = 0.05
 FOLDS = 3
 """Parts of the segments that are left out in turn."""
 
-MIN_Z = 3.0
-"""Standard errors by which a larger set must predict segments better that it was not fitted to."""
-
-ITERATIONS, FOLD_ITERATIONS, DELAY_ITERATIONS = 5, 3, 1
+ITERATIONS, FOLD_ITERATIONS, DELAY_ITERATIONS = 5, 3, 2
 """Iterations of the least-squares solver: of a fit to all segments, of a fit without some of them,
 and of the fits that compare control delays."""
 
@@ -107,7 +105,7 @@ class Experiment:
 
     def nominal_errors(self) -> FloatArray:
         """Returns the errors of the robot's own model, segment by segment, ``(errors,)``."""
-        return self._errors([self._start()])[0]
+        return np.asarray(self._errors([self._start()])[0])
 
     def chosen_sets(self) -> list[JointFit]:
         """Fits the nested sets of parameters.
@@ -133,19 +131,36 @@ class Experiment:
             basis = Basis.of(self._robot, name)
             if name == "shared":
                 point = self._with_best_delay(basis, start, everything)
-                folds = [replace(fold, delay=point.delay) for fold in folds]
             point = self._solved(basis, point, everything, ITERATIONS)
+            point = self._with_near_delay(basis, point, everything)
+            folds = [replace(fold, delay=point.delay) for fold in folds]
             folds = [
                 self._solved(basis, fold, self._folds != number, FOLD_ITERATIONS)
                 for number, fold in enumerate(folds)
             ]
             held_out = self._held_out(folds)
             own = self._losses(held_out)
-            if not _is_better(own, losses):
+            if not is_better(own, losses):
                 continue
             chosen.append(self._fit(name, point, basis, held_out))
             losses = own
         return chosen
+
+    def fit_of(self, name: str) -> JointFit:
+        """Returns the fit of a set to all segments, without a test that it is better.
+
+        Its ``held_out_error`` is the error of the fit.
+
+        Args:
+            name: Name of a set of ``SETS``, not the nominal one.
+        """
+        everything = np.ones(self._segments, dtype=bool)
+        point = self._with_best_delay(Basis.of(self._robot, SETS[1]), self._start(), everything)
+        for each in SETS[1 : SETS.index(name) + 1]:
+            basis = Basis.of(self._robot, each)
+            point = self._solved(basis, point, everything, ITERATIONS)
+            point = self._with_near_delay(basis, point, everything)
+        return self._fit(name, point, basis, self._errors([point])[0])
 
     def _fit(self, name: str, point: Point, basis: Basis | None, held_out: FloatArray) -> JointFit:
         errors = self._errors([point])[0]
@@ -155,8 +170,8 @@ class Experiment:
             logarithms=point.logarithms,
             deviations=deviations,
             delay=point.delay,
-            error=_root_mean_square(errors),
-            held_out_error=_root_mean_square(held_out),
+            error=root_mean_square(errors),
+            held_out_error=root_mean_square(held_out),
             joint_errors=self._joint_errors(errors),
         )
 
@@ -187,6 +202,30 @@ class Experiment:
             best = min(near, key=cost)
             step //= 2
         return solved[best][1]
+
+    def _with_near_delay(self, basis: Basis, start: Point, used: BoolArray) -> Point:
+        """Returns the fit with the best delay around that of a fit.
+
+        The delay moves by a physics step at a time, as long as the fit improves.
+        """
+        substeps = 1 if self._robot.model.na else self._robot.substeps
+
+        def cost(point: Point) -> float:
+            residuals = self._residuals(basis, [point], used)[:, 0]
+            return float(residuals @ residuals)
+
+        best, least = start, cost(start)
+        for direction in (-1, 1):
+            while True:
+                parts = round(best.delay * substeps) + direction
+                if not 0 <= parts <= MAX_CONTROL_DELAY * substeps:
+                    break
+                moved = replace(best, delay=as_delay(parts, substeps))
+                moved = self._solved(basis, moved, used, DELAY_ITERATIONS)
+                if not cost(moved) < least:
+                    break
+                best, least = moved, cost(moved)
+        return best
 
     def _solved(self, basis: Basis, start: Point, used: BoolArray, iterations: int) -> Point:
         """Returns the least-squares fit of a set to some segments."""
@@ -241,7 +280,7 @@ class Experiment:
         errors = self._errors(points)[:, np.repeat(used, self._widths())].T
         coordinates = np.stack([basis.coordinates(point) for point in points], axis=1)
         weight = np.sqrt(len(errors)) * PRIOR_WEIGHT / basis.deviations
-        return np.concatenate([_damped(errors), weight[:, np.newaxis] * coordinates])
+        return np.concatenate([damped(errors), weight[:, np.newaxis] * coordinates])
 
     def _errors(self, points: Sequence[Point]) -> FloatArray:
         """Returns the errors of all segments, segment by segment, ``(points, errors)``.
@@ -298,7 +337,7 @@ class Experiment:
         """Returns the mean loss of each segment, ``(segments,)``."""
         widths = self._widths()
         firsts = np.concatenate([[0], np.cumsum(widths)[:-1]])
-        return np.asarray(np.add.reduceat(_damped(errors) ** 2, firsts) / widths)
+        return np.asarray(np.add.reduceat(damped(errors) ** 2, firsts) / widths)
 
     def _held_out(self, folds: Sequence[Point]) -> FloatArray:
         """Returns the errors of each segment by the fit that it was left out of, ``(errors,)``."""
@@ -345,19 +384,3 @@ class Experiment:
         unit = count * PRIOR_WEIGHT**2
         variance = np.diag(inverse @ (spread + prior * unit) @ inverse)
         return basis.spread(np.minimum(np.sqrt(variance), basis.deviations))
-
-
-def _is_better(one: FloatArray, other: FloatArray) -> bool:
-    """Returns whether the losses of segments are significantly lower, paired over the segments."""
-    gains = other - one
-    error = float(gains.std(ddof=1)) / np.sqrt(len(gains))
-    return bool(gains.mean() > MIN_Z * error and gains.mean() > 0)
-
-
-def _root_mean_square(errors: FloatArray) -> float:
-    return float(np.sqrt(np.mean(errors**2)))
-
-
-def _damped(errors: FloatArray) -> FloatArray:
-    """Returns pseudo-Huber residuals: their squares grow linearly with errors above 1."""
-    return np.asarray(np.sign(errors) * np.sqrt(2 * (np.sqrt(1 + errors**2) - 1)))

@@ -23,7 +23,7 @@ from selfmodel.trials.velocity_estimation import lacks_joint_velocities, with_jo
 SEGMENT_SECONDS = 1.0
 """Length of a segment, s, in a trial that is long enough."""
 
-MIN_SEGMENTS = 6
+MIN_SEGMENTS = 12
 """Smallest number of segments of a trial: a short trial has shorter segments."""
 
 MIN_HORIZON = 5
@@ -85,15 +85,16 @@ def _segments(
     horizon: int,
     compared: tuple[Signal, ...],
 ) -> JointSegments:
-    known = np.isfinite(np.hstack(list(states.values()))).all(axis=1)
-    commanded = np.isfinite(behaviour["commands"]).all(axis=1)
-    steady = np.isfinite(behaviour.steady_commands).all(axis=1)
+    known = np.asarray(np.isfinite(np.hstack(list(states.values()))).all(axis=1))
+    commanded = np.asarray(np.isfinite(behaviour["commands"]).all(axis=1))
+    steady = np.asarray(np.isfinite(behaviour.steady_commands).all(axis=1))
     before = command_steps(starts, horizon)
     usable = known[starts] & commanded[before].all(axis=1)
     starts, before = starts[usable], before[usable]
     after = starts[:, np.newaxis] + np.arange(1, horizon + 1)
     on_time = np.logical_and.accumulate(steady[before], axis=1)[:, LEAD:]
-    seen = np.isfinite(np.hstack([behaviour[signal] for signal in compared])).all(axis=1)
+    compared_values = np.hstack([behaviour[signal] for signal in compared])
+    seen = np.asarray(np.isfinite(compared_values).all(axis=1))
     judged = np.asarray(on_time & seen[after])
     kept = judged.any(axis=1)
     return JointSegments(

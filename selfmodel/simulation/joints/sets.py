@@ -49,12 +49,11 @@ class Basis:
     def of(cls, robot: Robot, name: str) -> "Basis":
         """Returns the coordinates of a set of ``SETS`` other than the nominal one."""
         hinges = len(robot.anatomy.hinges)
-        groups_of = {
-            "shared": lambda: np.zeros(hinges, dtype=np.intp),
-            "kinds": lambda: kinds_of_joints(robot),
-            "joints": lambda: np.arange(hinges),
-        }
-        hinge_groups = groups_of[name]()
+        hinge_groups = np.zeros(hinges, dtype=np.intp)
+        if name == "kinds":
+            hinge_groups = kinds_of_joints(robot)
+        elif name == "joints":
+            hinge_groups = np.arange(hinges)
         groups, applies_to, deviations, bounds, first = {}, [], [], [], 0
         for quantity in QUANTITIES:
             joints = joint_of_motor(robot) if quantity == "gain" else np.arange(hinges)

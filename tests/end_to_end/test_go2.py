@@ -1,0 +1,40 @@
+"""A real robot's log: the calibrated model predicts what it was not fitted to, and says intact."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.go2 import FITTED, _hypotheses, _robot_of
+from benchmarks.go2_sample import SAMPLE, positions_and_commands, robot_on_stand, simulated
+from selfmodel.robot.robot import Robot
+
+NUMBERS = Path(__file__).parents[2] / "benchmarks" / "go2.json"
+
+pytestmark = [
+    pytest.mark.search,
+    pytest.mark.skipif(not SAMPLE.exists(), reason="the recording is not here"),
+]
+
+
+@pytest.fixture(scope="module")
+def fitted() -> Robot:
+    found = json.loads(NUMBERS.read_text())
+    return _robot_of(robot_on_stand(), found["fit"])
+
+
+def error(robot: Robot) -> float:
+    positions, commands = positions_and_commands(robot)
+    errors = (simulated(robot, positions, commands) - positions)[FITTED:]
+    return float(np.sqrt(np.mean(errors**2)))
+
+
+def test_the_last_five_seconds_are_predicted_better_by_a_quarter(fitted: Robot):
+    assert error(fitted) < 0.75 * error(robot_on_stand())
+
+
+def test_no_weak_motor_explains_the_healthy_robot_better(fitted: Robot):
+    found = _hypotheses(fitted, 1)
+
+    assert (found["smaller loss"], found["significantly better"]) == (0, 0)
