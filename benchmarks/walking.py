@@ -10,7 +10,7 @@ from selfmodel.controllers.controller import Controller
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.sensing import SensorReader
+from selfmodel.robot.state.sensing import SensorReader
 
 
 @dataclass(frozen=True)

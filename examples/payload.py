@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import mujoco
 
 from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
-from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.anatomy.anatomy import Anatomy
 
 if TYPE_CHECKING:
-    from selfmodel.robot.embodiment import Embodiment
+    from selfmodel.robot.editing.embodiment import Embodiment
 
 
 def load(embodiment: "Embodiment", _anatomy: Anatomy, fault: Fault) -> None:

@@ -10,8 +10,8 @@ import mujoco
 
 from selfmodel.errors import unknown_name
 from selfmodel.robot.mjcf.adaptation import adapt_text
-from selfmodel.robot.mjcf.document import read_document
-from selfmodel.robot.mjcf.files import InMemory
+from selfmodel.robot.mjcf.document.document import read_document
+from selfmodel.robot.mjcf.document.files import InMemory
 from selfmodel.robot.mjcf.load import robot_from
 from selfmodel.robot.mjcf.mujoco_errors import loading_a_model
 from selfmodel.robot.mjcf.settings import MjcfSettings

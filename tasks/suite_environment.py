@@ -16,11 +16,11 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.physical.environment_robot import EnvironmentRobot
 from selfmodel.physical.simulated_robot import OWN_SEED
 from selfmodel.recovery.fitness import Score
-from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.editing.embodiment import Embodiment
 from selfmodel.robot.mjcf.mujoco_errors import loading_a_model
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.sensing import SensorReader
-from selfmodel.robot.state_access import current_value, signal_fields, state_writer
+from selfmodel.robot.state.access import current_value, signal_fields, state_writer
+from selfmodel.robot.state.sensing import SensorReader
 from selfmodel.simulation.activations import activations_since_rest
 from selfmodel.trials.behaviour import Behaviour, Sample
 from selfmodel.trials.signals import SIGNALS, Signal

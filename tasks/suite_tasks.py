@@ -13,8 +13,8 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.neuron import SILENT_NEURON
 from selfmodel.faults.notation import parse
 from selfmodel.physical.reality_gap import draw_gap_of, perturbed_model
-from selfmodel.robot.anatomy import Anatomy
-from selfmodel.robot.anatomy_reader import read_anatomy
+from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.robot.anatomy.reader import read_anatomy
 from selfmodel.robot.mjcf.mujoco_errors import loading_a_model, mujoco_errors_as_input_errors
 from selfmodel.tasks import suite_bodies
 from selfmodel.tasks.randomness import Seed, construction_numbers, episode_numbers

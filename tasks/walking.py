@@ -21,10 +21,10 @@ from selfmodel.physical.measurement_noise import ExactMeasurement, Measurement, 
 from selfmodel.physical.reality_gap import RealityGap, draw_gap
 from selfmodel.physical.simulated_robot import physical_embodiment
 from selfmodel.robot.control_delay import CONTROL_DELAY, split_delay
-from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.editing.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.sensing import SensorReader
-from selfmodel.robot.state_access import current_value, signal_fields
+from selfmodel.robot.state.access import current_value, signal_fields
+from selfmodel.robot.state.sensing import SensorReader
 from selfmodel.tasks.randomness import Seed, construction_numbers, episode_numbers, next_seed
 from selfmodel.tasks.start_noise import start_level
 from selfmodel.trials.signals import Signal

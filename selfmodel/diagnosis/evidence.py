@@ -11,7 +11,7 @@ from selfmodel.diagnosis.comparator import Comparator, PiecewiseTrial, PreparedT
 from selfmodel.diagnosis.search_cost import steps_of
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.robot.known_base import BASE_SIGNALS, completed_trial
+from selfmodel.robot.base.known_base import BASE_SIGNALS, completed_trial
 from selfmodel.simulation.batch_memory import largest_batch
 from selfmodel.simulation.cache import Cache
 from selfmodel.simulation.outcome import SimulationResult

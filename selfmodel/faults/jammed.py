@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 from selfmodel.faults.kind import Fault, FaultKind, joints
 from selfmodel.faults.motor import WEAK_MOTOR
 from selfmodel.faults.sensor import FAILED_SENSOR, SENSOR_GAIN
-from selfmodel.robot.anatomy import Anatomy, Joint
+from selfmodel.robot.anatomy.anatomy import Anatomy, Joint
 
 if TYPE_CHECKING:
-    from selfmodel.robot.embodiment import Embodiment
+    from selfmodel.robot.editing.embodiment import Embodiment
 
 ANGLE_LEVELS = 12
 """Levels of the angle, evenly spaced inside the joint's range: 0.09 rad apart for 60 degrees."""

@@ -6,12 +6,12 @@ from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
 from selfmodel.arrays import FloatArray
-from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.anatomy.anatomy import Anatomy
 
 if TYPE_CHECKING:
     from mujoco import MjSpec
 
-    from selfmodel.robot.embodiment import Embodiment
+    from selfmodel.robot.editing.embodiment import Embodiment
 
 Values = TypeVar("Values")
 

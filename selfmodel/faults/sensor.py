@@ -7,10 +7,10 @@ touch is 0 or 1, and an angle is 1 at the end of its joint's range.
 from typing import TYPE_CHECKING
 
 from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
-from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.anatomy.anatomy import Anatomy
 
 if TYPE_CHECKING:
-    from selfmodel.robot.embodiment import Embodiment
+    from selfmodel.robot.editing.embodiment import Embodiment
 
 
 def _sensors(anatomy: Anatomy) -> tuple[str, ...]:

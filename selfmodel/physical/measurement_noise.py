@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
-from selfmodel.robot.anatomy import Anatomy
-from selfmodel.robot.embodiment import WELD_ARMATURE, Embodiment
+from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.robot.editing.embodiment import WELD_ARMATURE, Embodiment
 from selfmodel.trials.signal_scales import MEASUREMENT_FULL_SCALES
 from selfmodel.trials.signals import Signal
 

@@ -7,8 +7,8 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray, IndexArray
+from selfmodel.robot.anatomy.transmission import motor_joints
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.transmission import motor_joints
 
 QUANTITIES = ("gain", "damping", "dry friction", "armature")
 """Fitted quantities: torque of a motor at the same target, as a factor; viscous damping of a joint,

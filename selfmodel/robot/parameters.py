@@ -8,8 +8,8 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.robot.control_delay import CONTROL_DELAY
+from selfmodel.robot.editing.scaling import scale_model
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.scaling import scale_model
 
 
 @dataclass(frozen=True)

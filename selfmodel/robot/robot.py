@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 
-from selfmodel.robot.anatomy import Anatomy
-from selfmodel.robot.anatomy_reader import driven_joints, read_anatomy
-from selfmodel.robot.base import find_root_body
+from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.robot.anatomy.reader import driven_joints, read_anatomy
+from selfmodel.robot.base.fixed_base import reference_pose
+from selfmodel.robot.base.root_body import find_root_body
 from selfmodel.robot.control_delay import control_delay, has_control_delay
-from selfmodel.robot.fixed_base import reference_pose
 from selfmodel.robot.model_checks import check_model
 from selfmodel.robot.mujoco_log import configure
 

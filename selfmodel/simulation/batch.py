@@ -8,12 +8,12 @@ import numpy as np
 from mujoco.batch import Batch, SimulationError
 
 from selfmodel.arrays import BoolArray, IndexArray
-from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.editing.embodiment import Embodiment
 from selfmodel.robot.mjcf.mujoco_errors import mujoco_errors_as_input_errors
 from selfmodel.robot.mujoco_log import uncounted_warnings
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state_access import signal_fields
-from selfmodel.robot.state_fields import Reader
+from selfmodel.robot.state.access import signal_fields
+from selfmodel.robot.state.fields import Reader
 from selfmodel.trials.signals import Signal
 
 

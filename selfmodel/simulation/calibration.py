@@ -19,8 +19,8 @@ from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
 from selfmodel.faults.build import apply_faults
 from selfmodel.faults.hypothesis import INTACT
+from selfmodel.robot.base.known_base import trial_with_known_base
 from selfmodel.robot.control_delay import MAX_CONTROL_DELAY
-from selfmodel.robot.known_base import trial_with_known_base
 from selfmodel.robot.parameters import (
     Parameters,
     factor_names,

@@ -9,10 +9,10 @@ import numpy as np
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.errors import InputError
 from selfmodel.robot.control_delay import MAX_CONTROL_DELAY, split_delay
-from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.editing.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.sensing import SensorReader
-from selfmodel.robot.state_access import state_writer
+from selfmodel.robot.state.access import state_writer
+from selfmodel.robot.state.sensing import SensorReader
 from selfmodel.simulation.activations import initial_activations
 from selfmodel.simulation.batch import LiveBatch, live_signals, new_batch
 from selfmodel.simulation.outcome import SimulationResult, SimulationStats

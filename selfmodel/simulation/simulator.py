@@ -14,9 +14,9 @@ from selfmodel.faults.build import apply_faults, build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.physical.reality_gap import perturbed_models
 from selfmodel.robot.control_delay import split_delay
-from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.editing.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.sensing import SensorReader
+from selfmodel.robot.state.sensing import SensorReader
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.simulation.batch import LiveBatch, live_signals, new_batch
 from selfmodel.simulation.ground_contacts import ground_contact_points

@@ -18,8 +18,8 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import ALL_KINDS, KINDS, PAPER_KINDS, notation_kinds
-from selfmodel.robot.anatomy import Anatomy
-from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.robot.editing.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from tests.helpers.drivers import random_motion

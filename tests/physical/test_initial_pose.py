@@ -10,7 +10,7 @@ from selfmodel.faults.build import build
 from selfmodel.faults.notation import parse
 from selfmodel.physical.initial_pose import ANGLE_DEVIATION, TILT_DEVIATION, randomize_initial_pose
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state_access import signal_fields
+from selfmodel.robot.state.access import signal_fields
 from selfmodel.tasks import ROBOTS
 
 QUADRUPED = ROBOTS["quadruped"].robot()

@@ -6,11 +6,12 @@ import mujoco
 
 from selfmodel.cli.output.tables import folding, print_tables
 from selfmodel.faults.registry import ALL_KINDS
-from selfmodel.robot.actuator_ranges import command_ranges
-from selfmodel.robot.base import FreeBase, read_base
-from selfmodel.robot.fixed_base import FixedBase
+from selfmodel.robot.anatomy.actuator_ranges import command_ranges
+from selfmodel.robot.anatomy.transmission import motor_joints
+from selfmodel.robot.base.base import read_base
+from selfmodel.robot.base.fixed_base import FixedBase
+from selfmodel.robot.base.free_base import FreeBase
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.transmission import motor_joints
 
 
 def parts(robot: Robot) -> dict[str, Any]:

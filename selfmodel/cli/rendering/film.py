@@ -12,7 +12,7 @@ from selfmodel.faults.broken import BROKEN
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.jammed import JAMMED, JAMMED_AT_ANGLE
-from selfmodel.robot.known_base import with_known_base
+from selfmodel.robot.base.known_base import with_known_base
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Behaviour
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state_access import state_writer
+from selfmodel.robot.state.access import state_writer
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import Signal
 

@@ -14,26 +14,26 @@ import mujoco
 
 from selfmodel.errors import InputError
 from selfmodel.files import encodable, read_file
-from selfmodel.robot.mjcf.base import carry_hinges, fix_base, free_base
-from selfmodel.robot.mjcf.command_ranges import add_command_ranges
-from selfmodel.robot.mjcf.document import Document, parse_xml, read_document
-from selfmodel.robot.mjcf.expand import check_loggable, expand
-from selfmodel.robot.mjcf.files import Files, InMemory, robot_folder
-from selfmodel.robot.mjcf.forward import turn_forward
-from selfmodel.robot.mjcf.ground import add_ground
+from selfmodel.robot.mjcf.document.document import Document, parse_xml, read_document
+from selfmodel.robot.mjcf.document.expand import check_loggable, expand
+from selfmodel.robot.mjcf.document.files import Files, InMemory, robot_folder
+from selfmodel.robot.mjcf.document.names import name_parts
 from selfmodel.robot.mjcf.hidden_state import remove_hidden_state
-from selfmodel.robot.mjcf.keyframe import bake_keyframe
-from selfmodel.robot.mjcf.missing_meshes import replace_missing_meshes
+from selfmodel.robot.mjcf.meshes.missing_meshes import replace_missing_meshes
+from selfmodel.robot.mjcf.meshes.visuals import drop_textures, reduce_meshes
+from selfmodel.robot.mjcf.motors.command_ranges import add_command_ranges
+from selfmodel.robot.mjcf.motors.reach import limit_reach
+from selfmodel.robot.mjcf.motors.servos import add_servos
 from selfmodel.robot.mjcf.mujoco_errors import compile_model, mujoco_errors_as_input_errors
-from selfmodel.robot.mjcf.names import name_parts
-from selfmodel.robot.mjcf.reach import limit_reach
+from selfmodel.robot.mjcf.placement.base import carry_hinges, fix_base, free_base
+from selfmodel.robot.mjcf.placement.forward import turn_forward
+from selfmodel.robot.mjcf.placement.ground import add_ground
+from selfmodel.robot.mjcf.placement.keyframe import bake_keyframe
 from selfmodel.robot.mjcf.rehearsal import run_on_model
 from selfmodel.robot.mjcf.sensors import add_sensors
-from selfmodel.robot.mjcf.servos import add_servos
 from selfmodel.robot.mjcf.settings import MAX_CONTROL_TIMESTEP, MjcfSettings, checked_settings
 from selfmodel.robot.mjcf.untrusted import checked_model
 from selfmodel.robot.mjcf.usability import check_usable
-from selfmodel.robot.mjcf.visuals import drop_textures, reduce_meshes
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.urdf.conversion import convert
 from selfmodel.robot.urdf.reading import read_urdf

@@ -4,7 +4,7 @@ from xml.etree import ElementTree as ET  # of checked texts
 
 import mujoco
 
-from selfmodel.robot.mjcf.document import Document
+from selfmodel.robot.mjcf.document.document import Document
 
 MIN_ITERATIONS = {"iterations": 100, "ls_iterations": 50}
 """Least iterations of a solver without warm start, MuJoCo's defaults, by option. A Unitree Go1 with

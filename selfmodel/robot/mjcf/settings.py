@@ -8,7 +8,7 @@ from typing import Any
 
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.files import load_toml, read_file
-from selfmodel.robot.mjcf.files import is_around_home
+from selfmodel.robot.mjcf.document.files import is_around_home
 from selfmodel.robot.mjcf.joint_values import JointValues, checked_joint_values
 
 MAX_SETTINGS_BYTES = 2**16

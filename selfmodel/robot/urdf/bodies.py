@@ -10,7 +10,7 @@ from xml.etree import ElementTree as ET
 import mujoco
 import numpy as np
 
-from selfmodel.robot.mjcf.expand import format_numbers
+from selfmodel.robot.mjcf.document.expand import format_numbers
 from selfmodel.robot.urdf.frame import NO_FRAME, Frame, placed
 from selfmodel.robot.urdf.inertia import inertial
 

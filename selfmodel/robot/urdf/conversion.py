@@ -5,8 +5,8 @@ from xml.etree import ElementTree as ET  # of checked texts
 import mujoco
 
 from selfmodel.errors import InputError
-from selfmodel.robot.mjcf.document import Document
-from selfmodel.robot.mjcf.expand import format_numbers
+from selfmodel.robot.mjcf.document.document import Document
+from selfmodel.robot.mjcf.document.expand import format_numbers
 from selfmodel.robot.mjcf.joint_values import check_patterns
 from selfmodel.robot.mjcf.mujoco_errors import compile_model, loading_a_model
 from selfmodel.robot.mjcf.settings import MjcfSettings

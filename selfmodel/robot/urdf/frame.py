@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.robot.mjcf.expand import format_numbers
+from selfmodel.robot.mjcf.document.expand import format_numbers
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.robot.mjcf.expand import format_numbers
+from selfmodel.robot.mjcf.document.expand import format_numbers
 from selfmodel.robot.urdf.frame import Frame, placed
 
 

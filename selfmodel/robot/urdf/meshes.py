@@ -6,8 +6,8 @@ from posixpath import join, normpath, splitext
 from urllib.parse import unquote
 
 from selfmodel.errors import InputError
-from selfmodel.robot.mjcf.document import Document, plain_name
-from selfmodel.robot.mjcf.files import Files
+from selfmodel.robot.mjcf.document.document import Document, plain_name
+from selfmodel.robot.mjcf.document.files import Files
 from selfmodel.robot.urdf.tree import quoted
 
 READABLE = (".stl", ".obj")

@@ -10,8 +10,8 @@ from types import MappingProxyType
 from xml.etree import ElementTree as ET  # of checked texts
 
 from selfmodel.errors import InputError
-from selfmodel.robot.mjcf.document import Document
-from selfmodel.robot.mjcf.files import Files
+from selfmodel.robot.mjcf.document.document import Document
+from selfmodel.robot.mjcf.document.files import Files
 from selfmodel.robot.model_checks import MAX_NUMBER
 from selfmodel.robot.urdf.meshes import READABLE, Meshes
 from selfmodel.robot.urdf.tree import check_tree, check_types, quoted

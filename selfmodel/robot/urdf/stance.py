@@ -7,9 +7,9 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
-from selfmodel.robot.mjcf.contacts import ground_contact_geoms
-from selfmodel.robot.mjcf.ground import lowest_point
+from selfmodel.robot.anatomy.contacts import ground_contact_geoms
 from selfmodel.robot.mjcf.joint_values import JointValues, value_of
+from selfmodel.robot.mjcf.placement.ground import lowest_point
 
 
 @dataclass(frozen=True)

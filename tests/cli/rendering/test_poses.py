@@ -8,7 +8,7 @@ from hypothesis.extra import numpy as arrays
 from selfmodel.cli.rendering.poses import POSE, Poses, poses_of
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state_access import signal_fields
+from selfmodel.robot.state.access import signal_fields
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import Behaviour

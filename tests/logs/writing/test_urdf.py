@@ -9,8 +9,8 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 from selfmodel.logs.mcap.contents import read_contents
 from selfmodel.logs.writing.kinematics import body_names
 from selfmodel.logs.writing.urdf import _roll_pitch_yaw, urdf
-from selfmodel.robot.mjcf.document import parse_xml
-from selfmodel.robot.mjcf.files import InMemory
+from selfmodel.robot.mjcf.document.document import parse_xml
+from selfmodel.robot.mjcf.document.files import InMemory
 from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.urdf.conversion import convert

@@ -3,8 +3,8 @@
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-from selfmodel.robot.mjcf.document import Document, parse_xml
-from selfmodel.robot.mjcf.files import InMemory
+from selfmodel.robot.mjcf.document.document import Document, parse_xml
+from selfmodel.robot.mjcf.document.files import InMemory
 from selfmodel.robot.mjcf.settings import checked_settings
 from selfmodel.robot.urdf.conversion import convert
 from selfmodel.robot.urdf.reading import read_urdf

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from selfmodel.errors import InputError
-from selfmodel.robot.mjcf.document import parse_xml
-from selfmodel.robot.mjcf.files import robot_folder
+from selfmodel.robot.mjcf.document.document import parse_xml
+from selfmodel.robot.mjcf.document.files import robot_folder
 from selfmodel.robot.urdf.reading import read_urdf
 from tests.robot.urdf.samples import CUBE, link, read, urdf
 

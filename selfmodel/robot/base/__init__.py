@@ -1,0 +1,1 @@
+"""Base of a robot: its root body, and how that body moves."""

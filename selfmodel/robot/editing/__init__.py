@@ -1,0 +1,1 @@
+"""Edits of a robot's model: the copy that faults edit, and functions on compiled models."""

@@ -1,0 +1,1 @@
+"""MJCF document: its files, its explicit elements, and their names and frames."""

@@ -1,0 +1,1 @@
+"""Meshes of an MJCF: visual assets, convex hulls and stand-ins for missing files."""

@@ -1,0 +1,1 @@
+"""Motors of an MJCF: position servos, their reach, and command ranges."""

@@ -1,0 +1,1 @@
+"""MuJoCo's state of a robot: signals and sensor readings."""

@@ -1,0 +1,85 @@
+"""Reads and writes the signals of a behaviour in MuJoCo's state."""
+
+from collections.abc import Callable, Mapping
+
+import mujoco
+import numpy as np
+
+from selfmodel.arrays import FloatArray, columns
+from selfmodel.robot.base.base import read_base
+from selfmodel.robot.robot import Robot
+from selfmodel.robot.state.fields import Bind, DerivedSignal, StateField
+from selfmodel.trials.signals import Signal
+
+StateWriter = Callable[[Mapping[Signal, FloatArray]], None]
+"""Writes signals, ``(n, width)`` each, into the state; absent signals keep their values."""
+
+
+def signal_fields(
+    robot: Robot, *models: mujoco.MjModel
+) -> dict[Signal, StateField | DerivedSignal]:
+    """Returns the state field of each signal that the physics determines.
+
+    Commands are ``ctrl``. Sensor readings are not included: ``SensorReader`` computes them.
+
+    Args:
+        robot: The robot, whose parts name the columns of the signals.
+        models: Models of the states: no model for the robot's own, one for all states, or one per
+            state, of one layout. A model has all parts of the robot, and may have more.
+    """
+    models = models or (robot.model,)
+    model = models[0]
+    motors = columns([int(model.actuator(name).id) for name in robot.anatomy.motors])
+    return {
+        "commands": StateField("ctrl", motors),
+        **_joint_fields(robot, model),
+        **read_base(models, robot.root).signal_fields(),
+    }
+
+
+def state_writer(robot: Robot, bind: Bind, *models: mujoco.MjModel) -> StateWriter:
+    """Returns a function that writes the joint and base signals into a state.
+
+    Args:
+        robot: The robot, whose parts name the columns of the signals.
+        bind: Returns the fields of the state, which are written.
+        models: Models of the states, as for ``signal_fields``.
+    """
+    models = models or (robot.model,)
+    qpos, qvel = bind("qpos"), bind("qvel")
+    arrays = {"qpos": qpos, "qvel": qvel}
+    base, joints = read_base(models, robot.root), _joint_fields(robot, models[0])
+
+    def write(state: Mapping[Signal, FloatArray]) -> None:
+        for signal in ("joint_positions", "joint_velocities"):
+            if signal in state:
+                arrays[joints[signal].field][:, joints[signal].columns] = state[signal]
+        base.write(qpos, qvel, state)
+
+    return write
+
+
+def bind_data(data: mujoco.MjData) -> Bind:
+    """Returns a function from the name of a field of MjData to the field as ``(1, width)``."""
+
+    def bind(field: str) -> FloatArray:
+        values: FloatArray = getattr(data, field)
+        return values[np.newaxis]
+
+    return bind
+
+
+def current_value(field: StateField | DerivedSignal, data: mujoco.MjData) -> FloatArray:
+    """Returns a copy of the current value of a signal of a single robot, ``(width,)``."""
+    return np.array(field.reader(bind_data(data))()[0])
+
+
+def _joint_fields(robot: Robot, model: mujoco.MjModel) -> dict[Signal, StateField]:
+    hinges = [model.joint(name) for name in robot.anatomy.hinges]
+    positions = columns([int(hinge.qposadr[0]) for hinge in hinges])
+    velocities = columns([int(hinge.dofadr[0]) for hinge in hinges])
+    return {
+        "joint_positions": StateField("qpos", positions),
+        "joint_velocities": StateField("qvel", velocities),
+        "joint_efforts": StateField("qfrc_actuator", velocities),
+    }
