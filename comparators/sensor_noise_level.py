@@ -36,9 +36,10 @@ def noise_level_loss(predicted: FloatArray, logged: FloatArray, graded: BoolArra
     Returns:
         The mean over the sensors of ``log(1 + (e / ERROR_SCALE)^2)``, with e the error of the noise
         level in a reading's unit; exactly 0 if no sensor has an excess of noise in the log or in
-        the prediction, and if segments have no more than ``ORDER`` rows.
+        the prediction, if segments have no more than ``ORDER`` rows, and without sensors.
     """
-    if logged.shape[1] <= ORDER:
+    _, rows, sensors = logged.shape
+    if rows <= ORDER or not sensors:
         return np.zeros(len(predicted))
     found = _excess(logged[np.newaxis], graded)
     error = (_excess(predicted, graded) - found) / ERROR_SCALE

@@ -110,3 +110,9 @@ def test_less_than_the_least_is_none():
     logged = noisy(moving(0.05), 0, 0, 0.7 * MARGIN, 0)
 
     assert loss(moving(0.05), logged) == 0
+
+
+def test_a_robot_without_sensors_has_no_noise():
+    readings = np.zeros((SEGMENTS, ROWS, 0))
+
+    assert loss(readings, readings, np.ones((1, 0), dtype=bool)) == 0
