@@ -42,7 +42,7 @@ TASKS_BY_DOMAIN: Mapping[str, tuple[str, ...]] = {
 """Task names by domain."""
 
 FILE_TASKS: tuple[str, ...] = ("walk",)
-"""Tasks of a robot from an MJCF file."""
+"""Tasks of a robot from an MJCF or URDF file."""
 
 
 def entry(name: str) -> Entry:
@@ -77,7 +77,8 @@ def load(
 
     Args:
         domain_name: Name of a robot, such as ``"quadruped"``; of a domain or a body of dm_control's
-            suite, such as ``"suite-walker"`` or ``"suite-walker-walk"``; or path of an MJCF file.
+            suite, such as ``"suite-walker"`` or ``"suite-walker-walk"``; or path of an MJCF or URDF
+            file.
         task_name: Name of one of its tasks, such as ``"walk"``.
         task_kwargs: Arguments of the task: ``hypothesis``, the robot's faults, in notation or as a
             ``Hypothesis``, which may have faults of third-party kinds; ``time_limit`` in seconds;

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Entry:
-    """A robot of the registry, or a robot from a user's MJCF.
+    """A robot of the registry, or a robot from a user's MJCF or URDF.
 
     Attributes:
         robot: Makes the healthy robot.

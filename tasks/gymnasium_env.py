@@ -25,7 +25,7 @@ NAMESPACE = "selfmodel"
 """Namespace of the ids."""
 
 FILE_ID = f"{NAMESPACE}/File-v0"
-"""Id of the environment of an MJCF file, with the argument ``robot``."""
+"""Id of the environment of an MJCF or URDF file, with the argument ``robot``."""
 
 PICTURE_SIZE = (480, 640)
 """Default height and width of a picture, pixels."""
@@ -42,7 +42,7 @@ class TaskEnv(gymnasium.Env[Any, Any], EzPickle):
     truncated at the time limit, and terminated where the task ends it.
 
     Args:
-        robot: Name of a robot or path of an MJCF file, as for ``selfmodel.tasks.load``.
+        robot: Name of a robot or path of an MJCF or URDF file, as for ``selfmodel.tasks.load``.
         task: Name of the task.
         render_mode: ``"rgb_array"`` or None.
         height: Height of a picture, pixels.

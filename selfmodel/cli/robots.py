@@ -1,4 +1,4 @@
-"""``selfmodel robots``: the robots of selfmodel, and the parts of a robot or an MJCF file."""
+"""``selfmodel robots``: the robots of selfmodel, and the parts of a robot or a file."""
 
 from typing import Annotated, Any
 

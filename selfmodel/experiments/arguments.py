@@ -39,8 +39,8 @@ def load_robot(
     Args:
         name: ``quadruped``, ``hexapod``, ``suite-DOMAIN-TASK``, or the path of an MJCF or URDF
             file.
-        settings: Settings of the MJCF file; None for those of the TOML file beside it.
-        budget: Memory and time that the model of an MJCF file may take.
+        settings: Settings of the file; None for those of the TOML file beside it.
+        budget: Memory and time that the model of a file may take.
 
     Raises:
         InputError: The name is unknown, the file is no valid robot, or settings are given for a
@@ -49,7 +49,9 @@ def load_robot(
     if is_model(str(name)):
         return load_mjcf(name, settings, budget)
     if settings is not None:
-        raise InputError(f"settings are for an MJCF file: {str(name)!r} is the name of a robot")
+        raise InputError(
+            f"settings are for an MJCF or URDF file: {str(name)!r} is the name of a robot"
+        )
     return robot_entry(str(name)).robot()
 
 
@@ -76,7 +78,7 @@ def parse_hypothesis(
 
 
 def robot_of(source: RobotSource) -> Robot:
-    """Returns a robot, given as itself, by name or by MJCF file.
+    """Returns a robot, given as itself, by name or by MJCF or URDF file.
 
     Raises:
         InputError: The name is unknown, the file is no valid robot, or the type is another.

@@ -19,24 +19,26 @@ _MODEL_ENDINGS = (".xml", ".urdf", ".xacro")
 
 
 def robot_entry(name: str, settings: Iterable[str] = (), budget: Budget = DEFAULT_BUDGET) -> Entry:
-    """Returns a robot, its cases and its tasks, by name or by MJCF file.
+    """Returns a robot, its cases and its tasks, by name or by MJCF or URDF file.
 
     Args:
         name: Name of a robot of selfmodel, or the path of an MJCF or URDF file.
-        settings: Settings of the MJCF file, such as ``forward=-x``; they override those of the
+        settings: Settings of the file, such as ``forward=-x``; they override those of the
             TOML file beside it.
         budget: Memory and time that the model may take.
 
     Raises:
-        InputError: The name is unknown (the message has the nearest names), the MJCF file is no
-            valid robot, or settings are given for a robot by name.
+        InputError: The name is unknown (the message has the nearest names), the file is no valid
+            robot, or settings are given for a robot by name.
     """
     given = tuple(settings)
     if is_model(name):
         made = load_mjcf(Path(name), _settings(name, given), budget)
         return Entry(robot=lambda: made)
     if given:
-        raise InputError(f"--set {given[0]} is for an MJCF file: {name!r} is the name of a robot")
+        raise InputError(
+            f"--set {given[0]} is for an MJCF or URDF file: {name!r} is the name of a robot"
+        )
     # dm_control would load an OpenGL library.
     os.environ.setdefault("MUJOCO_GL", "disable")
     return entry(name)
@@ -45,7 +47,7 @@ def robot_entry(name: str, settings: Iterable[str] = (), budget: Budget = DEFAUL
 def notes_on(
     name: str, settings: Iterable[str], budget: Budget = DEFAULT_BUDGET
 ) -> tuple[str, ...]:
-    """Returns the changes that made an MJCF file a robot; see ``robot_entry``."""
+    """Returns the changes that made an MJCF or URDF file a robot; see ``robot_entry``."""
     return adapt(Path(name), _settings(name, settings), budget).notes
 
 

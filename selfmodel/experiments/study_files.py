@@ -21,7 +21,7 @@ Row = TypeVar("Row", bound="DataclassInstance")
 
 
 def key_of(robot: str) -> str:
-    """Returns the robot's part of a file name: its name, or the name of its MJCF file."""
+    """Returns the robot's part of a file name: its name, or the name of its MJCF or URDF file."""
     name = Path(robot).stem if robots.is_model(robot) else robot
     return re.sub(r"[^\w.-]", "_", name, flags=re.ASCII).lstrip(".-") or "robot"
 

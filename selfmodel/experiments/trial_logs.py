@@ -46,7 +46,7 @@ def robot_of_logs(
 
     Args:
         found: At least one log.
-        override: Name of a robot, or an MJCF file, that replaces the model in the logs.
+        override: Name of a robot, or an MJCF or URDF file, that replaces the model in the logs.
         budget: Memory and time that each model may take.
 
     Raises:
@@ -69,7 +69,7 @@ def robot_of_logs(
 
 
 def _override(name: str, own: Robot, budget: Budget) -> Robot:
-    """Returns the robot that replaces the model in a log; an MJCF file is adapted or unchanged."""
+    """Returns the robot that replaces the model in a log; a file is adapted or unchanged."""
     if not is_model(name):
         return robot_entry(name).robot()
     try:

@@ -329,7 +329,7 @@ def test_diagnosis_shows_its_ranking_and_takes_another_self_model(
             ["logs", "import", "a.mcap", "--mapping", "/dev/zero", "-o", "n.mcap"],
             "/dev/zero: expected a mapping, got a pipe or a device",
         ),
-        (["diagnose", "a.mcap", "--robot", "no.xml"], "no.xml: expected an MJCF file"),
+        (["diagnose", "a.mcap", "--robot", "no.xml"], "no.xml: expected an MJCF or URDF file"),
         (["diagnose", "a.mcap", "--robot", "octopod"], "unknown robot 'octopod'"),
         (["diagnose", "cut.mcap.part"], "selfmodel logs salvage cut.mcap.part"),
         (["diagnose", "no.mcap"], "no.mcap: expected a log file that can be read"),

@@ -1,5 +1,9 @@
 """Which library there is to draw with; what needs one is skipped where there is none."""
 
+import os
+import subprocess
+import sys
+
 import pytest
 
 from selfmodel.cli.rendering.gl import WITHOUT_SCREEN, works
@@ -10,3 +14,15 @@ WORKS = next(filter(works, WITHOUT_SCREEN), None)
 draws = pytest.mark.skipif(
     WORKS is None, reason="neither EGL nor OSMesa is there: apt-get install libosmesa6"
 )
+
+
+def drawing(program: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Runs a Python program that draws, and returns its output."""
+    return subprocess.run(
+        [sys.executable, "-c", program, *arguments],
+        env={**os.environ, "MUJOCO_GL": str(WORKS)},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )

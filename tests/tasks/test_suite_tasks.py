@@ -1,9 +1,5 @@
 """Tests of the suite's tasks on damaged bodies: observations and rewards are the suite's."""
 
-import os
-import subprocess
-import sys
-
 import mujoco
 import numpy as np
 import pytest
@@ -15,7 +11,7 @@ from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.robot.mjcf.mujoco_errors import loading_a_model
 from selfmodel.tasks import entry, suite_bodies, suite_tasks
-from tests.helpers.opengl import WORKS, draws
+from tests.helpers.opengl import drawing, draws
 
 FAST = (("walker", "walk"), ("reacher", "easy"))
 EVERY = [
@@ -235,13 +231,6 @@ os._exit(0)  # skips OpenGL's cleanup at exit, whose order is undefined
 @pytest.mark.opengl
 @draws
 def test_the_task_with_random_terrain_runs_where_there_is_opengl():
-    done = subprocess.run(
-        [sys.executable, "-c", ESCAPE],
-        env={**os.environ, "MUJOCO_GL": str(WORKS)},
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=300,
-    )
+    done = drawing(ESCAPE)
 
     assert done.stdout.endswith("seen\n"), done.stderr

@@ -3,9 +3,6 @@
 They are parametrised over every task, with every failure of Table I and every environment.
 """
 
-import os
-import subprocess
-import sys
 from collections.abc import Iterator
 from functools import partial
 
@@ -25,7 +22,7 @@ from selfmodel.faults.registry import KINDS
 from selfmodel.robot.anatomy.anatomy import Anatomy
 from selfmodel.robot.editing.embodiment import Embodiment
 from selfmodel.tasks import ALL_TASKS, ROBOTS, SUITE, TASKS_BY_DOMAIN
-from tests.helpers.opengl import WORKS, draws
+from tests.helpers.opengl import drawing, draws
 
 FASTEST = 50.0
 """Upper bound on the robots' speed, m/s."""
@@ -301,13 +298,6 @@ os._exit(0)  # skips OpenGL's cleanup at exit, whose order is undefined
 @every_task
 def test_the_viewer_shows_a_damaged_robot_in_a_window_of_ours(domain: str, task: str):
     """Runs ``dm_control.viewer.launch`` with an off-screen window."""
-    done = subprocess.run(
-        [sys.executable, "-c", LAUNCHED, domain, task],
-        env={**os.environ, "MUJOCO_GL": str(WORKS)},
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=300,
-    )
+    done = drawing(LAUNCHED, domain, task)
 
     assert done.stdout.endswith("seen\n"), done.stderr

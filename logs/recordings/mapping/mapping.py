@@ -165,8 +165,8 @@ class RecordingMapping:
 
     Attributes:
         document: Text of the mapping; errors name its lines.
-        robot: Name of a robot, or an MJCF file.
-        control_timestep: Control time step, s; with an MJCF file only.
+        robot: Name of a robot, or an MJCF or URDF file.
+        control_timestep: Control time step, s; with an MJCF or URDF file only.
         controller: File of the controller.
         stage: Stage of the trial: ``before`` for a healthy robot.
         clock: Clock of the times: ``header`` or ``log``; ``column`` for a table.

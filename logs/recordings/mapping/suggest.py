@@ -21,7 +21,7 @@ def suggest(
     Args:
         path: Folder or file of a bag, or a table.
         robot: Robot of the recording.
-        name: Name of the robot in the mapping, or its MJCF file.
+        name: Name of the robot in the mapping, or its MJCF or URDF file.
         with_timestep: Whether the mapping must contain the control time step.
         budget: Memory and time for the recording.
 

@@ -1,6 +1,9 @@
 """Records of a bag's file in any format: announced topics, and messages as bytes."""
 
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+
+from selfmodel.logs.errors import LogError
 
 MAX_LOG_TIME = 2**62
 """Maximum log time of a bag, ns: the year 2116; sums still fit 64 bits."""
@@ -49,3 +52,27 @@ def checked_time(time: object) -> int:
     if not isinstance(time, int) or not 0 <= time < MAX_LOG_TIME:
         raise DamageError(f"a message has the log time {time!r} ns")
     return time
+
+
+def explained(
+    items: Iterable[Announced | Stored],
+    failures: tuple[type[Exception], ...],
+    explain: Callable[[Exception, str], LogError],
+) -> Iterator[Announced | Stored]:
+    """Yields the records of a file, and explains the exceptions of damaged bytes.
+
+    Args:
+        items: The records.
+        failures: Exceptions that damaged bytes raise.
+        explain: Returns the error of an exception and of a text: the number of messages before it.
+
+    Raises:
+        LogError: The file is damaged.
+    """
+    count = 0
+    try:
+        for item in items:
+            count += isinstance(item, Stored)
+            yield item
+    except failures as failure:
+        raise explain(failure, f"{count} messages before that can be read") from failure

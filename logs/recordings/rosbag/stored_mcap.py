@@ -7,6 +7,7 @@ of messages are verified.
 
 import struct
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import zstandard
@@ -16,7 +17,13 @@ from mcap.stream_reader import StreamReader
 
 from selfmodel.logs.errors import CorruptError, LogError, NotMcapError, TruncatedError
 from selfmodel.logs.recordings.rosbag.bounded_file import BoundedFile
-from selfmodel.logs.recordings.rosbag.stored import Announced, DamageError, Stored, checked_time
+from selfmodel.logs.recordings.rosbag.stored import (
+    Announced,
+    DamageError,
+    Stored,
+    checked_time,
+    explained,
+)
 
 ADVICE = "record it again, or recover its intact part with `mcap recover`"
 
@@ -44,14 +51,8 @@ def read_mcap(path: Path, name: Path) -> Iterator[Announced | Stored]:
         LogError: The file is damaged or ends too early.
         OSError: The file cannot be read.
     """
-    count = 0
-    try:
-        with BoundedFile(path) as file:
-            for item in _items(file):
-                count += isinstance(item, Stored)
-                yield item
-    except _FAILURES as failure:
-        raise _explained(name, failure, f"{count} messages before that can be read") from failure
+    with BoundedFile(path) as file:
+        yield from explained(_items(file), _FAILURES, partial(_error, name))
 
 
 def _items(file: BoundedFile) -> Iterator[Announced | Stored]:
@@ -80,7 +81,7 @@ def _items(file: BoundedFile) -> Iterator[Announced | Stored]:
         raise DamageError("bytes follow its end")
 
 
-def _explained(name: Path, failure: Exception, good: str) -> LogError:
+def _error(name: Path, failure: Exception, good: str) -> LogError:
     if isinstance(failure, InvalidMagic):
         return NotMcapError(
             name, "its first or last bytes are not those of MCAP", good=good, advice=ADVICE

@@ -5,6 +5,7 @@ import shlex
 import struct
 from collections import Counter
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -13,7 +14,13 @@ from rosbags.rosbag1 import Reader, ReaderError
 from selfmodel.logs.errors import CorruptError, IncompleteError, LogError
 from selfmodel.logs.recordings.rosbag.bounded_file import BoundedFile, BoundedPath
 from selfmodel.logs.recordings.rosbag.message_types import ROS1
-from selfmodel.logs.recordings.rosbag.stored import Announced, DamageError, Stored, checked_time
+from selfmodel.logs.recordings.rosbag.stored import (
+    Announced,
+    DamageError,
+    Stored,
+    checked_time,
+    explained,
+)
 
 if TYPE_CHECKING:
     from rosbags.interfaces.typing import RPath
@@ -35,7 +42,7 @@ _FAILURES = (
 
 
 def read_ros1(path: Path, name: Path) -> Iterator[Announced | Stored]:
-    """Yields the records of a file: topics, then messages in the order of their log times.
+    """Returns the records of a file: topics, then messages in the order of their log times.
 
     Args:
         path: The file.
@@ -44,13 +51,7 @@ def read_ros1(path: Path, name: Path) -> Iterator[Announced | Stored]:
     Raises:
         LogError: The file is damaged, ends too early, or has no index.
     """
-    count = 0
-    try:
-        for item in _items(path):
-            count += isinstance(item, Stored)
-            yield item
-    except _FAILURES as failure:
-        raise _explained(name, failure, f"{count} messages before that can be read") from failure
+    return explained(_items(path), _FAILURES, partial(_error, name))
 
 
 def _items(path: Path) -> Iterator[Announced | Stored]:
@@ -103,7 +104,7 @@ _CHUNK_INFO = b"\x04\0\0\0op=\x06"
 """Field of the header of a chunk's entry in the index."""
 
 
-def _explained(name: Path, failure: Exception, good: str) -> LogError:
+def _error(name: Path, failure: Exception, good: str) -> LogError:
     again = f"`rosbag reindex {shlex.quote(name.name)}`"
     if "not indexed" in str(failure):
         return IncompleteError(

@@ -4,16 +4,23 @@ import shlex
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 
-from selfmodel.logs.errors import CorruptError, IncompleteError
-from selfmodel.logs.recordings.rosbag.stored import Announced, DamageError, Stored, checked_time
+from selfmodel.logs.errors import CorruptError, IncompleteError, LogError
+from selfmodel.logs.recordings.rosbag.stored import (
+    Announced,
+    DamageError,
+    Stored,
+    checked_time,
+    explained,
+)
 
 SQLITE_MAGIC = b"SQLite format 3\x00"
 
 
 def read_sqlite(path: Path, name: Path) -> Iterator[Announced | Stored]:
-    """Yields the records of a file: topics, then messages in the order of their recording.
+    """Returns the records of a file: topics, then messages in the order of their recording.
 
     Args:
         path: The file; it is only read.
@@ -23,18 +30,7 @@ def read_sqlite(path: Path, name: Path) -> Iterator[Announced | Stored]:
         CorruptError: The file is damaged, or not a rosbag2 recording.
     """
     _refuse_unfinished(path, name)
-    count = 0
-    try:
-        for item in _items(path):
-            count += isinstance(item, Stored)
-            yield item
-    except _FAILURES as failure:
-        raise CorruptError(
-            name,
-            f"the file is damaged or no rosbag2 recording: {failure}",
-            good=f"{count} messages before that can be read",
-            advice="record it again, or recover its intact part with `sqlite3 FILE .recover`",
-        ) from failure
+    return explained(_items(path), _FAILURES, partial(_error, name))
 
 
 _FAILURES = (
@@ -43,6 +39,15 @@ _FAILURES = (
     OverflowError,
 )
 """Exceptions of a damaged file."""
+
+
+def _error(name: Path, failure: Exception, good: str) -> LogError:
+    return CorruptError(
+        name,
+        f"the file is damaged or no rosbag2 recording: {failure}",
+        good=good,
+        advice="record it again, or recover its intact part with `sqlite3 FILE .recover`",
+    )
 
 
 def _refuse_unfinished(path: Path, name: Path) -> None:

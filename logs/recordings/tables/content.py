@@ -125,3 +125,8 @@ def as_numbers(values: NDArray[Any], *, exact: bool) -> Numbers:
     if exact and values.dtype.kind in "iu" and not (values > 2**62).any():
         return values.astype(np.int64)
     return values.astype(np.float64)
+
+
+def reason_of(failure: Exception) -> str:
+    """Returns the message of a library's exception in one line, or the name of its type."""
+    return " ".join(str(failure).split())[:200] or type(failure).__name__

@@ -4,11 +4,8 @@ An array ``(rows,)`` is a column. An array ``(rows, n)`` is n columns, called by
 and a label: those of an array of n texts, such as ``joint_names``, or numbers from 0.
 """
 
-import struct
-import tokenize
 import warnings
 import zipfile
-import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import prod
@@ -19,23 +16,15 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from selfmodel.errors import InputError
-from selfmodel.logs.recordings.tables.content import Content, Numbers, Request, as_numbers
-from selfmodel.sandbox.budget import memory_error
-
-_FAILURES = (
-    ValueError,  # numpy's headers
-    TypeError,
-    KeyError,
-    EOFError,
-    RuntimeError,  # an encrypted file, or an unknown compression
-    OverflowError,
-    SyntaxError,
-    tokenize.TokenError,  # numpy's headers are Python literals
-    struct.error,
-    zipfile.BadZipFile,
-    zlib.error,
+from selfmodel.logs.npz import NPZ_FAILURES
+from selfmodel.logs.recordings.tables.content import (
+    Content,
+    Numbers,
+    Request,
+    as_numbers,
+    reason_of,
 )
-"""Exceptions of zipfile and numpy for malformed bytes."""
+from selfmodel.sandbox.budget import memory_error
 
 
 @dataclass(frozen=True)
@@ -66,11 +55,10 @@ def read_npz(request: Request) -> Content:
                 return _content(request, archive)
     except InputError:
         raise
-    except _FAILURES as failure:
-        reason = " ".join(str(failure).split())[:200] or type(failure).__name__
+    except NPZ_FAILURES as failure:
         raise InputError(
-            f"{request.path}: expected an NPZ file of arrays of numbers, got: {reason}: write it "
-            f"again with numpy.savez"
+            f"{request.path}: expected an NPZ file of arrays of numbers, got: "
+            f"{reason_of(failure)}: write it again with numpy.savez"
         ) from failure
 
 

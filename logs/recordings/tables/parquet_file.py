@@ -5,7 +5,13 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from selfmodel.errors import InputError
-from selfmodel.logs.recordings.tables.content import Content, Numbers, Request, as_numbers
+from selfmodel.logs.recordings.tables.content import (
+    Content,
+    Numbers,
+    Request,
+    as_numbers,
+    reason_of,
+)
 
 
 def read_parquet(request: Request) -> Content:
@@ -24,10 +30,9 @@ def read_parquet(request: Request) -> Content:
     except (pa.ArrowException, ValueError, OSError) as failure:
         if isinstance(failure, InputError):
             raise
-        reason = " ".join(str(failure).split())[:200] or type(failure).__name__
         raise InputError(
-            f"{request.path}: expected a Parquet file, got: {reason}: write it again, for example "
-            f"with DataFrame.to_parquet"
+            f"{request.path}: expected a Parquet file, got: {reason_of(failure)}: write it again, "
+            f"for example with DataFrame.to_parquet"
         ) from failure
 
 

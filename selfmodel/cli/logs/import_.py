@@ -57,7 +57,7 @@ def import_(
     if suggest:
         if robot is None or out or mapping or as_json:
             raise InputError(
-                "--suggest needs --robot NAME|MODEL.xml, and excludes --out, --mapping and --json"
+                "--suggest needs --robot ROBOT, and excludes --out, --mapping and --json"
             )
         lines = _suggestion(recording, robot, allowed).removesuffix("\n").split("\n")
         print_lines(*lines)
@@ -67,7 +67,7 @@ def import_(
     if out is None or mapping is None:
         raise InputError(
             "an import needs --out TRIAL.mcap and --mapping MAP.toml; "
-            "--suggest --robot NAME|MODEL.xml prints a mapping to edit"
+            "--suggest --robot ROBOT prints a mapping to edit"
         )
     check_log_name(out)
     _import(recording, out, mapping, allowed, as_json=as_json)

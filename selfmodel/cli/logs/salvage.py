@@ -50,7 +50,7 @@ def _left_out(other: Discarded) -> str:
     if not other.trial:
         return f"left out: {counted(other.steps, 'step')} without a seal"
     return (
-        f"left out: {counted(other.steps, 'step')} in {counted(other.batches, 'chunk')} sealed for "
+        f"left out: {counted(other.steps, 'step')} in {counted(other.batches, 'batch')} sealed for "
         f"the trial {other.trial} ({other.identity[:12]})"
     )
 

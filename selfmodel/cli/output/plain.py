@@ -24,5 +24,11 @@ def figure_text(text: str) -> str:
 
 
 def counted(number: float, noun: str) -> str:
-    """Returns a number and its noun, such as ``1 log`` or ``2 logs``."""
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+    """Returns a number and its noun in the singular or plural.
+
+    Examples:
+        >>> counted(1, "log"), counted(2, "batch")
+        ('1 log', '2 batches')
+    """
+    ending = "" if number == 1 else "es" if noun.endswith("ch") else "s"
+    return f"{number} {noun}{ending}"

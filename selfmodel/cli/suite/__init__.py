@@ -1,4 +1,4 @@
-"""``selfmodel suite``: studies of the bodies of dm_control's suite and of MJCF files."""
+"""``selfmodel suite``: studies of the bodies of dm_control's suite and of MJCF and URDF files."""
 
 from selfmodel.cli.lazy import group
 

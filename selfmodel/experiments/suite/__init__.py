@@ -1,1 +1,1 @@
-"""Study of recoveries of many bodies: dm_control's suite, the paper's robots, MJCF files."""
+"""Study of recoveries of many bodies: dm_control's suite, the paper's robots, users' files."""

@@ -1,4 +1,4 @@
-"""Bodies of a study: domains and tasks of dm_control's suite, the paper's robots, MJCF files."""
+"""Bodies of a study: domains and tasks of dm_control's suite, the paper's robots, users' files."""
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
@@ -18,8 +18,8 @@ def bodies(domains: Sequence[str], tasks: Sequence[str] | None) -> tuple[str, ..
     """Returns the unique names of the robots of domains and tasks.
 
     Args:
-        domains: Names in ``DOMAINS``, or paths of MJCF files. The prefix of a domain of the suite
-            may be omitted unless another robot has the same name.
+        domains: Names in ``DOMAINS``, or paths of MJCF or URDF files. The prefix of a domain of the
+            suite may be omitted unless another robot has the same name.
         tasks: Names of tasks; a domain contributes the tasks that it has. None for the default
             task of each domain.
 

@@ -34,7 +34,7 @@ class Study:
     """Definition of a study: bodies, failures and parameters of the recoveries.
 
     Attributes:
-        bodies: Names of robots, and paths of MJCF files.
+        bodies: Names of robots, and paths of MJCF or URDF files.
         cases: Numbers of failures like those of Table I; a case that does not apply to a body or
             to its controllers is omitted.
         seeds: Seeds, one run each.

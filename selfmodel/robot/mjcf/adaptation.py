@@ -78,7 +78,7 @@ def adapt(path: Path, settings: MjcfSettings, budget: Budget = DEFAULT_BUDGET) -
     Raises:
         InputError: The file cannot be a robot; the message has the reason and the remedy.
     """
-    data = read_file(path, "an MJCF file", budget.model_text)
+    data = read_file(path, "an MJCF or URDF file", budget.model_text)
     try:
         files = robot_folder(path.parent, settings.assets)
         document = _read(data, files, path.name, settings, budget)

@@ -1,4 +1,4 @@
-"""Loads a robot from an MJCF file."""
+"""Loads a robot from an MJCF or URDF file."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 def load_mjcf(
     path: Path | str, settings: MjcfSettings | None = None, budget: Budget = DEFAULT_BUDGET
 ) -> Robot:
-    """Returns the robot that an MJCF file describes; see docs/reference/mjcf.md.
+    """Returns the robot that an MJCF or URDF file describes; see docs/reference/mjcf.md.
 
     Args:
         path: The file, which is read only. It may name the files that ``adapt`` describes.

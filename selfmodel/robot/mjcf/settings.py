@@ -1,4 +1,4 @@
-"""Settings of a user for the properties of a robot that its MJCF does not contain."""
+"""Settings of a user for the properties of a robot that its MJCF or URDF does not contain."""
 
 import sys
 from collections.abc import Mapping
@@ -30,7 +30,7 @@ BASES = ("free", "fixed")
 
 @dataclass(frozen=True)
 class MjcfSettings:
-    """Settings for the conversion of an MJCF to a robot.
+    """Settings for the conversion of an MJCF or URDF to a robot.
 
     Attributes:
         forward: Forward direction of the robot, in the world frame of the file.
@@ -53,7 +53,7 @@ class MjcfSettings:
             world, as on a stand; None for the base of the file.
         base_height: Height of the root body with ``base="fixed"``, m; None for the height of the
             file, or the lowest height at which the robot cannot touch the ground if that is larger.
-        assets: Folder with files that the MJCF names, in addition to its own; "" for none.
+        assets: Folder with files that the MJCF or URDF names, in addition to its own; "" for none.
     """
 
     forward: str = "x"
@@ -73,10 +73,10 @@ class MjcfSettings:
 
 
 def read_settings(path: Path, extra: Mapping[str, Any] | None = None) -> MjcfSettings:
-    """Returns the settings of an MJCF file: of ``ROBOT.toml`` in the folder of ``ROBOT.xml``.
+    """Returns the settings of an MJCF or URDF file: of the TOML file of the same name.
 
     Args:
-        path: The MJCF file.
+        path: The MJCF or URDF file.
         extra: Settings that override those of the file. Folders are relative to the working folder;
             in the file, to the folder of the file.
 

@@ -48,6 +48,15 @@ def _pick(file: McapFile, kind: type, rng: np.random.Generator) -> int | None:
     return int(rng.choice(found)) if found else None
 
 
+def _messages_like(file: McapFile, message: Message) -> list[tuple[int, Message]]:
+    """Messages of the same channel, with their indices."""
+    return [
+        (index, item)
+        for index, item in enumerate(file.items)
+        if isinstance(item, Message) and item.channel_id == message.channel_id
+    ]
+
+
 def metadata_value(file: McapFile, rng: np.random.Generator) -> str:
     """Changes, adds, renames or removes an entry of a metadata record."""
     index = _pick(file, Metadata, rng)
@@ -124,10 +133,9 @@ def payload(file: McapFile, rng: np.random.Generator) -> str:
         file.items[index] = dataclasses.replace(item, data=new)
         return f"message {index} {what}"
     seed = int(rng.integers(2**32))
-    for at, other in enumerate(file.items):
-        if isinstance(other, Message) and other.channel_id == item.channel_id:
-            new, what = cdrs.mutated(other.data, np.random.default_rng(seed))
-            file.items[at] = dataclasses.replace(other, data=new)
+    for at, other in _messages_like(file, item):
+        new, what = cdrs.mutated(other.data, np.random.default_rng(seed))
+        file.items[at] = dataclasses.replace(other, data=new)
     return f"every message of channel {item.channel_id} {what}"
 
 
@@ -146,10 +154,9 @@ def names(file: McapFile, rng: np.random.Generator) -> str:
     name = held[rng.integers(len(held))]
     new = (text(rng) * len(name))[: len(name)] if rng.random() < 0.7 else held[0]
     encoded = new.encode("utf-8", "replace").ljust(len(name.encode()), b"_")[: len(name.encode())]
-    for at, other in enumerate(file.items):
-        if isinstance(other, Message) and other.channel_id == chosen.channel_id:
-            data = other.data.replace(name.encode(), encoded)
-            file.items[at] = dataclasses.replace(other, data=data)
+    for at, other in _messages_like(file, chosen):
+        data = other.data.replace(name.encode(), encoded)
+        file.items[at] = dataclasses.replace(other, data=data)
     return f"{name} is {encoded!r:.40}"
 
 

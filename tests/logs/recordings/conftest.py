@@ -26,7 +26,14 @@ from tests.logs.recordings.rosbag.bags import (
 JOINTS = ("LHX", "LHY", "RHX", "RHY")
 HINGES = ("left_hip_x", "left_hip_y", "right_hip_x", "right_hip_y")
 
-MAPPING = """\
+NAMES = """\
+left_hip_x = "LHX"
+left_hip_y = { name = "LHY", sign = -1, offset = 0.1 }
+right_hip_x = "RHX"
+right_hip_y = "RHY"
+"""
+
+MAPPING = f"""\
 robot = "biped.xml"
 control_timestep = 0.01
 
@@ -34,21 +41,13 @@ control_timestep = 0.01
 topic = "/joint_states"
 unit = "rad"
 [joints.names]
-left_hip_x = "LHX"
-left_hip_y = { name = "LHY", sign = -1, offset = 0.1 }
-right_hip_x = "RHX"
-right_hip_y = "RHY"
-
+{NAMES}
 [commands]
 topic = "/commands"
 unit = "rad"
 order = ["RHY", "RHX", "LHY", "LHX"]
 [commands.names]
-left_hip_x = "LHX"
-left_hip_y = { name = "LHY", sign = -1, offset = 0.1 }
-right_hip_x = "RHX"
-right_hip_y = "RHY"
-
+{NAMES}
 [base]
 topic = "/odom"
 

@@ -192,7 +192,7 @@ def test_the_command_reports_what_it_leaves_out(log: Path, other: Path, saved: P
     said = CliRunner().invoke(app, [*arguments, str(saved)]).output
     told = CliRunner().invoke(app, [*arguments, str(log.with_name("b.mcap")), "--json"]).output
 
-    line = f"left out: 50 steps in 1 chunk sealed for the trial 01-after ({foreign[:12]})"
+    line = f"left out: 50 steps in 1 batch sealed for the trial 01-after ({foreign[:12]})"
     assert line in said
     assert json.loads(told)["discarded"] == [
         {"trial": "01-after", "identity": foreign, "batches": 1, "steps": 50}

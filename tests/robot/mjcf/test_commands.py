@@ -91,7 +91,7 @@ def test_settings_are_options(ant: Path, tmp_path: Path):
         (("robots", "ant.xml", "--set", "neurons=4"), "give --neurons N to the command"),
         (("robots", "ant.xml", "--set", "y"), "a setting such as forward=-x, got 'y'"),
         (("robots", "ant.xml", "--set", "touch=['torso_geom']"), "unknown body"),
-        (("robots", "no.xml"), "no.xml: expected an MJCF file"),
+        (("robots", "no.xml"), "no.xml: expected an MJCF or URDF file"),
         (("trial", "bad.xml", "--out", "t.mcap"), "ctrlrange=[-1, 1]"),
     ],
 )
