@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.tasks import suite_bodies, suite_tasks
+from selfmodel.tasks.arguments import check_names
 from selfmodel.tasks.entry import Entry
 from selfmodel.tasks.hexapod import HEXAPOD
 from selfmodel.tasks.quadruped import QUADRUPED
@@ -67,7 +68,7 @@ def entry(name: str) -> Entry:
 
 
 def load(
-    domain_name: str,
+    domain_name: str | Path,
     task_name: str,
     task_kwargs: Mapping[str, Any] | None = None,
     environment_kwargs: Mapping[str, Any] | None = None,
@@ -90,11 +91,12 @@ def load(
             otherwise: the rewards are speeds, which dm_control cannot map to colours.
 
     Raises:
-        InputError: The robot or the task is unknown, the file cannot be a robot, the hypothesis
-            cannot be parsed, or ``visualize_reward`` is true for a speed.
+        InputError: The robot, the task or an argument of the task is unknown, the file cannot be a
+            robot, an argument is out of range, or ``visualize_reward`` is true for a speed.
     """
+    check_names(task_kwargs or {})
     make = constructor(domain_name, task_name)
-    is_suite = domain_name.startswith(suite_bodies.PREFIX)
+    is_suite = str(domain_name).startswith(suite_bodies.PREFIX)
     if visualize_reward and not is_suite:
         raise InputError(
             f"{domain_name} {task_name}: the reward is a speed and has no colours to be shown in: "
@@ -106,7 +108,7 @@ def load(
     return environment
 
 
-def constructor(domain_name: str, task_name: str) -> Callable[..., "control.Environment"]:
+def constructor(domain_name: str | Path, task_name: str) -> Callable[..., "control.Environment"]:
     """Returns the function that makes the environments of a task; a file is read once.
 
     Args:
@@ -116,7 +118,7 @@ def constructor(domain_name: str, task_name: str) -> Callable[..., "control.Envi
     Raises:
         InputError: The robot or the task is unknown, or the file cannot be a robot.
     """
-    if Path(domain_name).suffix:
+    if isinstance(domain_name, Path) or Path(domain_name).suffix:
         if task_name not in FILE_TASKS:
             raise unknown_name(f"task of {domain_name}", task_name, FILE_TASKS)
         # Imported here, because dm_control's physics initialises a display when imported.

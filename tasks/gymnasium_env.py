@@ -20,6 +20,7 @@ from gymnasium.utils import EzPickle
 
 from selfmodel import tasks
 from selfmodel.arrays import FloatArray
+from selfmodel.tasks.arguments import check_names
 
 NAMESPACE = "selfmodel"
 """Namespace of the ids."""
@@ -86,6 +87,7 @@ class TaskEnv(gymnasium.Env[Any, Any], EzPickle):
             raise error.Error(f"expected the render_mode rgb_array or None, got {render_mode!r}")
         if "random" in task_kwargs:
             raise error.Error("random is not an argument here: give the seed to reset(seed=...)")
+        check_names(task_kwargs)
         self.render_mode = render_mode
         self._view = {"height": height, "width": width, "camera_id": camera}
         self._make = tasks.constructor(robot, task)

@@ -4,6 +4,8 @@ import copy
 
 import numpy as np
 
+from selfmodel.errors import InputError
+
 Seed = int | np.random.RandomState | np.random.Generator | None
 """Seed or generator of a task's random numbers; None for another seed each time."""
 
@@ -13,12 +15,21 @@ def episode_numbers(random: Seed) -> np.random.RandomState:
 
     Args:
         random: A ``RandomState`` is returned itself; a ``Generator`` is advanced by one number.
+
+    Raises:
+        InputError: The seed is out of range, or is no whole number.
     """
     if isinstance(random, np.random.RandomState):
         return random
     if isinstance(random, np.random.Generator):
         return np.random.RandomState(int(random.integers(2**32)))
-    return np.random.RandomState(random)
+    try:
+        return np.random.RandomState(random)
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            f"expected random as a whole number from 0 to {2**32 - 1}, a numpy RandomState or "
+            f"Generator, or None, got {random!r}"
+        ) from error
 
 
 def construction_numbers(episodes: np.random.RandomState) -> np.random.Generator:

@@ -2,6 +2,7 @@
 
 from selfmodel.errors import InputError
 from selfmodel.physical.initial_pose import ANGLE_DEVIATION
+from selfmodel.tasks.arguments import check_number
 
 MAX_START_NOISE = 1.0
 """Largest standard deviation of the initial joint angles, rad."""
@@ -15,10 +16,11 @@ def start_level(start_noise: float | None, gap: float) -> float:
         gap: Level of the reality gap.
 
     Raises:
-        InputError: The noise is out of range.
+        InputError: The noise is no number, or out of range.
     """
     if start_noise is None:
         return gap
+    check_number("start_noise", start_noise)
     if not 0 <= start_noise <= MAX_START_NOISE:
         raise InputError(
             f"expected a start_noise from 0 to {MAX_START_NOISE:g} rad, such as 0.02, got "

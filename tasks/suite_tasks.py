@@ -11,12 +11,12 @@ from selfmodel.errors import InputError
 from selfmodel.faults.build import apply_faults
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.neuron import SILENT_NEURON
-from selfmodel.faults.notation import parse
 from selfmodel.physical.reality_gap import draw_gap_of, perturbed_model
 from selfmodel.robot.anatomy.anatomy import Anatomy
 from selfmodel.robot.anatomy.reader import read_anatomy
 from selfmodel.robot.mjcf.mujoco_errors import loading_a_model, mujoco_errors_as_input_errors
 from selfmodel.tasks import suite_bodies
+from selfmodel.tasks.arguments import check_number, check_time_limit, parsed
 from selfmodel.tasks.randomness import Seed, construction_numbers, episode_numbers
 from selfmodel.tasks.start_noise import start_level
 
@@ -84,9 +84,12 @@ def environment(
         environment_kwargs: Arguments of ``control.Environment``.
 
     Raises:
-        InputError: The hypothesis cannot be parsed or does not apply, or the gap or the start noise
-            is out of range.
+        InputError: The hypothesis cannot be parsed or does not apply, or another argument is out of
+            range.
     """
+    if time_limit is not None:
+        check_time_limit(time_limit)
+    check_number("gap", gap)
     suite = importlib.import_module("dm_control.suite")
     episodes = episode_numbers(random)
     construction = construction_numbers(episodes)
@@ -95,8 +98,7 @@ def environment(
     with loading_a_model():  # MuJoCo warns about the cheetah
         env = suite.load(domain, task, {"random": episodes, **limit}, extra)
     anatomy = _anatomy(domain, task, env.physics.model.ptr)
-    if isinstance(hypothesis, str):
-        hypothesis = parse(hypothesis, anatomy)
+    hypothesis = parsed(hypothesis, anatomy)
     drawn = draw_gap_of(env.physics.model.ptr, anatomy, gap, construction)
     start = start_level(start_noise, gap)
     if not hypothesis.faults and gap == 0 and start == 0:

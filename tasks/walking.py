@@ -14,7 +14,6 @@ from dm_control.suite import base
 from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.faults.notation import parse
 from selfmodel.physical.debris import detached_limbs, place_debris
 from selfmodel.physical.initial_pose import randomize_initial_pose
 from selfmodel.physical.measurement_noise import ExactMeasurement, Measurement, NoisyMeasurement
@@ -25,6 +24,7 @@ from selfmodel.robot.editing.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state.access import current_value, signal_fields
 from selfmodel.robot.state.sensing import SensorReader
+from selfmodel.tasks.arguments import check_number, check_time_limit, parsed
 from selfmodel.tasks.randomness import Seed, construction_numbers, episode_numbers, next_seed
 from selfmodel.tasks.start_noise import start_level
 from selfmodel.trials.signals import Signal
@@ -62,8 +62,7 @@ def environment(
 
     Raises:
         InputError: The base of the robot is fixed, its control delay has a part of a control step,
-            the hypothesis cannot be parsed or does not apply, or the gap or the start noise is out
-            of range.
+            the hypothesis cannot be parsed or does not apply, or another argument is out of range.
     """
     if robot.has_fixed_base:
         raise InputError(
@@ -76,8 +75,9 @@ def environment(
             f"dm_control applies commands at control steps, and the control delay of {robot.name} "
             f"is {robot.control_delay:g} of them: set {CONTROL_DELAY} to a whole number"
         )
-    if isinstance(hypothesis, str):
-        hypothesis = parse(hypothesis, robot.anatomy)
+    hypothesis = parsed(hypothesis, robot.anatomy)
+    check_time_limit(time_limit)
+    check_number("gap", gap)
     episodes = episode_numbers(random)
     construction = construction_numbers(episodes)
     drawn = draw_gap(robot, gap, construction)

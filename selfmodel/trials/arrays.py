@@ -11,8 +11,11 @@ from selfmodel.errors import InputError, unknown_name
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import SIGNALS, Names, Signal
 
-MAX_PERIOD_ERROR = 0.1
-"""Largest difference of the time between two rows from the control time step, relative to it."""
+MAX_TIME_ERROR = 0.5
+"""Largest difference of the time of a row from its control step, control time steps."""
+
+MAX_LENGTH_ERROR = 1e-3
+"""Largest difference of the length of a quaternion from 1: float32 and printed digits round it."""
 
 
 class Parts(Protocol):
@@ -54,9 +57,13 @@ def behaviour_of_arrays(
         orders: Names of the columns of an array, where they are not in the robot's order.
 
     Raises:
-        InputError: An array has another shape, the rows are not control steps, or a name is
-            unknown, missing or listed twice.
+        InputError: An array has another shape, infinite numbers or quaternions that are not of unit
+            length, the rows are not control steps, or a name is unknown, missing or listed twice.
     """
+    if isinstance(robot, str):
+        raise InputError(
+            f"expected a robot, got its name {robot!r}: use selfmodel.load_robot({robot!r})"
+        )
     names = robot.anatomy.names
     given = {signal: _numbers(signal, values) for signal, values in arrays.items()}
     lengths = {len(values) for values in given.values() if values is not None and values.ndim}
@@ -74,7 +81,9 @@ def behaviour_of_arrays(
                 f"{signal} must have the shape (steps, {_columns(signal)}) = ({steps}, {width}), "
                 f"got {values.shape}: its columns are {', '.join(names.columns(signal))}"
             )
+        _check_finite(signal, values)
         found[signal] = frozen(_ordered(values, signal, names, orders.get(signal)))
+    _check_unit_length(found["base_orientation"])
     _check_time(time, steps, robot.control_timestep)
     scheduled = np.arange(steps, dtype=np.float64) * robot.control_timestep
     return Behaviour(names, frozen(scheduled), found)
@@ -119,12 +128,33 @@ def _check_time(time: ArrayLike | None, steps: int, timestep: float) -> None:
         return
     if values.shape != (steps,):
         raise InputError(f"time must have the shape (steps,) = ({steps},), got {values.shape}")
-    wrong = np.flatnonzero(~(np.abs(np.diff(values) - timestep) <= MAX_PERIOD_ERROR * timestep))
+    expected = timestep * np.arange(steps)
+    wrong = np.flatnonzero(~(np.abs(values - values[0] - expected) <= MAX_TIME_ERROR * timestep))
     if len(wrong):
         k = int(wrong[0])
         raise InputError(
-            f"the rows must be one control time step apart, {timestep:g} s, and the rows {k} and "
-            f"{k + 1} are {values[k + 1] - values[k]:g} s apart: load the robot with the time "
-            f"step of the rows, resample them, or import a file of them with `selfmodel logs "
-            f"import`, which resamples"
+            f"the rows must be one control time step apart, {timestep:g} s, and row {k} is "
+            f"{values[k] - values[0]:g} s after row 0, not {expected[k]:g} s: load the robot with "
+            f"the time step of the rows, resample them, or import a file of them with `selfmodel "
+            f"logs import`, which resamples"
+        )
+
+
+def _check_finite(signal: str, values: FloatArray) -> None:
+    infinite = np.argwhere(np.isinf(values))
+    if len(infinite):
+        row, column = infinite[0]
+        raise InputError(
+            f"{signal} has an infinite number in row {row}, column {column}: set what was not "
+            f"measured to NaN"
+        )
+
+
+def _check_unit_length(orientations: FloatArray) -> None:
+    lengths = np.linalg.norm(orientations, axis=1)
+    wrong = np.flatnonzero(np.abs(lengths - 1) > MAX_LENGTH_ERROR)
+    if len(wrong):
+        raise InputError(
+            f"base_orientation must have unit quaternions, w x y z, got one of length "
+            f"{lengths[wrong[0]]:g} in row {wrong[0]}: normalise it, or set it to NaN"
         )

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from selfmodel.controllers.command_source import CommandSource
 from selfmodel.controllers.playback import played_back
-from selfmodel.errors import InputError
+from selfmodel.errors import InputError, unknown_name
 from selfmodel.trials.arrays import Described, behaviour_of_arrays
 from selfmodel.trials.behaviour import Behaviour, forward_displacement
 from selfmodel.trials.columns import columns_of
@@ -32,6 +32,18 @@ MAX_SEED = 2**63 - 1
 def stage_of(name: str) -> Stage | None:
     """Returns the stage with a name; None if there is no such stage."""
     return next((stage for stage in STAGES if stage == name), None)
+
+
+def checked_stage(name: str) -> Stage:
+    """Returns the stage with a name.
+
+    Raises:
+        InputError: There is no such stage.
+    """
+    found = stage_of(name)
+    if found is None:
+        raise unknown_name("stage", name, STAGES)
+    return found
 
 
 def checked_seed(seed: int) -> int:
@@ -119,7 +131,8 @@ class Trial:
     ) -> "Trial":
         """Returns a trial of measured arrays, one row per control step.
 
-        Numbers that were not measured are NaN; a signal that is left out is NaN as a whole.
+        Numbers that were not measured are NaN; a signal that is left out is NaN as a whole. Columns
+        are used in their order: the names of a data frame's columns are not read.
 
         Example:
             >>> import selfmodel
@@ -134,7 +147,8 @@ class Trial:
             robot: Robot of the trial, such as ``selfmodel.load_robot("quadruped")``.
             joint_positions: Joint angles, ``(steps, hinges)`` rad.
             commands: Commands, ``(steps, motors)``, each in its motor's unit.
-            time: Times of the rows, ``(steps,)`` s, which are checked to be control steps.
+            time: Times of the rows, ``(steps,)`` s since any moment; each must be within half a
+                control step of its own.
             joint_names: Hinges of the columns of the joints' arrays; None for the order of
                 ``robot.anatomy.hinges``.
             motor_names: Motors of the columns of ``commands``; None for the order of
@@ -151,8 +165,9 @@ class Trial:
             name: Name of the trial: letters, digits, ``-``.
 
         Raises:
-            InputError: An array has another shape or type, the rows are not control steps, the
-                first commands are missing, or a name is unknown.
+            InputError: An array has another shape or type, an infinite number or a quaternion that
+                is not of unit length, the rows are not control steps, the first commands are
+                missing, or a name or the stage is unknown.
         """
         joints: tuple[Signal, ...] = ("joint_positions", "joint_velocities", "joint_efforts")
         arrays: dict[Signal, ArrayLike | None] = {
@@ -174,7 +189,7 @@ class Trial:
             raise InputError(
                 f"{error}: begin the arrays at the first row with all commands"
             ) from error
-        plan = TrialPlan(name, stage, controller or played, behaviour.steps, seed=0)
+        plan = TrialPlan(name, checked_stage(stage), controller or played, behaviour.steps, seed=0)
         return cls(plan, robot.name, behaviour, f"{name} ({_digest(behaviour)})")
 
     def to_pandas(self) -> Any:  # noqa: ANN401  # pandas is optional

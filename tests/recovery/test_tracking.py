@@ -52,8 +52,8 @@ def test_steps_after_the_reference_do_not_count():
 
 
 def test_joints_that_only_one_of_robot_and_reference_has_do_not_count():
-    named = ("joint3", "camera_pan")
-    score = tracking(Reference(named, TIME, np.ones((50, 2))), arm())
+    named = ("camera_pan", "joint3")
+    score = tracking(Reference(named, TIME, np.ones((50, 2)) * [5, 1]), arm())
     positions = np.zeros((1, 50, 6))
     positions[..., 2] = 1.0
     assert score.of(arm(), INTACT, moved(positions))[0] == 0

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.recovery.fitness import DISPLACEMENT
@@ -50,6 +51,21 @@ def test_the_ground_of_a_slope_is_that_of_the_hypothesis(quadruped: Robot):
     runs = [(slope, driver) for driver in random_controllers(quadruped, 1)]
     behaviour = Simulator(quadruped, 1).run(runs, 2, UPRIGHT.record).behaviour
     assert falls_of(quadruped, slope, behaviour) == 2
+
+
+def test_height_is_measured_from_the_sloping_ground(quadruped: Robot):
+    slope = parse("slope=-0.5", quadruped.anatomy)
+    normal = build(quadruped, slope).normal
+    x = np.arange(STEPS) * np.sign(normal[0])  # downhill
+    heights = (quadruped.standing_height - normal[0] * x) / normal[2]
+    run = walked(quadruped, x.tolist(), [0.0] * STEPS, heights.tolist())
+    assert falls_of(quadruped, slope, run) == STEPS
+    assert falls_of(quadruped, INTACT, run) == 1
+
+
+def test_a_run_that_begins_with_a_fall_has_no_displacement(quadruped: Robot):
+    run = walked(quadruped, [0, 1, 2, 3, 4], [0.0] * STEPS, [0.01] * STEPS)
+    assert UPRIGHT.of(quadruped, INTACT, run) == 0
 
 
 def test_the_score_of_a_run_does_not_depend_on_its_batch(quadruped: Robot):

@@ -34,7 +34,7 @@ CHECKED = {
 every = pytest.mark.parametrize(
     ("name", "kwargs"),
     [
-        pytest.param(*what, id=name, marks=pytest.mark.bodies if "suite" in what[0] else ())
+        pytest.param(*what, id=name, marks=() if name == "quadruped" else pytest.mark.bodies)
         for name, what in CHECKED.items()
     ],
 )
@@ -152,6 +152,8 @@ def test_a_vector_of_environments_is_that_many_single_ones(mode: str):
 def test_wrong_arguments_are_refused():
     with pytest.raises(gymnasium.error.Error, match="give the seed to reset"):
         gymnasium.make(ID, random=1)
+    with pytest.raises(InputError, match="unknown argument of the task 'gaps': did you mean gap"):
+        gymnasium.make(ID, gaps=0.05)
     with pytest.raises(InputError, match="unknown part in the term 'break:knee'"):
         gymnasium.make(ID, hypothesis="break:knee")
     with pytest.raises(InputError, match=r"unknown task of .*ant\.xml 'run'"):

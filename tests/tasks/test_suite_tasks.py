@@ -127,7 +127,8 @@ def test_a_welded_joint_keeps_its_angle_although_the_suite_draws_another():
     ],
 )
 def test_the_specification_compiles_to_the_suites_model(domain: str, task: str):
-    model = suite_bodies.specification(domain, task).compile()
+    with loading_a_model():  # MuJoCo warns about the cheetah
+        model = suite_bodies.specification(domain, task).compile()
     own = own_environment(domain, task).physics.model.ptr
     for name in ("body_mass", "jnt_range", "geom_pos", "geom_rgba", "actuator_gear", "qpos0"):
         np.testing.assert_array_equal(getattr(model, name), getattr(own, name), name)
@@ -186,6 +187,7 @@ def test_rough_ground_needs_flat_ground():
         tasks.load("suite-reacher", "easy", {"hypothesis": "roughness=0.03"})
 
 
+@pytest.mark.bodies
 def test_the_suites_arguments_are_the_suites():
     kwargs = {"hypothesis": "break:left_ankle", "time_limit": 0.5}
     environment = tasks.load(

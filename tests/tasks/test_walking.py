@@ -29,9 +29,7 @@ ARM = """
 
 def test_a_file_walks_like_its_robot_in_the_simulator():
     robot = selfmodel.load_robot(ANT)
-    environment = tasks.load(
-        str(ANT), "walk", {"hypothesis": f"break:{robot.anatomy.joints[-1].name}"}
-    )
+    environment = tasks.load(ANT, "walk", {"hypothesis": f"break:{robot.anatomy.joints[-1].name}"})
     step = environment.reset()
 
     assert environment.control_timestep() == pytest.approx(robot.control_timestep)

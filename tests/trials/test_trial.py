@@ -68,7 +68,16 @@ def test_trials_of_other_numbers_have_other_paths(biped: Robot):  # noqa: F811
         ({"commands": [["a"]]}, "commands must be an array of numbers, got list"),
         ({"commands": np.full((6, 4), np.nan)}, "begin the arrays at the first row with all"),
         ({"base_orientation": np.zeros((6, 3))}, "its columns are w, x, y, z"),
-        ({"time": np.arange(6) * 0.02}, "the rows 0 and 1 are 0.02 s apart: load the robot with"),
+        (
+            {"time": np.arange(6) * 0.02},
+            r"row 1 is 0.02 s after row 0, not 0.01 s: load the robot with",
+        ),
+        ({"time": np.arange(6) * 0.0112}, "row 5 is 0.056 s after row 0, not 0.05 s"),
+        ({"time": [0, 0.01, 0.02, np.nan, 0.04, 0.05]}, "row 3 is nan s after row 0"),
+        ({"joint_positions": np.full((6, 4), np.inf)}, "infinite number in row 0, column 0: set"),
+        ({"base_orientation": np.zeros((6, 4))}, "one of length 0 in row 0: normalise it, or"),
+        ({"stage": "befor"}, "unknown stage 'befor': did you mean before"),
+        ({"robot": "biped"}, r"got its name 'biped': use selfmodel\.load_robot\('biped'\)"),
         ({"time": np.arange(5) * 0.01}, r"time must have the shape \(steps,\) = \(6,\)"),
         ({"joint_names": ("a", "b", "c", "d")}, "unknown column of joint_positions 'a'"),
         ({"joint_names": ("left_hip_x",) * 4}, "must be each of left_hip_x, .* once, got"),
@@ -80,7 +89,24 @@ def test_an_error_has_the_expected_shape_and_the_remedy(
     biped: Robot,  # noqa: F811
 ):
     with pytest.raises(InputError, match=message):
-        Trial.from_arrays(biped, **{**arrays(biped), **change})
+        Trial.from_arrays(**{"robot": biped, **arrays(biped), **change})
+
+
+def test_times_may_begin_anywhere_and_jitter(biped: Robot):  # noqa: F811
+    time = 1.7e9 + 0.01 * np.arange(6) + [0, 0.004, -0.004, 0.004, 0, 0]
+
+    trial = Trial.from_arrays(biped, **arrays(biped), time=time)
+
+    np.testing.assert_allclose(trial.behaviour.time, 0.01 * np.arange(6))
+
+
+def test_orientations_may_be_rounded_or_missing(biped: Robot):  # noqa: F811
+    given = np.tile([0.7071, 0, 0, 0.7071], (6, 1))
+    given[2] = np.nan
+
+    trial = Trial.from_arrays(biped, **arrays(biped), base_orientation=given)
+
+    np.testing.assert_array_equal(trial.behaviour["base_orientation"], given)
 
 
 def test_fewer_than_two_rows_are_no_trial(biped: Robot):  # noqa: F811

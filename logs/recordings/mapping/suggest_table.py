@@ -10,6 +10,7 @@ from selfmodel.logs.recordings.mapping.likeness import matched
 from selfmodel.logs.recordings.mapping.mapping import UNKNOWN
 from selfmodel.logs.recordings.mapping.quoting import escaped, key, quoted
 from selfmodel.logs.recordings.mapping.suggest_bag import TRIAL_LINES
+from selfmodel.logs.recordings.tables.content import NO_TIME
 from selfmodel.logs.recordings.tables.table import read_table
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import Budget
@@ -80,8 +81,9 @@ def _time(path: Path, found: Classified, names: Sequence[str], budget: Budget) -
 
 
 def _guessed_unit(path: Path, name: str, budget: Budget) -> str:
-    times = read_table(path, {name}, budget).columns[name].astype(np.float64)
-    periods = np.abs(np.diff(times[np.isfinite(times)]))
+    times = read_table(path, {name}, budget, exact=name).columns[name]
+    known = times[np.isfinite(times) & (times != NO_TIME)].astype(np.float64)
+    periods = np.abs(np.diff(known))
     usual = float(np.median(periods)) if len(periods) else 0.0
     return next((unit for unit, most in _LONGEST_PERIODS.items() if usual <= most), "ns")
 

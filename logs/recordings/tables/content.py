@@ -17,6 +17,9 @@ from selfmodel.sandbox.message import Message
 LONGEST_NAME = 1000
 """Maximum length of a column's name, characters."""
 
+NO_TIME = np.iinfo(np.int64).min
+"""Missing time among integers; numpy's missing date."""
+
 Numbers = NDArray[np.float64] | NDArray[np.int64]
 
 
@@ -119,9 +122,12 @@ def as_numbers(values: NDArray[Any], *, exact: bool) -> Numbers:
     """Returns an array of numbers as float64, or its integers as int64.
 
     Args:
-        values: Array of any numeric type.
-        exact: Whether integers are not rounded.
+        values: Array of any numeric type, or of dates or durations, which are numbers of ns.
+        exact: Whether integers are not rounded; a missing date is then ``NO_TIME``.
     """
+    if values.dtype.kind in "mM":
+        whole = values.astype(f"{values.dtype.kind}8[ns]").astype(np.int64)
+        return whole if exact else np.where(np.isnat(values), np.nan, whole.astype(np.float64))
     if exact and values.dtype.kind in "iu" and not (values > 2**62).any():
         return values.astype(np.int64)
     return values.astype(np.float64)

@@ -1,7 +1,8 @@
 """Reader of CSV files: a line of names, then a line of numbers per sample.
 
 Fields are separated by commas, semicolons, tabs, bars or spaces. Where the separator is no comma,
-a decimal comma is read too. Errors name the line and the column.
+a decimal comma is read too. Dates of ISO 8601 in the time column are ns since 1970. Errors name
+the line and the column.
 """
 
 import csv
@@ -13,11 +14,12 @@ from typing import TextIO
 import numpy as np
 
 from selfmodel.errors import InputError
-from selfmodel.logs.recordings.tables.content import Content, Numbers, Request
+from selfmodel.logs.recordings.tables.content import NO_TIME, Content, Numbers, Request
 
 _SEPARATORS = ",;\t|"
 _MISSING = frozenset({"", "nan", "-nan", "na", "n/a", "null", "none", "-"})
 _WORDS = {"true": 1.0, "false": 0.0}
+_DATE = re.compile(r"(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(?:\.\d{1,9})?)(?:Z|[+-]00:?00)?")
 _LONGEST_HEADER = 2**24
 _LONGEST_SHOWN = 40
 
@@ -63,7 +65,7 @@ def _content(request: Request, file: TextIO) -> Content:
         if len(row) != len(names):
             raise InputError(
                 f"{path}, line {line}: expected {len(names)} fields, as in line 1, got {len(row)}: "
-                f"correct the line"
+                f"correct the line, or remove lines above the names"
             )
         request.check_numbers(count * len(places))
         for name, place in places.items():
@@ -128,6 +130,8 @@ def _number(text: str, *, exact: bool, comma: bool) -> float:
     text = text.strip()
     if exact and text.lstrip("+-").isdecimal() and len(text) < 20:
         return int(text)
+    if exact and (date := _DATE.fullmatch(text)):
+        return int(np.datetime64(date[1].replace(" ", "T"), "ns").astype(np.int64))
     try:
         if "_" not in text:  # which Python reads in a number
             return float(text)
@@ -144,9 +148,11 @@ def _number(text: str, *, exact: bool, comma: bool) -> float:
 
 
 def _array(values: list[float]) -> Numbers:
-    """Values as int64 if all of them are integers, else as float64."""
-    if values and all(type(value) is int for value in values):
-        array = np.array(values)
+    """Values as int64 if all that are not missing are integers, else as float64."""
+    kinds = {type(value) for value in values if value == value}  # noqa: PLR0124  # no NaN
+    if kinds == {int}:
+        whole = [value if type(value) is int else NO_TIME for value in values]
+        array = np.array(whole)
         return array if array.dtype == np.int64 else array.astype(np.float64)
     return np.array(values, dtype=np.float64)
 

@@ -67,22 +67,23 @@ def _content(request: Request, archive: zipfile.ZipFile) -> Content:
     found = [member for member in members if member is not None]
     texts = {m.name: _read(request, archive, m) for m in found if _is_text(request, m)}
     labels = {name: tuple(map(str, array.tolist())) for name, array in texts.items()}
-    numeric = [m for m in found if m.dtype.kind in "fiubM" and m.shape and len(m.shape) <= 2]
+    numeric = [m for m in found if m.dtype.kind in "fiubmM" and m.shape and len(m.shape) <= 2]
     total = sum(m.shape[1] if len(m.shape) == 2 else 1 for m in numeric)
     if total > request.budget.names:
         what = f"{request.path} has more than {request.budget.names} columns"
         raise memory_error(what, request.budget)
-    names = {member.name: _names(member, labels) for member in numeric}
-    request.check_names([name for some in names.values() for name in some])
-    needed = [m for m in numeric if not request.wanted.isdisjoint(names[m.name])]
-    request.check_numbers(sum(prod(member.shape) for member in needed))
+    named = [(member, _names(member, labels)) for member in numeric]
+    names = [name for _, some in named for name in some]
+    request.check_names(names)
+    needed = [(m, some) for m, some in named if not request.wanted.isdisjoint(some)]
+    request.check_numbers(sum(prod(member.shape) for member, _ in needed))
     columns: dict[str, Numbers] = {}
-    for member in needed:
-        array = _read(request, archive, member).reshape(member.shape[0], -1)
-        for k, name in enumerate(names[member.name]):
+    for member, some in needed:
+        array = _read(request, archive, member).reshape(member.shape[0], prod(member.shape[1:]))
+        for k, name in enumerate(some):
             if name in request.wanted:
                 columns[name] = as_numbers(array[:, k], exact=name == request.exact)
-    return Content([name for some in names.values() for name in some], columns)
+    return Content(names, columns)
 
 
 def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> _Member | None:
@@ -116,8 +117,6 @@ def _read(request: Request, archive: zipfile.ZipFile, member: _Member) -> NDArra
         array: NDArray[Any] = npy.read_array(file, allow_pickle=False)
         if file.read(1):  # reads to the end, where zipfile compares the checksum
             raise ValueError(f"bytes follow the array {member.name}")
-    if array.dtype.kind == "M":
-        return array.astype("datetime64[ns]").astype(np.int64)
     return array
 
 

@@ -6,6 +6,7 @@ import pyarrow.parquet as pq
 
 from selfmodel.errors import InputError
 from selfmodel.logs.recordings.tables.content import (
+    NO_TIME,
     Content,
     Numbers,
     Request,
@@ -53,16 +54,25 @@ def _content(request: Request, data: pa.OSFile) -> Content:
 
 def _is_numeric(kind: pa.DataType) -> bool:
     types = pa.types
-    checks = (types.is_integer, types.is_floating, types.is_boolean, types.is_timestamp)
-    return any(check(kind) for check in checks)
+    checks = (types.is_integer, types.is_floating, types.is_boolean)
+    times = (types.is_timestamp, types.is_duration)
+    return any(check(kind) for check in (*checks, *times))
 
 
 def _numbers(column: pa.ChunkedArray, *, exact: bool) -> Numbers:
     if pa.types.is_timestamp(column.type):
-        column = column.cast(pa.timestamp("ns", column.type.tz)).cast(pa.int64())
+        column = _integers(column.cast(pa.timestamp("ns", column.type.tz)), exact=exact)
+    elif pa.types.is_duration(column.type):
+        column = _integers(column.cast(pa.duration("ns")), exact=exact)
     elif pa.types.is_boolean(column.type):
         column = column.cast(pa.int8())
     return as_numbers(np.asarray(column.to_numpy()), exact=exact)
+
+
+def _integers(times: pa.ChunkedArray, *, exact: bool) -> pa.ChunkedArray:
+    """Times in ns as integers; a missing one remains null, or is ``NO_TIME``."""
+    whole = times.cast(pa.int64())
+    return whole.fill_null(NO_TIME) if exact else whole
 
 
 pa.set_memory_pool(pa.system_memory_pool())

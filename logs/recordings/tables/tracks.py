@@ -10,7 +10,7 @@ from selfmodel.logs.recordings.mapping.mapping import TABLE, RecordingMapping, T
 from selfmodel.logs.recordings.resampling.clock import Clocked, Track, track
 from selfmodel.logs.recordings.resampling.tracks import RawTracks
 from selfmodel.logs.recordings.series import Column, IntArray, Series, Topic
-from selfmodel.logs.recordings.tables.content import Numbers
+from selfmodel.logs.recordings.tables.content import NO_TIME, Numbers
 from selfmodel.logs.recordings.tables.table import Table
 
 MAX_TIME = 2**62
@@ -49,10 +49,9 @@ def rows_of(table: Table, time: TimeColumn) -> Rows:
                 f"{table.path}: expected {len(values)} rows in {name}, as in {time.column}, got "
                 f"{len(column)}: write columns of the same length"
             )
-    index = np.flatnonzero(np.isfinite(values))
+    index = np.flatnonzero(np.isfinite(values) & (values != NO_TIME))
     known = values[index]
-    # Compared as float: the magnitude of the smallest int64 is no int64.
-    far = np.flatnonzero(np.abs(known.astype(np.float64)) >= MAX_TIME // time.unit)
+    far = np.flatnonzero(np.abs(known) >= MAX_TIME // time.unit)
     if len(far):
         raise InputError(
             f"{table.path}: expected times of at most {MAX_TIME / time.unit:.3g} in "

@@ -30,6 +30,7 @@ from selfmodel.robot.mjcf.placement.forward import turn_forward
 from selfmodel.robot.mjcf.placement.ground import add_ground
 from selfmodel.robot.mjcf.placement.keyframe import bake_keyframe
 from selfmodel.robot.mjcf.rehearsal import run_on_model
+from selfmodel.robot.mjcf.reserved_memory import drop_large_reservations
 from selfmodel.robot.mjcf.sensors import add_sensors
 from selfmodel.robot.mjcf.settings import MAX_CONTROL_TIMESTEP, MjcfSettings, checked_settings
 from selfmodel.robot.mjcf.untrusted import checked_model
@@ -155,6 +156,7 @@ def adapt_text(
 
 def _adapted(name: str, document: Document, settings: MjcfSettings, budget: Budget) -> AdaptedMjcf:
     check_loggable(document, budget)
+    drop_large_reservations(document)
     expand(document)
     name_parts(document)
     for body in document.bodies():

@@ -101,7 +101,7 @@ def read_settings(path: Path, extra: Mapping[str, Any] | None = None) -> MjcfSet
 
 def _folder_of(file: Path, assets: object) -> str:
     """Returns the folder that a file of settings, which may be from any source, names."""
-    if not isinstance(assets, str) or Path(assets).is_absolute():
+    if not isinstance(assets, str) or "\0" in assets or Path(assets).is_absolute():
         raise InputError(
             f"assets needs the path of a folder, relative to this file, got {assets!r}: give an "
             f"absolute path with --set assets=DIR"

@@ -1,5 +1,6 @@
 """Tests of the reach of limbs: which of them can be lowered to the ground."""
 
+import math
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,7 @@ from tests.robot.mjcf.awkward import LEGS, MOTORS, mjcf
 EXTRA = """<body name="extra" pos="0 0 {height}"><joint name="pitch" axis="0 1 0" range="{range}"/>
 <geom {shape}/></body>"""
 EXTRA_MOTOR = MOTORS + '<motor name="extra_motor" joint="pitch" ctrlrange="-1 1"/>'
+HALF = math.sqrt(0.5)
 RIGID = 'type="capsule" size=".02" fromto="0 0 0 0 0 {length}"'
 
 
@@ -70,6 +72,43 @@ def test_the_lowest_point_is_that_of_the_shape(
     robot = with_extra(tmp_path, shape, height, ends="-20 20")
 
     assert reaches_ground(robot, limb(robot, "pitch")) == reaches
+
+
+@pytest.mark.parametrize(
+    ("shape", "extent"),
+    [
+        ('type="capsule" size=".03 .1"', 0.03 + 0.1 * HALF),
+        ('type="cylinder" size=".08 .1"', 0.18 * HALF),
+        ('type="ellipsoid" size=".08 .03 .15"', 0.17 * HALF),
+        ('type="box" size=".08 .03 .15"', 0.23 * HALF),
+    ],
+)
+@pytest.mark.parametrize(("gap", "reaches"), [(0.014, True), (0.019, False)])
+def test_a_tilted_shape_is_a_leg_if_it_ends_within_the_tolerance_of_the_ground(
+    *, shape: str, extent: float, gap: float, reaches: bool, tmp_path: Path
+):
+    # The feet are 0.33 m below the torso, of which the tolerance is 0.0165 m.
+    tilted = f'{shape} euler="0 45 0"'
+    robot = with_extra(tmp_path, tilted, extent + gap - 0.33, ends="-.01 .01")
+
+    assert reaches_ground(robot, limb(robot, "pitch")) == reaches
+
+
+def test_the_hinges_of_a_leg_move_in_turns(tmp_path: Path):
+    upper, lower = 'range="-90 90" axis="0 1 0"', 'range="-90 0" axis="0 1 0"'
+    leg = f"""<body name="upper" pos="0 1 0"><joint name="shoulder" {upper}/>
+    <geom type="capsule" size=".01" fromto="0 0 0 0 0 -1"/>
+    <body name="lower" pos="0 0 -1" euler="0 90 0"><joint name="elbow" {lower}/>
+    <geom type="capsule" size=".01" fromto="0 0 0 0 0 -1"/></body></body>"""
+    motors = "".join(
+        f'<motor name="{name}" joint="{name}" ctrlrange="-1 1"/>' for name in ("shoulder", "elbow")
+    )
+    path = tmp_path / "robot.xml"
+    # Each hinge once: 0.71 m + 1 m; the shoulder again: 1.83 m.
+    path.write_text(mjcf(torso='<geom size="1.87"/>', legs=leg, motors=motors), encoding="utf-8")
+    robot = load_mjcf(path)
+
+    assert reaches_ground(robot, [robot.anatomy.joint(name) for name in ("shoulder", "elbow")])
 
 
 def test_a_limb_that_cannot_touch_the_ground_does_not_reach_it(tmp_path: Path):

@@ -113,9 +113,16 @@ def robot_folder(folder: Path, assets: str = "") -> Folder:
     Raises:
         InputError: The further folder does not exist.
     """
-    if assets and not Path(assets).is_dir():
+    if assets and not _is_folder(assets):
         raise InputError(f"assets needs a folder with files of the robot, got {assets!r}")
     return Folder(folder, root_around(folder), Path(assets) if assets else None)
+
+
+def _is_folder(path: str) -> bool:
+    try:
+        return Path(path).is_dir()
+    except OSError:  # a name that is too long for the file system
+        return False
 
 
 def root_around(folder: Path) -> Path:

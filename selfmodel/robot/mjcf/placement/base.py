@@ -44,9 +44,8 @@ def free_base(document: Document, model: mujoco.MjModel) -> None:
     elements[name].insert(0, ET.Element("freejoint", {"name": f"{name}_root"}))
     pose = format_numbers(np.concatenate([model.body_pos[body], model.body_quat[body]]))
     for key in document.children("keyframe"):
-        for attribute, first in (("qpos", pose), ("qvel", "0 0 0 0 0 0")):
-            if key.get(attribute):
-                key.set(attribute, f"{first} {key.get(attribute)}")
+        if key.get("qpos"):
+            key.set("qpos", f"{pose} {key.get('qpos')}")
     document.notes.append(f"the base {name} has a free joint")
 
 

@@ -62,6 +62,18 @@ def test_the_unit_of_time_is_guessed_from_the_rows(
     assert f'unit = "{unit}"  # CHECK' in suggestion(path, biped)
 
 
+@pytest.mark.parametrize("form", ["csv", "npz"])
+def test_dates_are_nanoseconds(form: str, biped: Robot, tmp_path: Path):
+    dates = np.datetime64("2026-01-01", "ns") + np.arange(5) * np.timedelta64(5, "ms")
+    if form == "npz":
+        path = write_npz(tmp_path / "t.npz", {"time": dates})
+    else:
+        path = tmp_path / "t.csv"
+        path.write_text("\n".join(["time", *map(str, dates)]))
+
+    assert 'unit = "ns"  # CHECK' in suggestion(path, biped)
+
+
 def test_vectors_are_of_the_base_or_of_the_imu():
     names = [f"base_quat.{axis}" for axis in "xyzw"] + [f"odom_pos_{axis}" for axis in "xyz"]
     names += [f"gyro[{axis}]" for axis in "xyz"] + [f"imu_quat_{axis}" for axis in "wxyz"]

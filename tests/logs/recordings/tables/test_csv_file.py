@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from selfmodel.errors import InputError
+from selfmodel.logs.recordings.tables.content import NO_TIME
 from selfmodel.sandbox.budget import Budget, BudgetError
 from tests.logs.recordings.tables.tables import read_here
 
@@ -51,9 +52,28 @@ def test_integers_of_the_exact_column_are_not_rounded(tmp_path: Path):
     assert found["q"].dtype == np.float64
 
 
+@pytest.mark.parametrize("end", ["", "Z", "+00:00"])
+def test_dates_of_the_exact_column_are_whole_nanoseconds(end: str, tmp_path: Path):
+    times = ("2026-01-01 00:00:00.123456789", "", "2026-01-01T00:00:01")
+    rows = "".join(f"{time}{end if time else ''},1\n" for time in times)
+
+    _, found = read_here(written(tmp_path, f"t,q\n{rows}"), "t", exact="t")
+
+    start = 1767225600 * 10**9
+    assert found["t"].dtype == np.int64
+    assert found["t"].tolist() == [start + 123456789, NO_TIME, start + 10**9]
+
+
+@pytest.mark.parametrize("text", ["2026-13-01 00:00:00", "2026-01-01 00:00:00+02:00", "2026-01-01"])
+def test_other_dates_are_refused(text: str, tmp_path: Path):
+    with pytest.raises(InputError, match=r"line 2, column 1 \(t\): expected a number, got '2026"):
+        read_here(written(tmp_path, f"t,q\n{text},1\n"), "t", exact="t")
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
+        ("# of a robot\ntime,q\n0,1\n", "line 2: .* or remove lines above the names"),
         ("", "line 1: expected names of columns, got an empty file"),
         ("1,2\n3,4\n", "line 1: expected names of columns, got numbers: add a first line"),
         ("time,q\n0,1\n1\n", "line 3: expected 2 fields, as in line 1, got 1"),

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from selfmodel.errors import InputError
+from selfmodel.logs.recordings.tables.content import NO_TIME
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget, BudgetError
 from tests.logs.recordings.tables.tables import read_here
 
@@ -36,6 +37,39 @@ def test_integers_and_dates_of_the_exact_column_are_not_rounded(tmp_path: Path):
 
     assert read_here(path, "t", exact="t")[1]["t"].tolist() == exact.tolist()
     assert read_here(path, "date", exact="date")[1]["date"].tolist() == exact.tolist()
+
+
+def test_dates_and_durations_are_nanoseconds_and_missing_ones_are_no_times(tmp_path: Path):
+    path = tmp_path / "t.npz"
+    date = np.array(["2026-01-01T00:00:00.5", "NaT"], dtype="datetime64[ms]")
+    np.savez(path, date=date, duration=date - date[0])
+
+    exact = read_here(path, "date", exact="date")[1]["date"]
+    rounded = read_here(path, "date", "duration")[1]
+
+    assert exact.tolist() == [1767225600_500_000_000, NO_TIME]
+    np.testing.assert_array_equal(rounded["date"], [1767225600.5e9, np.nan])
+    np.testing.assert_array_equal(rounded["duration"], [0.0, np.nan])
+
+
+def test_arrays_without_rows_are_columns_without_numbers(tmp_path: Path):
+    path = tmp_path / "t.npz"
+    np.savez(path, t=np.zeros(0), q=np.zeros((0, 2)))
+
+    names, found = read_here(path, "t", "q.1")
+
+    assert names == ["t", "q.0", "q.1"]
+    assert found["t"].size == found["q.1"].size == 0
+
+
+def test_two_arrays_of_one_name_are_refused(tmp_path: Path):
+    path = tmp_path / "t.npz"
+    np.savez(path, q=np.zeros(2))
+    with zipfile.ZipFile(path, "a") as archive, pytest.warns(UserWarning, match="Duplicate name"):
+        archive.writestr("q.npy", archive.read("q.npy"))
+
+    with pytest.raises(InputError, match="the columns 1 and 2 are both called 'q'"):
+        read_here(path, "q")
 
 
 def test_objects_are_no_columns(tmp_path: Path):

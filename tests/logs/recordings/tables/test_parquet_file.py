@@ -9,6 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from selfmodel.errors import InputError
+from selfmodel.logs.recordings.tables.content import NO_TIME
 from selfmodel.sandbox.budget import Budget, BudgetError
 from tests.logs.recordings.tables.tables import columns, read_here, write_parquet
 
@@ -32,6 +33,18 @@ def test_numbers_of_every_type_are_columns_and_missing_ones_are_nan(tmp_path: Pa
     assert found["t"].tolist() == [round(when.timestamp()) * 10**9] * 2
     for name, first in (("f", 1.5), ("i", 1.0), ("b", 1.0)):
         np.testing.assert_array_equal(found[name], [first, np.nan])
+
+
+@pytest.mark.parametrize("kind", [pa.timestamp("us", "Europe/Berlin"), pa.duration("ms")])
+def test_times_are_nanoseconds_and_a_missing_one_is_no_time(kind: pa.DataType, tmp_path: Path):
+    path = tmp_path / "t.parquet"
+    pq.write_table(pa.table({"t": pa.array([1700000000123, None], kind)}), path)
+    first = 1700000000123 * (10**6 if pa.types.is_duration(kind) else 10**3)
+
+    exact, rounded = (read_here(path, "t", exact=exact)[1]["t"] for exact in ("t", ""))
+
+    assert exact.tolist() == [first, NO_TIME]
+    np.testing.assert_array_equal(rounded, [float(first), np.nan])
 
 
 @pytest.mark.parametrize("place", [0, 500, -30, -1])

@@ -93,6 +93,43 @@ def test_rows_without_a_time_are_left_out_and_a_gap_is_nan(biped: Robot, tmp_pat
     ]
 
 
+def test_a_date_that_is_missing_is_a_row_without_a_time(biped: Robot, tmp_path: Path):
+    found = columns()
+    dates = np.datetime64("2026-01-01", "ns") + np.arange(40) * np.timedelta64(5, "ms")
+    dates[7] = np.datetime64("NaT")
+    path = write_npz(tmp_path / "t.npz", {**found, "time": dates})
+
+    recording = imported(path, biped, MAPPING.replace('unit = "s"', 'unit = "ns"'))
+
+    assert recording.behaviour.steps == 20
+    assert recording.origin == 1767225600 * 10**9
+    assert recording.qualities["table"].refused == {"without a time": 1}
+
+
+def test_rows_are_sorted_and_the_first_of_equal_times_is_kept(biped: Robot, tmp_path: Path):
+    found = columns()
+    order = np.r_[20:40, 0:20, 5]
+    twice = {name: values[order] for name, values in found.items()}
+    twice["q_0"][-1] = 9.0
+
+    recording = imported(write_csv(tmp_path / "t.csv", twice), biped)
+
+    np.testing.assert_array_equal(recording.behaviour["joint_positions"][:, 0], found["q_0"][::2])
+    assert any("out of order" in note for note in recording.notes)
+    assert any("1 with a stamp that another has" in note for note in recording.notes)
+
+
+@pytest.mark.parametrize("value", [np.inf, -np.inf, 1e300])
+def test_a_number_that_no_robot_has_is_missing(value: float, biped: Robot, tmp_path: Path):
+    found = columns()
+    found["q_0"][20] = value
+
+    recording = imported(write_npz(tmp_path / "t.npz", found), biped)
+
+    positions = recording.behaviour["joint_positions"][:, 0]
+    assert np.flatnonzero(np.isnan(positions)).tolist() == [10]
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

@@ -144,6 +144,8 @@ def test_the_folder_of_the_user_is_a_root(tmp_path: Path):
 def test_a_folder_that_does_not_exist_is_refused(tmp_path: Path):
     with pytest.raises(InputError, match="assets needs a folder"):
         robot_folder(tmp_path, str(tmp_path / "no"))
+    with pytest.raises(InputError, match="assets needs a folder"):
+        robot_folder(tmp_path, "n" * 5000)
 
 
 def test_a_settings_file_names_a_folder_relative_to_itself(tmp_path: Path):
@@ -154,7 +156,9 @@ def test_a_settings_file_names_a_folder_relative_to_itself(tmp_path: Path):
     assert Path(settings.assets).resolve() == tmp_path / "repo" / "parts"
 
 
-@pytest.mark.parametrize("assets", ['"/"', '"/etc"', '"../../../../../../../../../.."', "3"])
+@pytest.mark.parametrize(
+    "assets", ['"/"', r'"a\u0000b"', '"/etc"', '"../../../../../../../../../.."', "3"]
+)
 def test_a_settings_file_cannot_open_the_whole_disk(tmp_path: Path, assets: str):
     put(tmp_path / "robot.toml", f"assets = {assets}")
 

@@ -1,5 +1,6 @@
 """Tests of meshes that are too large for a log: their convex hulls take their places."""
 
+import re
 from pathlib import Path
 
 import mujoco
@@ -95,6 +96,23 @@ def test_colliding_meshes_become_the_hulls_with_which_they_collide(
             before, after = points(whole.model, geom), points(reduced.model, geom)
             assert np.allclose(reach(before), reach(after), atol=1e-7)
     assert np.allclose(motion(whole)[:200], motion(reduced)[:200], atol=1e-5)
+
+
+def test_hulls_leave_the_masses_that_the_meshes_gave_to_the_bodies(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    package = menagerie(tmp_path, RINGS, meshes_collide=True)
+    file = package / "xml" / "go.xml"
+    text = re.sub("<inertial [^>]*/>", "", file.read_text(encoding="utf-8"))
+    file.write_text(text, encoding="utf-8")
+
+    whole, _ = adapted(tmp_path, 10**6, monkeypatch)
+    reduced, _ = adapted(tmp_path, 10**4, monkeypatch)
+
+    assert not reduced.assets
+    for name in ("body_mass", "body_inertia", "body_ipos"):
+        before, after = getattr(whole.model, name), getattr(reduced.model, name)
+        assert np.allclose(before, after, rtol=1e-9, atol=1e-12), name
 
 
 def motion(robot: Robot, steps: int = 100) -> np.ndarray:

@@ -47,6 +47,13 @@ def test_torques_have_no_reach(tmp_path: Path):
         loaded(tmp_path, mjcf(motors=TORQUE_MOTORS), "reach=0.5")
 
 
+def test_a_servo_with_a_gear_has_no_reach_because_its_command_is_no_angle(tmp_path: Path):
+    motors = SERVOS.replace('name="right"', 'name="right" gear="2"')
+    model = loaded(tmp_path, mjcf(motors=motors), "reach=0.1")
+
+    assert model.actuator_ctrlrange.ravel() == pytest.approx([-0.1, 0.1, -0.2, 0.6])
+
+
 @pytest.mark.parametrize("setting", ["reach=0", "reach=far", "reach={left_hip=-1}"])
 def test_an_invalid_reach_is_refused(setting: str, tmp_path: Path):
     with pytest.raises(InputError, match="reach needs"):

@@ -11,7 +11,7 @@ from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.adaptation import adapt
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import parse_setting, read_settings
-from tests.robot.mjcf.awkward import LEGS, mjcf
+from tests.robot.mjcf.awkward import KEY, LEGS, mjcf
 from tests.robot.mjcf.test_adaptation import written
 
 TORQUE_MOTORS = """<motor name="left" joint="left_hip" gear="-4" ctrlrange="-2 1"/>
@@ -34,6 +34,22 @@ def test_a_torque_motor_becomes_a_servo_with_its_torque_limits(tmp_path: Path):
     assert model.actuator_gear[:, 0].tolist() == [1, 1]
     assert model.actuator_forcerange.tolist() == [[-4, 8], [-7, 7]]
     assert np.array_equal(model.actuator_ctrlrange, model.jnt_range[model.actuator_trnid[:, 0]])
+
+
+def test_a_gain_of_the_motor_is_part_of_its_torque_limits(tmp_path: Path):
+    left = '<general name="left" joint="left_hip" gainprm="3" gear="2" ctrlrange="-1 2"/>'
+    motors = left + TORQUE_MOTORS.splitlines()[1]
+    model = loaded(tmp_path, mjcf(motors=motors), *GAINS)
+
+    assert model.actuator_forcerange.tolist() == [[-6, 12], [-7, 7]]
+
+
+def test_a_motor_with_dynamics_stays(tmp_path: Path):
+    left = '<general name="left" joint="left_hip" dyntype="filter" dynprm="1" ctrlrange="-1 2"/>'
+    motors = left + TORQUE_MOTORS.splitlines()[1]
+    model = loaded(tmp_path, mjcf(motors=motors), *GAINS)
+
+    assert model.actuator_gainprm[:, 0].tolist() == [1, 30]
 
 
 @pytest.fixture(scope="module")
@@ -80,6 +96,10 @@ def test_a_joint_without_a_range_needs_the_reach(tmp_path: Path):
         loaded(tmp_path, text, *GAINS)
     model = loaded(tmp_path, text, *GAINS, "reach=0.5")
     assert model.actuator_ctrlrange.tolist() == [[-0.5, 0.5], [-0.5, 0.5]]
+    key = KEY.format("0 0 .35 1 0 0 0 .4 -.1")
+    posed = text.replace("<mujoco>", f"<mujoco>{key}")
+    model = loaded(tmp_path, posed, *GAINS, "reach=0.5")
+    assert model.actuator_ctrlrange.ravel() == pytest.approx([-0.1, 0.9, -0.6, 0.4])
 
 
 def test_gains_are_for_the_joints_that_their_patterns_fit(tmp_path: Path):

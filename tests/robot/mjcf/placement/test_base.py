@@ -7,8 +7,8 @@ import pytest
 from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.placement.base import STAND_CLEARANCE
 from selfmodel.robot.mjcf.settings import checked_settings
-from tests.helpers.arms import arm, arm_mjcf, robot_of
-from tests.robot.mjcf.awkward import BALL, GROUND, mjcf
+from tests.helpers.arms import PEDESTAL, arm, arm_mjcf, robot_of
+from tests.robot.mjcf.awkward import BALL, GROUND, LEGS, mjcf
 
 TWO_ARMS = '<body name="left" pos="0 1 0">{arm}</body><body name="table"><geom size=".1"/></body>'
 HOME = '<keyframe><key name="home" qpos="0 0 .4 1 0 0 0 .2 -.2"/></keyframe>'
@@ -68,9 +68,22 @@ def test_the_stand_is_as_low_as_the_reach_of_the_robot_permits():
     assert robot.standing_height == pytest.approx(reach + STAND_CLEARANCE)
 
 
+def test_a_stand_has_room_for_hinges_beside_the_origin_of_their_body():
+    legs = LEGS.replace('name="left_hip"', 'name="left_hip" pos="0 0 .1"')
+    high, low = (robot_of(mjcf(legs=text), base="fixed") for text in (legs, LEGS))
+    assert high.standing_height - low.standing_height == pytest.approx(0.2)
+
+
+def test_a_stand_is_above_the_top_of_other_ground():
+    block = '<geom name="block" type="box" size="1 1 .1"/>'
+    block, floor = (robot_of(mjcf(world=world), base="fixed") for world in (block, GROUND))
+    assert block.standing_height - floor.standing_height == pytest.approx(0.1)
+
+
 def test_the_height_of_a_stand_can_be_set():
-    assert robot_of(mjcf(), base="fixed", base_height=2.5).standing_height == 2.5
-    assert robot_of(arm_mjcf(), base="fixed", base_height=2.5).standing_height == 2.5
+    carried = '<body name="table" pos="0 0 .2"><geom size=".1"/>' + PEDESTAL + "</body>"
+    for text in (mjcf(), arm_mjcf(), arm_mjcf(carried)):
+        assert robot_of(text, base="fixed", base_height=2.5).standing_height == 2.5
 
 
 def test_a_stand_holds_the_robot_in_the_pose_of_its_keyframe():
