@@ -20,8 +20,9 @@ def exported(
 ) -> Robot:
     """Returns the robot of a walker of dm_control.locomotion."""
     monkeypatch.setenv("MUJOCO_GL", "disable")
-    from dm_control import mjcf
-    from dm_control.locomotion import walkers
+    # Imported here, because dm_control initialises a display when imported.
+    from dm_control import mjcf  # noqa: PLC0415  # see the line above
+    from dm_control.locomotion import walkers  # noqa: PLC0415  # see the line above
 
     walker = getattr(walkers, name)()
     if upright:
