@@ -17,11 +17,12 @@ def drop_large_reservations(document: Document) -> None:
     Args:
         document: The MJCF, edited in place.
     """
-    dropped = []
-    for size in document.root.findall("size"):
-        for attribute in _RESERVATIONS:
-            if _is_large(size.get(attribute, "")):
-                dropped.append(f"{attribute}={size.attrib.pop(attribute)}")
+    dropped = [
+        f"{attribute}={size.attrib.pop(attribute)}"
+        for size in document.root.findall("size")
+        for attribute in _RESERVATIONS
+        if _is_large(size.get(attribute, ""))
+    ]
     if dropped:
         document.notes.append(f"MuJoCo chooses its memory itself, without {', '.join(dropped)}")
 
