@@ -253,7 +253,7 @@ Reference = Annotated[
         metavar="FILE",
         help="Trajectory to follow with --score tracking: LOG.mcap, or a table (.csv, .npz, "
         ".parquet) with the columns time and joints.",
-        show_default="the motion of the first controller",
+        show_default="the motion of a first controller with random weights",
         rich_help_panel=CONTROLLER,
     ),
 ]

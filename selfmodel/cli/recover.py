@@ -35,7 +35,7 @@ from selfmodel.cli.options import (
     Trials,
 )
 from selfmodel.cli.output.display import displacement_text, display
-from selfmodel.cli.output.printing import print_json
+from selfmodel.cli.output.printing import print_json, print_notes
 from selfmodel.cli.output.report import facts, print_report, result_file
 from selfmodel.comparators import DEFAULT
 from selfmodel.controllers.controller import check_silent_neurons
@@ -105,6 +105,12 @@ def recover(
     chosen = choose_score(
         score, entry, design, steps=steps, seed=seed, reference=reference, budget=limits
     )
+    if chosen.gait is not None:
+        print_notes(
+            f"note: no --reference is given, so the robot is to repeat the motion of its first "
+            f"controller, a {design.name} with random weights: the {chosen.score.name} before the "
+            f"failure is 0, except for a reality gap"
+        )
     experiment = Experiment(
         robot=made,
         case=case,

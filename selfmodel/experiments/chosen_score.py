@@ -7,6 +7,7 @@ from selfmodel.controllers.controller import Controller, Design
 from selfmodel.errors import InputError
 from selfmodel.experiments import plugins
 from selfmodel.experiments.references import (
+    check_moving,
     random_controller,
     read_reference,
     simulated_reference,
@@ -58,8 +59,8 @@ def choose_score(
         budget: Memory and time that the file may take.
 
     Raises:
-        InputError: The name is unknown or the robot has no such score, or a reference is given for
-            another score.
+        InputError: The name is unknown or the robot has no such score, a reference is given for
+            another score, or the motion of the first controller stops.
     """
     robot = entry.robot()
     check_score(name, entry)
@@ -70,7 +71,9 @@ def choose_score(
     if reference is not None:
         return ChosenScore(tracking(read_reference(reference, robot, budget), robot), gait)
     first = gait or random_controller(design, seed)
-    return ChosenScore(tracking(simulated_reference(robot, first, steps), robot), first)
+    motion = simulated_reference(robot, first, steps)
+    check_moving(motion)
+    return ChosenScore(tracking(motion, robot), first)
 
 
 def check_score(name: str, entry: Entry) -> None:
@@ -103,6 +106,6 @@ def check_motion(name: str, robot: Robot) -> None:
     if robot.has_fixed_base and name in (DISPLACEMENT.name, UPRIGHT.name):
         raise InputError(
             f"the base of {robot.name} is fixed, so its {name} is always 0: give --score "
-            f"{TRACKING}, and --reference FILE with a joint trajectory, or no --reference for the "
-            f"motion of a first controller"
+            f"{TRACKING}, with --reference FILE for a joint trajectory to follow, or with "
+            f"--controller cpg alone for the motion of a random CPG"
         )

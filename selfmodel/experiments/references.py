@@ -18,6 +18,9 @@ from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
 
+LEAST_MOTION = 0.02
+"""Smallest motion of a joint that can be followed, rad."""
+
 TIME = "time"
 """Name of the column of a table with the time of each row, s."""
 
@@ -64,6 +67,24 @@ def simulated_reference(robot: Robot, driver: CommandSource, steps: int) -> Refe
     """
     run = Simulator(robot, threads=1).run([(INTACT, driver)], steps, ["joint_positions"]).behaviour
     return Reference(run.names.hinges, run.time, run["joint_positions"][0])
+
+
+def check_moving(reference: Reference) -> None:
+    """Checks that the motion of a controller goes on: a pose that is reached is nothing to follow.
+
+    Args:
+        reference: The motion.
+
+    Raises:
+        InputError: In the second half, no joint moves by ``LEAST_MOTION``.
+    """
+    second_half = reference.positions[len(reference.time) // 2 :]
+    if np.ptp(second_half, axis=0).max() < LEAST_MOTION:
+        raise InputError(
+            "the first controller, which has random weights, moves the joints into a pose and "
+            "stops, so there is no motion to follow: give --controller cpg, whose motion goes on, "
+            "another --seed, or --reference FILE"
+        )
 
 
 def random_controller(design: Design, seed: int) -> Controller:

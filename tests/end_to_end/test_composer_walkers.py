@@ -1,5 +1,6 @@
 """Walkers of dm_control.composer, as their library exports them, are robots with a free base."""
 
+import importlib
 from pathlib import Path
 
 import mujoco
@@ -19,11 +20,9 @@ def exported(
     folder: Path, name: str, monkeypatch: pytest.MonkeyPatch, *, upright: bool = False
 ) -> Robot:
     """Returns the robot of a walker of dm_control.locomotion."""
-    monkeypatch.setenv("MUJOCO_GL", "disable")
-    # Imported here, because dm_control initialises a display when imported.
-    from dm_control import mjcf  # noqa: PLC0415  # see the line above
-    from dm_control.locomotion import walkers  # noqa: PLC0415  # see the line above
-
+    monkeypatch.setenv("MUJOCO_GL", "disable")  # without an OpenGL library
+    walkers = importlib.import_module("dm_control.locomotion.walkers")
+    mjcf = importlib.import_module("dm_control.mjcf")
     walker = getattr(walkers, name)()
     if upright:
         walker.root_body.quat = walker.upright_pose.xquat

@@ -9,7 +9,7 @@ from selfmodel.errors import InputError
 from selfmodel.experiments.chosen_score import ChosenScore, choose_score
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.recovery.upright import UPRIGHT
-from selfmodel.robot.designs import cpg_for
+from selfmodel.robot.designs import cpg_for, network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import Entry
@@ -33,6 +33,13 @@ def test_without_a_reference_the_first_controller_follows_itself(quadruped: Robo
         run = Simulator(robot, 1).run([(INTACT, found.gait)], 30, found.score.record)
         assert found.score.of(robot, INTACT, run.behaviour)[0] == 0
     assert chosen("tracking", arm(), seed=1).gait != chosen("tracking", arm(), seed=2).gait
+
+
+def test_a_first_controller_that_settles_in_a_pose_is_refused_with_the_remedy():
+    with pytest.raises(InputError, match=r"no motion to follow: give --controller cpg"):
+        choose_score(
+            "tracking", Entry(robot=arm), network_for(arm()), steps=600, seed=0, reference=None
+        )
 
 
 def test_another_score_evolves_the_first_controller(quadruped: Robot):

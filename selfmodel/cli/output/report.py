@@ -62,7 +62,9 @@ def _sentence(found: dict[str, Any]) -> str:
     before, after, recovered = (
         f"{score[when]:.4f} {score['unit']}".rstrip() for when in ("before", "after", "recovered")
     )
-    return f"The {score['name']} was {before} before, {after} after the failure, and {recovered}"
+    return (
+        f"The score {score['name']} was {before} before, {after} after the failure, and {recovered}"
+    )
 
 
 def _reality(found: dict[str, Any]) -> str:
