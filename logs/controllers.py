@@ -7,11 +7,8 @@ design's own arrays (``KINDS``: ``hidden``, a count, of a network; ``timestep``,
 """
 
 import io
-import struct
-import tokenize
 import warnings
 import zipfile
-import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,6 +25,7 @@ from selfmodel.controllers.network import Network
 from selfmodel.errors import InputError
 from selfmodel.files import read_file
 from selfmodel.logs.errors import LogWriteError
+from selfmodel.logs.malformed_npz import FAILURES
 
 MAX_CONTROLLER_BYTES = 2**20
 """Largest size of a controller file, bytes; those of the paper's robots are under 3,000."""
@@ -171,21 +169,7 @@ def _design(arrays: Arrays) -> Design:
     return KINDS[str(arrays["kind"])].read(sensors, motors, ranges, arrays)
 
 
-_FAILURES = (
-    ValueError,  # numpy's headers, and a genome that does not fit
-    TypeError,
-    KeyError,
-    EOFError,
-    MemoryError,
-    RuntimeError,  # an encrypted file, or an unknown compression
-    OverflowError,
-    SyntaxError,
-    tokenize.TokenError,  # numpy's headers are Python literals
-    struct.error,
-    zipfile.BadZipFile,
-    zlib.error,
-    Warning,
-)
+_FAILURES = (*FAILURES, MemoryError, Warning)
 """Every exception of zipfile and numpy for malformed bytes."""
 
 

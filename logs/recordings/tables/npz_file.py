@@ -4,11 +4,8 @@ An array ``(rows,)`` is a column. An array ``(rows, n)`` is n columns, called by
 and a label: those of an array of n texts, such as ``joint_names``, or numbers from 0.
 """
 
-import struct
-import tokenize
 import warnings
 import zipfile
-import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import prod
@@ -19,23 +16,9 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from selfmodel.errors import InputError
+from selfmodel.logs.malformed_npz import FAILURES
 from selfmodel.logs.recordings.tables.content import Content, Numbers, Request, as_numbers
 from selfmodel.sandbox.budget import memory_error
-
-_FAILURES = (
-    ValueError,  # numpy's headers
-    TypeError,
-    KeyError,
-    EOFError,
-    RuntimeError,  # an encrypted file, or an unknown compression
-    OverflowError,
-    SyntaxError,
-    tokenize.TokenError,  # numpy's headers are Python literals
-    struct.error,
-    zipfile.BadZipFile,
-    zlib.error,
-)
-"""Exceptions of zipfile and numpy for malformed bytes."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +49,7 @@ def read_npz(request: Request) -> Content:
                 return _content(request, archive)
     except InputError:
         raise
-    except _FAILURES as failure:
+    except FAILURES as failure:
         reason = " ".join(str(failure).split())[:200] or type(failure).__name__
         raise InputError(
             f"{request.path}: expected an NPZ file of arrays of numbers, got: {reason}: write it "
@@ -77,7 +60,7 @@ def read_npz(request: Request) -> Content:
 def _content(request: Request, archive: zipfile.ZipFile) -> Content:
     members = [_member(archive, info) for info in archive.infolist()[: request.budget.names + 1]]
     found = [member for member in members if member is not None]
-    texts = {m.name: _read(request, archive, m) for m in found if _is_text(request, m)}
+    texts = {m.name: _read(archive, m) for m in found if _is_text(request, m)}
     labels = {name: tuple(map(str, array.tolist())) for name, array in texts.items()}
     numeric = [m for m in found if m.dtype.kind in "fiubmM" and m.shape and len(m.shape) <= 2]
     total = sum(m.shape[1] if len(m.shape) == 2 else 1 for m in numeric)
@@ -91,7 +74,7 @@ def _content(request: Request, archive: zipfile.ZipFile) -> Content:
     request.check_numbers(sum(prod(member.shape) for member, _ in needed))
     columns: dict[str, Numbers] = {}
     for member, some in needed:
-        array = _read(request, archive, member).reshape(member.shape[0], prod(member.shape[1:]))
+        array = _read(archive, member).reshape(member.shape[0], prod(member.shape[1:]))
         for k, name in enumerate(some):
             if name in request.wanted:
                 columns[name] = as_numbers(array[:, k], exact=name == request.exact)
@@ -120,11 +103,7 @@ def _is_text(request: Request, member: _Member) -> bool:
     return few and member.dtype.kind == "U" and member.dtype.itemsize <= 4 * 1000
 
 
-def _read(request: Request, archive: zipfile.ZipFile, member: _Member) -> NDArray[Any]:
-    if prod(member.shape) * member.dtype.itemsize > request.budget.unpacked_bytes:
-        raise memory_error(
-            f"{request.path}: the array {member.name} has the shape {member.shape}", request.budget
-        )
+def _read(archive: zipfile.ZipFile, member: _Member) -> NDArray[Any]:
     with archive.open(member.file) as file:
         array: NDArray[Any] = npy.read_array(file, allow_pickle=False)
         if file.read(1):  # reads to the end, where zipfile compares the checksum
