@@ -169,7 +169,7 @@ def _design(arrays: Arrays) -> Design:
     return KINDS[str(arrays["kind"])].read(sensors, motors, ranges, arrays)
 
 
-_FAILURES = (*FAILURES, MemoryError, Warning)
+_FAILURES: tuple[type[Exception], ...] = (*FAILURES, MemoryError, Warning)
 """Every exception of zipfile and numpy for malformed bytes."""
 
 
