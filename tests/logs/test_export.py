@@ -38,6 +38,7 @@ def behaviour(robot: Robot, steps: int, seed: int, share: float = 0.0) -> Behavi
     return Behaviour(names, frozen(time), {s: frozen(found[s]) for s in SIGNALS})
 
 
+@pytest.mark.process
 @settings(max_examples=12, deadline=None, suppress_health_check=[*HealthCheck])
 @given(
     form=st.sampled_from(FORMS),

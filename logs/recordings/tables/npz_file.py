@@ -65,7 +65,7 @@ def read_npz(request: Request) -> Content:
 def _content(request: Request, archive: zipfile.ZipFile) -> Content:
     members = [_member(archive, info) for info in archive.infolist()[: request.budget.names + 1]]
     found = [member for member in members if member is not None]
-    texts = {m.name: _read(request, archive, m) for m in found if _is_text(request, m)}
+    texts = {m.name: _read(archive, m) for m in found if _is_text(request, m)}
     labels = {name: tuple(map(str, array.tolist())) for name, array in texts.items()}
     numeric = [m for m in found if m.dtype.kind in "fiubmM" and m.shape and len(m.shape) <= 2]
     total = sum(m.shape[1] if len(m.shape) == 2 else 1 for m in numeric)
@@ -79,7 +79,7 @@ def _content(request: Request, archive: zipfile.ZipFile) -> Content:
     request.check_numbers(sum(prod(member.shape) for member, _ in needed))
     columns: dict[str, Numbers] = {}
     for member, some in needed:
-        array = _read(request, archive, member).reshape(member.shape[0], prod(member.shape[1:]))
+        array = _read(archive, member).reshape(member.shape[0], prod(member.shape[1:]))
         for k, name in enumerate(some):
             if name in request.wanted:
                 columns[name] = as_numbers(array[:, k], exact=name == request.exact)
@@ -108,11 +108,7 @@ def _is_text(request: Request, member: _Member) -> bool:
     return few and member.dtype.kind == "U" and member.dtype.itemsize <= 4 * 1000
 
 
-def _read(request: Request, archive: zipfile.ZipFile, member: _Member) -> NDArray[Any]:
-    if prod(member.shape) * member.dtype.itemsize > request.budget.unpacked_bytes:
-        raise memory_error(
-            f"{request.path}: the array {member.name} has the shape {member.shape}", request.budget
-        )
+def _read(archive: zipfile.ZipFile, member: _Member) -> NDArray[Any]:
     with archive.open(member.file) as file:
         array: NDArray[Any] = npy.read_array(file, allow_pickle=False)
         if file.read(1):  # reads to the end, where zipfile compares the checksum

@@ -115,9 +115,27 @@ def test_a_bomb_is_refused_by_its_header(tmp_path: Path):
     assert read_here(path, "q.1", budget=small)[1]["q.1"].tolist() == [0.0] * 5
 
 
+def test_labels_of_many_characters_are_no_labels(tmp_path: Path):
+    path = tmp_path / "t.npz"
+    np.savez(path, q=np.zeros((2, 2)), q_names=["a", "b" * 1001])
+
+    assert read_here(path)[0] == ["q.0", "q.1"]
+
+
+def test_whole_numbers_beyond_int64_are_rounded(tmp_path: Path):
+    path = tmp_path / "t.npz"
+    np.savez(path, t=np.array([2**64 - 1], dtype=np.uint64))
+
+    assert read_here(path, "t", exact="t")[1]["t"].tolist() == [2.0**64]
+
+
 def test_a_header_that_promises_more_than_the_file_has_is_refused(tmp_path: Path):
     path, header = tmp_path / "t.npz", b"{'descr': '<f8', 'fortran_order': False, 'shape': (9,)}"
-    for shape, message in ((b"(99,)", "expected an NPZ file"), (b"(9**9,)", "expected an NPZ")):
+    for shape, message in (
+        (b"(99,)", "expected an NPZ file"),
+        (b"(9**9,)", "expected an NPZ"),
+        (b"(-9,)", "array of the shape"),
+    ):
         text = header.replace(b"(9,)", shape).ljust(117) + b"\n"
         with zipfile.ZipFile(path, "w") as archive:
             archive.writestr("q.npy", b"\x93NUMPY\x01\x00\x76\x00" + text + bytes(72))

@@ -64,3 +64,11 @@ def test_a_bomb_is_refused_by_its_number_of_rows(tmp_path: Path):
 
     with pytest.raises(BudgetError, match="numbers in the wanted columns"):
         read_here(path, "q", budget=Budget(memory=10**6))
+
+
+def test_columns_beyond_the_budget_are_refused_whatever_their_type(tmp_path: Path):
+    path = tmp_path / "t.parquet"
+    pq.write_table(pa.table({f"c{k}": ["text"] for k in range(11)}), path)
+
+    with pytest.raises(BudgetError, match="more than 10 columns"):
+        read_here(path, "c1", budget=Budget(memory=10**6))

@@ -1,5 +1,6 @@
 """Promises of a table: the child process reads it, within the budget."""
 
+import os
 import zipfile
 from pathlib import Path
 
@@ -29,6 +30,13 @@ def test_a_missing_file_is_a_sentence(tmp_path: Path):
     for name in ("t.csv", "t.npz", "t.parquet"):
         with pytest.raises(InputError, match="expected a table that can be read, got: No such"):
             read_table(tmp_path / name, ())
+
+
+def test_a_pipe_is_not_waited_for(tmp_path: Path):
+    os.mkfifo(tmp_path / "t.csv")
+
+    with pytest.raises(InputError, match="expected a table, got a pipe or a device"):
+        read_table(tmp_path / "t.csv", ())
 
 
 def test_a_missing_package_is_a_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

@@ -79,6 +79,28 @@ def test_degrees_and_velocities_in_the_world_are_converted(biped: Robot, tmp_pat
     assert np.allclose(signals["base_linear_velocity"][0], [1.0, 0.0, 2.0])
 
 
+def test_torques_have_the_sign_of_their_angle_and_velocities_are_of_the_base_by_default(
+    biped: Robot, tmp_path: Path
+):
+    found = columns()
+    half = math.sqrt(0.5)
+    base = {"w": half, "x": 0.0, "y": 0.0, "z": half}
+    found |= {f"quat_{axis}": np.full(40, value) for axis, value in base.items()}
+    found |= {f"vel_{axis}": np.full(40, float(k)) for k, axis in enumerate("xyz")}
+    text = MAPPING.replace("[commands]\n", '[joints.efforts]\nleft_hip_y = "cmd_1"\n\n[commands]\n')
+    text = text.replace(
+        'unit = "mm"',
+        'unit = "m"\norientation = ["quat_w", "quat_x", "quat_y", "quat_z"]\n'
+        'linear_velocity = ["vel_x", "vel_y", "vel_z"]',
+    )
+
+    signals = imported(write_npz(tmp_path / "t.npz", found), biped, text).behaviour
+
+    np.testing.assert_array_equal(signals["joint_efforts"][:, 1], -found["cmd_1"][::2])
+    # The heading at the start is turned to +x, where the axes of the base are those of the world.
+    assert np.allclose(signals["base_linear_velocity"][0], [0.0, 1.0, 2.0])
+
+
 def test_rows_without_a_time_are_left_out_and_a_gap_is_nan(biped: Robot, tmp_path: Path):
     found = columns()
     found["time"][7] = np.nan
@@ -156,9 +178,10 @@ def test_columns_of_other_lengths_and_impossible_times_are_refused(biped: Robot,
     with pytest.raises(InputError, match="expected 40 rows in q_0, as in time, got 39"):
         imported(path, biped)
 
-    path = write_npz(tmp_path / "u.npz", {**columns(), "time": columns()["time"] + 1.7e18})
-    with pytest.raises(InputError, match="in row 1: check the unit in"):
-        imported(path, biped)
+    for start in (5e9, 1.7e18):  # s
+        path = write_npz(tmp_path / "u.npz", {**columns(), "time": columns()["time"] + start})
+        with pytest.raises(InputError, match="in row 1: check the unit in"):
+            imported(path, biped)
 
 
 def test_the_mapping_of_a_table_is_not_that_of_a_bag(biped: Robot, tmp_path: Path):
