@@ -30,7 +30,7 @@ def main() -> None:
     robots: dict[str, Robot] = {}
     for part in sorted(folder_of(out, 0.0).glob("runs/*/parts/recovery.json")):
         run = part.parents[1]
-        if run.name in found:
+        if run.name in found or json.loads(part.read_text(encoding="utf-8"))["status"] != "done":
             continue
         parameters = json.loads((run / "run.json").read_text(encoding="utf-8"))["parameters"]
         body = parameters["body"]

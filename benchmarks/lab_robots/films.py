@@ -15,7 +15,10 @@ from benchmarks.lab_robots.models import write_models
 from benchmarks.lab_robots.study import folder_of
 
 FIGURE = Path("docs/figures/lab-robots.png")
-COLUMNS, TILE = 4, (360, 270)
+COLUMNS, TILE = 4, (360, 232)
+CAPTION = 26
+"""Height of the captions of a film, pixels."""
+
 BUDGET = ("--budget", "memory=2GB,time=10min")
 
 
@@ -53,9 +56,11 @@ def _contact_sheet(films: list[Path]) -> None:
         with Image.open(path) as film:
             film.seek(film.n_frames // 2)
             picture = film.convert("RGB")
-        logged = picture.crop((0, 25, picture.width // 2, picture.height - 25))
-        tile = logged.resize((width, round(logged.height * width / logged.width)))
-        ImageDraw.Draw(tile).text((8, 8), path.stem, fill="white")
+        logged = picture.crop((0, CAPTION, picture.width // 2, picture.height - CAPTION))
+        tile = logged.resize(TILE)
+        draw = ImageDraw.Draw(tile)
+        draw.rectangle(draw.textbbox((8, 8), path.stem), fill="white")
+        draw.text((8, 8), path.stem, fill="black")
         sheet.paste(tile, (number % COLUMNS * width, number // COLUMNS * height))
     FIGURE.parent.mkdir(parents=True, exist_ok=True)
     sheet.quantize(128).save(FIGURE, optimize=True)

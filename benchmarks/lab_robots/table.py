@@ -76,13 +76,19 @@ def main() -> None:
 
 
 def _collected(out: Path) -> list[Row]:
-    """Returns the rows of the finished recoveries, of each model as often at one gap as at all."""
+    """Returns the rows of the finished recoveries, and prints the failed ones."""
     exact = json.loads((out / "exactness.json").read_text(encoding="utf-8"))
     rows = []
     names = [field.name for field in fields(Row)]
     for gap in GAPS:
         for part in sorted(folder_of(out, gap).glob("runs/*/parts/recovery.json")):
-            result = json.loads(part.read_text(encoding="utf-8"))["result"][0]
+            found = json.loads(part.read_text(encoding="utf-8"))
+            if found["status"] != "done":
+                print(
+                    f"failed: {part.parents[1].name} at {gap:g}: {found['error']}", file=sys.stderr
+                )
+                continue
+            result = found["result"][0]
             difference = exact[part.parents[1].name] if gap == 0 else None
             values = {**result, "gap": gap, "difference": difference}
             rows.append(Row(**{name: values[name] for name in names}))
