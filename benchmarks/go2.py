@@ -12,7 +12,7 @@ import argparse
 import json
 from pathlib import Path
 from time import perf_counter, process_time
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -47,6 +47,9 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import calibrate
 from selfmodel.simulation.simulator import Simulator
 
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
 FITTED, ALL = 10 * RATE, 15 * RATE
 KINDS = (BROKEN, JAMMED, FAILED_SENSOR, WEAK_MOTOR)
 COMPARATOR = SegmentPrediction("segment-prediction")
@@ -66,7 +69,7 @@ def main() -> None:
     options = parser.parse_args()
     found = json.loads(options.out.read_text()) if options.out.exists() else {}
     nominal = robot_on_stand()
-    stages = {
+    stages: dict[str, Callable[[], Any]] = {
         "fit": lambda: _fit(nominal, 0, FITTED, options.threads),
         "thirds": lambda: [
             _fit(nominal, k * ALL // 3, (k + 1) * ALL // 3, options.threads) for k in range(3)

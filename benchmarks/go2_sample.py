@@ -57,14 +57,15 @@ def trial_of(
 ) -> Trial:
     """Returns a part of the recording as a trial; it has joint positions and commands only."""
     names, steps = robot.anatomy.names, last - first
-    unknown = {signal: np.full((steps, names.width(signal)), np.nan) for signal in SIGNALS}
-    known = {"joint_positions": positions[first:last], "commands": commands[first:last]}
+    signals = {signal: np.full((steps, names.width(signal)), np.nan) for signal in SIGNALS}
+    signals["joint_positions"] = positions[first:last]
+    signals["commands"] = commands[first:last]
     time = np.arange(steps) / RATE
     controller = played_back(robot.anatomy.motors, commands[first:last])
     return Trial(
         TrialPlan("go2", "single", controller, steps, 0),
         robot.name,
-        Behaviour(names, time, {**unknown, **known}),
+        Behaviour(names, time, signals),
         f"go2-{first}-{last}",
     )
 

@@ -54,7 +54,7 @@ def _contact_sheet(films: list[Path]) -> None:
     sheet = Image.new("RGB", (COLUMNS * width, rows * height), "white")
     for number, path in enumerate(films):
         with Image.open(path) as film:
-            film.seek(film.n_frames // 2)
+            film.seek(getattr(film, "n_frames", 1) // 2)
             picture = film.convert("RGB")
         logged = picture.crop((0, CAPTION, picture.width // 2, picture.height - CAPTION))
         tile = logged.resize(TILE)

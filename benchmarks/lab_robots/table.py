@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from statistics import median
+from typing import Any
 
 from benchmarks.lab_robots.models import MODELS
 from benchmarks.lab_robots.study import GAPS, folder_of
@@ -109,7 +110,7 @@ def _read() -> list[Row]:
 
 
 def _row(values: Mapping[str, str]) -> Row:
-    parsers: Mapping[object, Callable[[str], object]] = {
+    parsers: Mapping[object, Callable[[str], Any]] = {
         str: str,
         int: int,
         float: float,
