@@ -64,7 +64,7 @@ def test_an_answer_that_takes_more_memory_than_the_budget_is_refused_with_the_re
     with pytest.raises(BudgetError, match=r"x takes more than 0\.1 GB of memory"):
         run_isolated(
             "tests.helpers.isolated_tasks:answer",
-            Message({"characters": 50_000_000}),
+            Message({"characters": 100_000_000}),
             what="x",
             budget=Budget(memory=10**8),
         )
