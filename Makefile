@@ -1,6 +1,7 @@
 .DEFAULT_GOAL := help
 PYTHON ?= python3
 BIN := .venv/bin
+SLOW := process or search or bodies or opengl or fuzz
 READY := .venv/.ready
 VIEWERS := .viewers
 NODE_READY := .ci/viewers/node_modules/.ready
@@ -23,7 +24,10 @@ demo: $(READY) ## recover a quadruped from a lost lower leg, showing what it doe
 test: $(READY) ## run the fast tests: every promise, in about two minutes on two cores
 	$(BIN)/pytest --numprocesses auto --dist loadfile --durations 10
 
-test-all: $(READY) ## run every test, with every case; in about ten minutes on two cores
+test-slow: $(READY) ## run the tests that `make test` leaves out; in about ten minutes on two cores
+	$(BIN)/pytest -m "$(SLOW)" --numprocesses auto --dist loadfile --no-loadscope-reorder --durations 30
+
+test-all: $(READY) ## run every test, with every case; in about twelve minutes on two cores
 	$(BIN)/pytest -m "" --numprocesses auto --dist loadfile --no-loadscope-reorder --durations 30
 
 docs: $(READY) ## build the documentation site in docs/_build; warnings are errors
@@ -72,4 +76,4 @@ bench: $(READY) ## measure speed and memory; on a quiet machine
 results: $(READY) ## run Table I on both robots and write docs/results/table-one.md; takes over an hour
 	$(BIN)/python -m benchmarks.table_one
 
-.PHONY: help setup demo test test-all docs lint types wheel viewers fuzz bench results
+.PHONY: help setup demo test test-slow test-all docs lint types wheel viewers fuzz bench results
