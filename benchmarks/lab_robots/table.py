@@ -164,6 +164,8 @@ def _print_cases(rows: Sequence[Row]) -> None:
     for case in sorted({row.case for row in rows}):
         for gap in GAPS:
             own = [row for row in rows if (row.case, row.gap) == (case, gap)]
+            if not own:
+                continue
             counts = (sum(row.upright for row in own), sum(row.correct for row in own))
             texts = [f"{count} of {len(own)}" for count in counts]
             ratio = f"{median(row.recovery for row in own):.2f}"
