@@ -8,8 +8,10 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 
 from selfmodel.logs import LogError
+from selfmodel.sandbox.limits import address_space
 
 MEMORY = 3 * 2**30
+"""Bytes of address space beyond those of the test process, which libraries make large."""
 SECONDS = 5.0
 WALL_SECONDS = 120.0
 MEGABYTES = 1000
@@ -49,7 +51,8 @@ def outcome(call: Callable[[], object]) -> Outcome:
 
 
 def _run(call: Callable[[], object], sender: Connection) -> None:
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    limit = (address_space() or 0) + MEMORY
+    resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     start, error = time.process_time(), ""
     try:
