@@ -86,6 +86,7 @@ class SegmentPrediction:
             steady=steady,
             readings=_logged_readings(behaviour["sensors"], starts, horizon),
             arithmetic=_arithmetic_loss(trial, starts, horizon),
+            piece_steps=(starts[:, np.newaxis] + np.array([0, horizon]))[steady],
         )
 
     def _starts(
@@ -152,6 +153,7 @@ class PreparedSegments:
         steady: Mask of the segments without a late step, ``(segments,)``.
         readings: The logged readings.
         arithmetic: Loss of the controller's arithmetic, ``(segments,)``.
+        piece_steps: First and last step of each segment without a late step, ``(segments, 2)``.
     """
 
     request: Segments
@@ -160,6 +162,7 @@ class PreparedSegments:
     steady: BoolArray
     readings: LoggedReadings
     arithmetic: FloatArray
+    piece_steps: IndexArray
 
     def distances(self, simulated: Behaviour) -> FloatArray:
         """Returns the mean loss of the segments, ``(n,)``."""
@@ -167,13 +170,26 @@ class PreparedSegments:
 
     def losses(self, simulated: Behaviour) -> FloatArray:
         """Returns the loss of each segment without a late step, ``(n, segments)``."""
-        total = np.zeros(simulated["sensors"].shape[:2]) + self.arithmetic
+        terms = self._terms(simulated)
+        total = np.zeros(simulated["sensors"].shape[:2]) + terms.pop("commands")
+        for term in terms.values():
+            total += term
+        return total if self.steady.all() else np.ascontiguousarray(total[:, self.steady])
+
+    def losses_by_signal(self, simulated: Behaviour) -> dict[str, FloatArray]:
+        """Returns the part of each signal in the losses, ``(n, segments)`` each."""
+        return {signal: term[:, self.steady] for signal, term in self._terms(simulated).items()}
+
+    def _terms(self, simulated: Behaviour) -> dict[str, FloatArray]:
+        """Returns the loss of each signal in each segment, ``(n, segments)`` each."""
+        shape = simulated["sensors"].shape[:2]
+        terms = {"commands": np.broadcast_to(self.arithmetic, shape)}
         for signal, logged in self.states.items():
             predicted = simulated[signal][:, :, self.compared]
             error = difference(signal, predicted, logged) / PREDICTION_ERROR_SCALES[signal]
-            total += _finite_mean(np.log1p(np.square(error)))
-        total += _readings_loss(simulated["sensors"], self.readings, self.steady)
-        return total if self.steady.all() else np.ascontiguousarray(total[:, self.steady])
+            terms[signal] = _finite_mean(np.log1p(np.square(error)))
+        terms["sensors"] = _readings_loss(simulated["sensors"], self.readings, self.steady)
+        return terms
 
 
 def _all_finite(commands: FloatArray, starts: IndexArray, horizon: int) -> BoolArray:

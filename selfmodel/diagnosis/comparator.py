@@ -1,8 +1,9 @@
 """Comparator interface: distances between simulated behaviour and a logged trial."""
 
+from collections.abc import Mapping
 from typing import Protocol, runtime_checkable
 
-from selfmodel.arrays import FloatArray
+from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.errors import InputError
 from selfmodel.simulation.requests import Request
 from selfmodel.trials.behaviour import Behaviour
@@ -54,6 +55,29 @@ class PiecewiseTrial(PreparedTrial, Protocol):
         Returns:
             ``(n, pieces)`` finite numbers of at least 0; ``distances`` is their mean over the
             pieces. The pieces and their order are the same for every hypothesis.
+        """
+        ...
+
+
+@runtime_checkable
+class TimedTrial(PiecewiseTrial, Protocol):
+    """A prepared trial whose pieces have times, so that a change in time can be found."""
+
+    @property
+    def piece_steps(self) -> IndexArray:
+        """First and last control step of each piece, ``(pieces, 2)``, in increasing order."""
+        ...
+
+
+@runtime_checkable
+class LocatedTrial(PiecewiseTrial, Protocol):
+    """A prepared trial whose losses are sums over signals."""
+
+    def losses_by_signal(self, simulated: Behaviour) -> Mapping[str, FloatArray]:
+        """Returns the part of each signal in the losses, ``(n, pieces)`` each.
+
+        Args:
+            simulated: As for ``distances``.
         """
         ...
 

@@ -1,25 +1,21 @@
 """The diagnostic search: an EA over hypotheses, local refinement, and the verdict."""
 
-import math
-from collections.abc import Callable, Sequence
+import dataclasses
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
 
 from selfmodel.arrays import FloatArray
+from selfmodel.diagnosis.change_point import Change, best_split, change_at, is_change
 from selfmodel.diagnosis.comparator import Comparator
-from selfmodel.diagnosis.detectable import detectable_weaknesses
-from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
+from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.diagnosis.evidence import Evidence
+from selfmodel.diagnosis.judgement import Question, judged, ranked_by_distance
 from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
-from selfmodel.diagnosis.model_error import any_fault_is_model_error
 from selfmodel.diagnosis.refine import refined
 from selfmodel.diagnosis.search_cost import SearchSize
-from selfmodel.diagnosis.significance import TEST, is_better
 from selfmodel.diagnosis.surrogate import Surrogate, own_surrogate, surrogate_of
-from selfmodel.diagnosis.undetectable import undetectable_faults
-from selfmodel.diagnosis.unsearched import best_unsearched_fault
-from selfmodel.diagnosis.verdict import all_diverged, verdict_of
 from selfmodel.evolution import Evolution, GenerationCallback, evolve
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import GENE_VALUES, HypothesisSpace
@@ -28,12 +24,10 @@ from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Trial
+from selfmodel.trials.trial_part import TrialPart, whole
 
 REFINEMENT_STARTS = 2
 """Hypotheses from the EA that the refinement starts from, best first."""
-
-EQUAL_DISTANCES = "equal distances"
-"""Name of the test for a comparator with one distance per trial."""
 
 
 class DiagnosticSearch:
@@ -87,45 +81,21 @@ class DiagnosticSearch:
             on_generation: Callback, called after each generation.
         """
         surrogate = surrogate_of(self.evidence, self._own_surrogate, trials)
-        is_piecewise = self.evidence.is_piecewise(trials)
         found = self._evolved(surrogate, seeds, rng, on_generation)
-        best, losses = found[0], self._loss_functions(trials, surrogate)
-        # Ranked: hypotheses that were proposed and compared with the whole trials. Hypotheses that
-        # only the tests below compare with the trials are never ranked.
-        ranked: set[Hypothesis] = set() if is_piecewise else set(found)
-        if is_piecewise:
-            best = self._refined(found[:REFINEMENT_STARTS], losses, ranked)
-        ranked |= {best, INTACT}
-        self._proposed |= ranked
-        judged = list(ranked)
-        totals = dict(zip(judged, map(float, self.evidence.distances(judged, trials)), strict=True))
-        if not math.isfinite(totals[best]):
-            best = _ranked(totals)[0]
-        if not math.isfinite(totals[best]):
-            return all_diverged(_ranked(totals)[: self._settings.kept], trials)
-        others = [one for one in _ranked(totals) if one != best]
-        indistinguishable = self._indistinguishable(best, others, losses, is_piecewise=is_piecewise)
-        unsearched = best_unsearched_fault(best, self._space, losses)
-        undetectable = undetectable_faults(best, self._space, losses) if is_piecewise else []
-        kept = self._settings.kept
-        return Diagnosis(
-            ranked=tuple(Candidate(one, totals[one]) for one in [best, *others][:kept]),
-            trials=len(trials),
-            intact_distance=totals[INTACT],
-            indistinguishable=indistinguishable[:kept],
-            verdict=verdict_of(
-                losses=partial(losses.damaged, [best]),
-                healthy=self._healthy_losses,
-                indistinguishable=indistinguishable,
-                unsearched=unsearched,
-            ),
-            test=TEST if is_piecewise else EQUAL_DISTANCES,
-            unsearched=unsearched,
-            undetectable=tuple(undetectable[:kept]),
-            detectable=tuple(detectable_weaknesses(best, self._space, losses.damaged))
-            if is_piecewise
-            else (),
+        question = self._question(trials, surrogate)
+        if not self.evidence.is_piecewise(trials):
+            return ranked_by_distance(found, question)
+        best, compared = self._refined(found[:REFINEMENT_STARTS], question)
+        change = self._change(best, found, trials, question)
+        if change is None:
+            return judged(best, compared, question)
+        later = self._question(
+            _since(change, trials),
+            dataclasses.replace(surrogate, trials=_since(change, surrogate.trials)),
         )
+        best, compared = self._refined([change.after, *found[:REFINEMENT_STARTS]], later)
+        diagnosis = judged(best, compared, later)
+        return dataclasses.replace(diagnosis, change=self._dated(change, diagnosis.best, trials))
 
     def check(self, trials: Sequence[Trial]) -> None:
         """Checks that the comparator accepts all trials, before any search.
@@ -188,68 +158,90 @@ class DiagnosticSearch:
         self._proposed |= totals.keys()
         return _ranked(totals)
 
-    def _loss_functions(self, trials: Sequence[Trial], surrogate: Surrogate) -> LossFunctions:
-        """Returns the losses on the trials, the surrogate's, and those on healthy trials.
+    def _question(self, trials: Sequence[Trial | TrialPart], surrogate: Surrogate) -> Question:
+        """Returns the question of the hypothesis that explains some trials, or parts of them.
 
         Closed-loop windows are correlated, so gains on them are not compared with gains on healthy
         trials.
         """
-        known = [*self._intact, *trials]
-        comparable = self.evidence.is_piecewise(trials) and self.evidence.uses_segments(known)
-        return LossFunctions(
-            damaged=partial(self.evidence.losses, trials=trials),
-            surrogate=surrogate.losses,
-            healthy=partial(self.evidence.losses, trials=self._intact)
-            if comparable and self._intact
-            else None,
+        known = [*self._intact, *(whole(trial).trial for trial in trials)]
+        is_piecewise = self.evidence.is_piecewise(known)
+        comparable = is_piecewise and self.evidence.uses_segments(known)
+        return Question(
+            evidence=self.evidence,
+            space=self._space,
+            trials=trials,
+            intact=self._intact,
+            kept=self._settings.kept,
+            losses=LossFunctions(
+                damaged=partial(self.evidence.losses, trials=trials),
+                surrogate=surrogate.losses,
+                healthy=partial(self.evidence.losses, trials=self._intact)
+                if comparable and self._intact
+                else None,
+            ),
         )
 
-    @property
-    def _healthy_losses(self) -> Callable[[], FloatArray] | None:
-        """The losses of the empty hypothesis on healthy trials; None without such trials."""
-        return partial(self.evidence.losses, [INTACT], self._intact) if self._intact else None
-
     def _refined(
-        self, known: Sequence[Hypothesis], losses: LossFunctions, compared: set[Hypothesis]
-    ) -> Hypothesis:
-        """Returns the best hypothesis around the known ones.
+        self, known: Sequence[Hypothesis], question: Question
+    ) -> tuple[Hypothesis, set[Hypothesis]]:
+        """Returns the best hypothesis around known ones, and all that were compared.
 
-        Args:
-            known: Hypotheses to start from.
-            losses: Losses on the trials.
-            compared: Every hypothesis that is compared with the whole trials is added.
+        Hypotheses that only the tests of a verdict compare with the trials are never ranked.
         """
-        return refined(
+        compared: set[Hypothesis] = set()
+        best = refined(
             known,
             self._space,
             self._settings.genes,
             LossFunctions(
-                damaged=_recorded(losses.damaged, compared),
-                surrogate=_recorded(losses.surrogate, self._proposed),
-                healthy=losses.healthy,
+                damaged=_recorded(question.losses.damaged, compared),
+                surrogate=_recorded(question.losses.surrogate, self._proposed),
+                healthy=question.losses.healthy,
             ),
         )
+        compared |= {best, INTACT}
+        self._proposed |= compared
+        return best, compared
 
-    def _indistinguishable(
+    def _change(
         self,
         best: Hypothesis,
-        others: Sequence[Hypothesis],
-        losses: LossFunctions,
-        *,
-        is_piecewise: bool,
-    ) -> tuple[Hypothesis, ...]:
-        """Hypotheses not significantly worse than the best, without supersets of its faults."""
-        parts = _without_severities(best)
-        candidates = [other for other in others if not parts <= _without_severities(other)]
-        best_losses, *rows = losses.damaged([best, *candidates])
-        if is_piecewise:
-            distinct = [is_better(best_losses, row) for row in rows]
-        else:
-            distinct = [bool(row.sum() != best_losses.sum()) for row in rows]
-        indistinct = [one for one, apart in zip(candidates, distinct, strict=True) if not apart]
-        return tuple(
-            one for one in indistinct if not any_fault_is_model_error(one, losses, self._space)
+        found: Sequence[Hypothesis],
+        trials: Sequence[Trial],
+        question: Question,
+    ) -> Change | None:
+        """Returns the change in time that predicts the trials significantly better than ``best``.
+
+        None if there is no such change, or if the losses of the comparator have no times.
+        """
+        timeline = self.evidence.timeline(trials)
+        if timeline is None:
+            return None
+        losses = question.losses
+        singles = self._space.with_one_more(INTACT)
+        after = dict.fromkeys([best, *found[:REFINEMENT_STARTS], *singles])
+        split = best_split([INTACT, best], list(after), losses.surrogate, losses.damaged)
+        if split is None or not is_change(split, best, losses.damaged):
+            return None
+        return change_at(split, losses.damaged, timeline, [trial.plan.name for trial in trials])
+
+    def _dated(self, change: Change, after: Hypothesis, trials: Sequence[Trial]) -> Change:
+        """Returns a change with the time that the final hypothesis gives it."""
+        losses, timeline = (
+            partial(self.evidence.losses, trials=trials),
+            self.evidence.timeline(trials),
         )
+        split = best_split([change.before], [after], losses, losses)
+        if split is None or timeline is None:
+            return change
+        return change_at(split, losses, timeline, [trial.plan.name for trial in trials])
+
+
+def _since(change: Change, trials: Sequence[Trial]) -> list[Trial | TrialPart]:
+    """Returns the trials from the one with a change on, without the time before the change."""
+    first, *rest = trials[change.index :]
+    return [TrialPart(first, begin=change.time), *rest]
 
 
 def _recorded(losses: Losses, into: set[Hypothesis]) -> Losses:
@@ -260,10 +252,6 @@ def _recorded(losses: Losses, into: set[Hypothesis]) -> Losses:
         return losses(hypotheses)
 
     return recorded
-
-
-def _without_severities(hypothesis: Hypothesis) -> set[tuple[FaultKind, str]]:
-    return {(fault.kind.without_severity, fault.part) for fault in hypothesis.faults}
 
 
 def _ranked(totals: dict[Hypothesis, float]) -> list[Hypothesis]:

@@ -4,12 +4,14 @@ import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from selfmodel.diagnosis.change_point import Change
 from selfmodel.diagnosis.detectable import DetectableWeakness
+from selfmodel.diagnosis.fit import Fit
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.trials.data_frame import data_frame
 
-Verdict = Literal["explained", "ambiguous", "unexplained"]
-"""``explained``: the best hypothesis predicts the trials about as well as the self-model predicts
+Verdict = Literal["intact", "explained", "ambiguous", "unexplained"]
+"""``intact``: nothing changed that these trials would have shown. ``explained``: the best hypothesis predicts the trials about as well as the self-model predicts
 the healthy robot, and no other hypothesis except ``undetectable`` ones does. ``ambiguous``: other
 hypotheses are indistinguishable from the best. ``unexplained``: the best hypothesis predicts
 significantly worse than the self-model predicts the healthy robot, or significantly worse than with
@@ -73,6 +75,9 @@ class Diagnosis:
             ``undetectable.undetectable_faults``.
         detectable: Smallest detectable weakness of each joint's motors, if weak motors were
             searched; see ``detectable.detectable_weaknesses``.
+        fit: Numbers behind the verdict; None if every simulation diverged.
+        change: Change of the robot during the trials; the diagnosis is about the time after it.
+            None if one hypothesis is enough.
         reason: Cause of the verdict and remedy, if every simulation diverged; else empty.
     """
 
@@ -86,6 +91,8 @@ class Diagnosis:
     undetectable: tuple[Hypothesis, ...] = ()
     reason: str = ""
     detectable: tuple[DetectableWeakness, ...] = ()
+    fit: Fit | None = None
+    change: Change | None = None
 
     @property
     def best(self) -> Hypothesis:
@@ -101,6 +108,7 @@ class Diagnosis:
             lines += [f"  {name}: {others}"] if others else []
         if self.unsearched is not None:
             lines.append(f"  unsearched: {self.unsearched.hypothesis} ({self.unsearched.kind})")
+        lines += [f"  {self.change}"] if self.change else []
         lines += [f"  reason: {self.reason}"] if self.reason else []
         return "\n".join(lines) + ">"
 
@@ -120,6 +128,8 @@ class Diagnosis:
             "outside": self.unsearched.to_dict() if self.unsearched else None,
             "ranked": [candidate.to_dict() for candidate in self.ranked],
             **({"reason": self.reason} if self.reason else {}),
+            **({"fit": self.fit.to_dict()} if self.fit else {}),
+            **({"change": self.change.to_dict()} if self.change else {}),
             **(
                 {"detectable": [one.to_dict() for one in self.detectable]}
                 if self.detectable

@@ -1,13 +1,21 @@
 """Losses of hypotheses on logged trials, each simulated once."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Literal
 
 import numpy as np
 
-from selfmodel.arrays import FloatArray
-from selfmodel.diagnosis.comparator import Comparator, PiecewiseTrial, PreparedTrial, as_comparator
+from selfmodel.arrays import BoolArray, FloatArray
+from selfmodel.diagnosis.change_point import Timeline
+from selfmodel.diagnosis.comparator import (
+    Comparator,
+    LocatedTrial,
+    PiecewiseTrial,
+    PreparedTrial,
+    TimedTrial,
+    as_comparator,
+)
 from selfmodel.diagnosis.search_cost import steps_of
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import Hypothesis
@@ -21,6 +29,7 @@ from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.magnitudes import check_magnitudes
 from selfmodel.trials.signals import Signal
 from selfmodel.trials.trial import Trial
+from selfmodel.trials.trial_part import TrialPart, whole
 
 TrialKey = tuple[str, int]
 """Path of a trial's log and number of steps: the opening of a trial has the same path."""
@@ -89,7 +98,9 @@ class Evidence:
         """
         return sum(steps_of(self._prepare(one).request, one.behaviour.steps) for one in trials)
 
-    def distances(self, hypotheses: Sequence[Hypothesis], trials: Sequence[Trial]) -> FloatArray:
+    def distances(
+        self, hypotheses: Sequence[Hypothesis], trials: Sequence[Trial | TrialPart]
+    ) -> FloatArray:
         """Returns the distance of each hypothesis from all trials together, ``(n,)``.
 
         The distance is the sum of the comparator's distances, and infinite for a hypothesis whose
@@ -97,15 +108,58 @@ class Evidence:
         """
         total = np.zeros(len(hypotheses))
         for trial in trials:
-            total += np.array([row.mean() for row in self._rows(hypotheses, trial)])
+            total += np.array([row.mean() for row in self._part_rows(hypotheses, trial)])
         return total
 
-    def losses(self, hypotheses: Sequence[Hypothesis], trials: Sequence[Trial]) -> FloatArray:
+    def losses(
+        self, hypotheses: Sequence[Hypothesis], trials: Sequence[Trial | TrialPart]
+    ) -> FloatArray:
         """Returns the losses of each hypothesis on all trials, ``(n, pieces)``.
 
         A comparator without losses has one column per trial: the distance.
         """
-        return np.concatenate([np.array(self._rows(hypotheses, trial)) for trial in trials], axis=1)
+        rows = [np.array(self._part_rows(hypotheses, trial)) for trial in trials]
+        return np.concatenate(rows, axis=1)
+
+    def timeline(self, trials: Sequence[Trial]) -> Timeline | None:
+        """Returns the times of the columns of ``losses``; None if the comparator has no times.
+
+        Raises:
+            InputError: The comparator cannot judge one of the trials.
+        """
+        prepared = [self._prepare(trial) for trial in trials]
+        timed = [one for one in prepared if isinstance(one, TimedTrial)]
+        if len(timed) < len(prepared):
+            return None
+        times = [
+            trial.behaviour.time[one.piece_steps] for trial, one in zip(trials, timed, strict=True)
+        ]
+        return Timeline(
+            trial=np.repeat(np.arange(len(trials)), [len(one) for one in times]),
+            begin=np.concatenate([one[:, 0] for one in times]),
+            end=np.concatenate([one[:, 1] for one in times]),
+        )
+
+    def losses_by_signal(
+        self, hypothesis: Hypothesis, trials: Sequence[Trial | TrialPart]
+    ) -> Mapping[str, float]:
+        """Returns the part of each signal in the mean loss of a hypothesis.
+
+        The result is empty for a comparator whose losses are no sums over signals, and for a
+        hypothesis whose simulation diverges.
+        """
+        found: dict[str, list[FloatArray]] = {}
+        for part in map(whole, trials):
+            prepared = self._prepare(part.trial)
+            if not isinstance(prepared, LocatedTrial):
+                return {}
+            result = simulate(self._simulator, prepared.request, part.trial, [hypothesis])
+            if result.diverged.any():
+                return {}
+            kept = self._pieces(part)
+            for signal, losses in prepared.losses_by_signal(result.behaviour).items():
+                found.setdefault(signal, []).append(losses[0, kept])
+        return {signal: float(np.concatenate(each).mean()) for signal, each in found.items()}
 
     def _prepare(self, trial: Trial) -> PreparedTrial:
         key = _key(trial)
@@ -133,6 +187,24 @@ class Evidence:
                 f"{self._simulator.robot.name} is fixed: give the comparator segment-prediction"
             )
         return prepared
+
+    def _part_rows(
+        self, hypotheses: Sequence[Hypothesis], trial: Trial | TrialPart
+    ) -> list[FloatArray]:
+        part = whole(trial)
+        rows = self._rows(hypotheses, part.trial)
+        if part.is_whole:
+            return rows
+        kept = self._pieces(part)
+        return [row[kept] for row in rows]
+
+    def _pieces(self, part: TrialPart) -> BoolArray | slice:
+        """Returns the columns of the losses of a trial that lie within a part of it."""
+        prepared = self._prepare(part.trial)
+        if part.is_whole or not isinstance(prepared, TimedTrial):
+            return slice(None)
+        times = part.trial.behaviour.time[prepared.piece_steps]
+        return np.asarray((times[:, 0] >= part.begin) & (times[:, 1] <= part.end))
 
     def _rows(self, hypotheses: Sequence[Hypothesis], trial: Trial) -> list[FloatArray]:
         cache = self._losses.setdefault(_key(trial), Cache())

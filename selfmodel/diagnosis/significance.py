@@ -5,6 +5,8 @@ difficulty of a segment cancels. Neighbouring segments are dependent and the err
 are systematic, so the significance levels are stricter than a textbook's.
 """
 
+import math
+
 import numpy as np
 
 from selfmodel.arrays import FloatArray
@@ -23,6 +25,11 @@ where the prediction is almost exact."""
 
 NEGLIGIBLE_LOSS = 1e-6
 """Mean loss that counts as 0: the rounding errors of a model that equals the robot."""
+
+LOSS_FLOOR = 1e-3
+"""Excess of a mean loss over that of healthy trials that is never significant: a tenth of a
+millimetre or a milliradian of error on average. A ratio of smaller losses compares rounding errors
+and contacts that switch a step early."""
 
 TEST = f"paired z over the pieces of the trials >= {MIN_Z:g}, or {LOSS_RATIO:g} times the loss"
 """Name of the test in reports and in JSON."""
@@ -109,20 +116,22 @@ def _gains(
     return other - one, healthy_other - healthy_one
 
 
-def exceeds_healthy_loss(losses: FloatArray, healthy: FloatArray) -> bool:
-    """Returns whether losses are significantly higher than those on healthy trials.
+def excess_over_healthy(losses: FloatArray, healthy: FloatArray) -> float:
+    """Returns the excess of a mean loss over that of healthy trials, in standard errors.
 
     Args:
-        losses: Losses of the best hypothesis, ``(segments,)``.
-        healthy: Losses of the empty hypothesis on healthy trials, ``(healthy_segments,)``. The
-            test is unpaired (Welch). With a single segment, or with infinite losses, the ratio of
-            the means alone decides.
+        losses: Losses of the best hypothesis, ``(pieces,)``.
+        healthy: Losses of the empty hypothesis on healthy trials, ``(healthy_pieces,)``. The
+            test is unpaired (Welch). With a single piece, or with infinite losses, the result is
+            infinite if the ratio of the means is significant, else 0.
     """
-    larger = bool(losses.mean() > LOSS_RATIO * healthy.mean() + NEGLIGIBLE_LOSS)
+    larger = bool(losses.mean() > LOSS_RATIO * healthy.mean() + LOSS_FLOOR)
     if min(len(losses), len(healthy)) < 2 or not np.isfinite([losses.mean(), healthy.mean()]).all():
-        return larger
+        return math.inf if larger else 0.0
     difference, error = _welch(losses, healthy)
-    return larger or difference > MIN_Z_ACROSS_TRIALS * error + NEGLIGIBLE_LOSS
+    if difference <= LOSS_FLOOR:
+        return 0.0
+    return difference / error if error > 0 else math.inf
 
 
 def _welch(one: FloatArray, other: FloatArray) -> tuple[float, float]:

@@ -1,22 +1,39 @@
 """The verdict of a diagnosis: ``explained``, ``ambiguous`` or ``unexplained``."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, UnsearchedFault, Verdict
-from selfmodel.diagnosis.significance import exceeds_healthy_loss
+from selfmodel.diagnosis.fit import Fit
+from selfmodel.diagnosis.significance import MIN_Z_ACROSS_TRIALS, excess_over_healthy
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.trials.trial import Trial
 
 NO_TEST = "none: every simulation diverged"
 """Name of the test of a diagnosis without a finite distance."""
 
 
+def fit_of(losses: FloatArray, intact: FloatArray, healthy: FloatArray | None) -> Fit:
+    """Returns how well the best hypothesis predicts the trials.
+
+    Args:
+        losses: Losses of the best hypothesis on the trials to explain, ``(pieces,)``.
+        intact: Losses of the empty hypothesis on the same trials.
+        healthy: Losses of the empty hypothesis on healthy trials, ``(healthy_pieces,)``; None
+            without healthy trials.
+    """
+    return Fit(
+        loss=float(losses.mean()),
+        intact_loss=float(intact.mean()),
+        healthy_loss=None if healthy is None else float(healthy.mean()),
+        excess=None if healthy is None else excess_over_healthy(losses, healthy),
+        threshold=MIN_Z_ACROSS_TRIALS,
+    )
+
+
 def verdict_of(
-    *,
-    losses: Callable[[], FloatArray],
-    healthy: Callable[[], FloatArray] | None,
+    best: Hypothesis,
+    fit: Fit,
     indistinguishable: Sequence[Hypothesis],
     unsearched: UnsearchedFault | None,
 ) -> Verdict:
@@ -24,36 +41,35 @@ def verdict_of(
 
     The verdict is ``unexplained`` if an unsearched fault predicts the trials significantly better,
     or if the loss is significantly higher than that of the self-model on healthy trials; otherwise
-    ``ambiguous`` if other hypotheses are indistinguishable from the best, else ``explained``.
+    ``ambiguous`` if other hypotheses are indistinguishable from the best, else ``explained``, or
+    ``intact`` for the empty hypothesis.
 
     Args:
-        losses: Computes the losses of the best hypothesis on the trials to explain,
-            ``(1, segments)``.
-        healthy: Computes the losses of the empty hypothesis on healthy trials, ``(1, segments)``;
-            None without healthy trials. Called only where the verdict depends on it.
+        best: The best hypothesis.
+        fit: Its loss, compared with that of healthy trials.
         indistinguishable: Hypotheses not significantly worse than the best.
         unsearched: The best hypothesis with a fault of an unsearched kind, if it is better.
     """
-    if unsearched is not None:
+    if unsearched is not None or fit.is_unexplained:
         return "unexplained"
-    if healthy is not None and exceeds_healthy_loss(losses()[0], healthy()[0]):
-        return "unexplained"
-    return "ambiguous" if indistinguishable else "explained"
+    if indistinguishable:
+        return "ambiguous"
+    return "explained" if best else "intact"
 
 
-def all_diverged(ranked: Sequence[Hypothesis], trials: Sequence[Trial]) -> Diagnosis:
+def all_diverged(ranked: Sequence[Hypothesis], paths: Sequence[str]) -> Diagnosis:
     """Returns the diagnosis of trials on which the simulation of every hypothesis diverged.
 
     The verdict is ``unexplained``: the trials do not support any of the hypotheses.
 
     Args:
         ranked: Hypotheses that were compared with the trials, at least one.
-        trials: The trials to explain.
+        paths: Paths of the logs of the trials to explain.
     """
-    logs = ", ".join(trial.path for trial in trials)
+    logs = ", ".join(paths)
     return Diagnosis(
         ranked=tuple(Candidate(hypothesis, math.inf) for hypothesis in ranked),
-        trials=len(trials),
+        trials=len(paths),
         intact_distance=math.inf,
         indistinguishable=(),
         verdict="unexplained",

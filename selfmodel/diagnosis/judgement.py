@@ -1,0 +1,147 @@
+"""Judgement of the best hypothesis of a search: its ranking, its rivals and the verdict."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from selfmodel.arrays import FloatArray
+from selfmodel.diagnosis.detectable import detectable_weaknesses
+from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
+from selfmodel.diagnosis.evidence import Evidence
+from selfmodel.diagnosis.loss_functions import LossFunctions
+from selfmodel.diagnosis.model_error import any_fault_is_model_error
+from selfmodel.diagnosis.significance import TEST, is_better
+from selfmodel.diagnosis.undetectable import undetectable_faults
+from selfmodel.diagnosis.unsearched import best_unsearched_fault
+from selfmodel.diagnosis.verdict import all_diverged, fit_of, verdict_of
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.hypothesis_space import HypothesisSpace
+from selfmodel.faults.kind import FaultKind
+from selfmodel.trials.trial import Trial
+from selfmodel.trials.trial_part import TrialPart, whole
+
+EQUAL_DISTANCES = "equal distances"
+"""Name of the test for a comparator with one distance per trial."""
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """Trials to explain, and the losses of hypotheses about them.
+
+    Attributes:
+        evidence: Distances of hypotheses from trials.
+        space: The hypotheses about the robot.
+        trials: Trials to explain, or parts of them.
+        intact: Trials of the healthy robot.
+        kept: Number of hypotheses in a ranking.
+        losses: Loss functions of the trials.
+    """
+
+    evidence: Evidence
+    space: HypothesisSpace
+    trials: Sequence[Trial | TrialPart]
+    intact: Sequence[Trial]
+    kept: int
+    losses: LossFunctions
+
+    @property
+    def logs(self) -> list[str]:
+        """Paths of the trials' logs."""
+        return [whole(trial).trial.path for trial in self.trials]
+
+    @property
+    def healthy_losses(self) -> FloatArray | None:
+        """Losses of the empty hypothesis on healthy trials, ``(pieces,)``; None without any."""
+        return self.evidence.losses([INTACT], self.intact)[0] if self.intact else None
+
+
+def judged(best: Hypothesis, compared: Iterable[Hypothesis], question: Question) -> Diagnosis:
+    """Returns the diagnosis of a refined search, for a comparator with losses.
+
+    Args:
+        best: The best hypothesis.
+        compared: Every hypothesis that was compared with the trials, the best included.
+        question: The trials and their losses.
+    """
+    totals = _totals(compared, question)
+    if not math.isfinite(totals[best]):
+        best = _ranked(totals)[0]
+    if not math.isfinite(totals[best]):
+        return all_diverged(_ranked(totals)[: question.kept], question.logs)
+    others = [one for one in _ranked(totals) if one != best]
+    space, losses, kept = question.space, question.losses, question.kept
+    indistinguishable = _indistinguishable(best, others, question)
+    unsearched = best_unsearched_fault(best, space, losses)
+    fit = fit_of(*losses.damaged([best, INTACT]), question.healthy_losses)
+    return Diagnosis(
+        ranked=tuple(Candidate(one, totals[one]) for one in [best, *others][:kept]),
+        trials=len(question.trials),
+        intact_distance=totals[INTACT],
+        indistinguishable=indistinguishable[:kept],
+        verdict=verdict_of(best, fit, indistinguishable, unsearched),
+        test=TEST,
+        unsearched=unsearched,
+        undetectable=tuple(undetectable_faults(best, space, losses)[:kept]),
+        detectable=tuple(detectable_weaknesses(best, space, losses.damaged)),
+        fit=fit,
+    )
+
+
+def ranked_by_distance(found: Iterable[Hypothesis], question: Question) -> Diagnosis:
+    """Returns the diagnosis of a comparator without losses: hypotheses by their distance.
+
+    Args:
+        found: Every hypothesis that was compared with the trials.
+        question: The trials and their losses.
+    """
+    totals = _totals({*found, INTACT}, question)
+    ranked, kept = _ranked(totals), question.kept
+    best = ranked[0]
+    if not math.isfinite(totals[best]):
+        return all_diverged(ranked[:kept], question.logs)
+    parts = _without_severities(best)
+    equal = tuple(
+        one
+        for one in ranked[1:]
+        if totals[one] == totals[best] and not parts <= _without_severities(one)
+    )
+    fit = fit_of(*question.losses.damaged([best, INTACT]), question.healthy_losses)
+    return Diagnosis(
+        ranked=tuple(Candidate(one, totals[one]) for one in ranked[:kept]),
+        trials=len(question.trials),
+        intact_distance=totals[INTACT],
+        indistinguishable=equal[:kept],
+        verdict=verdict_of(best, fit, equal, None),
+        test=EQUAL_DISTANCES,
+        fit=fit,
+    )
+
+
+def _totals(hypotheses: Iterable[Hypothesis], question: Question) -> dict[Hypothesis, float]:
+    """Returns the distance of each hypothesis."""
+    listed = list(hypotheses)
+    distances = question.evidence.distances(listed, question.trials)
+    return dict(zip(listed, map(float, distances), strict=True))
+
+
+def _ranked(totals: Mapping[Hypothesis, float]) -> list[Hypothesis]:
+    return sorted(totals, key=lambda one: (totals[one], len(one), one))
+
+
+def _indistinguishable(
+    best: Hypothesis, others: Sequence[Hypothesis], question: Question
+) -> tuple[Hypothesis, ...]:
+    """Hypotheses not significantly worse than the best, without supersets of its faults."""
+    parts, losses = _without_severities(best), question.losses
+    candidates = [other for other in others if not parts <= _without_severities(other)]
+    best_losses, *rows = losses.damaged([best, *candidates])
+    return tuple(
+        one
+        for one, row in zip(candidates, rows, strict=True)
+        if not is_better(best_losses, row)
+        and not any_fault_is_model_error(one, losses, question.space)
+    )
+
+
+def _without_severities(hypothesis: Hypothesis) -> set[tuple[FaultKind, str]]:
+    return {(fault.kind.without_severity, fault.part) for fault in hypothesis.faults}

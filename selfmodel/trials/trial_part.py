@@ -1,0 +1,31 @@
+"""A part of a trial in time."""
+
+import math
+from dataclasses import dataclass
+
+from selfmodel.trials.trial import Trial
+
+
+@dataclass(frozen=True, eq=False)
+class TrialPart:
+    """A part of a trial: the pieces that lie between two times.
+
+    Attributes:
+        trial: The whole trial.
+        begin: First time of the part, s since the start of the trial.
+        end: Last time of the part, s since the start of the trial.
+    """
+
+    trial: Trial
+    begin: float = -math.inf
+    end: float = math.inf
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the part has no bounds."""
+        return self.begin == -math.inf and self.end == math.inf
+
+
+def whole(trial: Trial | TrialPart) -> TrialPart:
+    """Returns a trial as a part without bounds; a part is returned unchanged."""
+    return trial if isinstance(trial, TrialPart) else TrialPart(trial)
