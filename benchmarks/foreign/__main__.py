@@ -1,0 +1,75 @@
+"""``python -m benchmarks.foreign``: generates recordings, scores their diagnoses, and prints rates."""
+
+import argparse
+import itertools
+import multiprocessing
+from collections.abc import Iterable
+from functools import partial
+from pathlib import Path
+
+from benchmarks.foreign.cases import CASES, GROUPS
+from benchmarks.foreign.gap import LEVELS
+from benchmarks.foreign.generate import Plan, generate
+from benchmarks.foreign.robots import NAMES
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.foreign", description=__doc__)
+    commands = parser.add_subparsers(dest="command", required=True)
+    _add_generate(commands.add_parser("generate", help="write recordings"))
+    options = parser.parse_args()
+    options.run(options)
+
+
+def _add_generate(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("out", type=Path, help="folder of the recordings")
+    parser.add_argument("--robots", default="quadruped,hexapod", help=", ".join(NAMES))
+    parser.add_argument("--cases", default="all", help="all, or names of cases or groups")
+    parser.add_argument("--seeds", default="0", help="such as 0 or 0-4")
+    parser.add_argument("--gaps", default="large", help=", ".join(LEVELS))
+    parser.add_argument("--trials", type=int, default=1, help="trials with the faults, 1 to 3")
+    parser.add_argument("--duration", type=float, default=10.0, help="of each trial, s")
+    parser.add_argument("--jobs", type=int, default=2, help="processes")
+    parser.set_defaults(run=_generate)
+
+
+def _generate(options: argparse.Namespace) -> None:
+    work = partial(generate, options.out)
+    with multiprocessing.get_context("spawn").Pool(options.jobs) as pool:
+        for folder in pool.imap_unordered(work, plans(options)):
+            print(folder, flush=True)
+
+
+def plans(options: argparse.Namespace) -> list[Plan]:
+    """Returns the recordings that the options name."""
+    names = _chosen(options.cases)
+    return [
+        Plan(robot, case, seed, gap, options.duration, options.trials)
+        for gap, seed, case, robot in itertools.product(
+            options.gaps.split(","), _seeds(options.seeds), names, options.robots.split(",")
+        )
+    ]
+
+
+def _chosen(text: str) -> list[str]:
+    words = text.split(",")
+    unknown = [word for word in words if word not in {"all", *CASES, *GROUPS}]
+    if unknown:
+        raise SystemExit(
+            f"error: unknown case {unknown[0]!r}: expected all, a group ({', '.join(GROUPS)}) or "
+            f"a case ({', '.join(CASES)})"
+        )
+    return [
+        name
+        for name, case in CASES.items()
+        if "all" in words or name in words or case.group in words
+    ]
+
+
+def _seeds(text: str) -> Iterable[int]:
+    first, _, last = text.partition("-")
+    return range(int(first), int(last or first) + 1)
+
+
+if __name__ == "__main__":
+    main()
