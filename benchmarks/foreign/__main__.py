@@ -10,13 +10,18 @@ from pathlib import Path
 from benchmarks.foreign.cases import CASES, GROUPS
 from benchmarks.foreign.gap import LEVELS
 from benchmarks.foreign.generate import Plan, generate
+from benchmarks.foreign.judge import summary
+from benchmarks.foreign.rates import table
 from benchmarks.foreign.robots import NAMES
+from benchmarks.foreign.score import Question, read_rows, score
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.foreign", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
     _add_generate(commands.add_parser("generate", help="write recordings"))
+    _add_score(commands.add_parser("score", help="diagnose recordings, and append the answers"))
+    _add_table(commands.add_parser("table", help="print the rates of right answers"))
     options = parser.parse_args()
     options.run(options)
 
@@ -31,6 +36,33 @@ def _add_generate(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--duration", type=float, default=10.0, help="of each trial, s")
     parser.add_argument("--jobs", type=int, default=2, help="processes")
     parser.set_defaults(run=_generate)
+
+
+def _add_score(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("out", type=Path, help="folder of the recordings")
+    parser.add_argument("--rows", type=Path, help="file of the rows [OUT/scores.jsonl]")
+    parser.add_argument("--kinds", default="", help="those of `selfmodel diagnose`")
+    parser.add_argument("--trials", type=int, default=1, help="trials with the faults, 1 to 3")
+    parser.add_argument("--options", default="", help="further options of `selfmodel diagnose`")
+    parser.add_argument("--jobs", type=int, default=2, help="processes")
+    parser.set_defaults(run=_score)
+
+
+def _add_table(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("rows", type=Path, help="file of the rows")
+    parser.add_argument("--by", choices=("group", "case"), default="group")
+    parser.set_defaults(run=_table)
+
+
+def _score(options: argparse.Namespace) -> None:
+    question = Question(options.kinds, options.trials, tuple(options.options.split()))
+    rows = options.rows or options.out / "scores.jsonl"
+    for row in score(options.out, rows, question, options.jobs):
+        print(summary(row), flush=True)
+
+
+def _table(options: argparse.Namespace) -> None:
+    print(table(read_rows(options.rows), options.by))
 
 
 def _generate(options: argparse.Namespace) -> None:
