@@ -1,0 +1,67 @@
+"""The compiled model of a robot with its gap and its faults."""
+
+import mujoco
+import numpy as np
+
+from benchmarks.foreign.damage import damaged
+from benchmarks.foreign.faults import Fault
+from benchmarks.foreign.gap import Gap, apply_gap, set_grip
+from benchmarks.foreign.robots import Robot
+
+
+def compiled(
+    robot: Robot, gap: Gap, faults: tuple[Fault, ...], angles: dict[str, float] | None = None
+) -> mujoco.MjModel:
+    """Returns the model of a robot.
+
+    Args:
+        robot: The robot.
+        gap: Difference between the robot and its model.
+        faults: The faults.
+        angles: Angle of each hinge that jams where it is, rad.
+    """
+    model = damaged(robot, faults, angles or {}).compile()
+    apply_gap(model, robot, gap)
+    for fault in faults:
+        _change(model, robot, gap, fault)
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    return model
+
+
+def _change(model: mujoco.MjModel, robot: Robot, gap: Gap, fault: Fault) -> None:
+    """Changes the numbers of a compiled model by a fault."""
+    match fault.kind:
+        case "motor":
+            for motor in _motors(model, robot, fault.part):
+                model.actuator_gainprm[motor] *= fault.value
+                model.actuator_biasprm[motor] *= fault.value
+                model.actuator_forcerange[motor] *= fault.value
+        case "friction":
+            model.geom_friction[:, 0] = fault.value
+            for name, factor in gap.grip.items():
+                set_grip(model, name, factor)
+        case "damping":
+            model.dof_damping[_dofs(model, robot, fault.part)] *= fault.value
+        case "joint-friction":
+            model.dof_frictionloss[_dofs(model, robot, fault.part)] += fault.value
+        case "grip":
+            set_grip(model, fault.part, fault.value)
+        case "heavy-limb":
+            body = model.body(fault.part).id
+            model.body_mass[body] *= fault.value
+            model.body_inertia[body] *= fault.value
+        case "soft-ground":
+            model.geom_solref[:] = (-fault.value, -fault.value / 20)
+        case "short-range":
+            model.joint(fault.part).range = (-fault.value, fault.value)
+
+
+def _dofs(model: mujoco.MjModel, robot: Robot, part: str) -> list[int]:
+    return [int(model.joint(hinge).dofadr[0]) for hinge in robot.part(part).hinges]
+
+
+def _motors(model: mujoco.MjModel, robot: Robot, part: str) -> list[int]:
+    hinges = robot.part(part).hinges
+    names = [motor for motor, hinge in robot.motors.items() if hinge in hinges]
+    found = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name) for name in names]
+    return [int(number) for number in np.array(found, dtype=int) if number >= 0]

@@ -1,0 +1,272 @@
+"""The cases: each draws its faults for a robot and a seed."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from benchmarks.foreign.faults import Fault
+from benchmarks.foreign.robots import Robot
+from benchmarks.foreign.seeds import stream
+
+Draw = Callable[[Robot, np.random.Generator], tuple[Fault, ...]]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A case.
+
+    Attributes:
+        name: Its name.
+        group: Its group in the tables.
+        draw: Draws the faults.
+        onset: Whether the faults begin in mid-trial.
+        network: Whether a network has to control the robot, because sensors are wrong.
+    """
+
+    name: str
+    group: str
+    draw: Draw
+    onset: bool = False
+    network: bool = False
+
+
+def faults_of(case: Case, robot: Robot, seed: int) -> tuple[Fault, ...]:
+    """Returns the faults of a case; they do not depend on the gap."""
+    return case.draw(robot, stream(seed, robot.name, case.name, "faults"))
+
+
+def onset_of(case: Case, robot: Robot, seed: int) -> float | None:
+    """Returns the time at which the faults begin, s; None if they hold from the start."""
+    if not case.onset:
+        return None
+    drawn = stream(seed, robot.name, case.name, "onset").uniform(3, 7)
+    return round(drawn / robot.control_timestep) * robot.control_timestep
+
+
+def _lost(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    return _limb(robot, rng, ("freezes", "follows"))
+
+
+def _limb(robot: Robot, rng: np.random.Generator, modes: tuple[str, ...]) -> tuple[Fault, ...]:
+    return (Fault("lost", _part(robot, rng), encoders=str(rng.choice(modes))),)
+
+
+def _part(robot: Robot, rng: np.random.Generator) -> str:
+    return robot.parts[rng.integers(len(robot.parts))].name
+
+
+def _hinge_part(robot: Robot, rng: np.random.Generator) -> str:
+    """Draws a part of one hinge."""
+    single = [part.name for part in robot.parts if len(part.hinges) == 1]
+    return single[rng.integers(len(single))]
+
+
+def _signed(rng: np.random.Generator, low: float, high: float) -> float:
+    return float(rng.choice((-1, 1)) * rng.uniform(low, high))
+
+
+def _jam(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    """A jam at 0, or at the end of the range nearest to 0."""
+    name = _part(robot, rng)
+    model = robot.spec().compile()
+    low, high = model.joint(robot.part(name).hinges[0]).range
+    return (Fault("jam", name, float(min(max(low, 0.0), high))),)
+
+
+def _jam_angle(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    name = _hinge_part(robot, rng)
+    model = robot.spec().compile()
+    low, high = model.joint(robot.part(name).hinges[0]).range
+    side = rng.choice((0.2, 0.8)) + rng.uniform(-0.1, 0.1)
+    return (Fault("jam", name, round(float(low + side * (high - low)), 3)),)
+
+
+def _sensor(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    return (Fault("dead-sensor", list(robot.touches)[rng.integers(len(robot.touches))]),)
+
+
+def _lost_and_sensor(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    (limb,) = _lost(robot, rng)
+    others = [name for name in robot.touches if name not in robot.part(limb.part).touches]
+    return limb, Fault("dead-sensor", others[rng.integers(len(others))])
+
+
+def _lost_and_jam(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    (limb,) = _lost(robot, rng)
+    while True:
+        (jam,) = _jam(robot, rng)
+        if set(robot.part(jam.part).touches) != set(robot.part(limb.part).touches):
+            return limb, jam
+
+
+def _motor(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    return (Fault("motor", _part(robot, rng), round(rng.uniform(0.05, 0.5), 3)),)
+
+
+def _friction(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    del robot
+    return (Fault("friction", value=round(rng.uniform(0.35, 0.6), 3)),)
+
+
+def _slope(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    del robot
+    return (Fault("slope", value=round(_signed(rng, 0.1, 0.2), 3)),)
+
+
+def _wind(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    del robot
+    return (Fault("wind", value=round(_signed(rng, 12, 25), 2)),)
+
+
+def _payload(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    del robot
+    place = (float(rng.uniform(-0.1, 0.1)), float(rng.uniform(-0.05, 0.05)), 0.08)
+    return (Fault("payload", value=round(rng.uniform(0.2, 0.5), 3), place=place),)
+
+
+def _heavier(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    """A torso that is 30 % heavier, as a payload at its centre."""
+    del rng
+    model = robot.spec().compile()
+    part = 0.3 * model.body(robot.root).mass[0] / model.body_mass.sum()
+    return (Fault("payload", value=round(float(part), 3)),)
+
+
+def _damping(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    return (Fault("damping", _hinge_part(robot, rng), 8.0),)
+
+
+def _joint_friction(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    return (Fault("joint-friction", _hinge_part(robot, rng), round(rng.uniform(2, 5), 2)),)
+
+
+def _delay(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    del robot
+    return (Fault("delay", value=round(rng.uniform(0.03, 0.08), 3)),)
+
+
+def _encoder_offset(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    hinge = robot.hinges[rng.integers(len(robot.hinges))]
+    return (Fault("encoder-offset", hinge, round(_signed(rng, 0.1, 0.25), 3)),)
+
+
+def _grip(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    feet = list(robot.touches.values())
+    return (Fault("grip", feet[rng.integers(len(feet))], 0.1),)
+
+
+def _backlash(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    hinge = robot.part(_hinge_part(robot, rng)).hinges[0]
+    return (Fault("backlash", hinge, round(rng.uniform(0.1, 0.3), 3)),)
+
+
+def _encoder(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    """An encoder that is not recorded; nothing else is wrong."""
+    hinge = robot.hinges[rng.integers(len(robot.hinges))]
+    return (Fault("encoder", hinge, encoders=str(rng.choice(("nan", "none")))),)
+
+
+def _crossed(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    first, second = rng.choice(list(robot.motors), 2, replace=False)
+    return (Fault("crossed", f"{first} {second}"),)
+
+
+def _tether(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    weight = robot.spec().compile().body_mass.sum() * 9.81
+    return (Fault("tether", value=float(weight * rng.uniform(0.3, 0.8))),)
+
+
+def _heavy_limb(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    feet = list(robot.touches.values())
+    return (Fault("heavy-limb", feet[rng.integers(len(feet))], float(rng.uniform(4, 7))),)
+
+
+def _soft_ground(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    del robot
+    return (Fault("soft-ground", value=float(rng.uniform(150, 400))),)
+
+
+def _side_slope(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    del robot
+    return (Fault("side-slope", value=_signed(rng, 0.12, 0.25)),)
+
+
+def _short_range(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    hinge = robot.part(_hinge_part(robot, rng)).hinges[0]
+    return (Fault("short-range", hinge, float(rng.uniform(0.1, 0.2))),)
+
+
+def _with(*draws: Draw) -> Draw:
+    def draw(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+        return tuple(fault for one in draws for fault in one(robot, rng))
+
+    return draw
+
+
+def _nothing(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    del robot, rng
+    return ()
+
+
+def _lost_nan(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    return _limb(robot, rng, ("nan",))
+
+
+def _lost_none(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    return _limb(robot, rng, ("none",))
+
+
+def _dead_motor(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    return (Fault("motor", _part(robot, rng), round(rng.uniform(0.01, 0.3), 3)),)
+
+
+def _jam_there(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    """A jam at the angle at which the joint is at the onset."""
+    return (Fault("jam", _hinge_part(robot, rng), float("nan")),)
+
+
+CASES = {
+    case.name: case
+    for case in (
+        Case("break", "paper", _lost),
+        Case("jam", "paper", _jam),
+        Case("sensor", "paper", _sensor, network=True),
+        Case("break+sensor", "paper", _lost_and_sensor, network=True),
+        Case("break+jam", "paper", _lost_and_jam),
+        Case("healthy", "healthy", _nothing),
+        Case("jam-angle", "wide", _jam_angle),
+        Case("motor", "wide", _motor),
+        Case("heavier", "wide", _heavier),
+        Case("damping", "wide", _damping),
+        Case("joint-friction", "wide", _joint_friction),
+        Case("delay", "wide", _delay),
+        Case("encoder-offset", "wide", _encoder_offset),
+        Case("grip", "wide", _grip),
+        Case("backlash", "wide", _backlash),
+        Case("friction", "default", _friction),
+        Case("slope", "default", _slope),
+        Case("wind", "default", _wind),
+        Case("payload", "default", _payload),
+        Case("break+friction", "default", _with(_lost, _friction)),
+        Case("jam+slope", "default", _with(_jam, _slope)),
+        Case("motor+wind", "default", _with(_motor, _wind)),
+        Case("break+payload", "default", _with(_lost, _payload)),
+        Case("onset-jam", "onset", _jam_there, onset=True),
+        Case("onset-motor", "onset", _dead_motor, onset=True),
+        Case("onset-break", "onset", _lost, onset=True),
+        Case("break-nan", "lost-encoder", _lost_nan),
+        Case("break-none", "lost-encoder", _lost_none),
+        Case("encoder", "lost-encoder", _encoder),
+        Case("crossed", "outside", _crossed),
+        Case("tether", "outside", _tether),
+        Case("heavy-limb", "outside", _heavy_limb),
+        Case("soft-ground", "outside", _soft_ground),
+        Case("side-slope", "outside", _side_slope),
+        Case("short-range", "outside", _short_range),
+    )
+}
+"""The cases by name."""
+
+GROUPS = tuple(dict.fromkeys(case.group for case in CASES.values()))
+"""The groups in the order of the tables."""

@@ -1,0 +1,109 @@
+"""Diagnoses of recordings by the command line of selfmodel, one JSON line each."""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+LIMIT = 1800
+"""Longest time of one command, s."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """How recordings are diagnosed.
+
+    Attributes:
+        kinds: Value of ``--kinds``; empty for the default.
+        trials: Number of trials with the faults.
+        options: Further options of ``diagnose``.
+    """
+
+    kinds: str = ""
+    trials: int = 1
+    options: tuple[str, ...] = ()
+
+
+def score(out: Path, rows: Path, question: Question, jobs: int) -> Iterator[dict[str, Any]]:
+    """Diagnoses every recording of a folder that has no row yet, and appends the rows.
+
+    Args:
+        out: Folder of the recordings.
+        rows: File with a JSON object per line; created if it does not exist.
+        question: How to diagnose.
+        jobs: Number of commands at a time.
+    """
+    asked = {"kinds": question.kinds, "trials": question.trials, "options": [*question.options]}
+    done = {
+        row["name"] for row in read_rows(rows) if {key: row["asked"][key] for key in asked} == asked
+    }
+    folders = sorted(path.parent for path in out.glob("*/truth.json"))
+    left = [folder for folder in folders if folder.name not in done]
+    with ThreadPoolExecutor(jobs) as pool, rows.open("a") as file:
+        for future in as_completed([pool.submit(diagnosed, f, question) for f in left]):
+            row = {**future.result(), "asked": asked}
+            file.write(json.dumps(row) + "\n")
+            file.flush()
+            yield row
+
+
+def read_rows(path: Path) -> list[dict[str, Any]]:
+    """Returns the rows of a file; none if it does not exist."""
+    if not path.exists():
+        return []
+    return [json.loads(line) for line in path.read_text().splitlines() if line.strip()]
+
+
+def diagnosed(folder: Path, question: Question) -> dict[str, Any]:
+    """Imports and diagnoses one recording.
+
+    Returns:
+        Its truth, the answer of ``diagnose --json`` or None, the error, and the seconds of the
+        diagnosis.
+    """
+    truth = json.loads((folder / "truth.json").read_text())
+    row: dict[str, Any] = {"name": folder.name, "truth": truth, "answer": None, "error": ""}
+    with tempfile.TemporaryDirectory() as made:
+        names = ["before", *(f"after-{k + 1}" for k in range(question.trials))]
+        for name in names:
+            imported = _selfmodel(
+                ["logs", "import", name, "--mapping", f"{name}.toml"],
+                ["--out", str(Path(made, f"{name}.mcap"))],
+                cwd=folder,
+            )
+            if imported.returncode:
+                return {**row, "error": imported.stderr[-2000:], "seconds": 0.0}
+        start = time.perf_counter()
+        kinds = ["--kinds", question.kinds] if question.kinds else []
+        found = _selfmodel(
+            ["diagnose", *(f"{name}.mcap" for name in names), *kinds, *question.options],
+            ["--json", "--yes", "--threads", "1"],
+            cwd=Path(made),
+        )
+        row["seconds"] = time.perf_counter() - start
+    if found.returncode:
+        return {**row, "error": found.stderr[-2000:]}
+    return {**row, "answer": json.loads(found.stdout)}
+
+
+def _selfmodel(
+    first: Sequence[str], last: Sequence[str], cwd: Path
+) -> subprocess.CompletedProcess[str]:
+    """Runs the command line of the selfmodel that is importable here."""
+    here = str(Path(__file__).resolve().parents[2])
+    return subprocess.run(
+        [sys.executable, "-m", "selfmodel", *first, *last],
+        cwd=cwd,
+        env={**os.environ, "PYTHONPATH": here, "OMP_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        timeout=LIMIT,
+        check=False,
+    )
