@@ -10,10 +10,10 @@ JSON and its logs are used, which stay the same while modules move.
 
 ``benchmarks/same_bits/same_bits_0.1.json`` was recorded with version 0.1 (commit b097c0d), all
 parts but ``table-one``, whose reference is ``docs/results.jsonl``: all 74 runs take about two hours
-of one processor, the other parts about ten minutes. The scenarios of ``suite-walker-walk`` differ from it
-since copies of MJCF files have no warm start. Bits are those of one version of MuJoCo and of numpy
-and of one processor family: where ``compare`` prints that these differ, record both versions on
-one machine. MuJoCo's threads do not matter; those of BLAS are set to one.
+of one processor, the other parts about ten minutes. The scenarios of ``suite-walker-walk`` differ
+from it since copies of MJCF files have no warm start. Bits are those of one version of MuJoCo and
+of numpy and of one processor family: where ``compare`` prints that these differ, record both
+versions on one machine. MuJoCo's threads do not matter; those of BLAS are set to one.
 """
 
 import argparse
