@@ -6,16 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.go2.sample import SAMPLE, positions_and_commands, robot_on_stand, simulated
+from benchmarks.go2.sample import positions_and_commands, robot_on_stand, simulated
 from benchmarks.go2.study import FITTED, better_hypotheses, robot_of
 from selfmodel.robot.robot import Robot
+from tests.helpers.go2 import recorded
 
 NUMBERS = Path(__file__).parents[2] / "benchmarks" / "go2" / "go2.json"
 
-pytestmark = [
-    pytest.mark.search,
-    pytest.mark.skipif(not SAMPLE.exists(), reason="the recording is not here"),
-]
+pytestmark = [pytest.mark.search, recorded]
 
 
 @pytest.fixture(scope="module")
