@@ -132,10 +132,10 @@ def injected_faults(
     Args:
         robot: The calibrated robot.
         part: First row, and the row after the last.
-        detectable: Smallest detectable weakness of each motor, as in the diagnosis of the part.
+        detectable: Smallest detectable severities, as in the diagnosis of the part.
         threads: Threads of MuJoCo's steps.
     """
-    shown = {row["joint"]: row["torque"] for row in detectable}
+    shown = {row["part"]: row["below"] for row in detectable if row["kind"] == "motor"}
     positions, commands = positions_and_commands(robot)
     whole = trial_of(robot, positions, commands)
     space = HypothesisSpace.of(KINDS, robot.anatomy)

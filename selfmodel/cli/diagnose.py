@@ -26,7 +26,12 @@ from selfmodel.cli.options import (
 from selfmodel.cli.output.display import display
 from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_json, print_lines, print_notes
-from selfmodel.cli.output.ranking import confidence_sentence, detectable_sentences, ranking_table
+from selfmodel.cli.output.ranking import (
+    confidence_sentence,
+    detectable_sentences,
+    fit_sentence,
+    ranking_table,
+)
 from selfmodel.cli.output.tables import print_tables
 from selfmodel.comparators import DEFAULT
 from selfmodel.controllers.playback import Playback
@@ -156,6 +161,7 @@ def _print(result: dict[str, Any]) -> None:
         f"{result['comparator']}: {result['evaluations']} evaluations by the EA, "
         f"{result['distinct_hypotheses']} distinct hypotheses, {result['seconds']:.1f} s.",
         confidence_sentence(result),
+        fit_sentence(result),
         *detectable_sentences(result),
         *(f"from before the failure, not explained: {Path(path)}" for path in result["intact"]),
     )

@@ -1,8 +1,11 @@
 """Change-point: the time at which the robot changed, from losses along time.
 
-The pieces of all trials, in the order of the trials, are one timeline. A change at a time means that
-one hypothesis predicts the pieces before it, and another the pieces after it. Losses of many
-candidates are already known from the search, so a scan over all times is a cumulative sum.
+The pieces of all trials, in the order of the trials, are one timeline. Before a change, one
+hypothesis predicts the pieces; after it, another. The losses of the candidates are known from the
+search, so a scan over all times is a cumulative sum and needs no further simulation.
+
+Source: Page, "Continuous inspection schemes", Biometrika 41 (1954), the cumulative sum; here of the
+differences of two hypotheses' losses, over all times afterwards.
 """
 
 from collections.abc import Sequence

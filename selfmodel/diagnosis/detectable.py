@@ -1,7 +1,7 @@
-"""Smallest detectable weakness of each motor: the limit of what the trials show."""
+"""Smallest detectable severity of each fault kind and part: the limit of what the trials show."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,38 +16,59 @@ from selfmodel.diagnosis.significance import (
 )
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
-from selfmodel.faults.kind import Fault
-from selfmodel.faults.motor import WEAK_MOTOR
-
-TORQUES = (0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0)
-"""Remaining torques that are tested, as fractions, largest first."""
+from selfmodel.faults.kind import ENVIRONMENT, Fault
 
 
 @dataclass(frozen=True)
-class DetectableWeakness:
-    """The smallest weakness of the motors of a joint that the trials would have shown.
+class DetectableSeverity:
+    """The smallest severities of a fault that the trials would have shown, on either side.
 
     Attributes:
-        joint: Name of the joint.
-        torque: The largest remaining fraction of the torque that predicts the trials clearly
-            worse than the best hypothesis, as every smaller one does; None if a motor without
-            torque would not have shown.
+        kind: Name of the fault kind.
+        part: Name of the part; empty for an environment.
+        below: The largest severity below the nominal one that predicts the trials clearly worse
+            than the best hypothesis; None if no such severity would have shown.
+        above: The smallest severity above the nominal one, likewise.
     """
 
-    joint: str
-    torque: float | None
+    kind: str
+    part: str
+    below: float | None
+    above: float | None
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the JSON values."""
-        return {"joint": self.joint, "torque": self.torque}
+        return {"kind": self.kind, "part": self.part, "below": self.below, "above": self.above}
 
 
-def detectable_weaknesses(
+@dataclass
+class _Side:
+    """Severities of a fault on one side of the nominal one, nearest first, and a bisection.
+
+    All severities from index ``high`` on show; those before ``low`` do not.
+    """
+
+    fault: Fault
+    severities: Sequence[float]
+    low: int
+    high: int
+
+    @property
+    def middle(self) -> int:
+        return (self.low + self.high) // 2
+
+    @property
+    def smallest(self) -> float | None:
+        return self.severities[self.high] if self.high < len(self.severities) else None
+
+
+def detectable_severities(
     best: Hypothesis, space: HypothesisSpace, losses: Losses
-) -> list[DetectableWeakness]:
-    """Returns the smallest detectable weakness of every joint with motors.
+) -> list[DetectableSeverity]:
+    """Returns the smallest detectable severities of every kind with a nominal severity.
 
-    Joints with a fault in the best hypothesis are left out.
+    The nominal friction is the model's; the level with the smallest loss is taken for it. Parts with a fault in the best hypothesis are left out. A severity beyond one that shows is
+    assumed to show too, so that a bisection over the kind's levels finds the limit.
 
     Args:
         best: The best hypothesis.
@@ -55,22 +76,64 @@ def detectable_weaknesses(
         losses: Losses of hypotheses on the trials, ``(n, segments)``.
 
     Returns:
-        In the order of the joints; empty if the space does not contain weak motors.
+        In the order of the kinds and their parts.
     """
-    if WEAK_MOTOR not in space.kinds:
-        return []
     faulty = {fault.part for fault in best.faults}
-    joints = [joint for joint in WEAK_MOTOR.parts(space.anatomy) if joint not in faulty]
-    weaker = {
-        joint: [space.canonical([*best.faults, Fault(WEAK_MOTOR, joint, t)]) for t in TORQUES]
-        for joint in joints
-    }
-    best_losses, *rows = losses([best, *(one for ones in weaker.values() for one in ones)])
-    shown = [_is_clearly_worse(row, best_losses) for row in rows]
-    return [
-        DetectableWeakness(joint, _largest(shown[i * len(TORQUES) : (i + 1) * len(TORQUES)]))
-        for i, joint in enumerate(joints)
+    faults = [
+        Fault(kind, part)
+        for kind in space.kinds
+        if kind.severity_bounds is not None and kind.edit_spec is None
+        for part in kind.parts(space.anatomy)
+        if part not in faulty
     ]
+    nominal = {fault: _nominal(fault, best, space, losses) for fault in faults}
+    sides = [
+        side
+        for fault, severity in nominal.items()
+        if severity is not None
+        for side in _sides(fault, severity, space)
+    ]
+    while open_ := [side for side in sides if side.low < side.high]:
+        candidates = [_with(best, side, space) for side in open_]
+        best_losses, *rows = losses([best, *candidates])
+        for side, row in zip(open_, rows, strict=True):
+            if _is_clearly_worse(row, best_losses):
+                side.high = side.middle
+            else:
+                side.low = side.middle + 1
+    return [
+        DetectableSeverity(below.fault.kind.name, below.fault.part, below.smallest, above.smallest)
+        for below, above in zip(sides[::2], sides[1::2], strict=True)
+    ]
+
+
+def _nominal(
+    fault: Fault, best: Hypothesis, space: HypothesisSpace, losses: Losses
+) -> float | None:
+    """Returns the severity at which a fault has no effect; None if the kind has none."""
+    known = [value for value, to in fault.kind.degenerates_to.items() if to is None]
+    if known or fault.part != ENVIRONMENT:
+        return known[0] if known else None
+    levels = space.levels(fault)
+    rows = losses([space.canonical([*best.faults, replace(fault, severity=s)]) for s in levels])
+    return levels[int(np.argmin(rows.sum(axis=1)))]
+
+
+def _sides(fault: Fault, nominal: float, space: HypothesisSpace) -> tuple[_Side, _Side]:
+    """Returns the severities below and above the nominal one, nearest first."""
+    levels = sorted(space.levels(fault))
+    below = [level for level in reversed(levels) if level < nominal]
+    above = [level for level in levels if level > nominal]
+    halves = [[(nominal + side[0]) / 2, *side] if side else [] for side in (below, above)]
+    first, second = (_Side(fault, side, 0, len(side)) for side in halves)
+    return first, second
+
+
+def _with(best: Hypothesis, side: _Side, space: HypothesisSpace) -> Hypothesis:
+    fault = side.fault
+    return space.canonical(
+        [*best.faults, replace(fault, severity=side.severities[side.middle])]
+    )
 
 
 def _is_clearly_worse(one: FloatArray, best: FloatArray) -> bool:
@@ -87,10 +150,3 @@ def _is_clearly_worse(one: FloatArray, best: FloatArray) -> bool:
     more = one.mean() > best.mean() + NEGLIGIBLE_LOSS
     ratio = one.mean() > LOSS_RATIO * best.mean() + NEGLIGIBLE_LOSS
     return bool(more and (ratio or paired_z(one, best) >= MIN_Z_ACROSS_TRIALS))
-
-
-def _largest(shown: Sequence[bool]) -> float | None:
-    """Returns the largest torque from which on all smaller ones are shown."""
-    hidden = [i for i, each in enumerate(shown) if not each]
-    first = hidden[-1] + 1 if hidden else 0
-    return TORQUES[first] if first < len(TORQUES) else None

@@ -5,18 +5,19 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from selfmodel.diagnosis.change_point import Change
-from selfmodel.diagnosis.detectable import DetectableWeakness
+from selfmodel.diagnosis.detectable import DetectableSeverity
 from selfmodel.diagnosis.fit import Fit
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.trials.data_frame import data_frame
 
 Verdict = Literal["intact", "explained", "ambiguous", "unexplained"]
-"""``intact``: nothing changed that these trials would have shown. ``explained``: the best hypothesis predicts the trials about as well as the self-model predicts
-the healthy robot, and no other hypothesis except ``undetectable`` ones does. ``ambiguous``: other
-hypotheses are indistinguishable from the best. ``unexplained``: the best hypothesis predicts
-significantly worse than the self-model predicts the healthy robot, or significantly worse than with
-a fault of an unsearched kind, so a fault is missing; requires a trial of the healthy robot. A
-diagnosis is also ``unexplained`` if the simulation of every hypothesis diverged."""
+"""``intact``: the empty hypothesis predicts the trials about as well as the self-model predicts the
+healthy robot, and no other hypothesis except ``undetectable`` ones does. ``explained``: the same for
+a hypothesis with faults. ``ambiguous``: other hypotheses are indistinguishable from the best.
+``unexplained``: the best hypothesis predicts significantly worse than the self-model predicts the
+healthy robot, or significantly worse than with a fault of an unsearched kind, so a fault is missing;
+requires a trial of the healthy robot. A diagnosis is also ``unexplained`` if the simulation of every
+hypothesis diverged."""
 
 
 @dataclass(frozen=True)
@@ -73,8 +74,8 @@ class Diagnosis:
         undetectable: The best hypothesis with one more fault, for each undetectable fault,
             smallest distance first, at most as many as are ranked; see
             ``undetectable.undetectable_faults``.
-        detectable: Smallest detectable weakness of each joint's motors, if weak motors were
-            searched; see ``detectable.detectable_weaknesses``.
+        detectable: Smallest detectable severities of each kind and part, for the verdict
+            ``intact``; see ``detectable.detectable_severities``.
         fit: Numbers behind the verdict; None if every simulation diverged.
         change: Change of the robot during the trials; the diagnosis is about the time after it.
             None if one hypothesis is enough.
@@ -90,7 +91,7 @@ class Diagnosis:
     unsearched: UnsearchedFault | None = None
     undetectable: tuple[Hypothesis, ...] = ()
     reason: str = ""
-    detectable: tuple[DetectableWeakness, ...] = ()
+    detectable: tuple[DetectableSeverity, ...] = ()
     fit: Fit | None = None
     change: Change | None = None
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from selfmodel.arrays import FloatArray
-from selfmodel.diagnosis.detectable import detectable_weaknesses
+from selfmodel.diagnosis.detectable import detectable_severities
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
 from selfmodel.diagnosis.evidence import Evidence
 from selfmodel.diagnosis.loss_functions import LossFunctions
@@ -82,7 +82,9 @@ def judged(best: Hypothesis, compared: Iterable[Hypothesis], question: Question)
         test=TEST,
         unsearched=unsearched,
         undetectable=tuple(undetectable_faults(best, space, losses)[:kept]),
-        detectable=tuple(detectable_weaknesses(best, space, losses.damaged)),
+        detectable=()
+        if best
+        else tuple(detectable_severities(best, space, losses.damaged)),
         fit=fit,
     )
 

@@ -10,8 +10,10 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, get_args
 
-from selfmodel.diagnosis.detectable import DetectableWeakness
+from selfmodel.diagnosis.change_point import Change
+from selfmodel.diagnosis.detectable import DetectableSeverity
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, UnsearchedFault, Verdict
+from selfmodel.diagnosis.fit import Fit
 from selfmodel.faults.hypothesis import Hypothesis
 
 
@@ -21,10 +23,14 @@ def confidence_to_dict(diagnosis: Diagnosis) -> dict[str, Any]:
     extra = [_extra(hypothesis, diagnosis.best) for hypothesis in diagnosis.undetectable]
     keys = ("verdict", "rivals", "unseen", "test", "outside", "intact_distance")
     found = {key: extra if key == "unseen" else values[key] for key in keys}
-    detectable = [weakness.to_dict() for weakness in diagnosis.detectable]
-    return {**found, "reason": diagnosis.reason or None} | (
-        {"detectable": detectable} if detectable else {}
-    )
+    detectable = [one.to_dict() for one in diagnosis.detectable]
+    return {
+        **found,
+        "reason": diagnosis.reason or None,
+        "fit": diagnosis.fit.to_dict() if diagnosis.fit else None,
+        "change": diagnosis.change.to_dict() if diagnosis.change else None,
+        **({"detectable": detectable} if detectable else {}),
+    }
 
 
 def ranking_to_list(ranked: Sequence[Candidate]) -> list[dict[str, Any]]:
@@ -37,8 +43,8 @@ def diagnosis_from_dict(values: Mapping[str, Any], parse: Callable[[str], Hypoth
 
     Args:
         values: JSON values. ``outside`` and ``unseen`` are optional: earlier files lack them.
-            ``reason`` is there only for a diagnosis with a reason, ``detectable`` only for one that
-            searched weak motors.
+            ``reason`` is there only for a diagnosis with a reason, ``detectable`` only for one whose
+            kinds have a nominal severity, ``change`` only for one with a change in time.
         parse: Reads the notation of a hypothesis.
 
     Raises:
@@ -66,13 +72,43 @@ def diagnosis_from_dict(values: Mapping[str, Any], parse: Callable[[str], Hypoth
         else UnsearchedFault(parse(outside["hypothesis"]), str(outside["kind"])),
         undetectable=tuple(parse(text) for text in values.get("unseen", ())),
         reason=str(values.get("reason", "")),
-        detectable=tuple(_weakness(item) for item in values.get("detectable", ())),
+        detectable=tuple(_detectable(item) for item in values.get("detectable", ())),
+        fit=_fit(values["fit"]) if values.get("fit") else None,
+        change=_change(values["change"], parse) if values.get("change") else None,
     )
 
 
-def _weakness(item: Mapping[str, Any]) -> DetectableWeakness:
-    torque = item["torque"]
-    return DetectableWeakness(str(item["joint"]), None if torque is None else _from_json(torque))
+def _detectable(item: Mapping[str, Any]) -> DetectableSeverity:
+    below, above = (
+        None if item[side] is None else _from_json(item[side]) for side in ("below", "above")
+    )
+    return DetectableSeverity(str(item["kind"]), str(item["part"]), below, above)
+
+
+def _optional(value: object) -> float | None:
+    return None if value is None else _from_json(value)
+
+
+def _fit(values: Mapping[str, Any]) -> Fit:
+    return Fit(
+        loss=_from_json(values["loss"]),
+        intact_loss=_from_json(values["intact_loss"]),
+        healthy_loss=_optional(values["healthy_loss"]),
+        excess=_optional(values["excess"]),
+        threshold=_from_json(values["threshold"]),
+    )
+
+
+def _change(values: Mapping[str, Any], parse: Callable[[str], Hypothesis]) -> Change:
+    return Change(
+        trial=str(values["trial"]),
+        index=int(values["index"]),
+        time=_from_json(values["time"]),
+        earliest=_from_json(values["earliest"]),
+        latest=_from_json(values["latest"]),
+        before=parse(values["before"]),
+        after=parse(values["after"]),
+    )
 
 
 def _extra(hypothesis: Hypothesis, best: Hypothesis) -> str:

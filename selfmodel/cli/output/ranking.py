@@ -16,32 +16,77 @@ def confidence_sentence(found: Mapping[str, Any]) -> str:
             ``ranking_to_list``.
     """
     besides = ", ".join(found["unseen"])
-    return _verdict(found) + (f" Undetectable in these trials: {besides}." if besides else "")
+    change = found.get("change")
+    return (
+        _verdict(found)
+        + (f" {_change(change)}" if change else "")
+        + (f" Undetectable in these trials: {besides}." if besides else "")
+    )
 
 
-def detectable_sentences(found: Mapping[str, Any]) -> list[str]:
-    """Returns the smallest detectable weakness of the motors as a sentence, if it was measured.
+def fit_sentence(found: Mapping[str, Any]) -> str:
+    """Returns the numbers behind the verdict as a sentence; empty if there are none.
 
     Args:
         found: Result of ``confidence_to_dict``.
     """
-    weaknesses = found.get("detectable", ())
-    if not weaknesses:
+    fit = found.get("fit")
+    if not fit or fit["loss"] is None:
+        return ""
+    loss = f"Mean loss {fit['loss']:.3g}, of intact {_number(fit['intact_loss'])}"
+    if fit["healthy_loss"] is None:
+        return f"{loss}; no trial of the healthy robot to compare with."
+    return (
+        f"{loss}, on healthy trials {_number(fit['healthy_loss'])}: an excess of "
+        f"{_number(fit['excess'])} standard errors, unexplained above {fit['threshold']:g}."
+    )
+
+
+def _number(value: float | None) -> str:
+    return "diverged" if value is None else f"{value:.3g}"
+
+
+def _change(change: Mapping[str, Any]) -> str:
+    return (
+        f"Changed at about t = {change['time']:.1f} s ({change['earliest']:.1f} to "
+        f"{change['latest']:.1f}) of {change['trial']}; before: {change['before']}."
+    )
+
+
+def detectable_sentences(found: Mapping[str, Any]) -> list[str]:
+    """Returns the smallest detectable severity of each kind as a sentence, if it was computed.
+
+    Args:
+        found: Result of ``confidence_to_dict``.
+    """
+    rows = found.get("detectable", ())
+    if not rows:
         return []
-    limits = ", ".join(
-        f"{one['joint']} " + ("none" if one["torque"] is None else f"{one['torque']:g}")
-        for one in weaknesses
+    kinds = dict.fromkeys(row["kind"] for row in rows)
+    limits = "; ".join(
+        f"{kind} {_limits([row for row in rows if row['kind'] == kind])}" for kind in kinds
     )
-    sentence = (
-        f"A weak motor would have shown at this fraction of its torque or less; a smaller "
-        f"weakness is below what these trials show: {limits}."
+    return [f"These trials would have shown: {limits}. Smaller changes are below the limit."]
+
+
+def _limits(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Returns the detectable severities of one kind, equal ones of several parts together."""
+    parts: dict[str, list[str]] = {}
+    for row in rows:
+        sides = (("up to", row["below"]), ("from", row["above"]))
+        limits = " or ".join(f"{word} {value:.4g}" for word, value in sides if value is not None)
+        parts.setdefault(limits or "no severity", []).append(row["part"])
+    return ", ".join(
+        f"{limits} ({', '.join(names)})" if len(parts) > 1 else limits
+        for limits, names in parts.items()
     )
-    return [sentence]
 
 
 def _verdict(found: Mapping[str, Any]) -> str:
     best = found["diagnosis"][0]["hypothesis"]
     match found["verdict"]:
+        case "intact":
+            return "Intact: the unchanged robot predicts the trials, and no other hypothesis does as well."
         case "explained":
             alone = "" if found["unseen"] else ", and no other hypothesis does as well"
             return f"Explained: {best} predicts the trials{alone}."
