@@ -12,8 +12,12 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.robot.anatomy.anatomy import Anatomy
-from selfmodel.trials.encoder_noise import standing_tolerance
+from selfmodel.trials.encoder_noise import PLAY, encoder_noise
 from selfmodel.trials.trial import Trial
+
+NOISE_RATIO = 1.2
+"""Largest ratio of an encoder's deviation to its noise while its joint stands. It is stricter than
+the factor of the comparator, because a whole trial has many more angles than a segment."""
 
 MIN_COMMANDED = 0.05
 """Smallest range of a command that should move its joint, in the motor's unit."""
@@ -135,7 +139,7 @@ def _joints(trial: Trial, anatomy: Anatomy, commanded: dict[str, float]) -> Iter
     positions = trial.behaviour["joint_positions"]
     angles = np.where(np.isfinite(positions), positions, np.nan)
     columns = {hinge: column for column, hinge in enumerate(trial.behaviour.names.hinges)}
-    tolerances = standing_tolerance(angles)
+    tolerances = np.hypot(PLAY, NOISE_RATIO * encoder_noise(angles))
     for joint in anatomy.joints:
         largest = max((commanded[motor] for motor in joint.motors), default=0.0)
         for hinge in joint.hinges:

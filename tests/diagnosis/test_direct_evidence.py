@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import pytest
 
 from selfmodel.diagnosis.direct_evidence import DirectEvidence, direct_evidence
 from selfmodel.robot.robot import Robot
@@ -54,6 +55,18 @@ def test_a_knee_that_swings_a_sixth_of_a_radian_moves(quadruped: Robot):
     found = evidence(quadruped, 0.085 * np.sin(np.arange(STEPS) * 0.1))
 
     assert {one.motion for one in found.joints} == {"moves"}
+
+
+@pytest.mark.parametrize("deviation", [0.01, 0.02, 0.05])
+def test_noise_neither_hides_a_swing_of_twice_its_deviation_nor_makes_one(
+    quadruped: Robot, deviation: float
+):
+    noise = np.random.default_rng(1).normal(0, deviation, STEPS)
+    swing = 2 * deviation * np.sin(np.arange(STEPS) * 0.1)
+    standing, swinging = evidence(quadruped, 0.3 + noise), evidence(quadruped, 0.3 + swing + noise)
+
+    assert {one.joint for one in standing.joints if one.motion == "stands"} == {KNEE}
+    assert {one.motion for one in swinging.joints} == {"moves"}
 
 
 def test_a_sensor_that_never_changes_is_named(quadruped: Robot):
