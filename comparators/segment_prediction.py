@@ -8,6 +8,11 @@ import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.comparators.command_errors import command_errors, command_spans
+from selfmodel.comparators.encoder_motion import (
+    LoggedMotion,
+    encoder_motion_loss,
+    logged_motion,
+)
 from selfmodel.comparators.sensor_noise_level import noise_level_loss
 from selfmodel.errors import InputError
 from selfmodel.simulation.requests import Segments, command_steps, cut_segments
@@ -35,9 +40,10 @@ class SegmentPrediction:
     A trial is cut into segments. Each begins in the logged state, continues under the logged
     commands, and is compared with the log at four steps. An error e of a signal whose scale is s
     has the loss ``log(1 + (e / s)^2)``, so that a chaotic moment cannot outweigh the rest; the loss
-    is averaged over the columns of a signal and summed over the signals. Two more terms are added
-    to that of the motion: the predicted readings, against the controller's input, and the
-    controller's arithmetic, the logged commands against the network's output for these readings.
+    is averaged over the columns of a signal and summed over the signals. Three more terms are added
+    to that of the motion: the predicted readings, against the controller's input; the controller's
+    arithmetic, the logged commands against the network's output for these readings; and the motion
+    of each encoder at the scale of its own noise (``encoder_motion``).
 
     Source: prediction over a short horizon is multiple shooting (Bock & Plitt 1984) without the
     fit. Its use here answers the paper's future work, section V: displacement contains too little
@@ -79,12 +85,14 @@ class SegmentPrediction:
         starts, steady = self._starts(trial, states)
         compared = np.unique(np.linspace(0, horizon, COMPARISONS + 1).round().astype(int)[1:])
         rows = starts[:, np.newaxis] + compared
+        request = cut_segments(behaviour, states, starts, horizon, (*self.state, "sensors"))
         return PreparedSegments(
-            request=cut_segments(behaviour, states, starts, horizon, (*self.state, "sensors")),
+            request=request,
             compared=compared,
             states={signal: values[rows] for signal, values in states.items()},
             steady=steady,
             readings=_logged_readings(behaviour["sensors"], starts, horizon),
+            motion=_logged_motion(trial, request, starts),
             arithmetic=_arithmetic_loss(trial, starts, horizon),
             piece_steps=(starts[:, np.newaxis] + np.array([0, horizon]))[steady],
         )
@@ -152,6 +160,7 @@ class PreparedSegments:
         states: Logged state at these steps, ``(segments, comparisons, width)`` for each signal.
         steady: Mask of the segments without a late step, ``(segments,)``.
         readings: The logged readings.
+        motion: The logged motion of the encoders; None for states without joint positions.
         arithmetic: Loss of the controller's arithmetic, ``(segments,)``.
         piece_steps: First and last step of each segment without a late step, ``(segments, 2)``.
     """
@@ -161,6 +170,7 @@ class PreparedSegments:
     states: Mapping[Signal, FloatArray]
     steady: BoolArray
     readings: LoggedReadings
+    motion: LoggedMotion | None
     arithmetic: FloatArray
     piece_steps: IndexArray
 
@@ -189,6 +199,9 @@ class PreparedSegments:
             error = difference(signal, predicted, logged) / PREDICTION_ERROR_SCALES[signal]
             terms[signal] = _finite_mean(np.log1p(np.square(error)))
         terms["sensors"] = _readings_loss(simulated["sensors"], self.readings, self.steady)
+        if self.motion is not None:
+            motion = encoder_motion_loss(simulated["joint_positions"], self.motion)
+            terms["encoder motion"] = motion
         return terms
 
 
@@ -204,6 +217,14 @@ def _arithmetic_loss(trial: Trial, starts: IndexArray, horizon: int) -> FloatArr
     errors = command_errors(trial) / scale
     rows = starts[:, np.newaxis] + np.arange(1, horizon + 1)
     return _finite_mean(np.log1p(np.square(errors[rows])))
+
+
+def _logged_motion(trial: Trial, request: Segments, starts: IndexArray) -> LoggedMotion | None:
+    """Returns the motion of the encoders in the segments; None without joint positions."""
+    resting = request.resting_angles
+    if resting is None:
+        return None
+    return logged_motion(trial.behaviour["joint_positions"], starts, request.horizon, resting)
 
 
 def _logged_readings(logged: FloatArray, starts: IndexArray, horizon: int) -> LoggedReadings:

@@ -176,11 +176,11 @@ def _median_angles(robot: Robot, segments: Segments) -> dict[str, tuple[int, int
 
     The result is empty for segments without joint positions.
     """
-    angles = segments.states.get("joint_positions")
+    angles = segments.resting_angles
     if angles is None:
         return {}
     hinges = [robot.model.joint(name) for name in robot.anatomy.hinges]
     return {
         hinge.name: (int(hinge.qposadr[0]), int(hinge.dofadr[0]), angle)
-        for hinge, angle in zip(hinges, np.median(angles, axis=0).tolist(), strict=True)
+        for hinge, angle in zip(hinges, angles.tolist(), strict=True)
     }

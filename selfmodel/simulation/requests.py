@@ -66,6 +66,15 @@ class Segments:
         """Control steps of a segment."""
         return int(self.commands.shape[1]) - self.lead
 
+    @property
+    def resting_angles(self) -> FloatArray | None:
+        """Angle at which the hinges of detached limbs are predicted: the median over the segments.
+
+        The shape is ``(hinges,)``, rad; None for segments without joint positions.
+        """
+        angles = self.states.get("joint_positions")
+        return None if angles is None else np.asarray(np.median(angles, axis=0))
+
 
 @dataclass(frozen=True)
 class Ensemble:

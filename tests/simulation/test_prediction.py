@@ -117,9 +117,8 @@ def test_the_joints_of_a_lost_limb_rest_where_noise_hides_them(
         0.2, 0.1, segments.states["joint_positions"].shape
     )
     noisy = {**segments.states, "joint_positions": shifted, "joint_velocities": shifted}
-    outcome = Simulator(robot, 1).predict(
-        [INTACT, broken], dataclasses.replace(segments, states=noisy)
-    )
+    shaken = dataclasses.replace(segments, states=noisy)
+    outcome = Simulator(robot, 1).predict([INTACT, broken], shaken)
     beyond = [joint, *(other for other in anatomy.joints if other.name in joint.descendants)]
     lost = [anatomy.hinges.index(hinge) for each in beyond for hinge in each.hinges]
     positions = outcome.behaviour["joint_positions"][..., lost]
@@ -128,6 +127,8 @@ def test_the_joints_of_a_lost_limb_rest_where_noise_hides_them(
     np.testing.assert_allclose(
         positions[1], np.broadcast_to(np.median(shifted[:, lost], axis=0), positions[1].shape)
     )
+    assert shaken.resting_angles is not None
+    np.testing.assert_array_equal(positions[1, 0, 0], shaken.resting_angles[lost])
     np.testing.assert_array_equal(velocities[1], 0)
     assert len(beyond) > 1
     np.testing.assert_allclose(positions[0, :, 0], shifted[:, lost])
