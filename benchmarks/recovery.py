@@ -19,6 +19,7 @@ from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.controllers.command_source import CommandSource
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.faults.notation import parse
+from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.logs.journal import create_journal
 from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.physical.interface import PhysicalRobot
@@ -111,6 +112,7 @@ def measure_once() -> dict[str, float]:
             damaged=damaged,
             simulator=simulator,
             comparator=FORWARD_DISPLACEMENT,
+            kinds=PAPER_KINDS,
             run_trial=timed.run_trial,
             journal=timed,
             settings=settings,

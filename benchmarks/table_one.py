@@ -26,6 +26,7 @@ from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.experiments.experiment import Experiment, run
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
+from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.logs import load_controller, save_controller
 from selfmodel.recovery.repair import RepairSearch
 from selfmodel.robot.robot import Robot
@@ -101,6 +102,7 @@ def recover_once(name: str, case: int, seed: int, out: Path) -> Facts:
             case=case,
             truth=parse(ROBOTS[name].cases[case], robot.anatomy),
             comparator=FORWARD_DISPLACEMENT,
+            kinds=PAPER_KINDS,
             settings=Settings(),
             seed=seed,
             threads=1,

@@ -9,7 +9,7 @@ from typing import Any
 from selfmodel.cli.confirmation import confirm_time
 from selfmodel.cli.options import (
     DEFAULT_BUDGET,
-    DEFAULT_KINDS,
+    DEFAULT_KIND_NAMES,
     Calibrated,
     ComparatorName,
     FileBudget,
@@ -45,7 +45,7 @@ def diagnose(
     *,
     robot: SelfModel = None,
     comparator: ComparatorName = DEFAULT.name,
-    kinds: KindNames = DEFAULT_KINDS,
+    kinds: KindNames = DEFAULT_KIND_NAMES,
     calibrate: Calibrated = True,
     population: LoggedPopulation = None,
     generations: LoggedGenerations = None,

@@ -10,7 +10,7 @@ import typer
 from selfmodel.cli import inputs
 from selfmodel.cli.options import (
     DEFAULT_BUDGET,
-    DEFAULT_KINDS,
+    DEFAULT_KIND_NAMES,
     Calibrated,
     Case,
     ComparatorName,
@@ -64,7 +64,7 @@ def recover(
     calibrate: Calibrated = True,
     gap: GapLevel = 0.0,
     structure: Structural = False,
-    kinds: KindNames = DEFAULT_KINDS,
+    kinds: KindNames = DEFAULT_KIND_NAMES,
     next_trial: NextTrialName = "repair",
     controller: ControllerKind = "network",
     neurons: Neurons = None,

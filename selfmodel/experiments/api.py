@@ -25,8 +25,8 @@ from selfmodel.experiments.arguments import (
 from selfmodel.experiments.chosen_score import check_motion
 from selfmodel.experiments.fitting import fitted
 from selfmodel.experiments.log_diagnosis import set_up_diagnosis
-from selfmodel.faults import PAPER_KINDS
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.logs import physical_trial
 from selfmodel.logs.journal import create_journal
 from selfmodel.logs.records import TrialHeader
@@ -246,7 +246,7 @@ def diagnose(
     healthy: TrialSource | Sequence[TrialSource] = (),
     robot: RobotSource | None = None,
     comparator: str | Comparator = DEFAULT,
-    kinds: KindSource = PAPER_KINDS,
+    kinds: KindSource = DEFAULT_KINDS,
     settings: Settings | None = None,
     calibrate: bool = True,
     seed: int | None = None,
@@ -274,7 +274,8 @@ def diagnose(
         robot: The nominal robot, its name, or the path of its MJCF or URDF file; None for the
             model in the logs.
         comparator: A comparator, its name, or ``package.module:object``.
-        kinds: Fault kinds to search, or their names, in a sequence or separated by commas.
+        kinds: Fault kinds to search, or names of kinds and of their sets, in a sequence or
+            separated by commas.
         settings: Parameters of the search; None for those in the first log.
         calibrate: Whether the self-model is fitted to the healthy trials.
         seed: Seed of all random numbers; None for that of the first trial.
@@ -311,7 +312,7 @@ def recover(
     folder: str | Path,
     *,
     comparator: str | Comparator = DEFAULT,
-    kinds: KindSource = PAPER_KINDS,
+    kinds: KindSource = DEFAULT_KINDS,
     settings: Settings | None = None,
     design: str | Design = "network",
     calibrate: bool = True,
@@ -341,7 +342,8 @@ def recover(
             made from it.
         folder: Folder of the run, new or empty: every trial's log and every diagnosis.
         comparator: A comparator, its name, or ``package.module:object``.
-        kinds: Fault kinds to search, or their names, in a sequence or separated by commas.
+        kinds: Fault kinds to search, or names of kinds and of their sets, in a sequence or
+            separated by commas.
         settings: Parameters of the recovery; the paper's by default.
         design: Name of a controller design, such as ``network`` or ``cpg``, or a design.
         calibrate: Whether the self-model is fitted to the trial before the failure.

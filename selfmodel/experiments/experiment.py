@@ -14,7 +14,7 @@ from selfmodel.experiments.reality import draw_reality
 from selfmodel.experiments.scoring import is_correct
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import FaultKind
-from selfmodel.faults.registry import PAPER_KINDS
+from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.logs.journal import create_journal
 from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.physical.interface import PhysicalRobot
@@ -63,7 +63,7 @@ class Experiment:
     gait: Controller | None = None
     gap: float = 0.0
     structure: bool = False
-    kinds: tuple[FaultKind, ...] = PAPER_KINDS
+    kinds: tuple[FaultKind, ...] = DEFAULT_KINDS
     calibrated: bool = True
     next_trial: str = "repair"
     design: Design | None = None

@@ -13,7 +13,7 @@ from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
-from selfmodel.faults.registry import PAPER_KINDS
+from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery.database import Database, Journal, RunTrial
 from selfmodel.recovery.events import Event, SearchBegins
@@ -147,7 +147,7 @@ def recover(
     on_event: Callable[[Event], None],
     gait: Controller | None = None,
     design: Design | None = None,
-    kinds: Sequence[FaultKind] = PAPER_KINDS,
+    kinds: Sequence[FaultKind] = DEFAULT_KINDS,
     calibrate: Callable[[Sequence[Trial]], Calibration] | None = None,
     next_trial: NextTrial = by_repair,
     score: Score = DISPLACEMENT,
