@@ -18,6 +18,7 @@ from time import perf_counter
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.controllers.command_source import CommandSource
 from selfmodel.diagnosis.diagnosis import Diagnosis
+from selfmodel.experiments.arguments import comparator_choice
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.logs.journal import create_journal
@@ -111,7 +112,7 @@ def measure_once() -> dict[str, float]:
             healthy=healthy,
             damaged=damaged,
             simulator=simulator,
-            comparator=FORWARD_DISPLACEMENT,
+            choose_comparator=comparator_choice(FORWARD_DISPLACEMENT),
             kinds=PAPER_KINDS,
             run_trial=timed.run_trial,
             journal=timed,

@@ -28,10 +28,10 @@ from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_json, print_lines, print_notes
 from selfmodel.cli.output.ranking import confidence_sentence, detectable_sentences, ranking_table
 from selfmodel.cli.output.tables import print_tables
-from selfmodel.comparators import DEFAULT
 from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
 from selfmodel.experiments import plugins, trial_logs
+from selfmodel.experiments.arguments import AUTO, comparator_choice
 from selfmodel.experiments.expected_time import diagnosis_seconds
 from selfmodel.experiments.log_diagnosis import by_stage, set_up_diagnosis
 from selfmodel.logs import TrialLog
@@ -44,7 +44,7 @@ def diagnose(
     files: LogFiles,
     *,
     robot: SelfModel = None,
-    comparator: ComparatorName = DEFAULT.name,
+    comparator: ComparatorName = AUTO,
     kinds: KindNames = DEFAULT_KIND_NAMES,
     calibrate: Calibrated = True,
     population: LoggedPopulation = None,
@@ -61,7 +61,7 @@ def diagnose(
     trials from before the failure, and the hypotheses predict all others.
     """
     start = perf_counter()
-    judge = plugins.comparator(comparator)
+    choice = comparator_choice(comparator)
     considered = plugins.kinds(kinds)
     allowed = Budget.parse(budget)
     logs = trial_logs.logs(files, allowed)
@@ -74,7 +74,7 @@ def diagnose(
         failed,
         healthy,
         robot=model,
-        comparator=judge,
+        choose_comparator=choice,
         kinds=considered,
         settings=_settings(first.settings, population, generations),
         seed=seed,
@@ -88,12 +88,14 @@ def diagnose(
     found = set_up(calibrate=calibrate)
     print_notes(*(f"note: {note}" for note in _notes(used)))
     with display() as on_event:
+        on_event(found.comparator)
         if found.calibration is not None:
             on_event(found.calibration)
         diagnosis = diagnose_trials(found.damaged, found.search, found.seed, on_event)
     result = {
         "robot": model.name,
-        "comparator": judge.name,
+        "comparator": found.comparator.comparator.name,
+        "comparator_reason": found.comparator.reason,
         "kinds": [kind.name for kind in considered],
         "seed": found.seed,
         "settings_from": first.trial.path,
@@ -155,6 +157,7 @@ def _print(result: dict[str, Any]) -> None:
         f"{result['robot']}, {counted(len(result['logs']), 'log')}, "
         f"{result['comparator']}: {result['evaluations']} evaluations by the EA, "
         f"{result['distinct_hypotheses']} distinct hypotheses, {result['seconds']:.1f} s.",
+        f"Comparator {result['comparator']}: {result['comparator_reason']}.",
         confidence_sentence(result),
         *detectable_sentences(result),
         *(f"from before the failure, not explained: {Path(path)}" for path in result["intact"]),

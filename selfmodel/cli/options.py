@@ -195,7 +195,8 @@ ComparatorName = Annotated[
     str,
     typer.Option(
         metavar="NAME",
-        help="Comparator of simulations with logged trials; or package.module:object.",
+        help="Comparator of simulations with logged trials: auto, the best that the logs allow; a "
+        "name; or package.module:object.",
         rich_help_panel=DIAGNOSIS,
     ),
 ]
