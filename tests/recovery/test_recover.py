@@ -127,17 +127,8 @@ def test_a_recovery_tells_the_papers_story(robot: Robot):
     ]
 
     once = ["diagnostic", "Diagnosis", "repair", "Trial"]
-    assert story == [
-        "repair",
-        "Trial",
-        "Trial",
-        "ChosenComparator",
-        *once,
-        *once,
-        *once,
-        "diagnostic",
-        "Diagnosis",
-    ]
+    first = ["repair", "Trial", "Trial", "ChosenComparator"]
+    assert story == [*first, *once, *once, *once, "diagnostic", "Diagnosis"]
     stages = [trial.plan.stage for trial in outcome.trials]
     assert stages == ["before", "after", "recovery", "recovery", "recovery"]
     assert outcome.trials[0].plan.controller == outcome.trials[1].plan.controller
