@@ -171,7 +171,7 @@ def _diagnosis(
 ) -> Facts:
     """Returns seconds of a diagnosis and of its search, and the number of evaluated hypotheses."""
     simulator = Simulator(known.model, threads)
-    diagnose = DiagnosticSearch(simulator, comparator, settings, intact=known.healthy)
+    diagnose = DiagnosticSearch(simulator, comparator, settings, PAPER_KINDS, intact=known.healthy)
     generations: list[Generation] = []
     start = perf_counter()
     diagnose([trial], [], np.random.default_rng(0), generations.append)

@@ -19,7 +19,9 @@ from time import perf_counter
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.controllers.command_source import CommandSource
 from selfmodel.diagnosis.diagnosis import Diagnosis
+from selfmodel.experiments.arguments import comparator_choice
 from selfmodel.faults.notation import parse
+from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.logs.journal import create_journal
 from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.physical.interface import PhysicalRobot
@@ -111,7 +113,8 @@ def measure_once() -> dict[str, float]:
             healthy=healthy,
             damaged=damaged,
             simulator=simulator,
-            comparator=FORWARD_DISPLACEMENT,
+            choose_comparator=comparator_choice(FORWARD_DISPLACEMENT),
+            kinds=PAPER_KINDS,
             run_trial=timed.run_trial,
             journal=timed,
             settings=settings,

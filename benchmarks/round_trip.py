@@ -77,7 +77,7 @@ def recorded(folder: Path, robot: Robot, truth: Hypothesis, gait: Controller) ->
 def compared(log: TrialLog, truth: Hypothesis) -> str:
     """Returns the best hypothesis for a log, and the distance of the truth."""
     simulator = Simulator(robot_of(log), os.cpu_count() or 1)
-    search = DiagnosticSearch(simulator, FORWARD_DISPLACEMENT, log.settings)
+    search = DiagnosticSearch(simulator, FORWARD_DISPLACEMENT, log.settings, PAPER_KINDS)
     best = diagnose_trials([log.trial], search, SEED, lambda _: None).best
     distance = 1000 * float(search.evidence.distances([truth], [log.trial])[0])
     text = "right" if best == truth else f"`{best}`"

@@ -23,9 +23,11 @@ from benchmarks.results import Facts, write_results
 from benchmarks.walking import walk
 from selfmodel.cli.output.report import facts
 from selfmodel.comparators import FORWARD_DISPLACEMENT
+from selfmodel.experiments.arguments import comparator_choice
 from selfmodel.experiments.experiment import Experiment, run
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
+from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.logs import load_controller, save_controller
 from selfmodel.recovery.repair import RepairSearch
 from selfmodel.robot.robot import Robot
@@ -100,7 +102,8 @@ def recover_once(name: str, case: int, seed: int, out: Path) -> Facts:
             robot=robot,
             case=case,
             truth=parse(ROBOTS[name].cases[case], robot.anatomy),
-            comparator=FORWARD_DISPLACEMENT,
+            choose_comparator=comparator_choice(FORWARD_DISPLACEMENT),
+            kinds=PAPER_KINDS,
             settings=Settings(),
             seed=seed,
             threads=1,

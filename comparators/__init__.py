@@ -24,8 +24,19 @@ COMPARATORS: Mapping[str, Comparator] = {
 }
 """All comparators of selfmodel, by name."""
 
-DEFAULT = SEGMENT_PREDICTION
-"""The comparator of a diagnosis if none is given."""
+PREFERENCE: tuple[Comparator, ...] = (
+    SEGMENT_PREDICTION,
+    SEGMENT_PREDICTION_ONBOARD,
+    NOISY_TRANSFER,
+    SENSOR_SERIES,
+)
+"""Comparators that ``auto`` chooses from, right most often across a reality gap first.
+
+They can judge every trial that the other comparators can judge. Source: the rates of right
+diagnoses in ``docs/results/comparators.md``."""
+
+DEFAULT = PREFERENCE[0]
+"""The comparator of trials with all signals."""
 
 __all__ = [
     "COMPARATORS",
@@ -34,6 +45,7 @@ __all__ = [
     "GAIT_PATTERN",
     "NOISY_TRANSFER",
     "PAPER_SENSORS",
+    "PREFERENCE",
     "SEGMENT_PREDICTION",
     "SEGMENT_PREDICTION_ONBOARD",
     "SENSOR_SERIES",

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.errors import InputError
+from selfmodel.diagnosis.comparator import TrialRefusedError
 from selfmodel.simulation.requests import ClosedLoop
 from selfmodel.trials.behaviour import Behaviour, forward_displacement
 from selfmodel.trials.trial import Trial
@@ -31,12 +31,13 @@ class ForwardDisplacement:
         """Returns the displacement of the trial.
 
         Raises:
-            InputError: The base's position is unknown at the first or the last step.
+            TrialRefusedError: The base's position is unknown at the first or the last step.
         """
         if not np.isfinite(trial.displacement):
-            raise InputError(
+            raise TrialRefusedError(
                 f"{trial.path}: {self.name} needs base_position at the first and the last step, "
-                f"and the log does not have it: leave this log out, or give another comparator"
+                f"and the log does not have it",
+                "leave this log out, or give another comparator",
             )
         return PreparedDisplacement(trial.displacement)
 

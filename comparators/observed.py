@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from selfmodel.errors import InputError
+from selfmodel.diagnosis.comparator import TrialRefusedError
 from selfmodel.trials.signals import Signal
 from selfmodel.trials.trial import Trial
 
@@ -20,13 +20,14 @@ def observed_signals(
         comparator: Name of the comparator, for the error.
 
     Raises:
-        InputError: The trial has none of the signals.
+        TrialRefusedError: The trial has none of the signals.
     """
     wanted = tuple(signals)
     found = tuple(signal for signal in wanted if np.isfinite(trial.behaviour[signal]).any())
     if not found:
-        raise InputError(
+        raise TrialRefusedError(
             f"{trial.path}: {comparator} needs at least one of {', '.join(wanted)}, and the log "
-            f"has none of them: leave this log out, or give another comparator"
+            f"has none of them",
+            "leave this log out, or give another comparator",
         )
     return found

@@ -14,7 +14,7 @@ from selfmodel.comparators.encoder_motion import (
     logged_motion,
 )
 from selfmodel.comparators.sensor_noise_level import noise_level_loss
-from selfmodel.errors import InputError
+from selfmodel.diagnosis.comparator import TrialRefusedError
 from selfmodel.simulation.requests import Segments, command_steps, cut_segments
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signal_difference import difference
@@ -78,7 +78,7 @@ class SegmentPrediction:
         """Returns the segments of the trial and the logged values to compare them with.
 
         Raises:
-            InputError: The trial is too short, or has too few observations.
+            TrialRefusedError: The trial is too short, or has too few observations.
         """
         behaviour, horizon = trial.behaviour, self.horizon
         states = estimated_states(behaviour, self.state)
@@ -103,9 +103,10 @@ class SegmentPrediction:
         """Returns the steps at which segments begin, and a mask of those without a late step."""
         behaviour, horizon = trial.behaviour, self.horizon
         if behaviour.steps < MIN_SEGMENTS * horizon + 1:
-            raise InputError(
+            raise TrialRefusedError(
                 f"{trial.path}: {self.name} needs {MIN_SEGMENTS * horizon + 1} steps or more, "
-                f"and the trial has {behaviour.steps}: leave this log out"
+                f"and the trial has {behaviour.steps}",
+                "leave this log out",
             )
         count = min(self.max_segments, (behaviour.steps - 1) // horizon)
         starts = np.linspace(0, behaviour.steps - 1 - horizon, count).round().astype(np.intp)
@@ -118,16 +119,17 @@ class SegmentPrediction:
         steady = _all_finite(behaviour.steady_commands, starts, horizon)
         if np.sum(usable & steady) < MIN_SEGMENTS:
             if usable.sum() >= MIN_SEGMENTS:
-                raise InputError(
+                raise TrialRefusedError(
                     f"{trial.path}: {self.name} needs {MIN_SEGMENTS} or more segments of {horizon} "
-                    f"steps in which none was late, and the log does not have them: have the robot "
-                    f"keep its control time step, or leave this log out"
+                    f"steps in which none was late, and the log does not have them",
+                    "have the robot keep its control time step, or leave this log out",
                 )
             lacking = [signal for signal, steps in known.items() if steps.sum() < MIN_SEGMENTS]
-            raise InputError(
+            raise TrialRefusedError(
                 f"{trial.path}: {self.name} needs {', '.join(lacking or self.state)} at "
                 f"{MIN_SEGMENTS} or more of {count} moments of the trial, and the log does not "
-                f"have it: give a comparator that needs fewer signals, or leave this log out"
+                f"have it",
+                "give a comparator that needs fewer signals, or leave this log out",
             )
         return starts[usable], steady[usable]
 

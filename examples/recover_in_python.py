@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT
+from selfmodel.experiments.arguments import comparator_choice
 from selfmodel.faults.notation import parse
 from selfmodel.logs.journal import create_journal
 from selfmodel.logs.physical_trial import TrialRunner
@@ -27,7 +28,7 @@ def main(folder: Path) -> None:
         healthy=SimulatedRobot(robot),  # or any object with PhysicalRobot's `run`
         damaged=SimulatedRobot(robot, truth),
         simulator=Simulator(robot, threads=2),
-        comparator=FORWARD_DISPLACEMENT,
+        choose_comparator=comparator_choice(FORWARD_DISPLACEMENT),
         run_trial=TrialRunner(journal.trials, robot, settings),
         journal=journal,
         settings=settings,

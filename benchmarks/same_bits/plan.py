@@ -26,6 +26,9 @@ COMPARATORS = (
     "segment-prediction",
     "segment-prediction-onboard",
 )
+PAPER = ("--kinds", "break,jam,sensor")
+"""The kinds of version 0.1 by default, which has no names of sets."""
+
 KINDS = (
     "break,jam,sensor,jam-angle,motor,sensor-gain,sensor-bias,sensor-noise,"
     "friction,slope,roughness,wind,crosswind"
@@ -110,7 +113,7 @@ def _trials() -> Iterator[Scenario]:
 def _diagnoses() -> Iterator[Scenario]:
     for robot in ROBOTS:
         before, after = _before_and_after(robot)
-        full = ("diagnose", "before.mcap", "after.mcap", *COMMON)
+        full = ("diagnose", "before.mcap", "after.mcap", *PAPER, *COMMON)
         yield Scenario(
             f"diagnoses/{robot}",
             {
@@ -118,7 +121,7 @@ def _diagnoses() -> Iterator[Scenario]:
                 "after": after,
                 "default": full,
                 "uncalibrated": (*full, "--no-calibrate"),
-                "without-healthy": ("diagnose", "after.mcap", *COMMON),
+                "without-healthy": ("diagnose", "after.mcap", *PAPER, *COMMON),
             },
         )
         yield Scenario(
@@ -136,8 +139,18 @@ def _diagnoses() -> Iterator[Scenario]:
         yield Scenario(
             f"diagnoses/{robot}-comparators",
             {
-                "recover": ("recover", robot, "--case", "6", *TINY, *COMMON, "--out", "run"),
-                **{name: (*diagnose, "--comparator", name) for name in COMPARATORS},
+                "recover": (
+                    "recover",
+                    robot,
+                    "--case",
+                    "6",
+                    *TINY,
+                    *PAPER,
+                    *COMMON,
+                    "--out",
+                    "run",
+                ),
+                **{name: (*diagnose, *PAPER, "--comparator", name) for name in COMPARATORS},
                 "kinds": (*diagnose, "--kinds", KINDS),
             },
         )
@@ -152,7 +165,7 @@ def _before_and_after(robot: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def _recover(robot: str, *options: str) -> dict[str, tuple[str, ...]]:
-    return {"recover": ("recover", robot, *options, "--out", "run", "--json")}
+    return {"recover": ("recover", robot, *options, *PAPER, "--out", "run", "--json")}
 
 
 def _recoveries() -> Iterator[Scenario]:

@@ -9,7 +9,7 @@ import typer
 from selfmodel.cli import inputs
 from selfmodel.cli.options import (
     CONTROLLER,
-    DEFAULT_KINDS,
+    DEFAULT_KIND_NAMES,
     STUDY,
     Cases,
     ComparatorNames,
@@ -36,6 +36,7 @@ from selfmodel.experiments.ablation import Ablation, AblationResults, ablate as 
 from selfmodel.experiments.ablation.results import as_dict
 from selfmodel.experiments.ablation.scores import ComparatorScore
 from selfmodel.experiments.confidence_intervals import Interval
+from selfmodel.faults.registry import kind_names
 from selfmodel.recovery.fitness import DISPLACEMENT
 from selfmodel.settings import Settings
 from selfmodel.simulation.threads import thread_count
@@ -50,7 +51,7 @@ def ablate(
     ] = "all",
     cases: Cases = "all",
     damages: Damages = "",
-    kinds: KindNames = DEFAULT_KINDS,
+    kinds: KindNames = DEFAULT_KIND_NAMES,
     comparators: ComparatorNames = "all",
     gaps: GapLevels = "0",
     structure: Structural = False,
@@ -103,7 +104,7 @@ def ablate(
         robots=inputs.texts("--robots", robots, ROBOTS),
         cases=None if cases == "all" else numbers,
         damages=[damage.strip() for damage in damages.split(",") if damage.strip()],
-        kinds=kinds,
+        kinds=kind_names(kinds),
         structure=structure,
         comparators=inputs.texts("--comparator", comparators, COMPARATORS),
         gaps=inputs.numbers("--gap", gaps),

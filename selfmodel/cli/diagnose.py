@@ -9,7 +9,7 @@ from typing import Any
 from selfmodel.cli.confirmation import confirm_time
 from selfmodel.cli.options import (
     DEFAULT_BUDGET,
-    DEFAULT_KINDS,
+    DEFAULT_KIND_NAMES,
     Calibrated,
     ComparatorName,
     FileBudget,
@@ -33,10 +33,10 @@ from selfmodel.cli.output.ranking import (
     ranking_table,
 )
 from selfmodel.cli.output.tables import print_tables
-from selfmodel.comparators import DEFAULT
 from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
 from selfmodel.experiments import plugins, trial_logs
+from selfmodel.experiments.arguments import AUTO, comparator_choice
 from selfmodel.experiments.expected_time import diagnosis_seconds
 from selfmodel.experiments.log_diagnosis import by_stage, set_up_diagnosis
 from selfmodel.logs import TrialLog
@@ -49,8 +49,8 @@ def diagnose(
     files: LogFiles,
     *,
     robot: SelfModel = None,
-    comparator: ComparatorName = DEFAULT.name,
-    kinds: KindNames = DEFAULT_KINDS,
+    comparator: ComparatorName = AUTO,
+    kinds: KindNames = DEFAULT_KIND_NAMES,
     calibrate: Calibrated = True,
     population: LoggedPopulation = None,
     generations: LoggedGenerations = None,
@@ -66,7 +66,7 @@ def diagnose(
     trials from before the failure, and the hypotheses predict all others.
     """
     start = perf_counter()
-    judge = plugins.comparator(comparator)
+    choice = comparator_choice(comparator)
     considered = plugins.kinds(kinds)
     allowed = Budget.parse(budget)
     logs = trial_logs.logs(files, allowed)
@@ -79,7 +79,7 @@ def diagnose(
         failed,
         healthy,
         robot=model,
-        comparator=judge,
+        choose_comparator=choice,
         kinds=considered,
         settings=_settings(first.settings, population, generations),
         seed=seed,
@@ -93,12 +93,14 @@ def diagnose(
     found = set_up(calibrate=calibrate)
     print_notes(*(f"note: {note}" for note in _notes(used)))
     with display() as on_event:
+        on_event(found.comparator)
         if found.calibration is not None:
             on_event(found.calibration)
         diagnosis = diagnose_trials(found.damaged, found.search, found.seed, on_event)
     result = {
         "robot": model.name,
-        "comparator": judge.name,
+        "comparator": found.comparator.comparator.name,
+        "comparator_reason": found.comparator.reason,
         "kinds": [kind.name for kind in considered],
         "seed": found.seed,
         "settings_from": first.trial.path,
@@ -160,6 +162,7 @@ def _print(result: dict[str, Any]) -> None:
         f"{result['robot']}, {counted(len(result['logs']), 'log')}, "
         f"{result['comparator']}: {result['evaluations']} evaluations by the EA, "
         f"{result['distinct_hypotheses']} distinct hypotheses, {result['seconds']:.1f} s.",
+        f"Comparator {result['comparator']}: {result['comparator_reason']}.",
         confidence_sentence(result),
         fit_sentence(result),
         *detectable_sentences(result),

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from selfmodel.errors import InputError
-from selfmodel.faults.registry import ALL_KINDS, PAPER_KINDS
+from selfmodel.faults.registry import ALL_KINDS, DEFAULT_KINDS, KIND_SETS, PAPER_KINDS
 from selfmodel.sandbox.budget import Budget
 from selfmodel.trials.trial import STAGES
 
@@ -21,7 +21,8 @@ DIAGNOSIS = "Diagnosis"
 SEARCH = "Search"
 STUDY = "Study"
 
-DEFAULT_KINDS = ",".join(kind.name for kind in PAPER_KINDS)
+DEFAULT_KIND_NAMES = ",".join(kind.name for kind in DEFAULT_KINDS)
+PAPER_KIND_NAMES = ",".join(kind.name for kind in PAPER_KINDS)
 
 RobotName = Annotated[
     str,
@@ -194,7 +195,8 @@ ComparatorName = Annotated[
     str,
     typer.Option(
         metavar="NAME",
-        help="Comparator of simulations with logged trials; or package.module:object.",
+        help="Comparator of simulations with logged trials: auto, the best that the logs allow; a "
+        "name; or package.module:object.",
         rich_help_panel=DIAGNOSIS,
     ),
 ]
@@ -221,7 +223,7 @@ KindNames = Annotated[
         "--kinds",
         metavar="KIND,...",
         help=f"Fault kinds to search: {', '.join(kind.name for kind in ALL_KINDS)}, "
-        "package.module:object, or all.",
+        f"package.module:object; or their sets: {', '.join(KIND_SETS)}.",
         rich_help_panel=DIAGNOSIS,
     ),
 ]

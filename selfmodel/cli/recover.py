@@ -10,7 +10,7 @@ import typer
 from selfmodel.cli import inputs
 from selfmodel.cli.options import (
     DEFAULT_BUDGET,
-    DEFAULT_KINDS,
+    DEFAULT_KIND_NAMES,
     Calibrated,
     Case,
     ComparatorName,
@@ -37,9 +37,9 @@ from selfmodel.cli.options import (
 from selfmodel.cli.output.display import displacement_text, display
 from selfmodel.cli.output.printing import print_json, print_notes
 from selfmodel.cli.output.report import facts, print_report, result_file
-from selfmodel.comparators import DEFAULT
 from selfmodel.controllers.controller import check_silent_neurons
 from selfmodel.experiments import plugins, robots
+from selfmodel.experiments.arguments import AUTO, comparator_choice
 from selfmodel.experiments.chosen_score import choose_score
 from selfmodel.experiments.experiment import Experiment, run
 from selfmodel.faults.hypothesis import INTACT
@@ -60,11 +60,11 @@ def recover(
     case: Case = None,
     damage: Damage = None,
     model_settings: ModelSettings = None,
-    comparator: ComparatorName = DEFAULT.name,
+    comparator: ComparatorName = AUTO,
     calibrate: Calibrated = True,
     gap: GapLevel = 0.0,
     structure: Structural = False,
-    kinds: KindNames = DEFAULT_KINDS,
+    kinds: KindNames = DEFAULT_KIND_NAMES,
     next_trial: NextTrialName = "repair",
     controller: ControllerKind = "network",
     neurons: Neurons = None,
@@ -115,7 +115,7 @@ def recover(
         robot=made,
         case=case,
         truth=truth,
-        comparator=plugins.comparator(comparator),
+        choose_comparator=comparator_choice(comparator),
         kinds=considered,
         calibrated=calibrate,
         settings=settings,

@@ -10,6 +10,22 @@ from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.trial import Trial
 
 
+class TrialRefusedError(InputError):
+    """A comparator cannot judge a trial, which lacks signals or steps.
+
+    Attributes:
+        reason: The trial, the requirement of the comparator and the content of the trial.
+
+    Args:
+        reason: As the attribute.
+        remedy: Advice, after a colon in the message.
+    """
+
+    def __init__(self, reason: str, remedy: str = "") -> None:
+        super().__init__(f"{reason}: {remedy}" if remedy else reason)
+        self.reason = reason
+
+
 @runtime_checkable
 class PreparedTrial(Protocol):
     """A logged trial prepared for comparison, made by ``Comparator.prepare``.
@@ -101,7 +117,8 @@ class Comparator(Protocol):
         The result depends on the trial alone.
 
         Raises:
-            InputError: The trial lacks a required signal; the message names the signal.
+            TrialRefusedError: The trial lacks a required signal; the message names the signal. Any
+                other ``InputError`` counts as this.
         """
         ...
 

@@ -16,18 +16,16 @@ from selfmodel.diagnosis.comparator import (
     TimedTrial,
     as_comparator,
 )
+from selfmodel.diagnosis.preparation import contract_error, prepared_trial
 from selfmodel.diagnosis.search_cost import steps_of
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.robot.base.known_base import BASE_SIGNALS, completed_trial
 from selfmodel.simulation.batch_memory import largest_batch
 from selfmodel.simulation.cache import Cache
 from selfmodel.simulation.outcome import SimulationResult
-from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments, recordable
+from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
-from selfmodel.trials.magnitudes import check_magnitudes
-from selfmodel.trials.signals import Signal
 from selfmodel.trials.trial import Trial
 from selfmodel.trials.trial_part import TrialPart, whole
 
@@ -164,29 +162,8 @@ class Evidence:
     def _prepare(self, trial: Trial) -> PreparedTrial:
         key = _key(trial)
         if key not in self._prepared:
-            # Numbers that are too large for arithmetic are refused by name, after the preparation.
-            with np.errstate(over="ignore", invalid="ignore"):
-                known = completed_trial(self._simulator.robot, trial)
-                prepared = self._checked(self._comparator.prepare(known))
-            check_magnitudes(trial, _compared_signals(prepared.request))
-            self._prepared[key] = prepared
+            self._prepared[key] = prepared_trial(self._comparator, self._simulator.robot, trial)
         return self._prepared[key]
-
-    def _checked(self, prepared: PreparedTrial) -> PreparedTrial:
-        if not isinstance(prepared, PreparedTrial):
-            raise self._contract_error(f"prepared {prepared!r}, which is no PreparedTrial")
-        possible = recordable(prepared.request)
-        record = prepared.request.record
-        if not record or not set(record) <= set(possible):
-            raise self._contract_error(
-                f"requested the signals {record!r}, of {', '.join(possible)}"
-            )
-        if self._simulator.robot.has_fixed_base and set(record) <= set(BASE_SIGNALS):
-            raise InputError(
-                f"{self._comparator.name} compares the motion of the base, and the base of "
-                f"{self._simulator.robot.name} is fixed: give the comparator segment-prediction"
-            )
-        return prepared
 
     def _part_rows(
         self, hypotheses: Sequence[Hypothesis], trial: Trial | TrialPart
@@ -229,8 +206,9 @@ class Evidence:
             losses = self._compare(prepared, result.behaviour, len(hypotheses))
         wrong = losses[~((losses >= 0) | diverged)]
         if len(wrong):
-            raise self._contract_error(
-                f"returned a distance that is not a number of at least 0: {wrong[0]}"
+            raise contract_error(
+                self._comparator,
+                f"returned a distance that is not a number of at least 0: {wrong[0]}",
             )
         return np.where(diverged, np.inf, losses)
 
@@ -238,28 +216,16 @@ class Evidence:
         if isinstance(prepared, PiecewiseTrial):
             losses = np.asarray(prepared.losses(simulated))
             if losses.ndim != 2 or len(losses) != count or not losses.shape[1]:
-                raise self._contract_error(
-                    f"returned losses {losses.shape} for {count} simulations"
+                raise contract_error(
+                    self._comparator, f"returned losses {losses.shape} for {count} simulations"
                 )
             return losses
         distances = np.asarray(prepared.distances(simulated))
         if distances.shape != (count,):
-            raise self._contract_error(
-                f"returned {distances.shape} distances for {count} simulations"
+            raise contract_error(
+                self._comparator, f"returned {distances.shape} distances for {count} simulations"
             )
         return np.asarray(distances[:, np.newaxis])
-
-    def _contract_error(self, problem: str) -> InputError:
-        return InputError(
-            f"the comparator {self._comparator.name!r} {problem}: run "
-            f"selfmodel.diagnosis.comparator_contract.check_comparator on it"
-        )
-
-
-def _compared_signals(request: Request) -> tuple[Signal, ...]:
-    """Returns the signals of a trial that a comparison depends on, each once."""
-    states = (*request.states, "commands") if isinstance(request, Segments) else ()
-    return tuple(dict.fromkeys((*states, *request.record)))
 
 
 def simulate(

@@ -4,18 +4,18 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from selfmodel.comparators import DEFAULT
 from selfmodel.controllers.command_source import CommandSource
 from selfmodel.controllers.controller import Controller, Design
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.experiments import plugins
 from selfmodel.experiments.arguments import (
+    AUTO,
     KindSource,
     RobotSource,
     TrialSource,
     check_seed,
-    comparator_of,
+    comparator_choice,
     hypothesis_of,
     kinds_of,
     robot_of,
@@ -25,8 +25,8 @@ from selfmodel.experiments.arguments import (
 from selfmodel.experiments.chosen_score import check_motion
 from selfmodel.experiments.fitting import fitted
 from selfmodel.experiments.log_diagnosis import set_up_diagnosis
-from selfmodel.faults import PAPER_KINDS
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.logs import physical_trial
 from selfmodel.logs.journal import create_journal
 from selfmodel.logs.records import TrialHeader
@@ -245,8 +245,8 @@ def diagnose(
     *,
     healthy: TrialSource | Sequence[TrialSource] = (),
     robot: RobotSource | None = None,
-    comparator: str | Comparator = DEFAULT,
-    kinds: KindSource = PAPER_KINDS,
+    comparator: str | Comparator = AUTO,
+    kinds: KindSource = DEFAULT_KINDS,
     settings: Settings | None = None,
     calibrate: bool = True,
     seed: int | None = None,
@@ -273,8 +273,10 @@ def diagnose(
             them, and the verdict compares with them.
         robot: The nominal robot, its name, or the path of its MJCF or URDF file; None for the
             model in the logs.
-        comparator: A comparator, its name, or ``package.module:object``.
-        kinds: Fault kinds to search, or their names, in a sequence or separated by commas.
+        comparator: A comparator, its name, or ``package.module:object``; ``auto`` for the best
+            that the trials allow.
+        kinds: Fault kinds to search, or names of kinds and of their sets, in a sequence or
+            separated by commas.
         settings: Parameters of the search; None for those in the first log.
         calibrate: Whether the self-model is fitted to the healthy trials.
         seed: Seed of all random numbers; None for that of the first trial.
@@ -291,7 +293,7 @@ def diagnose(
         sources_of(trials),
         sources_of(healthy),
         robot=None if robot is None else robot_of(robot),
-        comparator=comparator_of(comparator),
+        choose_comparator=comparator_choice(comparator),
         kinds=kinds_of(kinds),
         settings=settings,
         seed=seed,
@@ -299,6 +301,7 @@ def diagnose(
         threads=threads,
         budget=budget,
     )
+    on_event(found.comparator)
     if found.calibration is not None:
         on_event(found.calibration)
     return diagnose_trials(found.damaged, found.search, found.seed, on_event)
@@ -310,8 +313,8 @@ def recover(
     robot: RobotSource,
     folder: str | Path,
     *,
-    comparator: str | Comparator = DEFAULT,
-    kinds: KindSource = PAPER_KINDS,
+    comparator: str | Comparator = AUTO,
+    kinds: KindSource = DEFAULT_KINDS,
     settings: Settings | None = None,
     design: str | Design = "network",
     calibrate: bool = True,
@@ -340,8 +343,10 @@ def recover(
         robot: The nominal robot, its name, or the path of its MJCF or URDF file; the self-model is
             made from it.
         folder: Folder of the run, new or empty: every trial's log and every diagnosis.
-        comparator: A comparator, its name, or ``package.module:object``.
-        kinds: Fault kinds to search, or their names, in a sequence or separated by commas.
+        comparator: A comparator, its name, or ``package.module:object``; ``auto`` for the best
+            that the trials allow.
+        kinds: Fault kinds to search, or names of kinds and of their sets, in a sequence or
+            separated by commas.
         settings: Parameters of the recovery; the paper's by default.
         design: Name of a controller design, such as ``network`` or ``cpg``, or a design.
         calibrate: Whether the self-model is fitted to the trial before the failure.
@@ -365,7 +370,7 @@ def recover(
         healthy=healthy,
         damaged=damaged,
         simulator=Simulator(robot, count),
-        comparator=comparator_of(comparator),
+        choose_comparator=comparator_choice(comparator),
         run_trial=physical_trial.TrialRunner(journal.trials, robot, chosen),
         journal=journal,
         settings=chosen,

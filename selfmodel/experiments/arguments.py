@@ -1,9 +1,16 @@
 """Arguments of the public functions: objects from names, notation and paths."""
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
+from selfmodel.comparators import PREFERENCE
 from selfmodel.diagnosis.comparator import Comparator
+from selfmodel.diagnosis.comparator_choice import (
+    ComparatorChoice,
+    best_comparator,
+    given_comparator,
+)
 from selfmodel.errors import InputError
 from selfmodel.experiments import plugins, trial_logs
 from selfmodel.experiments.robots import is_model, robot_entry
@@ -15,6 +22,9 @@ from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.trials.trial import Trial
+
+AUTO = "auto"
+"""Name of the choice of the best comparator that all trials allow."""
 
 RobotSource = Robot | str | Path
 """A robot, its name, or the path of its MJCF or URDF file."""
@@ -105,13 +115,17 @@ def hypothesis_of(source: Hypothesis | str, robot: Robot) -> Hypothesis:
     return parse_hypothesis(source, robot)
 
 
-def comparator_of(source: Comparator | str) -> Comparator:
-    """Returns a comparator, given as itself or by name.
+def comparator_choice(source: Comparator | str) -> ComparatorChoice:
+    """Returns the choice of a comparator, given as itself, by name, or as ``auto``.
 
     Raises:
         InputError: The name is unknown, or its object is no comparator.
     """
-    return plugins.comparator(source) if isinstance(source, str) else source
+    if not isinstance(source, str):
+        return partial(given_comparator, source, PREFERENCE)
+    if source == AUTO:
+        return partial(best_comparator, PREFERENCE)
+    return partial(given_comparator, plugins.comparator(source), PREFERENCE)
 
 
 def kinds_of(source: KindSource) -> tuple[FaultKind, ...]:

@@ -7,14 +7,14 @@ from pathlib import Path
 from time import perf_counter
 
 from selfmodel.controllers.controller import Controller, Design
-from selfmodel.diagnosis.comparator import Comparator
+from selfmodel.diagnosis.comparator_choice import ComparatorChoice
 from selfmodel.experiments.fitting import fitted
 from selfmodel.experiments.plugins import NEXT_TRIAL
 from selfmodel.experiments.reality import draw_reality
 from selfmodel.experiments.scoring import is_correct
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import FaultKind
-from selfmodel.faults.registry import PAPER_KINDS
+from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.logs.journal import create_journal
 from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.physical.interface import PhysicalRobot
@@ -35,7 +35,7 @@ class Experiment:
         robot: The nominal robot.
         case: Number of the failure in Table I; None for a failure that is not in it.
         truth: Faults of the physical robot after the failure.
-        comparator: The comparator.
+        choose_comparator: Chooses the comparator from the first trials.
         settings: Parameters of the recovery.
         seed: Seed of all random numbers.
         threads: Number of threads of the physics.
@@ -55,7 +55,7 @@ class Experiment:
     robot: Robot
     case: int | None
     truth: Hypothesis
-    comparator: Comparator
+    choose_comparator: ComparatorChoice
     settings: Settings
     seed: int
     threads: int
@@ -63,7 +63,7 @@ class Experiment:
     gait: Controller | None = None
     gap: float = 0.0
     structure: bool = False
-    kinds: tuple[FaultKind, ...] = PAPER_KINDS
+    kinds: tuple[FaultKind, ...] = DEFAULT_KINDS
     calibrated: bool = True
     next_trial: str = "repair"
     design: Design | None = None
@@ -103,7 +103,7 @@ def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
         healthy=healthy,
         damaged=damaged,
         simulator=simulator,
-        comparator=experiment.comparator,
+        choose_comparator=experiment.choose_comparator,
         run_trial=TrialRunner(
             journal.trials,
             robot,

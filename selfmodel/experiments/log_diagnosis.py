@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from selfmodel.diagnosis.comparator import Comparator
+from selfmodel.diagnosis.comparator_choice import ChosenComparator, ComparatorChoice
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.errors import InputError
 from selfmodel.experiments import trial_logs
@@ -27,6 +27,7 @@ class LogDiagnosis:
     Attributes:
         damaged: Trials to explain, in the order in which they were run.
         healthy: Trials of the healthy robot.
+        comparator: The comparator, and the reason for its choice.
         calibration: Fit of the self-model to the healthy trials; None without a fit.
         search: The diagnostic EA.
         seed: Seed of all random numbers.
@@ -34,6 +35,7 @@ class LogDiagnosis:
 
     damaged: tuple[Trial, ...]
     healthy: tuple[Trial, ...]
+    comparator: ChosenComparator
     calibration: Calibration | None
     search: DiagnosticSearch
     seed: int
@@ -44,7 +46,7 @@ def set_up_diagnosis(
     healthy: Sequence[TrialSource] = (),
     *,
     robot: Robot | None,
-    comparator: Comparator,
+    choose_comparator: ComparatorChoice,
     kinds: Sequence[FaultKind],
     settings: Settings | None,
     seed: int | None,
@@ -59,7 +61,7 @@ def set_up_diagnosis(
             if there are trials of other stages.
         healthy: Trials of the healthy robot.
         robot: The nominal robot; None for the model in the logs.
-        comparator: The comparator.
+        choose_comparator: Chooses the comparator, before the calibration.
         kinds: Fault kinds to search.
         settings: Parameters of the search; None for those in the first log to explain, or the
             defaults for a trial without a log.
@@ -70,7 +72,7 @@ def set_up_diagnosis(
 
     Raises:
         InputError: There are no trials, a log is unusable, or a trial has no log and no robot is
-            given.
+            given, or no comparator can judge all trials.
     """
     if not trials:
         raise InputError("expected at least one trial to explain, got none")
@@ -91,14 +93,16 @@ def set_up_diagnosis(
     first = to_explain[0]
     if settings is None:
         settings = read[first.path].settings if first.path in read else Settings()
+    chosen = choose_comparator(nominal, [*reference, *to_explain])
     count = thread_count(threads)
     fit = fitted(nominal, reference, count) if calibrate and reference else None
     simulator = Simulator(fit.robot if fit else nominal, count, budget=budget)
     return LogDiagnosis(
         damaged=tuple(to_explain),
         healthy=tuple(reference),
+        comparator=chosen,
         calibration=fit,
-        search=DiagnosticSearch(simulator, comparator, settings, kinds, intact=reference),
+        search=DiagnosticSearch(simulator, chosen.comparator, settings, kinds, intact=reference),
         seed=first.plan.seed if seed is None else seed,
     )
 

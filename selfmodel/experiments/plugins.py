@@ -15,7 +15,7 @@ from selfmodel.controllers.controller import Design
 from selfmodel.diagnosis.comparator import Comparator, as_comparator
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.faults.kind import FaultKind
-from selfmodel.faults.registry import ALL_KINDS, KINDS
+from selfmodel.faults.registry import ALL_KINDS, KIND_SETS, KINDS, kind_names
 from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.next_trial import NextTrial, by_disagreement, by_repair
 from selfmodel.recovery.tracking import TRACKING
@@ -67,17 +67,15 @@ def kinds(names: str) -> tuple[FaultKind, ...]:
     """Returns fault kinds by name.
 
     Args:
-        names: Names separated by commas: of fault kinds of selfmodel, of entry points in the group
-            ``selfmodel.fault_kinds``, or ``package.module:object``; ``all`` is every fault kind of
-            selfmodel.
+        names: Names separated by commas: of fault kinds of selfmodel, of their sets in
+            ``KIND_SETS``, of entry points in the group ``selfmodel.fault_kinds``, or
+            ``package.module:object``.
 
     Raises:
         InputError: A name is unknown, an object is no fault kind, or two fault kinds have the same
             name or notation.
     """
-    chosen: list[FaultKind] = []
-    for name in (name.strip() for name in names.split(",")):
-        chosen += ALL_KINDS if name == "all" else [_kind(name)]
+    chosen = [_kind(name) for name in kind_names(names).split(",")]
     taken: dict[object, FaultKind] = {}
     for kind in (*KINDS.values(), *chosen):
         for key in (kind.name, (kind.keyword, kind.prefix, kind.severity_bounds is None)):
@@ -93,7 +91,7 @@ def _kind(name: str) -> FaultKind:
     own = {kind.name: kind for kind in ALL_KINDS}
     if name in own:
         return own[name]
-    found = _plug_in("kind", name, FAULT_KIND_GROUP, (*own, "all"))
+    found = _plug_in("kind", name, FAULT_KIND_GROUP, (*own, *KIND_SETS))
     if not isinstance(found, FaultKind):
         raise InputError(
             f"{name!r} is no kind: expected a selfmodel.faults.FaultKind, got {found!r}"

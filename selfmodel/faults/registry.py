@@ -25,8 +25,45 @@ KINDS: Mapping[str, FaultKind] = {
 PAPER_KINDS: tuple[FaultKind, ...] = (BROKEN, JAMMED, FAILED_SENSOR)
 """Kinds of the paper's diagnosis, in the order of its genome."""
 
+BODY_KINDS: tuple[FaultKind, ...] = (BROKEN, JAMMED, JAMMED_AT_ANGLE, FAILED_SENSOR, WEAK_MOTOR)
+"""Kinds of faults of the robot itself that are common."""
+
+ENVIRONMENT_KINDS: tuple[FaultKind, ...] = (FRICTION, SLOPE, WIND)
+"""Kinds of changes of the robot's environment that are common."""
+
 ALL_KINDS: tuple[FaultKind, ...] = tuple(kind for kind in KINDS.values() if kind.searchable)
 """All built-in kinds that a diagnosis may propose."""
+
+KIND_SETS: Mapping[str, tuple[FaultKind, ...]] = {
+    "paper": PAPER_KINDS,
+    "body": BODY_KINDS,
+    "environment": ENVIRONMENT_KINDS,
+    "default": (*BODY_KINDS, *ENVIRONMENT_KINDS),
+    "all": ALL_KINDS,
+}
+"""Sets of kinds, by the names that ``--kinds`` accepts in place of their kinds."""
+
+DEFAULT_KINDS: tuple[FaultKind, ...] = KIND_SETS["paper"]
+"""Kinds that a diagnosis, a recovery or an ablation searches if none are given."""
+
+
+def kind_names(names: str) -> str:
+    """Returns names of kinds with the names of sets replaced by those of their kinds.
+
+    Args:
+        names: Names of kinds and sets, separated by commas, as for ``--kinds``.
+
+    Returns:
+        Names of kinds, each once, separated by commas; unknown names are unchanged.
+    """
+    given = (name.strip() for name in names.split(","))
+    return ",".join(
+        dict.fromkeys(
+            single
+            for name in given
+            for single in ([kind.name for kind in KIND_SETS[name]] if name in KIND_SETS else [name])
+        )
+    )
 
 
 def notation_kinds(kinds: Iterable[FaultKind]) -> tuple[FaultKind, ...]:

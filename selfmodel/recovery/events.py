@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from selfmodel.diagnosis.comparator_choice import ChosenComparator
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.evolution import Generation
 from selfmodel.faults.hypothesis import Hypothesis
@@ -33,6 +34,14 @@ class DiscriminatingTrial:
     hypotheses: tuple[Hypothesis, ...]
 
 
-Event = SearchBegins | Generation | Calibration | DiscriminatingTrial | Trial | Diagnosis
-"""Start or generation of a search, calibration, start of the choice of a discriminating trial,
-finished trial, or diagnosis."""
+Event = (
+    SearchBegins
+    | Generation
+    | ChosenComparator
+    | Calibration
+    | DiscriminatingTrial
+    | Trial
+    | Diagnosis
+)
+"""Start or generation of a search, chosen comparator, calibration, start of the choice of a
+discriminating trial, finished trial, or diagnosis."""

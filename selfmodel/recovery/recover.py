@@ -7,13 +7,13 @@ from functools import partial
 from typing import Any
 
 from selfmodel.controllers.controller import Controller, Design
-from selfmodel.diagnosis.comparator import Comparator
+from selfmodel.diagnosis.comparator_choice import ChosenComparator, ComparatorChoice
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
-from selfmodel.faults.registry import PAPER_KINDS
+from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery.database import Database, Journal, RunTrial
 from selfmodel.recovery.events import Event, SearchBegins
@@ -40,6 +40,7 @@ class Recovery:
         repair_evaluations: Number of controllers that the repair EA evaluated.
         diagnostic_evaluations: Number of hypotheses that the diagnostic EA evaluated.
         distinct_hypotheses: Number of distinct hypotheses among them.
+        comparator: Comparator of the diagnoses, and the reason for its choice.
         calibration: Fit of the self-model to the trials before the failure; None without one.
         score: Score of the repair EA.
         scores: Score of each trial; those after the failure under the last diagnosis, which matters
@@ -52,6 +53,7 @@ class Recovery:
     repair_evaluations: int
     diagnostic_evaluations: int
     distinct_hypotheses: int
+    comparator: ChosenComparator
     calibration: Calibration | None = None
     score: Score = DISPLACEMENT
     scores: tuple[float, ...] = ()
@@ -139,7 +141,7 @@ def recover(
     healthy: PhysicalRobot,
     damaged: PhysicalRobot,
     simulator: Simulator,
-    comparator: Comparator,
+    choose_comparator: ComparatorChoice,
     run_trial: RunTrial,
     journal: Journal,
     settings: Settings,
@@ -147,7 +149,7 @@ def recover(
     on_event: Callable[[Event], None],
     gait: Controller | None = None,
     design: Design | None = None,
-    kinds: Sequence[FaultKind] = PAPER_KINDS,
+    kinds: Sequence[FaultKind] = DEFAULT_KINDS,
     calibrate: Callable[[Sequence[Trial]], Calibration] | None = None,
     next_trial: NextTrial = by_repair,
     score: Score = DISPLACEMENT,
@@ -158,7 +160,8 @@ def recover(
         healthy: Physical robot before the failure.
         damaged: Physical robot after the failure.
         simulator: Self-model.
-        comparator: Distance between the predictions of hypotheses and the logged trials.
+        choose_comparator: Chooses the comparator: checked with the trial before the failure, and
+            chosen with the failing trial as well.
         run_trial: Runs and logs a physical trial. The trial that ``run_trial`` returns is all that
             the algorithm observes of the robot.
         journal: Storage of the diagnoses.
@@ -210,6 +213,7 @@ def recover(
         gait = evolve_controller(INTACT)
     act(healthy, "before", INTACT, gait)
     healthy_trials = database.trials
+    choose_comparator(simulator.robot, healthy_trials)  # before the calibration and the failure
     calibration = calibrate(healthy_trials) if calibrate else None
     if calibration is not None:
         on_event(calibration)
@@ -218,8 +222,10 @@ def recover(
                 calibration.robot, simulator.threads, simulator.stats, simulator.budget
             )
             repair = RepairSearch(simulator, settings, design, repair.evaluations, score)
-    search = DiagnosticSearch(simulator, comparator, settings, kinds, intact=healthy_trials)
     act(damaged, "after", INTACT, gait)
+    chosen = choose_comparator(simulator.robot, database.trials)
+    on_event(chosen)
+    search = DiagnosticSearch(simulator, chosen.comparator, settings, kinds, intact=healthy_trials)
     for trials_left in range(settings.trials, 0, -1):
         best = diagnose().best
         situation = Situation(
@@ -241,6 +247,7 @@ def recover(
         repair_evaluations=repair.evaluations,
         diagnostic_evaluations=search.evaluations,
         distinct_hypotheses=search.distinct_hypotheses,
+        comparator=chosen,
         calibration=calibration,
         score=score,
         scores=tuple(

@@ -4,6 +4,7 @@ import pytest
 
 from selfmodel.comparators import DEFAULT
 from selfmodel.experiments import expected_time
+from selfmodel.experiments.arguments import comparator_choice
 from selfmodel.experiments.expected_time import (
     TIME_PER_STEP,
     calibration_seconds,
@@ -27,7 +28,7 @@ def planned(robot: Robot, population: int, threads: int = 1) -> LogDiagnosis:
         [after],
         [before],
         robot=robot,
-        comparator=DEFAULT,
+        choose_comparator=comparator_choice(DEFAULT),
         kinds=PAPER_KINDS,
         settings=Settings(generations=5).scaled(population),
         seed=0,

@@ -13,11 +13,19 @@ from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.kind_contract import check_fault_kind
 from selfmodel.errors import InputError
 from selfmodel.experiments import plugins, robots
+from selfmodel.experiments.arguments import kinds_of
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
 from selfmodel.faults.notation import parse
-from selfmodel.faults.registry import ALL_KINDS, KINDS, PAPER_KINDS, notation_kinds
+from selfmodel.faults.registry import (
+    ALL_KINDS,
+    KIND_SETS,
+    KINDS,
+    PAPER_KINDS,
+    kind_names,
+    notation_kinds,
+)
 from selfmodel.robot.anatomy.anatomy import Anatomy
 from selfmodel.robot.editing.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
@@ -154,10 +162,36 @@ def test_kinds_are_chosen_by_name(monkeypatch: pytest.MonkeyPatch):
     assert [kind.name for kind in plugins.kinds("jam,payload:PAYLOAD")] == ["jam", "payload"]
 
 
+def test_a_set_of_kinds_has_a_name_that_mixes_with_single_kinds():
+    paper = ("break", "jam", "sensor")
+
+    assert names_of("paper") == paper
+    assert names_of("paper,motor") == (*paper, "motor")
+    assert names_of("motor,paper,break") == ("motor", *paper)
+    assert names_of("default") == names_of("body,environment")
+    assert {"jam-angle", "motor"} <= set(names_of("body")) - set(names_of("environment"))
+    assert {"friction", "slope", "wind"} <= set(names_of("environment"))
+    assert set(names_of("default")) < set(names_of("all"))
+    assert kinds_of("paper") == kinds_of(["paper"]) == PAPER_KINDS
+    assert kind_names(" paper , motor,brake") == "break,jam,sensor,motor,brake"
+
+
+@pytest.mark.parametrize("name", KIND_SETS)
+def test_no_kind_has_the_name_of_a_set(name: str):
+    assert name not in KINDS
+
+
+def names_of(names: str) -> tuple[str, ...]:
+    """The names of the kinds that a text names."""
+    return tuple(kind.name for kind in plugins.kinds(names))
+
+
 @pytest.mark.parametrize(
     ("names", "said"),
     [
         ("brake", "unknown kind 'brake': did you mean break"),
+        ("papr", "unknown kind 'papr': did you mean paper"),
+        ("brake", "crosswind, paper, body, environment, default, all$"),
         ("", "unknown kind ''"),
         ("break,", "unknown kind ''"),
         ("neuron", "unknown kind 'neuron'"),

@@ -14,6 +14,7 @@ from selfmodel.controllers.command_source import make_batch
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError, TrialError
+from selfmodel.experiments.arguments import comparator_choice
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log
 from selfmodel.logs.journal import create_journal
@@ -260,7 +261,7 @@ def test_a_recovery_is_the_same_through_environments(tmp_path: Path):
             healthy=healthy,
             damaged=damaged,
             simulator=Simulator(QUADRUPED, 2),
-            comparator=FORWARD_DISPLACEMENT,
+            choose_comparator=comparator_choice(FORWARD_DISPLACEMENT),
             run_trial=TrialRunner(journal.trials, QUADRUPED, settings),
             journal=journal,
             settings=settings,

@@ -14,6 +14,7 @@ from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.evolution import Draw, Evolution, Generation
+from selfmodel.experiments.arguments import comparator_choice
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.notation import parse
@@ -104,7 +105,7 @@ def recovery(
         healthy=healthy,
         damaged=damaged,
         simulator=simulator,
-        comparator=FORWARD_DISPLACEMENT,
+        choose_comparator=comparator_choice(FORWARD_DISPLACEMENT),
         run_trial=in_memory(robot),
         journal=MemoryJournal(),
         settings=dataclasses.replace(BUDGET, trials=trials),
@@ -126,7 +127,8 @@ def test_a_recovery_tells_the_papers_story(robot: Robot):
     ]
 
     once = ["diagnostic", "Diagnosis", "repair", "Trial"]
-    assert story == ["repair", "Trial", "Trial", *once, *once, *once, "diagnostic", "Diagnosis"]
+    first = ["repair", "Trial", "Trial", "ChosenComparator"]
+    assert story == [*first, *once, *once, *once, "diagnostic", "Diagnosis"]
     stages = [trial.plan.stage for trial in outcome.trials]
     assert stages == ["before", "after", "recovery", "recovery", "recovery"]
     assert outcome.trials[0].plan.controller == outcome.trials[1].plan.controller
@@ -195,7 +197,7 @@ def test_the_truth_changes_a_diagnosis_only_through_what_the_robot_did(quadruped
             healthy=SimulatedRobot(quadruped),
             damaged=damaged,
             simulator=Simulator(quadruped, 2),
-            comparator=FORWARD_DISPLACEMENT,
+            choose_comparator=comparator_choice(FORWARD_DISPLACEMENT),
             run_trial=in_memory(quadruped),
             journal=MemoryJournal(),
             settings=dataclasses.replace(BUDGET, trials=1),
@@ -297,7 +299,7 @@ def recovery_in_files(
         healthy=SimulatedRobot(robot),
         damaged=SimulatedRobot(robot, truth),
         simulator=Simulator(robot, 2),
-        comparator=FORWARD_DISPLACEMENT,
+        choose_comparator=comparator_choice(FORWARD_DISPLACEMENT),
         run_trial=TrialRunner(journal.trials, robot, BUDGET, hidden).__call__,
         journal=SealedJournal(),
         settings=dataclasses.replace(BUDGET, trials=1),

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT
+from selfmodel.experiments.arguments import comparator_choice
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated_robot import SimulatedRobot
@@ -39,7 +40,7 @@ def evolved(robot: Robot, kind: str, next_trial: str = "repair") -> Recovery:
         healthy=SimulatedRobot(robot),
         damaged=SimulatedRobot(robot, parse("break:back_left_knee", robot.anatomy)),
         simulator=Simulator(robot, 1),
-        comparator=FORWARD_DISPLACEMENT,
+        choose_comparator=comparator_choice(FORWARD_DISPLACEMENT),
         run_trial=in_memory(robot),
         journal=MemoryJournal(),
         settings=FEW,

@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 import selfmodel
+from selfmodel.comparators import FORWARD_DISPLACEMENT
+from selfmodel.diagnosis.comparator_choice import ChosenComparator
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.recovery.recover import Recovery
@@ -45,6 +47,9 @@ def fit(quadruped: Robot) -> Calibration:
     return Calibration(quadruped, parameters, np.full(12, 0.15), 0.75, 0.5)
 
 
+CHOSEN = ChosenComparator(FORWARD_DISPLACEMENT, "given")
+
+
 def without_base(trial: Trial) -> Trial:
     behaviour = trial.behaviour
     unobserved = np.full_like(behaviour["base_position"], np.nan)
@@ -55,7 +60,7 @@ def without_base(trial: Trial) -> Trial:
 def test_an_unobserved_displacement_is_none_everywhere(trial: Trial):
     diagnosis = Diagnosis((Candidate(INTACT, 0.0),), 1, 0.0, (), "explained", "by hand")
     blind = without_base(trial)
-    recovery = Recovery((blind,) * 3, (INTACT,) * 3, diagnosis, 0, 0, 0)
+    recovery = Recovery((blind,) * 3, (INTACT,) * 3, diagnosis, 0, 0, 0, CHOSEN)
 
     values = json.loads(json.dumps(recovery.to_dict(), allow_nan=False))
 

@@ -14,6 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 
 from selfmodel.cli.output.console import text_console
 from selfmodel.cli.output.plain import counted, plain
+from selfmodel.diagnosis.comparator_choice import ChosenComparator
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
 from selfmodel.evolution import Generation
 from selfmodel.recovery.events import DiscriminatingTrial, Event, SearchBegins
@@ -70,6 +71,8 @@ class _Lines:
                     f"{counted(event.evaluations, 'evaluation')}, {_rate(event)}/s, "
                     f"{_best(event)}"
                 )
+            case ChosenComparator():
+                self._print_line(f"comparator {event.comparator.name}: {event.reason}")
             case Calibration():
                 self._print_line(
                     f"calibration: error {event.error_before:.3f} before, {event.error:.3f} after; "

@@ -7,7 +7,7 @@ import typer
 from selfmodel.cli import inputs
 from selfmodel.cli.options import (
     CONTROLLER,
-    DEFAULT_KINDS,
+    PAPER_KIND_NAMES,
     STUDY,
     Cases,
     ComparatorName,
@@ -36,6 +36,7 @@ from selfmodel.experiments.suite.plan import Study, known_cases
 from selfmodel.experiments.suite.results import write_results
 from selfmodel.experiments.suite.rows import Summary
 from selfmodel.experiments.suite.work import run_study
+from selfmodel.faults.registry import kind_names
 from selfmodel.settings import Settings
 from selfmodel.simulation.threads import thread_count
 
@@ -75,7 +76,7 @@ def run(
     controller: ControllerKind = "network",
     neurons: Neurons = None,
     comparator: ComparatorName = DEFAULT.name,
-    kinds: KindNames = DEFAULT_KINDS,
+    kinds: KindNames = PAPER_KIND_NAMES,
     steps: Annotated[
         int | None,
         typer.Option(
@@ -111,7 +112,7 @@ def run(
         score=score,
         controller=controller,
         comparator=comparator,
-        kinds=kinds,
+        kinds=kind_names(kinds),
         gap=gap,
         structure=structure,
         neurons=neurons,

@@ -17,7 +17,7 @@ from selfmodel.experiments.study_files import check_keys, key_of
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.notation import parse
-from selfmodel.faults.registry import PAPER_KINDS, notation_kinds
+from selfmodel.faults.registry import DEFAULT_KINDS, notation_kinds
 from selfmodel.physical.reality_gap import MAX_GAP_LEVEL
 from selfmodel.recovery.fitness import DISPLACEMENT
 from selfmodel.settings import Settings
@@ -63,7 +63,7 @@ class Ablation:
     folder: Path
     settings: Settings = Settings()  # noqa: RUF009  # a frozen dataclass
     damages: Sequence[str] = ()
-    kinds: str = ",".join(kind.name for kind in PAPER_KINDS)
+    kinds: str = ",".join(kind.name for kind in DEFAULT_KINDS)
     structure: bool = False
     next_trial: str = "bank"
     bank: Path | None = None

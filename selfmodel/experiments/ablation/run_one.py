@@ -20,6 +20,7 @@ from selfmodel.experiments.ablation.trials import (
     before_failure,
     calibrated_robot,
 )
+from selfmodel.experiments.arguments import comparator_choice
 from selfmodel.experiments.chosen_score import choose_score
 from selfmodel.experiments.experiment import Experiment, run
 from selfmodel.faults.hypothesis import INTACT
@@ -176,7 +177,7 @@ def _in_a_recovery(setting: Setting) -> list[AblationRow]:
         robot=setting.robot,
         case=cell.case,
         truth=setting.truth,
-        comparator=setting.comparator,
+        choose_comparator=comparator_choice(setting.comparator),
         # The trials of an experiment exclude the failing trial.
         settings=dataclasses.replace(settings, trials=settings.trials - 1),
         seed=cell.seed,

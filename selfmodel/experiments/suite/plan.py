@@ -9,6 +9,7 @@ from typing import Any
 
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.experiments import plugins, robots
+from selfmodel.experiments.arguments import comparator_choice
 from selfmodel.experiments.chosen_score import check_score
 from selfmodel.experiments.gaits import check_not_evolved, gait_settings
 from selfmodel.experiments.grid import Job, check_shared
@@ -42,7 +43,7 @@ class Study:
         settings: Parameters of the recoveries.
         score: Fitness of the repair EA, also reported per trial.
         controller: Name of the controller design.
-        comparator: Name of the comparator, or ``package.module:object``.
+        comparator: Name of the comparator, ``package.module:object``, or ``auto``.
         kinds: Fault kinds to search, as in ``--kinds``.
         gap: Level of the reality gap.
         structure: Whether the physical robots have structural mismatches.
@@ -74,7 +75,7 @@ def check(study: Study) -> None:
     Raises:
         InputError: The definition is invalid, or its folder contains another study.
     """
-    plugins.comparator(study.comparator)
+    comparator_choice(study.comparator)
     plugins.kinds(study.kinds)
     check_keys(study.bodies)
     for body in study.bodies:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from selfmodel.controllers.controller import check_silent_neurons
 from selfmodel.experiments import plugins, robots, trial_logs
+from selfmodel.experiments.arguments import comparator_choice
 from selfmodel.experiments.chosen_score import choose_score
 from selfmodel.experiments.experiment import Experiment, run as run_experiment
 from selfmodel.experiments.gaits import evolve_gait, write_gait
@@ -89,7 +90,7 @@ def _recover(job: Job, _part: str, run: Path) -> PartResult:
         robot=robot,
         case=parameters["case"],
         truth=truth,
-        comparator=plugins.comparator(shared["comparator"]),
+        choose_comparator=comparator_choice(shared["comparator"]),
         kinds=plugins.kinds(shared["kinds"]) if "kinds" in shared else PAPER_KINDS,
         gap=shared.get("gap", 0.0),
         structure=shared.get("structure", False),

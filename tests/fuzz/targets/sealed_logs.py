@@ -13,6 +13,7 @@ from selfmodel.comparators import COMPARATORS
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.errors import InputError, WorkError
 from selfmodel.experiments import trial_logs
+from selfmodel.experiments.arguments import comparator_choice
 from selfmodel.experiments.log_diagnosis import set_up_diagnosis
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.registry import ALL_KINDS
@@ -109,7 +110,7 @@ def _diagnosis(comparator: Comparator) -> str:
         made = set_up_diagnosis(
             [LOG],
             robot=None,
-            comparator=comparator,
+            choose_comparator=comparator_choice(comparator),
             kinds=ALL_KINDS,
             settings=None,
             seed=None,
