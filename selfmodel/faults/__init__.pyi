@@ -13,6 +13,7 @@ from .kind import (
 )
 from .motor import WEAK_MOTOR as WEAK_MOTOR
 from .neuron import SILENT_NEURON as SILENT_NEURON
+from .payload import PAYLOAD as PAYLOAD
 from .registry import ALL_KINDS as ALL_KINDS, KINDS as KINDS, PAPER_KINDS as PAPER_KINDS
 from .sensor import (
     FAILED_SENSOR as FAILED_SENSOR,

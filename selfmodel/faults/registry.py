@@ -8,6 +8,7 @@ from selfmodel.faults.jammed import JAMMED, JAMMED_AT_ANGLE
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.motor import WEAK_MOTOR
 from selfmodel.faults.neuron import SILENT_NEURON
+from selfmodel.faults.payload import PAYLOAD
 from selfmodel.faults.sensor import FAILED_SENSOR, SENSOR_BIAS, SENSOR_GAIN, SENSOR_NOISE
 from selfmodel.faults.terrain import ROUGHNESS
 from selfmodel.faults.wind import CROSSWIND, WIND
@@ -18,6 +19,7 @@ KINDS: Mapping[str, FaultKind] = {
         *(BROKEN, JAMMED, FAILED_SENSOR, SILENT_NEURON),
         *(JAMMED_AT_ANGLE, WEAK_MOTOR, SENSOR_GAIN, SENSOR_BIAS, SENSOR_NOISE),
         *(FRICTION, SLOPE, ROUGHNESS, WIND, CROSSWIND),
+        PAYLOAD,
     )
 }
 """All built-in kinds by name."""

@@ -16,6 +16,7 @@ from selfmodel.robot.anatomy.anatomy import Anatomy
 from selfmodel.robot.anatomy.transmission import motor_bodies, motor_joints
 from selfmodel.robot.editing import couplings
 from selfmodel.robot.editing.frames import turn_about_origin, turned_by_hinge
+from selfmodel.robot.editing.point_mass import add_point_mass, inertia_box_reach
 
 DETACHED_ARMATURE = 1.0
 """Rotor inertia of a hinge of a detached body, kg m^2. Any positive value keeps the mass matrix
@@ -143,6 +144,23 @@ class Embodiment:
         # A joint that several of the motors drive is scaled once.
         joints = {joint for motor in motors for joint in motor_joints(self.model, motor)}
         self.model.jnt_actfrcrange[sorted(joints)] *= factor
+
+    def load_body(self, name: str, fraction: float, forward: float) -> None:
+        """Adds a point mass to the root body of a robot.
+
+        Args:
+            name: Name of the root body.
+            fraction: The mass, as a fraction of the mass of the healthy robot.
+            forward: Place of the mass along the forward direction of the initial pose: 0 is the
+                centre of mass of the body, 1 and -1 are its ends, by the box of its inertia.
+        """
+        model, body = self.model, self.model.body(name)
+        # Of the model before the faults: ``mj_setConst`` is called after all of them.
+        mass = fraction * float(body.subtreemass[0])
+        ahead, inverse = np.empty(3), body.quat * (1.0, -1.0, -1.0, -1.0)
+        mujoco.mju_rotVecQuat(ahead, np.array([1.0, 0.0, 0.0]), inverse)
+        offset = forward * inertia_box_reach(model, name, ahead) * ahead
+        add_point_mass(model, name, mass, offset)
 
     def set_friction(self, coefficient: float) -> None:
         """Sets the sliding friction between static geoms and the geoms that can touch them."""
