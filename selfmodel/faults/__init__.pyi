@@ -1,9 +1,12 @@
 from .broken import BROKEN as BROKEN
 from .build import build as build
+from .damping import DAMPED_JOINT as DAMPED_JOINT
+from .grip import LOST_GRIP as LOST_GRIP
 from .ground import FRICTION as FRICTION, SLOPE as SLOPE
 from .hypothesis import INTACT as INTACT, Hypothesis as Hypothesis
 from .hypothesis_space import HypothesisSpace as HypothesisSpace
 from .jammed import JAMMED as JAMMED, JAMMED_AT_ANGLE as JAMMED_AT_ANGLE
+from .joint_friction import JOINT_FRICTION as JOINT_FRICTION
 from .kind import (
     ENVIRONMENT as ENVIRONMENT,
     Fault as Fault,

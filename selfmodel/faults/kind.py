@@ -24,6 +24,11 @@ def joints(anatomy: Anatomy) -> tuple[str, ...]:
     return tuple(joint.name for joint in anatomy.joints)
 
 
+def joints_with_motors(anatomy: Anatomy) -> tuple[str, ...]:
+    """Returns the joints with motors; a motor of several joints belongs to the first joint."""
+    return tuple(joint.name for joint in anatomy.joints if joint.motors)
+
+
 def environment_part(_anatomy: Anatomy) -> tuple[str, ...]:
     """Returns the only part of an environment kind."""
     return (ENVIRONMENT,)

@@ -3,8 +3,11 @@
 from collections.abc import Iterable, Mapping
 
 from selfmodel.faults.broken import BROKEN
+from selfmodel.faults.damping import DAMPED_JOINT
+from selfmodel.faults.grip import LOST_GRIP
 from selfmodel.faults.ground import FRICTION, SLOPE
 from selfmodel.faults.jammed import JAMMED, JAMMED_AT_ANGLE
+from selfmodel.faults.joint_friction import JOINT_FRICTION
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.motor import WEAK_MOTOR
 from selfmodel.faults.neuron import SILENT_NEURON
@@ -19,7 +22,7 @@ KINDS: Mapping[str, FaultKind] = {
         *(BROKEN, JAMMED, FAILED_SENSOR, SILENT_NEURON),
         *(JAMMED_AT_ANGLE, WEAK_MOTOR, SENSOR_GAIN, SENSOR_BIAS, SENSOR_NOISE),
         *(FRICTION, SLOPE, ROUGHNESS, WIND, CROSSWIND),
-        PAYLOAD,
+        *(PAYLOAD, DAMPED_JOINT, JOINT_FRICTION, LOST_GRIP),
     )
 }
 """All built-in kinds by name."""

@@ -14,7 +14,7 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.robot.anatomy.anatomy import Anatomy
 from selfmodel.robot.anatomy.transmission import motor_bodies, motor_joints
-from selfmodel.robot.editing import couplings
+from selfmodel.robot.editing import couplings, grip, resistance
 from selfmodel.robot.editing.frames import turn_about_origin, turned_by_hinge
 from selfmodel.robot.editing.point_mass import add_point_mass, inertia_box_reach
 
@@ -144,6 +144,19 @@ class Embodiment:
         # A joint that several of the motors drive is scaled once.
         joints = {joint for motor in motors for joint in motor_joints(self.model, motor)}
         self.model.jnt_actfrcrange[sorted(joints)] *= factor
+
+    def scale_damping(self, hinge: str, factor: float) -> None:
+        """Scales the viscous damping of a hinge; see ``resistance.scale_damping``."""
+        resistance.scale_damping(self.model, hinge, factor)
+
+    def add_dry_friction(self, hinge: str, fraction: float) -> None:
+        """Adds dry friction to a hinge; see ``resistance.add_dry_friction``."""
+        resistance.add_dry_friction(self.model, hinge, fraction)
+
+    def scale_grip(self, bodies: Sequence[str], factor: float) -> None:
+        """Scales the sliding friction of all contacts of some bodies, given by name."""
+        ids = np.array([self.model.body(name).id for name in bodies], dtype=np.intp)
+        grip.scale_grip(self.model, ids, factor)
 
     def load_body(self, name: str, fraction: float, forward: float) -> None:
         """Adds a point mass to the root body of a robot.
