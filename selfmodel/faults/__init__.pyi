@@ -1,6 +1,8 @@
 from .broken import BROKEN as BROKEN
 from .build import build as build
 from .damping import DAMPED_JOINT as DAMPED_JOINT
+from .delay import GROWN_DELAY as GROWN_DELAY
+from .encoder import ENCODER_OFFSET as ENCODER_OFFSET
 from .grip import LOST_GRIP as LOST_GRIP
 from .ground import FRICTION as FRICTION, SLOPE as SLOPE
 from .hypothesis import INTACT as INTACT, Hypothesis as Hypothesis

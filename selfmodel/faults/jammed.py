@@ -35,7 +35,8 @@ def _weld(embodiment: "Embodiment", anatomy: Anatomy, angles: Mapping[str, float
         embodiment.weld_hinge(hinge, angle)
     for column, sensor in enumerate(anatomy.sensors):
         if sensor.hinge in angles:
-            embodiment.fix_reading(column, sensor.reading(angles[sensor.hinge]))
+            offset = embodiment.encoder_offset[anatomy.hinges.index(sensor.hinge)]
+            embodiment.fix_reading(column, sensor.reading(angles[sensor.hinge] + offset))
 
 
 def _nearest_to_zero(joint: Joint) -> dict[str, float]:

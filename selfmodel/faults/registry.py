@@ -4,6 +4,8 @@ from collections.abc import Iterable, Mapping
 
 from selfmodel.faults.broken import BROKEN
 from selfmodel.faults.damping import DAMPED_JOINT
+from selfmodel.faults.delay import GROWN_DELAY
+from selfmodel.faults.encoder import ENCODER_OFFSET
 from selfmodel.faults.grip import LOST_GRIP
 from selfmodel.faults.ground import FRICTION, SLOPE
 from selfmodel.faults.jammed import JAMMED, JAMMED_AT_ANGLE
@@ -22,7 +24,7 @@ KINDS: Mapping[str, FaultKind] = {
         *(BROKEN, JAMMED, FAILED_SENSOR, SILENT_NEURON),
         *(JAMMED_AT_ANGLE, WEAK_MOTOR, SENSOR_GAIN, SENSOR_BIAS, SENSOR_NOISE),
         *(FRICTION, SLOPE, ROUGHNESS, WIND, CROSSWIND),
-        *(PAYLOAD, DAMPED_JOINT, JOINT_FRICTION, LOST_GRIP),
+        *(PAYLOAD, DAMPED_JOINT, JOINT_FRICTION, LOST_GRIP, GROWN_DELAY, ENCODER_OFFSET),
     )
 }
 """All built-in kinds by name."""

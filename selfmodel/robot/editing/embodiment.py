@@ -39,6 +39,9 @@ class Embodiment:
         offset: Summand of each reading after the gain, scaled with the reading, ``(sensors,)``.
         bias: Summand of each reading after the gain, independent of it, ``(sensors,)``.
         noise: Standard deviation of the sensor noise, ``(sensors,)``; see ``SensorNoise``.
+        added_delay: Control delay in addition to the robot's, control steps, ``(1,)``; see
+            ``control_delay.added_steps``.
+        encoder_offset: Logged minus true angle of each hinge, ``(hinges,)``, rad.
         silent_neurons: Indices of the silent hidden neurons of the controller.
         welded: Index in ``qpos``, index in ``qvel`` and angle (rad) of each welded hinge.
         detached: Names of the joints of detached bodies.
@@ -51,6 +54,8 @@ class Embodiment:
     offset: FloatArray
     bias: FloatArray
     noise: FloatArray
+    added_delay: FloatArray
+    encoder_offset: FloatArray
     silent_neurons: set[int] = field(default_factory=set)
     welded: list[tuple[int, int, float]] = field(default_factory=list)
     detached: set[str] = field(default_factory=set)
@@ -73,6 +78,8 @@ class Embodiment:
             offset=np.zeros(sensors),
             bias=np.zeros(sensors),
             noise=np.zeros(sensors),
+            added_delay=np.zeros(1),
+            encoder_offset=np.zeros(len(anatomy.hinges)),
             seed=seed,
         )
 
@@ -212,6 +219,15 @@ class Embodiment:
         """
         self.gain[sensor] *= factor
         self.offset[sensor] *= factor
+
+    def shift_reading(self, sensor: int, shift: float) -> None:
+        """Adds a constant to what a sensor measures; its gain applies to the constant too.
+
+        Args:
+            sensor: Column of the sensor.
+            shift: The constant, in units of the nominal reading.
+        """
+        self.offset[sensor] += self.gain[sensor] * shift
 
     def fix_reading(self, sensor: int, value: float) -> None:
         """Sets the reading of a sensor to a constant.
