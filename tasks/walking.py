@@ -22,7 +22,7 @@ from selfmodel.physical.simulated_robot import physical_embodiment
 from selfmodel.robot.control_delay import CONTROL_DELAY, added_steps, split_delay
 from selfmodel.robot.editing.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state.access import current_value
+from selfmodel.robot.state.access import current_value, observed_fields
 from selfmodel.robot.state.sensing import SensorReader
 from selfmodel.tasks.arguments import check_number, check_time_limit, parsed
 from selfmodel.tasks.randomness import Seed, construction_numbers, episode_numbers, next_seed
