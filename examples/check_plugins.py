@@ -7,8 +7,8 @@ Usage:
 
 import sys
 
+from gravity import GRAVITY
 from heading_comparator import HEADING
-from payload import PAYLOAD
 
 from selfmodel.diagnosis.comparator_contract import check_comparator, shown
 from selfmodel.diagnosis.evidence import simulate
@@ -30,5 +30,5 @@ simulated = simulate(Simulator(robot, threads=2), prepared.request, trial, [INTA
 check_comparator(HEADING, trial, simulated.behaviour)
 print(f"{HEADING.name}: {prepared.distances(simulated.behaviour)}")
 
-check_fault_kind(PAYLOAD, robot)
-print(f"{PAYLOAD.name}: {len(PAYLOAD.candidates(robot.anatomy))} faults that may be proposed")
+check_fault_kind(GRAVITY, robot)
+print(f"{GRAVITY.name}: {len(GRAVITY.candidates(robot.anatomy))} faults that may be proposed")

@@ -1,7 +1,7 @@
 """The environments of dm_control's suite as physical robots, and the returns of episodes."""
 
 import importlib
-from collections import OrderedDict
+from collections import OrderedDict, deque
 from collections.abc import Callable, Iterator
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -16,10 +16,11 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.physical.environment_robot import EnvironmentRobot
 from selfmodel.physical.simulated_robot import OWN_SEED
 from selfmodel.recovery.fitness import Score
+from selfmodel.robot.control_delay import added_steps
 from selfmodel.robot.editing.embodiment import Embodiment
 from selfmodel.robot.mjcf.mujoco_errors import loading_a_model
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state.access import current_value, signal_fields, state_writer
+from selfmodel.robot.state.access import current_value, observed_fields, signal_fields, state_writer
 from selfmodel.robot.state.sensing import SensorReader
 from selfmodel.simulation.activations import activations_since_rest
 from selfmodel.trials.behaviour import Behaviour, Sample
@@ -82,7 +83,8 @@ class _Stepped:
     def __init__(self, task: "Task", robot: Robot, embodiment: Embodiment) -> None:
         self._task = task
         self._robot, self._embodiment = robot, embodiment
-        self._fields = signal_fields(robot)
+        joints = observed_fields(robot, [embodiment])["joint_positions"]
+        self._fields = {**signal_fields(robot), "joint_positions": joints}
         self.returns: list[float] = []
 
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401  # attributes of the suite's task
@@ -92,6 +94,13 @@ class _Stepped:
         """Keeps the pose of the physics' reset and starts a new return."""
         self._reader = SensorReader(self._embodiment.model, self._robot.anatomy, [self._embodiment])
         self.returns.append(0.0)
+        delay = added_steps(self._robot.control_delay, float(self._embodiment.added_delay[0]))
+        self._delayed = deque(np.zeros((delay, self._embodiment.model.nu)))
+
+    def before_step(self, action: FloatArray, physics: "Physics") -> None:
+        """Applies the commands of some control steps ago."""
+        self._delayed.append(np.array(action, dtype=np.float64))
+        self._task.before_step(self._delayed.popleft(), physics)
 
     def get_reward(self, physics: "Physics") -> float:
         """Returns the suite's reward, and adds it to the return."""

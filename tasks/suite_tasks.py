@@ -14,6 +14,7 @@ from selfmodel.faults.neuron import SILENT_NEURON
 from selfmodel.physical.reality_gap import draw_gap_of, perturbed_model
 from selfmodel.robot.anatomy.anatomy import Anatomy
 from selfmodel.robot.anatomy.reader import read_anatomy
+from selfmodel.robot.control_delay import added_steps
 from selfmodel.robot.mjcf.mujoco_errors import loading_a_model, mujoco_errors_as_input_errors
 from selfmodel.tasks import suite_bodies
 from selfmodel.tasks.arguments import check_number, check_time_limit, parsed
@@ -108,13 +109,14 @@ def environment(
     model = _compiled(domain, task, env.physics.model.ptr, hypothesis, seed)
     with loading_a_model():
         embodiment = apply_faults(perturbed_model(model, drawn), anatomy, hypothesis, seed)
+    delay = drawn.delay + added_steps(0, float(embodiment.added_delay[0]))
     wrapper = importlib.import_module("dm_control.mujoco.wrapper.core")
     damaged = importlib.import_module("selfmodel.tasks.damaged_task")
     extra.pop("n_sub_steps", None)  # is in the control time step of the suite's environment
     constructor = importlib.import_module("dm_control.rl.control").Environment
     return constructor(
         type(env.physics).from_model(wrapper.MjModel(embodiment.model)),
-        damaged.DamagedTask(env.task, embodiment, anatomy, drawn.delay, start),
+        damaged.DamagedTask(env.task, embodiment, anatomy, delay, start),
         **{
             "time_limit": _default_time_limit(domain, task),
             **limit,

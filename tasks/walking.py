@@ -19,10 +19,10 @@ from selfmodel.physical.initial_pose import randomize_initial_pose
 from selfmodel.physical.measurement_noise import ExactMeasurement, Measurement, NoisyMeasurement
 from selfmodel.physical.reality_gap import RealityGap, draw_gap
 from selfmodel.physical.simulated_robot import physical_embodiment
-from selfmodel.robot.control_delay import CONTROL_DELAY, split_delay
+from selfmodel.robot.control_delay import CONTROL_DELAY, added_steps, split_delay
 from selfmodel.robot.editing.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state.access import current_value, signal_fields
+from selfmodel.robot.state.access import current_value, observed_fields
 from selfmodel.robot.state.sensing import SensorReader
 from selfmodel.tasks.arguments import check_number, check_time_limit, parsed
 from selfmodel.tasks.randomness import Seed, construction_numbers, episode_numbers, next_seed
@@ -143,7 +143,7 @@ class Walk(base.Task):
         super().__init__(random=random)
         self._robot, self._embodiment = robot, embodiment
         self._gap, self._limbs, self._start_level = gap, limbs, start
-        self._fields = signal_fields(robot, embodiment.model)
+        self._fields = observed_fields(robot, [embodiment])
         self._start = self._end = 0.0
         self._begin(np.random.default_rng(0))  # for the specs, before the first episode
 
@@ -153,6 +153,7 @@ class Walk(base.Task):
         self._reader = SensorReader(embodiment.model, self._robot.anatomy, [embodiment])
         self._measurement: Measurement = ExactMeasurement()
         delay = int(self._robot.control_delay)
+        delay += added_steps(delay, float(embodiment.added_delay[0]))
         if self._gap is not None:
             self._measurement = NoisyMeasurement(
                 self._gap.level, self._robot.anatomy, embodiment, rng

@@ -131,7 +131,8 @@ def _check_contacts(kind: FaultKind, candidates: tuple[Fault, ...], robot: Robot
 
 
 def _contents(embodiment: Embodiment) -> tuple[bytes, ...]:
-    parts = (embodiment.gain, embodiment.offset, embodiment.bias, embodiment.noise)
+    own = embodiment
+    parts = (own.gain, own.offset, own.bias, own.noise, own.added_delay, own.encoder_offset)
     return (
         _saved(embodiment.model),
         str(sorted(embodiment.silent_neurons)).encode(),

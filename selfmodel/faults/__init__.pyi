@@ -1,9 +1,14 @@
 from .broken import BROKEN as BROKEN
 from .build import build as build
+from .damping import DAMPED_JOINT as DAMPED_JOINT
+from .delay import GROWN_DELAY as GROWN_DELAY
+from .encoder import ENCODER_OFFSET as ENCODER_OFFSET
+from .grip import LOST_GRIP as LOST_GRIP
 from .ground import FRICTION as FRICTION, SLOPE as SLOPE
 from .hypothesis import INTACT as INTACT, Hypothesis as Hypothesis
 from .hypothesis_space import HypothesisSpace as HypothesisSpace
 from .jammed import JAMMED as JAMMED, JAMMED_AT_ANGLE as JAMMED_AT_ANGLE
+from .joint_friction import JOINT_FRICTION as JOINT_FRICTION
 from .kind import (
     ENVIRONMENT as ENVIRONMENT,
     Fault as Fault,
@@ -13,6 +18,7 @@ from .kind import (
 )
 from .motor import WEAK_MOTOR as WEAK_MOTOR
 from .neuron import SILENT_NEURON as SILENT_NEURON
+from .payload import PAYLOAD as PAYLOAD
 from .registry import ALL_KINDS as ALL_KINDS, KINDS as KINDS, PAPER_KINDS as PAPER_KINDS
 from .sensor import (
     FAILED_SENSOR as FAILED_SENSOR,

@@ -6,6 +6,8 @@ A hinge whose range excludes 0 is welded at the limit nearest to 0.
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from selfmodel.faults.damping import DAMPED_JOINT
+from selfmodel.faults.joint_friction import JOINT_FRICTION
 from selfmodel.faults.kind import Fault, FaultKind, joints
 from selfmodel.faults.motor import WEAK_MOTOR
 from selfmodel.faults.sensor import FAILED_SENSOR, SENSOR_GAIN
@@ -33,7 +35,8 @@ def _weld(embodiment: "Embodiment", anatomy: Anatomy, angles: Mapping[str, float
         embodiment.weld_hinge(hinge, angle)
     for column, sensor in enumerate(anatomy.sensors):
         if sensor.hinge in angles:
-            embodiment.fix_reading(column, sensor.reading(angles[sensor.hinge]))
+            offset = embodiment.encoder_offset[anatomy.hinges.index(sensor.hinge)]
+            embodiment.fix_reading(column, sensor.reading(angles[sensor.hinge] + offset))
 
 
 def _nearest_to_zero(joint: Joint) -> dict[str, float]:
@@ -54,12 +57,19 @@ def _absorbs_at_zero(fault: Fault, other: Fault, anatomy: Anatomy) -> bool:
         return sensor.hinge in angles and sensor.reading(angles[sensor.hinge]) == 0
     if other.part == fault.part and other.kind == JAMMED_AT_ANGLE:
         return True
-    return _absorbs_motor(fault, other, anatomy)
+    return _absorbs(fault, other, anatomy)
 
 
-def _absorbs_motor(fault: Fault, other: Fault, anatomy: Anatomy) -> bool:
-    """Returns whether the other fault weakens motors that move nothing but the welded joint."""
-    if other.part != fault.part or other.kind != WEAK_MOTOR:
+def _absorbs(fault: Fault, other: Fault, anatomy: Anatomy) -> bool:
+    """Returns whether a fault of the joint's resistance or motor has no further effect.
+
+    The motors of a welded joint have no effect unless they move another joint too.
+    """
+    if other.part != fault.part:
+        return False
+    if other.kind in (DAMPED_JOINT, JOINT_FRICTION):
+        return True
+    if other.kind != WEAK_MOTOR:
         return False
     joint = anatomy.joint(fault.part)
     return joint.motors_lost_if_jammed.issuperset(joint.motors)
@@ -92,7 +102,7 @@ JAMMED_AT_ANGLE = FaultKind(
     keyword="jam",
     parts=_joints_with_angles,
     apply=_apply_at_angle,
-    absorbs=_absorbs_motor,
+    absorbs=_absorbs,
     severity_bounds=_severity_bounds,
     levels=_levels,
     degenerates_to={0.0: JAMMED},

@@ -16,12 +16,17 @@ if TYPE_CHECKING:
 Values = TypeVar("Values")
 
 ENVIRONMENT = ""
-"""Part of the environment kinds, which apply to the world; notation omits it."""
+"""Part of the kinds that apply to the world or to the whole robot; notation omits it."""
 
 
 def joints(anatomy: Anatomy) -> tuple[str, ...]:
     """Returns the names of the joints that can fail."""
     return tuple(joint.name for joint in anatomy.joints)
+
+
+def joints_with_motors(anatomy: Anatomy) -> tuple[str, ...]:
+    """Returns the joints with motors; a motor of several joints belongs to the first joint."""
+    return tuple(joint.name for joint in anatomy.joints if joint.motors)
 
 
 def environment_part(_anatomy: Anatomy) -> tuple[str, ...]:
@@ -149,7 +154,7 @@ class Fault:
 
     Attributes:
         kind: Kind of the fault.
-        part: Name of the joint, sensor or neuron; ``ENVIRONMENT`` for an environment.
+        part: Name of the joint, sensor, neuron or place; ``ENVIRONMENT`` for an environment.
         severity: Severity in the kind's unit; 0 for a kind without severities.
     """
 

@@ -2,7 +2,13 @@
 
 from typing import TYPE_CHECKING
 
-from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
+from selfmodel.faults.kind import (
+    Fault,
+    FaultKind,
+    joints_with_motors,
+    uniform_bounds,
+    uniform_levels,
+)
 from selfmodel.robot.anatomy.anatomy import Anatomy
 
 if TYPE_CHECKING:
@@ -14,15 +20,10 @@ def _apply(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
     embodiment.weaken_motors(motors, fault.severity)
 
 
-def _joints_with_motors(anatomy: Anatomy) -> tuple[str, ...]:
-    """Returns the joints with motors; a motor of several joints belongs to the first joint."""
-    return tuple(joint.name for joint in anatomy.joints if joint.motors)
-
-
 WEAK_MOTOR = FaultKind(
     name="motor",
     keyword="motor",
-    parts=_joints_with_motors,
+    parts=joints_with_motors,
     apply=_apply,
     severity_bounds=uniform_bounds(0.0, 1.0),
     levels=uniform_levels(0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9),

@@ -3,11 +3,17 @@
 from collections.abc import Iterable, Mapping
 
 from selfmodel.faults.broken import BROKEN
+from selfmodel.faults.damping import DAMPED_JOINT
+from selfmodel.faults.delay import GROWN_DELAY
+from selfmodel.faults.encoder import ENCODER_OFFSET
+from selfmodel.faults.grip import LOST_GRIP
 from selfmodel.faults.ground import FRICTION, SLOPE
 from selfmodel.faults.jammed import JAMMED, JAMMED_AT_ANGLE
+from selfmodel.faults.joint_friction import JOINT_FRICTION
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.motor import WEAK_MOTOR
 from selfmodel.faults.neuron import SILENT_NEURON
+from selfmodel.faults.payload import PAYLOAD
 from selfmodel.faults.sensor import FAILED_SENSOR, SENSOR_BIAS, SENSOR_GAIN, SENSOR_NOISE
 from selfmodel.faults.terrain import ROUGHNESS
 from selfmodel.faults.wind import CROSSWIND, WIND
@@ -18,6 +24,7 @@ KINDS: Mapping[str, FaultKind] = {
         *(BROKEN, JAMMED, FAILED_SENSOR, SILENT_NEURON),
         *(JAMMED_AT_ANGLE, WEAK_MOTOR, SENSOR_GAIN, SENSOR_BIAS, SENSOR_NOISE),
         *(FRICTION, SLOPE, ROUGHNESS, WIND, CROSSWIND),
+        *(PAYLOAD, DAMPED_JOINT, JOINT_FRICTION, LOST_GRIP, GROWN_DELAY, ENCODER_OFFSET),
     )
 }
 """All built-in kinds by name."""

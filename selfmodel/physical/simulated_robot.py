@@ -18,11 +18,11 @@ from selfmodel.physical.measurement_noise import ExactMeasurement, Measurement, 
 from selfmodel.physical.reality_gap import RealityGap, perturbed_model
 from selfmodel.physical.structural_mismatch import StructuralMismatch, add_structural_mismatch
 from selfmodel.robot.base.known_base import BASE_SIGNALS
-from selfmodel.robot.control_delay import split_delay
+from selfmodel.robot.control_delay import added_steps, split_delay
 from selfmodel.robot.editing.embodiment import Embodiment
 from selfmodel.robot.mjcf.mujoco_errors import mujoco_errors_as_input_errors
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state.access import bind_data, signal_fields
+from selfmodel.robot.state.access import bind_data, observed_fields
 from selfmodel.robot.state.sensing import SensorReader
 from selfmodel.trials.behaviour import Sample
 from selfmodel.trials.signals import SIGNALS
@@ -90,6 +90,7 @@ class SimulatedRobot:
         model, data = embodiment.model, mujoco.MjData(embodiment.model)
         measurement: Measurement = ExactMeasurement()
         delay = robot.control_delay
+        delay += added_steps(delay, float(embodiment.added_delay[0]))
         substeps = round(robot.control_timestep / float(model.opt.timestep))
         if self._gap is not None:
             measurement = NoisyMeasurement(self._gap.level, robot.anatomy, embodiment, rng)
@@ -106,7 +107,7 @@ class SimulatedRobot:
         whole, part = split_delay(delay, substeps)
         delay_line = deque(np.zeros((whole + bool(part), model.nu)))
         # Logged commands are the controller's outputs, before the control delay.
-        state_fields = signal_fields(robot, model)
+        state_fields = observed_fields(robot, [embodiment])
         live = {signal: field.reader(bind_data(data)) for signal, field in state_fields.items()}
         live |= {"sensors": lambda: controllers.readings, "commands": lambda: commands}
         # The pose of a fixed base is known, so no sensor measures it.

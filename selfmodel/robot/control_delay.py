@@ -7,6 +7,7 @@ contain a further custom numeric, ``selfmodel_hidden_neurons``. Readers ignore i
 the log contains the number of hidden neurons.
 """
 
+import math
 from typing import TYPE_CHECKING
 
 # Comparators import the limit, and need no MuJoCo.
@@ -68,6 +69,17 @@ def split_delay(delay: float, substeps: int) -> tuple[int, int]:
         substeps: Physics steps per control step.
     """
     return divmod(round(delay * substeps), substeps)
+
+
+def added_steps(delay: float, added: float) -> int:
+    """Returns the whole control steps by which a control delay grows under a fault.
+
+    Args:
+        delay: Control delay of the healthy robot, in control steps.
+        added: Severity of the fault, in control steps; rounded, and limited so that the sum is at
+            most ``MAX_CONTROL_DELAY``.
+    """
+    return min(round(added), math.floor(MAX_CONTROL_DELAY - delay))
 
 
 def has_control_delay(model: "MjModel") -> bool:

@@ -12,7 +12,7 @@ from selfmodel.robot.editing.embodiment import Embodiment
 from selfmodel.robot.mjcf.mujoco_errors import mujoco_errors_as_input_errors
 from selfmodel.robot.mujoco_log import uncounted_warnings
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state.access import signal_fields
+from selfmodel.robot.state.access import observed_fields
 from selfmodel.robot.state.fields import Reader
 from selfmodel.trials.signals import Signal
 
@@ -37,7 +37,7 @@ def live_signals(
     The readings and the commands of the controllers are not part of MuJoCo's state, and are
     omitted.
     """
-    state = signal_fields(robot, *(embodiment.model for embodiment in embodiments))
+    state = observed_fields(robot, embodiments)
     return {
         signal: state[signal].reader(batch.bind)
         for signal in record

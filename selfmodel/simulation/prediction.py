@@ -8,7 +8,7 @@ import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.errors import InputError
-from selfmodel.robot.control_delay import MAX_CONTROL_DELAY, split_delay
+from selfmodel.robot.control_delay import MAX_CONTROL_DELAY, added_steps, split_delay
 from selfmodel.robot.editing.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state.access import state_writer
@@ -59,17 +59,19 @@ def predict(
     """
     lag = robot.control_delay if delay is None else delay
     delay_steps, part = split_delay(lag, robot.substeps)
-    if segments.lead < lag:
-        raise InputError(
-            f"the robot's commands take effect {lag} steps late, and segments have a lead "
-            f"of {segments.lead}: a comparator needs a lead of {MAX_CONTROL_DELAY}"
-        )
     n, count, horizon = len(embodiments), len(segments.commands), segments.horizon
     simulated, source_of = np.unique(
         np.arange(n) if same_dynamics_as is None else np.asarray(same_dynamics_as),
         return_inverse=True,
     )
     moving = [embodiments[i] for i in simulated]
+    added = [added_steps(lag, float(embodiment.added_delay[0])) for embodiment in moving]
+    longest = lag + max(added)
+    if segments.lead < longest:
+        raise InputError(
+            f"the robot's commands take effect {longest} steps late, and segments have a lead "
+            f"of {segments.lead}: a comparator needs a lead of {MAX_CONTROL_DELAY}"
+        )
     whole = "base_position" in segments.states
     stages: list[IndexArray] = np.split(np.arange(count), 1 if whole else count)
     together = len(stages[0])
@@ -88,13 +90,12 @@ def predict(
         )
         for signal in segments.record
     }
-    inputs = _BatchInputs(robot, batch, moving, segments)
-    activations = initial_activations(robot, segments, delay_steps)
+    delays = delay_steps + np.array(added, dtype=np.intp)
+    inputs = _BatchInputs(robot, batch, moving, segments, delays)
     alive = LiveBatch(batch)
     alive.reset(mujoco.mjtStage.mjSTAGE_NONE)
-    first = segments.lead - delay_steps
     for stage in stages:
-        inputs.write_states(activations, stage)
+        inputs.write_states(stage)
         clock = perf_counter()
         alive.forward()
         stats.physics_seconds += perf_counter() - clock
@@ -107,9 +108,9 @@ def predict(
             if k < horizon:
                 clock = perf_counter()
                 if part:
-                    inputs.write_commands(segments.commands[stage, first + k - 1])
+                    inputs.write_commands(stage, k - 1)
                     alive.step(part)
-                inputs.write_commands(segments.commands[stage, first + k])
+                inputs.write_commands(stage, k)
                 alive.step(robot.substeps - part)
                 stats.physics_seconds += perf_counter() - clock
     diverged: BoolArray = np.any(alive.diverged()[batch_rows].reshape(n, together), axis=1)
@@ -125,7 +126,15 @@ def _repeated(embodiments: Sequence[Embodiment], times: int) -> list[Embodiment]
 
 
 class _BatchInputs:
-    """Writes logged states and commands into a batch, the same for every embodiment."""
+    """Writes logged states and commands into a batch, for every embodiment by its delay.
+
+    Args:
+        robot: The healthy robot.
+        batch: The batch; its state is written.
+        embodiments: Embodiments of the batch, each in adjacent rows.
+        segments: Initial states and commands.
+        delays: Control delay of each embodiment, whole control steps, ``(embodiments,)``.
+    """
 
     def __init__(
         self,
@@ -133,14 +142,21 @@ class _BatchInputs:
         batch: mujoco.batch.Batch,
         embodiments: Sequence[Embodiment],
         segments: Segments,
+        delays: IndexArray,
     ) -> None:
         self._segments = segments
+        self._first = segments.lead - delays
+        by_delay = {
+            delay: initial_activations(robot, segments, delay) for delay in set(delays.tolist())
+        }
+        self._activations = np.array([by_delay[delay] for delay in delays.tolist()])
         self._n = len(embodiments)
         models = [own.model for own in embodiments for _ in range(batch.nsim // len(embodiments))]
         self._write = state_writer(robot, batch.bind, *models)
         self._ctrl = batch.bind("ctrl")
         self._act = batch.bind("act")
         self._qpos, self._qvel = batch.bind("qpos"), batch.bind("qvel")
+        self._offsets = np.array([own.encoder_offset for own in embodiments])
         median = _median_angles(robot, segments)
         self._constant_angles = [
             (number, *constant)
@@ -148,24 +164,23 @@ class _BatchInputs:
             for constant in (*own.welded, *(median[name] for name in own.detached & median.keys()))
         ]
 
-    def write_states(self, activations: FloatArray, stage: IndexArray) -> None:
-        """Writes the initial states of some segments.
-
-        Args:
-            activations: Initial activations of all segments, ``(segments, na)``.
-            stage: Indices of the segments to begin.
-        """
+    def write_states(self, stage: IndexArray) -> None:
+        """Writes the initial states of some segments, given by their indices."""
         states = self._segments.states
-        self._write({signal: self._for_all(values[stage]) for signal, values in states.items()})
-        self._act[:] = self._for_all(activations[stage])
+        logged = {signal: self._for_all(values[stage]) for signal, values in states.items()}
+        if "joint_positions" in logged and self._offsets.any():
+            logged["joint_positions"] -= np.repeat(self._offsets, len(stage), axis=0)
+        self._write(logged)
+        self._act[:] = self._activations[:, stage].reshape(self._act.shape)
         for number, position, velocity, angle in self._constant_angles:
             rows = slice(number * len(stage), (number + 1) * len(stage))
             self._qpos[rows, position] = angle
             self._qvel[rows, velocity] = 0.0
 
-    def write_commands(self, commands: FloatArray) -> None:
-        """Writes the commands of one step, ``(segments, motors)``."""
-        self._ctrl[:] = self._for_all(commands)
+    def write_commands(self, stage: IndexArray, step: int) -> None:
+        """Writes the commands that arrive at one step of some segments, given by their indices."""
+        arriving = self._segments.commands[stage, (self._first + step)[:, np.newaxis]]
+        self._ctrl[:] = arriving.reshape(self._ctrl.shape)
 
     def _for_all(self, values: FloatArray) -> FloatArray:
         return np.tile(values, (self._n, 1))

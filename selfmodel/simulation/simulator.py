@@ -8,12 +8,12 @@ from time import perf_counter
 import mujoco
 import numpy as np
 
-from selfmodel.arrays import FloatArray
+from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.controllers.command_source import CommandSource, make_batch
 from selfmodel.faults.build import apply_faults, build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.physical.reality_gap import perturbed_models
-from selfmodel.robot.control_delay import split_delay
+from selfmodel.robot.control_delay import added_steps, split_delay
 from selfmodel.robot.editing.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state.sensing import SensorReader
@@ -190,7 +190,11 @@ class Simulator:
         )
         sensordata, qpos, ctrl = (batch.bind(field) for field in ("sensordata", "qpos", "ctrl"))
         whole, part = split_delay(robot.control_delay, robot.substeps)
-        motors = _DelayLine(ctrl, whole + bool(part))
+        added = [
+            added_steps(robot.control_delay, float(embodiment.added_delay[0]))
+            for embodiment in embodiments
+        ]
+        motors = _DelayLine(ctrl, whole + bool(part) + np.array(added, dtype=np.intp))
         live = live_signals(robot, batch, embodiments, record)
         live |= {"sensors": lambda: controllers.readings, "commands": lambda: motors.inlet}
         # Steps first during the run, so that each step is written to contiguous memory.
@@ -229,24 +233,29 @@ class _DelayLine:
 
     Args:
         outlet: Commands at the motors, ``(n, motors)``; written.
-        delay: Control delay, control steps, rounded up.
+        delays: Control delay of each run, control steps, rounded up, ``(n,)``.
     """
 
-    def __init__(self, outlet: FloatArray, delay: int) -> None:
-        self._outlet = outlet
-        self._line = np.zeros((delay, *outlet.shape))
+    def __init__(self, outlet: FloatArray, delays: IndexArray) -> None:
+        self._outlet, self._delays = outlet, delays
+        longest = int(delays.max())
+        self._line = np.zeros((longest + 1, *outlet.shape))
+        self._rows = np.arange(len(outlet))
         self._step = 0
-        self.inlet = np.zeros(outlet.shape) if delay else outlet
+        self._delayed = longest > 0
+        self.inlet = np.zeros(outlet.shape) if self._delayed else outlet
         """Next commands, ``(n, motors)``; the outlet itself without a delay."""
 
     def advance(self) -> None:
         """Moves the commands of the inlet into the line, and the delayed ones to the outlet."""
-        if len(self._line):
-            slot = self._step % len(self._line)
-            self._outlet[:] = self._line[slot]
-            self._line[slot] = self.inlet
+        if self._delayed:
             self._step += 1
+            self._line[self._step % len(self._line)] = self.inlet
+            self._send(self._delays)
 
     def release(self) -> None:
-        """Moves the oldest command of the line to the outlet, where it would be a step later."""
-        self._outlet[:] = self._line[self._step % len(self._line)]
+        """Moves those commands to the outlet that would be there a step later."""
+        self._send(self._delays - 1)
+
+    def _send(self, delays: IndexArray) -> None:
+        self._outlet[:] = self._line[(self._step - delays) % len(self._line), self._rows]

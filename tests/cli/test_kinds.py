@@ -15,9 +15,10 @@ PATH = os.pathsep.join(filter(None, (str(EXAMPLES), os.environ.get("PYTHONPATH")
 
 @pytest.fixture(scope="module")
 def heavy(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
-    """A folder in which a robot under a load on slippery ground was recovered, and what it said."""
+    """A folder in which a robot in low gravity on slippery ground was recovered, and its output."""
     folder = tmp_path_factory.mktemp("heavy")
-    arguments = ("--damage", "payload=2+friction=0.4", "--kinds", "payload:PAYLOAD,friction,jam")
+    kinds = "gravity:GRAVITY,friction,jam"
+    arguments = ("--damage", "gravity=3.7+friction=0.4", "--kinds", kinds)
     done = selfmodel(
         *("recover", "quadruped", *arguments, *SMALL, "--trials", "1", "--out", "run", "--json"),
         cwd=folder,
@@ -37,9 +38,9 @@ def words(diagnosis: list[dict]) -> set[str]:
 def test_a_recovery_considers_the_kinds_that_are_chosen(heavy: tuple[Path, dict]):
     _, told = heavy
 
-    assert told["truth"] == "friction=0.4+payload=2.0"
-    assert told["kinds"] == ["payload", "friction", "jam"]
-    assert {"payload", "friction"} & words(told["diagnosis"])
+    assert told["truth"] == "friction=0.4+gravity=3.7"
+    assert told["kinds"] == ["gravity", "friction", "jam"]
+    assert {"gravity", "friction"} & words(told["diagnosis"])
     assert words(told["diagnosis"]) <= {*told["kinds"], "intact"}
 
 
@@ -48,7 +49,7 @@ def test_the_logs_and_the_kinds_of_a_run_give_its_ranking(heavy: tuple[Path, dic
     run, told = heavy
     logs = [trial["log"] for trial in told["trials"]]
     done = selfmodel(
-        *("diagnose", *logs, "--kinds", "payload:PAYLOAD,friction,jam", "--json"),
+        *("diagnose", *logs, "--kinds", "gravity:GRAVITY,friction,jam", "--json"),
         cwd=run,
         PYTHONPATH=PATH,
     )
@@ -59,28 +60,28 @@ def test_the_logs_and_the_kinds_of_a_run_give_its_ranking(heavy: tuple[Path, dic
 
 
 def test_a_trial_and_its_replay_name_a_kind_of_ones_own(tmp_path: Path):
-    own = ("--kinds", "payload:PAYLOAD")
+    own = ("--kinds", "gravity:GRAVITY")
     logged = selfmodel(
-        *("trial", "quadruped", "--damage", "payload=2", *own, "--out", "a.mcap"),
+        *("trial", "quadruped", "--damage", "gravity=3.7", *own, "--out", "a.mcap"),
         cwd=tmp_path,
         PYTHONPATH=PATH,
     )
     again = selfmodel(
-        *("replay", "a.mcap", "--hypothesis", "payload=2", *own, "--json"),
+        *("replay", "a.mcap", "--hypothesis", "gravity=3.7", *own, "--json"),
         cwd=tmp_path,
         PYTHONPATH=PATH,
     )
     drawn = selfmodel(
-        *("render", "a.mcap", "--hypothesis", "payload=2", *own, "--out", "a.png"),
+        *("render", "a.mcap", "--hypothesis", "gravity=3.7", *own, "--out", "a.png"),
         cwd=tmp_path,
         PYTHONPATH=PATH,
     )
 
     assert logged.returncode == drawn.returncode == 0, logged.stderr + drawn.stderr
     assert json.loads(again.stdout)["identical"]
-    unknown = selfmodel("replay", "a.mcap", "--hypothesis", "payload=2", cwd=tmp_path)
+    unknown = selfmodel("replay", "a.mcap", "--hypothesis", "gravity=3.7", cwd=tmp_path)
     assert unknown.returncode == 2
-    assert "payload" in unknown.stderr
+    assert "gravity" in unknown.stderr
 
 
 @pytest.mark.search

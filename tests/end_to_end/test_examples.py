@@ -82,7 +82,7 @@ def test_plugins_of_ones_own_are_checked_in_python(tmp_path: Path):
 
     assert logged.returncode == 0, logged.stderr
     assert told.startswith("heading: [0. ")
-    assert "payload: 12 faults that may be proposed" in told
+    assert "gravity: 12 faults that may be proposed" in told
 
 
 @pytest.mark.process

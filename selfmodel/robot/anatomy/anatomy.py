@@ -69,12 +69,14 @@ class Anatomy:
         sensors: Inputs of the controller in its order, touch before angle.
         motors: Actuators that the controller commands, in its order.
         hinges: Hinges of the model except those of the root body, in the order of the model.
+        floating_base: Name of the root body; "" for a fixed base.
     """
 
     joints: tuple[Joint, ...]
     sensors: tuple[Sensor, ...]
     motors: tuple[str, ...]
     hinges: tuple[str, ...]
+    floating_base: str
 
     def joint(self, name: str) -> Joint:
         """Returns the joint of that name.

@@ -46,6 +46,7 @@ def read_anatomy(model: mujoco.MjModel, root: int) -> Anatomy:
         sensors=sensors,
         motors=tuple(model.actuator(m).name for m in range(model.nu)),
         hinges=tuple(model.joint(j).name for j in hinges),
+        floating_base=model.body(root).name if base_joints else "",
     )
 
 

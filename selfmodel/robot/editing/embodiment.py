@@ -14,8 +14,9 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.robot.anatomy.anatomy import Anatomy
 from selfmodel.robot.anatomy.transmission import motor_bodies, motor_joints
-from selfmodel.robot.editing import couplings
+from selfmodel.robot.editing import couplings, grip, resistance
 from selfmodel.robot.editing.frames import turn_about_origin, turned_by_hinge
+from selfmodel.robot.editing.point_mass import add_point_mass, inertia_box_reach
 
 DETACHED_ARMATURE = 1.0
 """Rotor inertia of a hinge of a detached body, kg m^2. Any positive value keeps the mass matrix
@@ -38,6 +39,9 @@ class Embodiment:
         offset: Summand of each reading after the gain, scaled with the reading, ``(sensors,)``.
         bias: Summand of each reading after the gain, independent of it, ``(sensors,)``.
         noise: Standard deviation of the sensor noise, ``(sensors,)``; see ``SensorNoise``.
+        added_delay: Control delay in addition to the robot's, control steps, ``(1,)``; see
+            ``control_delay.added_steps``.
+        encoder_offset: Logged minus true angle of each hinge, ``(hinges,)``, rad.
         silent_neurons: Indices of the silent hidden neurons of the controller.
         welded: Index in ``qpos``, index in ``qvel`` and angle (rad) of each welded hinge.
         detached: Names of the joints of detached bodies.
@@ -50,6 +54,8 @@ class Embodiment:
     offset: FloatArray
     bias: FloatArray
     noise: FloatArray
+    added_delay: FloatArray
+    encoder_offset: FloatArray
     silent_neurons: set[int] = field(default_factory=set)
     welded: list[tuple[int, int, float]] = field(default_factory=list)
     detached: set[str] = field(default_factory=set)
@@ -72,6 +78,8 @@ class Embodiment:
             offset=np.zeros(sensors),
             bias=np.zeros(sensors),
             noise=np.zeros(sensors),
+            added_delay=np.zeros(1),
+            encoder_offset=np.zeros(len(anatomy.hinges)),
             seed=seed,
         )
 
@@ -144,6 +152,36 @@ class Embodiment:
         joints = {joint for motor in motors for joint in motor_joints(self.model, motor)}
         self.model.jnt_actfrcrange[sorted(joints)] *= factor
 
+    def scale_damping(self, hinge: str, factor: float) -> None:
+        """Scales the viscous damping of a hinge; see ``resistance.scale_damping``."""
+        resistance.scale_damping(self.model, hinge, factor)
+
+    def add_dry_friction(self, hinge: str, fraction: float) -> None:
+        """Adds dry friction to a hinge; see ``resistance.add_dry_friction``."""
+        resistance.add_dry_friction(self.model, hinge, fraction)
+
+    def scale_grip(self, bodies: Sequence[str], factor: float) -> None:
+        """Scales the sliding friction of all contacts of some bodies, given by name."""
+        ids = np.array([self.model.body(name).id for name in bodies], dtype=np.intp)
+        grip.scale_grip(self.model, ids, factor)
+
+    def load_body(self, name: str, fraction: float, forward: float) -> None:
+        """Adds a point mass to the root body of a robot.
+
+        Args:
+            name: Name of the root body.
+            fraction: The mass, as a fraction of the mass of the healthy robot.
+            forward: Place of the mass along the forward direction of the initial pose: 0 is the
+                centre of mass of the body, 1 and -1 are its ends, by the box of its inertia.
+        """
+        model, body = self.model, self.model.body(name)
+        # Of the model before the faults: ``mj_setConst`` is called after all of them.
+        mass = fraction * float(body.subtreemass[0])
+        ahead, inverse = np.empty(3), body.quat * (1.0, -1.0, -1.0, -1.0)
+        mujoco.mju_rotVecQuat(ahead, np.array([1.0, 0.0, 0.0]), inverse)
+        offset = forward * inertia_box_reach(model, name, ahead) * ahead
+        add_point_mass(model, name, mass, offset)
+
     def set_friction(self, coefficient: float) -> None:
         """Sets the sliding friction between static geoms and the geoms that can touch them."""
         model = self.model
@@ -181,6 +219,15 @@ class Embodiment:
         """
         self.gain[sensor] *= factor
         self.offset[sensor] *= factor
+
+    def shift_reading(self, sensor: int, shift: float) -> None:
+        """Adds a constant to what a sensor measures; its gain applies to the constant too.
+
+        Args:
+            sensor: Column of the sensor.
+            shift: The constant, in units of the nominal reading.
+        """
+        self.offset[sensor] += self.gain[sensor] * shift
 
     def fix_reading(self, sensor: int, value: float) -> None:
         """Sets the reading of a sensor to a constant.

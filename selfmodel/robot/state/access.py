@@ -1,15 +1,19 @@
 """Reads and writes the signals of a behaviour in MuJoCo's state."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray, columns
 from selfmodel.robot.base.base import read_base
+from selfmodel.robot.editing.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state.fields import Bind, DerivedSignal, StateField
+from selfmodel.robot.state.fields import Bind, DerivedSignal, ShiftedField, StateField
 from selfmodel.trials.signals import Signal
+
+ObservedSignal = StateField | ShiftedField | DerivedSignal
+"""A signal as a robot logs it."""
 
 StateWriter = Callable[[Mapping[Signal, FloatArray]], None]
 """Writes signals, ``(n, width)`` each, into the state; absent signals keep their values."""
@@ -35,6 +39,25 @@ def signal_fields(
         **_joint_fields(robot, model),
         **read_base(models, robot.root).signal_fields(),
     }
+
+
+def observed_fields(
+    robot: Robot, embodiments: Sequence[Embodiment]
+) -> dict[Signal, ObservedSignal]:
+    """Returns ``signal_fields`` as robots log them: joint positions with the encoders' offsets.
+
+    Args:
+        robot: The healthy robot.
+        embodiments: An embodiment for all states, or one per state.
+    """
+    fields: dict[Signal, ObservedSignal] = {
+        **signal_fields(robot, *(embodiment.model for embodiment in embodiments))
+    }
+    offsets = np.array([embodiment.encoder_offset for embodiment in embodiments])
+    if offsets.any():
+        joints = _joint_fields(robot, embodiments[0].model)["joint_positions"]
+        fields["joint_positions"] = ShiftedField(joints, offsets)
+    return fields
 
 
 def state_writer(robot: Robot, bind: Bind, *models: mujoco.MjModel) -> StateWriter:
@@ -69,7 +92,7 @@ def bind_data(data: mujoco.MjData) -> Bind:
     return bind
 
 
-def current_value(field: StateField | DerivedSignal, data: mujoco.MjData) -> FloatArray:
+def current_value(field: ObservedSignal, data: mujoco.MjData) -> FloatArray:
     """Returns a copy of the current value of a signal of a single robot, ``(width,)``."""
     return np.array(field.reader(bind_data(data))()[0])
 

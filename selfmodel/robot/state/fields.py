@@ -30,6 +30,24 @@ class StateField:
         return lambda: values[:, chosen]
 
 
+@dataclass(frozen=True, eq=False)
+class ShiftedField:
+    """A signal that differs from a field of MuJoCo's state by constants.
+
+    Attributes:
+        field: The field.
+        shift: Signal minus field, ``(n, width)``.
+    """
+
+    field: StateField
+    shift: FloatArray
+
+    def reader(self, bind: Bind) -> Reader:
+        """Returns a function that reads the signal from the bound state."""
+        true = self.field.reader(bind)
+        return lambda: true() + self.shift
+
+
 @dataclass(frozen=True)
 class DerivedSignal:
     """A signal that is computed from positions and velocities.

@@ -1,0 +1,75 @@
+"""Tests of a control delay that grew."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from selfmodel.controllers.playback import Playback
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.faults.notation import parse
+from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.robot.control_delay import added_steps
+from selfmodel.robot.parameters import nominal, with_parameters
+from selfmodel.robot.robot import Robot
+from selfmodel.simulation.requests import cut_segments
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.signals import SIGNALS
+from tests.helpers.drivers import random_motion
+
+STEPS = 60
+STATES = tuple(
+    signal for signal in SIGNALS if signal not in ("sensors", "commands", "joint_efforts")
+)
+
+
+def late(robot: Robot, delay: float) -> Robot:
+    return with_parameters(robot, dataclasses.replace(nominal(robot), delay=delay))
+
+
+def playback(robot: Robot) -> Playback:
+    return Playback(robot.anatomy.motors, random_motion(robot, STEPS))
+
+
+@pytest.mark.parametrize(("own", "added"), [(0, 1), (0, 3), (2, 2), (0.5, 2), (1.5, 1)])
+def test_a_grown_delay_is_the_robot_with_that_delay_beside_robots_without_it(
+    quadruped: Robot, own: float, added: int
+):
+    robot, truth = late(quadruped, own), late(quadruped, own + added)
+    hypotheses = [INTACT, parse(f"delay={added}", robot.anatomy), INTACT]
+    driver = playback(robot)
+    runs = Simulator(robot, 1).run([(each, driver) for each in hypotheses], STEPS, SIGNALS)
+    expected = Simulator(truth, 1).run([(INTACT, driver)], STEPS, SIGNALS).behaviour
+    prompt = Simulator(robot, 1).run([(INTACT, driver)], STEPS, SIGNALS).behaviour
+    for signal in SIGNALS:
+        np.testing.assert_array_equal(runs.behaviour[signal][1], expected[signal][0])
+        for row in (0, 2):
+            np.testing.assert_array_equal(runs.behaviour[signal][row], prompt[signal][0])
+    assert not np.array_equal(expected["base_position"], prompt["base_position"])
+
+    signals = {signal: expected[signal][0] for signal in SIGNALS}
+    logged = Behaviour(expected.names, expected.time, signals)
+    states = {signal: logged[signal] for signal in STATES}
+    segments = cut_segments(logged, states, np.array([0, 10, 30]), 10, STATES)
+    predicted = Simulator(robot, 1).predict(hypotheses, segments).behaviour
+    alone = Simulator(truth, 1).predict([INTACT], segments).behaviour
+    for signal in STATES:
+        np.testing.assert_array_equal(predicted[signal][1], alone[signal][0])
+
+
+def test_a_physical_robot_has_the_delay_of_its_fault(quadruped: Robot):
+    fault = parse("delay=2", quadruped.anatomy)
+    driver = playback(quadruped)
+    path = [
+        sample.values["base_position"]
+        for sample in SimulatedRobot(quadruped, fault).run(driver, STEPS)
+    ]
+    expected = Simulator(quadruped, 1).run([(fault, driver)], STEPS, ["base_position"])
+
+    np.testing.assert_array_equal(path, expected.behaviour["base_position"][0])
+
+
+def test_a_delay_grows_by_whole_steps_up_to_the_largest_delay():
+    assert [added_steps(0, added) for added in (0.0, 0.4, 1.6, 3.0)] == [0, 0, 2, 3]
+    assert [added_steps(delay, 3.0) for delay in (2, 2.5, 3, 5)] == [3, 2, 2, 0]
