@@ -41,7 +41,7 @@ def onset_of(case: Case, robot: Robot, seed: int) -> float | None:
     if not case.onset:
         return None
     drawn = stream(seed, robot.name, case.name, "onset").uniform(3, 7)
-    return round(drawn / robot.control_timestep) * robot.control_timestep
+    return round(round(drawn / robot.control_timestep) * robot.control_timestep, 6)
 
 
 def _lost(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
