@@ -43,9 +43,10 @@ def _change(model: mujoco.MjModel, robot: Robot, gap: Gap, fault: Fault) -> None
         case "damping":
             model.dof_damping[_dofs(model, robot, fault.part)] *= fault.value
         case "joint-friction":
-            model.dof_frictionloss[_dofs(model, robot, fault.part)] += fault.value
+            torque = max(abs(model.actuator_forcerange[m, 1]) for m in _motors(model, robot, fault.part))
+            model.dof_frictionloss[_dofs(model, robot, fault.part)] += fault.value * torque
         case "grip":
-            set_grip(model, fault.part, fault.value)
+            set_grip(model, robot.part(fault.part).body, fault.value)
         case "heavy-limb":
             body = model.body(fault.part).id
             model.body_mass[body] *= fault.value

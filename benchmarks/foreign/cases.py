@@ -41,7 +41,7 @@ def onset_of(case: Case, robot: Robot, seed: int) -> float | None:
     if not case.onset:
         return None
     drawn = stream(seed, robot.name, case.name, "onset").uniform(3, 7)
-    return round(drawn / robot.control_timestep) * robot.control_timestep
+    return round(round(drawn / robot.control_timestep) * robot.control_timestep, 6)
 
 
 def _lost(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
@@ -120,9 +120,13 @@ def _wind(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
 
 
 def _payload(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
-    del robot
-    place = (float(rng.uniform(-0.1, 0.1)), float(rng.uniform(-0.05, 0.05)), 0.08)
-    return (Fault("payload", value=round(rng.uniform(0.2, 0.5), 3), place=place),)
+    """A payload above the middle of the root body, or near its front or back end."""
+    end = ("back", "", "front")[rng.integers(3)]
+    model = robot.spec().compile()
+    length = float(model.geom_size[model.body(robot.root).geomadr[0], 0])
+    forward = {"back": -0.9, "": 0.0, "front": 0.9}[end] + rng.uniform(-0.1, 0.1)
+    place = (round(forward * length, 3), round(float(rng.uniform(-0.03, 0.03)), 3), 0.05)
+    return (Fault("payload", end, round(rng.uniform(0.2, 0.5), 3), place=place),)
 
 
 def _heavier(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
@@ -138,7 +142,7 @@ def _damping(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
 
 
 def _joint_friction(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
-    return (Fault("joint-friction", _hinge_part(robot, rng), round(rng.uniform(2, 5), 2)),)
+    return (Fault("joint-friction", _hinge_part(robot, rng), round(rng.uniform(0.15, 0.4), 3)),)
 
 
 def _delay(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
@@ -152,7 +156,7 @@ def _encoder_offset(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]
 
 
 def _grip(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
-    feet = list(robot.touches.values())
+    feet = [part.name for part in robot.parts if part.body in robot.touches.values()]
     return (Fault("grip", feet[rng.integers(len(feet))], 0.1),)
 
 

@@ -1,5 +1,7 @@
 """Faults made in the specification of a model, before it is compiled."""
 
+import math
+
 import mujoco
 import numpy as np
 
@@ -88,6 +90,8 @@ def _loosen(spec: mujoco.MjSpec, fault: Fault) -> None:
     """Adds a second hinge, without a motor, about the axis of the first: the play of the gear."""
     joint = spec.joint(fault.part)
     half = fault.value / 2
+    if spec.compiler.degree:
+        half = math.degrees(half)
     joint.parent.add_joint(
         name=f"{fault.part}_play",
         type=mujoco.mjtJoint.mjJNT_HINGE,

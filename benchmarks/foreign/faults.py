@@ -11,7 +11,7 @@ NOTATION = {
     "slope": "slope={value:.3f}",
     "wind": "wind={value:.2f}",
     "crosswind": "crosswind={value:.2f}",
-    "payload": "payload={value:.3f}",
+    "payload": "payload:{part}={value:.3f}",
     "damping": "damping:{part}={value:.2f}",
     "joint-friction": "joint-friction:{part}={value:.3f}",
     "delay": "delay={value:.3f}",
@@ -56,7 +56,7 @@ class Fault:
         if self.kind in UNKNOWN:
             return f"outside:{self.kind}"
         text = NOTATION[self.kind].format(part=self.part, value=self.value)
-        return text.removesuffix("=0.0000")
+        return text.removesuffix("=0.0000").replace(":=", "=")
 
 
 def notation(faults: tuple[Fault, ...]) -> list[str]:

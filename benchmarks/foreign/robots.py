@@ -1,6 +1,8 @@
 """The robots of the generator: MJCF files, read as data, with their parts by name."""
 
 import importlib.util
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -118,6 +120,11 @@ def _spec(name: str, path: Path) -> mujoco.MjSpec:
     return _ant(spec) if name == "ant" else spec
 
 
+def radians(spec: mujoco.MjSpec, angles: Sequence[float]) -> list[float]:
+    """Returns angles of a specification, which may be in degrees, in radians."""
+    return [float(math.radians(angle) if spec.compiler.degree else angle) for angle in angles]
+
+
 def _ant(spec: mujoco.MjSpec) -> mujoco.MjSpec:
     """Adds names, touch sensors and position servos, as ``ant.toml`` requests them."""
     for motor in spec.actuators:
@@ -126,7 +133,7 @@ def _ant(spec: mujoco.MjSpec) -> mujoco.MjSpec:
         stiffness, damping = SERVO_GAINS
         motor.gear = [1, 0, 0, 0, 0, 0]
         motor.set_to_position(kp=stiffness, kv=damping)
-        motor.ctrlrange = joint.range
+        motor.ctrlrange = radians(spec, joint.range)
         motor.forcerange = [-150, 150]
         motor.forcelimited = 1
     for joint in spec.joints:

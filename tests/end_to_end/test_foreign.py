@@ -1,0 +1,213 @@
+"""Recordings of the independent generator: what it makes, and how answers are judged."""
+
+import ast
+import json
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from rosbags.highlevel import AnyReader
+
+from benchmarks.foreign.body import compiled
+from benchmarks.foreign.cases import CASES, faults_of
+from benchmarks.foreign.faults import NOTATION, UNKNOWN, Fault
+from benchmarks.foreign.gap import draw_gap
+from benchmarks.foreign.generate import Plan, generate
+from benchmarks.foreign.judge import judged, terms
+from benchmarks.foreign.robots import NAMES, Robot, robot
+from benchmarks.foreign.seeds import stream
+from tests.helpers.command import selfmodel
+
+FOLDER = Path(__file__).parents[2] / "benchmarks" / "foreign"
+SCORER = {"__main__", "score", "judge", "rates"}
+
+
+def imported(path: Path) -> set[str]:
+    nodes = list(ast.walk(ast.parse(path.read_text())))
+    names = {node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)}
+    return names | {a.name for node in nodes if isinstance(node, ast.Import) for a in node.names}
+
+
+@pytest.mark.parametrize("path", sorted(FOLDER.glob("*.py")), ids=lambda path: path.stem)
+def test_the_generator_imports_nothing_of_selfmodel_and_of_the_scorer(path: Path):
+    names = imported(path)
+
+    if path.stem not in SCORER:
+        assert not [name for name in names if name.split(".")[0] == "selfmodel"]
+        assert not names & {f"benchmarks.foreign.{module}" for module in SCORER}
+
+
+@pytest.fixture(scope="module", params=NAMES)
+def machine(request: pytest.FixtureRequest) -> Robot:
+    return robot(request.param)
+
+
+def model_of(machine: Robot, *faults: Fault, gap: float = 0.0) -> mujoco.MjModel:
+    return compiled(machine, draw_gap(machine, gap, stream(0)), faults)
+
+
+def test_a_lost_limb_is_deleted_with_its_mass_hinges_and_motors(machine: Robot):
+    part = machine.parts[0]
+
+    whole, left = model_of(machine), model_of(machine, Fault("lost", part.name))
+
+    lost = whole.njnt - left.njnt
+    assert lost == len(part.beyond) == whole.nu - left.nu
+    assert mujoco.mj_name2id(left, mujoco.mjtObj.mjOBJ_BODY, part.body) == -1
+    assert left.body_mass.sum() < whole.body_mass.sum() - 0.01
+
+
+def test_a_jam_fixes_the_body_at_the_angle_of_its_hinge(machine: Robot):
+    part = next(part for part in machine.parts if len(part.hinges) == 1)
+    whole, jammed = model_of(machine), model_of(machine, Fault("jam", part.name, 0.3))
+    data, fixed = mujoco.MjData(whole), mujoco.MjData(jammed)
+    data.qpos[whole.joint(part.hinges[0]).qposadr[0]] = 0.3
+
+    mujoco.mj_forward(whole, data)
+    mujoco.mj_forward(jammed, fixed)
+
+    assert jammed.njnt == whole.njnt - 1
+    for body in range(whole.nbody):
+        assert data.xquat[body] == pytest.approx(fixed.xquat[body], abs=1e-9)
+        assert data.xpos[body] == pytest.approx(fixed.xpos[body], abs=1e-9)
+
+
+def test_a_gap_changes_each_limb_and_motor_independently_and_none_changes_nothing(machine: Robot):
+    ideal, real = model_of(machine), model_of(machine, gap=1.0)
+
+    mass = real.body_mass[1:] / ideal.body_mass[1:]
+    gain = real.actuator_gainprm[:, 0] / ideal.actuator_gainprm[:, 0]
+
+    np.testing.assert_array_equal(ideal.body_mass, machine.spec().compile().body_mass)
+    for factors in (mass, gain):
+        assert np.unique(factors.round(9)).size == factors.size
+        assert np.abs(factors - 1).max() <= 0.1 + 1e-9
+    assert real.opt.timestep == 0.001
+
+
+@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+def test_every_case_has_faults_of_known_kinds_that_compile_on_every_robot(
+    case: object, machine: Robot
+):
+    faults = faults_of(case, machine, 3)
+
+    assert faults == () or model_of(machine, *faults).nq
+    for fault in faults:
+        assert fault.kind in {*NOTATION, *UNKNOWN, "encoder"}
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("foreign")
+    return generate(out, Plan("quadruped", "onset-break", 5, "large", duration=8.0, trials=1))
+
+
+def joint_states(bag: Path) -> tuple[list[str], np.ndarray, np.ndarray]:
+    with AnyReader([bag]) as reader:
+        chosen = [c for c in reader.connections if c.topic == "/joint_states"]
+        read = [reader.deserialize(raw, c.msgtype) for c, _, raw in reader.messages(chosen)]
+    time = np.array([m.header.stamp.sec + m.header.stamp.nanosec * 1e-9 for m in read])
+    return read[0].name, time - 1.7e9, np.array([m.position for m in read])
+
+
+@pytest.mark.search
+def test_the_encoder_of_a_limb_that_is_lost_in_mid_trial_moves_before_and_is_frozen_after(
+    recording: Path,
+):
+    truth = json.loads((recording / "truth.json").read_text())
+    (fault,) = truth["faults"]
+    names, time, angles = joint_states(recording / "after-1")
+
+    column = angles[:, names.index(f"{fault['part']}_joint")]
+
+    assert fault["encoders"] == "freezes"
+    assert truth["truth"] == [f"break:{fault['part']}"]
+    assert column[time < truth["onset"]].std() > 0.05
+    assert column[time > truth["onset"] + 0.02].std() == 0
+
+
+@pytest.mark.search
+def test_the_recording_of_a_plan_is_always_the_same(recording: Path, tmp_path: Path):
+    again = generate(
+        tmp_path, Plan("quadruped", "onset-break", 5, "large", duration=8.0, trials=1)
+    )
+
+    for name in ("before", "after-1"):
+        (_, time, angles), (_, times, repeated) = joint_states(recording / name), joint_states(
+            again / name
+        )
+        np.testing.assert_array_equal(time, times)
+        np.testing.assert_array_equal(angles, repeated)
+    assert (recording / "truth.json").read_text() == (again / "truth.json").read_text()
+
+
+@pytest.mark.process
+@pytest.mark.search
+def test_recordings_are_imported_by_their_mappings(recording: Path, tmp_path: Path):
+    for name in ("before", "after-1"):
+        log = str(tmp_path / f"{name}.mcap")
+        done = selfmodel(
+            "logs", "import", name, "--mapping", f"{name}.toml", "--out", log, "--json",
+            cwd=recording,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        assert "far from the model's start pose" not in done.stdout
+
+
+def row(truth: list[str], best: str, verdict: str, **more: object) -> dict[str, object]:
+    return {
+        "name": "made",
+        "seconds": 1.0,
+        "truth": {"truth": truth, "onset": None, "group": "paper"},
+        "answer": {
+            "diagnosis": [{"hypothesis": best, "distance": 1.0}],
+            "kinds": ["break", "jam", "jam-angle", "motor"],
+            "verdict": verdict,
+            "rivals": [],
+            **more,
+        },
+    }
+
+
+@pytest.mark.parametrize(
+    ("truth", "best", "verdict", "right"),
+    [
+        ([], "intact", "explained", True),
+        ([], "intact", "unexplained", False),
+        ([], "motor:a=0.4", "explained", False),
+        (["break:a"], "break:a", "explained", True),
+        (["break:a"], "break:a", "unexplained", False),
+        (["break:a"], "break:b", "explained", False),
+        (["jam:a=0.3"], "jam:a=0.34", "explained", True),
+        (["jam:a=0.3"], "jam:a", "explained", False),
+        (["break:a", "jam:b"], "jam:b+break:a", "explained", True),
+        (["outside:tether"], "intact", "unexplained", True),
+        (["outside:tether"], "motor:a=0.5", "explained", False),
+    ],
+)
+def test_a_verdict_is_right_if_it_is_about_the_truth(truth, best, verdict, right):
+    assert judged(row(truth, best, verdict)).verdict_right is right
+
+
+def test_an_ambiguous_verdict_is_right_if_it_names_the_truth():
+    assert judged(row(["break:a"], "jam:a", "ambiguous", rivals=["break:a"])).verdict_right
+    assert not judged(row(["break:a"], "jam:a", "ambiguous", rivals=["jam:b"])).verdict_right
+
+
+def test_a_row_tells_false_alarms_missed_faults_and_inventions_apart():
+    assert judged(row([], "motor:a=0.4", "explained")).false_alarm
+    assert judged(row(["break:a"], "intact", "explained")).called_intact
+    assert judged(row(["break:a"], "break:a+motor:b=0.5", "explained")).invented
+    assert judged(row(["motor:a=0.4"], "motor:a=0.5", "explained")).severity_error == (
+        pytest.approx(0.25)
+    )
+    assert judged({**row(["break:a"], "", ""), "answer": None}).verdict_right is False
+
+
+def test_terms_are_read_from_the_notation():
+    assert terms(["break:a", "motor:b=0.5", "wind=-3.0", "intact"]) == {
+        ("break", "a"): None,
+        ("motor", "b"): 0.5,
+        ("wind", ""): -3.0,
+    }
