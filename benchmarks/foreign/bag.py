@@ -62,7 +62,9 @@ class Encoders:
     onset: float
 
 
-def encoders_of(robot: Robot, faults: tuple[Fault, ...], onset: float, signs: dict[str, int]) -> Encoders:
+def encoders_of(
+    robot: Robot, faults: tuple[Fault, ...], onset: float, signs: dict[str, int]
+) -> Encoders:
     """Returns how the encoders of a robot with faults are recorded."""
     broken: dict[str, str] = {}
     for fault in faults:
@@ -129,8 +131,10 @@ def _joints(
         )
         dead = unknown & (time >= encoders.onset)
         position[dead] = speed[dead] = np.nan
-        yield "/joint_states", _stamp(time), _joint_state(
-            _stamp(time), names, (signs * position)[order], (signs * speed)[order]
+        yield (
+            "/joint_states",
+            _stamp(time),
+            _joint_state(_stamp(time), names, (signs * position)[order], (signs * speed)[order]),
         )
 
 

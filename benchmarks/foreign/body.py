@@ -43,7 +43,9 @@ def _change(model: mujoco.MjModel, robot: Robot, gap: Gap, fault: Fault) -> None
         case "damping":
             model.dof_damping[_dofs(model, robot, fault.part)] *= fault.value
         case "joint-friction":
-            torque = max(abs(model.actuator_forcerange[m, 1]) for m in _motors(model, robot, fault.part))
+            torque = max(
+                abs(model.actuator_forcerange[m, 1]) for m in _motors(model, robot, fault.part)
+            )
             model.dof_frictionloss[_dofs(model, robot, fault.part)] += fault.value * torque
         case "grip":
             set_grip(model, robot.part(fault.part).body, fault.value)

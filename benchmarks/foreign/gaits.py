@@ -54,9 +54,7 @@ class Sinusoids:
         del angles, touch
         wave = np.sin(2 * np.pi * self.frequency * time + self.phase)
         grown = min(time / 0.5, 1.0)
-        return self.ranges.centre + grown * self.ranges.half * (
-            self.amplitude * wave + self.offset
-        )
+        return self.ranges.centre + grown * self.ranges.half * (self.amplitude * wave + self.offset)
 
 
 @dataclass(frozen=True)

@@ -100,9 +100,7 @@ def _stream(plan: Plan, *words: str) -> np.random.Generator:
     return stream(plan.seed, plan.robot, plan.case, *words)
 
 
-def _stated(
-    machine: Robot, faults: tuple[Fault, ...], motions: list[Motion]
-) -> tuple[Fault, ...]:
+def _stated(machine: Robot, faults: tuple[Fault, ...], motions: list[Motion]) -> tuple[Fault, ...]:
     """Returns the faults, a jam where the joint was at the onset with its angle."""
 
     def angle(part: str) -> float:
@@ -163,10 +161,12 @@ def _gaits(machine: Robot, case: Case, plan: Plan, faults: tuple[Fault, ...]) ->
         other = compiled(machine, perfect, faults)
         best = sorted(
             best[: 2 * GAITS],
-            key=lambda k: _change(
-                motions[k], _rehearsal(machine, other, drawn[k], faults, plan.duration), plan
-            )
-            < MATTERS,
+            key=lambda k: (
+                _change(
+                    motions[k], _rehearsal(machine, other, drawn[k], faults, plan.duration), plan
+                )
+                < MATTERS
+            ),
         )
     return [drawn[k] for k in best[:GAITS]]
 
@@ -206,7 +206,9 @@ def _trial(
         phases = [_phase(0.0, machine, (), partial(models, ())), *phases]
     motion = simulate(machine, phases, gait, plan.duration, latency)
     signs = dict(
-        zip(machine.hinges, _stream(plan, "signs").choice((-1, 1), len(machine.hinges)), strict=True)
+        zip(
+            machine.hinges, _stream(plan, "signs").choice((-1, 1), len(machine.hinges)), strict=True
+        )
     )
     encoders = encoders_of(machine, faults, onset or -1.0, signs)
     noise = Noise().scaled(gap.size)

@@ -29,11 +29,13 @@ from selfmodel.cli.output.printing import print_json, print_lines, print_notes
 from selfmodel.cli.output.ranking import (
     confidence_sentence,
     detectable_sentences,
+    evidence_sentences,
     fit_sentence,
     ranking_table,
 )
 from selfmodel.cli.output.tables import print_tables
 from selfmodel.controllers.playback import Playback
+from selfmodel.diagnosis.direct_evidence import direct_evidence
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
 from selfmodel.experiments import plugins, trial_logs
 from selfmodel.experiments.arguments import AUTO, comparator_choice
@@ -110,6 +112,7 @@ def diagnose(
         "calibration": found.calibration.to_dict() if found.calibration else None,
         "diagnosis": ranking_to_list(diagnosis.ranked),
         **confidence_to_dict(diagnosis),
+        "evidence": [one.to_dict() for one in direct_evidence(found.damaged, model.anatomy)],
         "evaluations": found.search.evaluations,
         "distinct_hypotheses": found.search.distinct_hypotheses,
         "seconds": perf_counter() - start,
@@ -166,5 +169,6 @@ def _print(result: dict[str, Any]) -> None:
         confidence_sentence(result),
         fit_sentence(result),
         *detectable_sentences(result),
+        *evidence_sentences(result),
         *(f"from before the failure, not explained: {Path(path)}" for path in result["intact"]),
     )

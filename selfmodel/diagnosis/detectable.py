@@ -131,9 +131,7 @@ def _sides(fault: Fault, nominal: float, space: HypothesisSpace) -> tuple[_Side,
 
 def _with(best: Hypothesis, side: _Side, space: HypothesisSpace) -> Hypothesis:
     fault = side.fault
-    return space.canonical(
-        [*best.faults, replace(fault, severity=side.severities[side.middle])]
-    )
+    return space.canonical([*best.faults, replace(fault, severity=side.severities[side.middle])])
 
 
 def _is_clearly_worse(one: FloatArray, best: FloatArray) -> bool:

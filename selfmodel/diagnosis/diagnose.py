@@ -10,15 +10,18 @@ from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis.change_point import Change, best_split, change_at, is_change
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnosis import Diagnosis
+from selfmodel.diagnosis.direct_evidence import direct_evidence
 from selfmodel.diagnosis.evidence import Evidence
 from selfmodel.diagnosis.judgement import Question, judged, ranked_by_distance
 from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
+from selfmodel.diagnosis.observed_jams import observed_jams
 from selfmodel.diagnosis.refine import refined
 from selfmodel.diagnosis.search_cost import SearchSize
 from selfmodel.diagnosis.surrogate import Surrogate, own_surrogate, surrogate_of
 from selfmodel.evolution import Evolution, GenerationCallback, evolve
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import GENE_VALUES, HypothesisSpace
+from selfmodel.faults.jammed import JAMMED_AT_ANGLE
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.settings import Settings
@@ -169,7 +172,7 @@ class DiagnosticSearch:
         comparable = is_piecewise and self.evidence.uses_segments(known)
         return Question(
             evidence=self.evidence,
-            space=self._space,
+            space=self._space_of(trials),
             trials=trials,
             intact=self._intact,
             kept=self._settings.kept,
@@ -182,6 +185,14 @@ class DiagnosticSearch:
             ),
         )
 
+    def _space_of(self, trials: Sequence[Trial | TrialPart]) -> HypothesisSpace:
+        """Returns the hypotheses, with the jams at the angles at which encoders stand."""
+        if JAMMED_AT_ANGLE not in self._space.kinds:
+            return self._space
+        anatomy = self._space.anatomy
+        evidence = direct_evidence([whole(trial).rows for trial in trials], anatomy)
+        return dataclasses.replace(self._space, observed=observed_jams(evidence, anatomy))
+
     def _refined(
         self, known: Sequence[Hypothesis], question: Question
     ) -> tuple[Hypothesis, set[Hypothesis]]:
@@ -192,7 +203,7 @@ class DiagnosticSearch:
         compared: set[Hypothesis] = set()
         best = refined(
             known,
-            self._space,
+            question.space,
             self._settings.genes,
             LossFunctions(
                 damaged=_recorded(question.losses.damaged, compared),
@@ -219,7 +230,7 @@ class DiagnosticSearch:
         if timeline is None:
             return None
         losses = question.losses
-        singles = self._space.with_one_more(INTACT)
+        singles = question.space.with_one_more(INTACT)
         after = dict.fromkeys([best, *found[:REFINEMENT_STARTS], *singles])
         split = best_split([INTACT, best], list(after), losses.surrogate, losses.damaged)
         if split is None or not is_change(split, best, losses.damaged):

@@ -82,9 +82,7 @@ def judged(best: Hypothesis, compared: Iterable[Hypothesis], question: Question)
         test=TEST,
         unsearched=unsearched,
         undetectable=tuple(undetectable_faults(best, space, losses)[:kept]),
-        detectable=()
-        if best
-        else tuple(detectable_severities(best, space, losses.damaged)),
+        detectable=() if best else tuple(detectable_severities(best, space, losses.damaged)),
         fit=fit,
     )
 

@@ -33,10 +33,12 @@ class HypothesisSpace:
     Attributes:
         anatomy: The robot's parts.
         kinds: Fault kinds, in the order of the second value of a gene.
+        observed: Faults that the trials suggest without a simulation; further coarse candidates.
     """
 
     anatomy: Anatomy
     kinds: tuple[FaultKind, ...]
+    observed: tuple[Fault, ...] = ()
 
     @classmethod
     def of(cls, kinds: Iterable[FaultKind], anatomy: Anatomy) -> "HypothesisSpace":
@@ -90,14 +92,18 @@ class HypothesisSpace:
 
     @cached_property
     def coarse_candidates(self) -> tuple[Fault, ...]:
-        """Every kind at every part, at ``COARSE_LEVELS`` evenly spaced levels or fewer."""
-        return tuple(
+        """Every kind at every part, at ``COARSE_LEVELS`` evenly spaced levels or fewer.
+
+        The observed faults are included.
+        """
+        spaced = (
             Fault(kind, part, levels[i])
             for kind in self.kinds
             for part in kind.parts(self.anatomy)
             for levels in (kind.levels(self.anatomy, part),)
             for i in _evenly_spaced(len(levels))
         )
+        return tuple(dict.fromkeys((*spaced, *self.observed)))
 
     def decode(self, genome: FloatArray) -> Hypothesis:
         """Returns the hypothesis that a genome encodes.

@@ -35,7 +35,7 @@ PAPER_KINDS: tuple[FaultKind, ...] = (BROKEN, JAMMED, FAILED_SENSOR)
 BODY_KINDS: tuple[FaultKind, ...] = (BROKEN, JAMMED, JAMMED_AT_ANGLE, FAILED_SENSOR, WEAK_MOTOR)
 """Kinds of faults of the robot itself that are common."""
 
-ENVIRONMENT_KINDS: tuple[FaultKind, ...] = (FRICTION, SLOPE, WIND)
+ENVIRONMENT_KINDS: tuple[FaultKind, ...] = (FRICTION, SLOPE, WIND, PAYLOAD)
 """Kinds of changes of the robot's environment that are common."""
 
 ALL_KINDS: tuple[FaultKind, ...] = tuple(kind for kind in KINDS.values() if kind.searchable)

@@ -1,8 +1,10 @@
 """A part of a trial in time."""
 
+import dataclasses
 import math
 from dataclasses import dataclass
 
+from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.trial import Trial
 
 
@@ -24,6 +26,19 @@ class TrialPart:
     def is_whole(self) -> bool:
         """Whether the part has no bounds."""
         return self.begin == -math.inf and self.end == math.inf
+
+    @property
+    def rows(self) -> Trial:
+        """The trial with the rows of the part alone."""
+        behaviour = self.trial.behaviour
+        kept = (behaviour.time >= self.begin) & (behaviour.time <= self.end)
+        part = Behaviour(
+            names=behaviour.names,
+            time=behaviour.time[kept],
+            signals={name: values[kept] for name, values in behaviour.signals.items()},
+            late=None if behaviour.late is None else behaviour.late[kept],
+        )
+        return dataclasses.replace(self.trial, behaviour=part)
 
 
 def whole(trial: Trial | TrialPart) -> TrialPart:

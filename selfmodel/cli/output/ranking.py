@@ -42,6 +42,22 @@ def fit_sentence(found: Mapping[str, Any]) -> str:
     )
 
 
+def evidence_sentences(found: Mapping[str, Any]) -> list[str]:
+    """Returns the evidence that needs no simulation: joints that stand, and constant sensors.
+
+    Args:
+        found: Values of ``--json`` output.
+    """
+    sentences = []
+    for one in found["evidence"]:
+        idle = one["commands_without_effect"]
+        constant = [f"{each['sensor']} ({each['reading']:g})" for each in one["constant_sensors"]]
+        facts = [f"commands without effect: {', '.join(idle)}"] if idle else []
+        facts += [f"constant readings: {', '.join(constant)}"] if constant else []
+        sentences += [f"In {one['trial']}, {'; '.join(facts)}."] if facts else []
+    return sentences
+
+
 def _number(value: float | None) -> str:
     return "diverged" if value is None else f"{value:.3g}"
 
