@@ -15,7 +15,7 @@ from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signal_difference import difference
 from selfmodel.trials.signal_scales import PREDICTION_ERROR_SCALES
 from selfmodel.trials.signals import Signal
-from selfmodel.trials.state_estimation import ONBOARD, STATE, estimated_states
+from selfmodel.trials.state_estimation import ONBOARD, STATE, estimated_states, known_rows
 from selfmodel.trials.trial import Trial
 
 MIN_SEGMENTS = 4
@@ -43,7 +43,12 @@ class SegmentPrediction:
     fit. Its use here answers the paper's future work, section V: displacement contains too little
     information.
 
-    Limits: the state is required, so encoders and the base's pose and velocity.
+    A hinge whose encoder was lost is unknown where it is NaN: it continues from its predicted state
+    at the end of the segment before, and has no loss. The mean over the columns of a signal is then
+    that of the known columns.
+
+    Limits: the state is required, so encoders and the base's pose and velocity; of the encoders,
+    one or more.
     ``segment-prediction-onboard`` requires neither the base's position nor its linear velocity, and
     continues each segment from the base's predicted state at the end of the segment before, which
     makes it less sharp. Slow effects, such as a light wind, hardly show within an eighth of a
@@ -101,8 +106,7 @@ class SegmentPrediction:
         count = min(self.max_segments, (behaviour.steps - 1) // horizon)
         starts = np.linspace(0, behaviour.steps - 1 - horizon, count).round().astype(np.intp)
         known: dict[Signal, BoolArray] = {
-            signal: np.asarray(np.isfinite(states[signal][starts]).all(axis=1))
-            for signal in self.state
+            signal: known_rows(signal, states[signal][starts]) for signal in self.state
         }
         known["commands"] = _all_finite(behaviour["commands"], starts, horizon)
         usable = np.asarray(np.logical_and.reduce(list(known.values())))
@@ -129,7 +133,8 @@ class LoggedReadings:
 
     Attributes:
         values: Readings, ``(segments, horizon + 1, sensors)``; NaN if unknown.
-        binary: Mask of the sensors whose readings in the whole trial are 0 or 1, ``(sensors,)``.
+        binary: Mask of the sensors whose readings in the whole trial are 0 or 1, ``(sensors,)``;
+            False for a sensor that was never observed.
         mid_trial: Mask of the segments that begin after the start of the trial, ``(segments,)``.
     """
 
@@ -191,9 +196,10 @@ def _arithmetic_loss(trial: Trial, starts: IndexArray, horizon: int) -> FloatArr
 
 
 def _logged_readings(logged: FloatArray, starts: IndexArray, horizon: int) -> LoggedReadings:
-    binary = np.isin(logged, (0.0, 1.0)) | np.isnan(logged)
+    unknown = np.isnan(logged)
+    binary = (np.isin(logged, (0.0, 1.0)) | unknown).all(axis=0) & ~unknown.all(axis=0)
     rows = starts[:, np.newaxis] + np.arange(horizon + 1)
-    return LoggedReadings(logged[rows], np.asarray(binary.all(axis=0)), starts > 0)
+    return LoggedReadings(logged[rows], np.asarray(binary), starts > 0)
 
 
 def _readings_loss(predicted: FloatArray, logged: LoggedReadings, steady: BoolArray) -> FloatArray:
@@ -209,9 +215,11 @@ def _readings_loss(predicted: FloatArray, logged: LoggedReadings, steady: BoolAr
     errors = predicted - logged.values
     graded = np.log1p(np.square(errors / PREDICTION_ERROR_SCALES["sensors"]))
     switched = np.abs(errors) * np.where(never, CONTRADICTION, 1.0)[:, None, None]
-    switched[:, logged.mid_trial, 0] = 0.0
+    switched[:, logged.mid_trial, 0] *= 0.0  # an unknown reading remains NaN
     losses = _finite_mean(np.where(switches[:, None, None], switched, graded))
-    noise = noise_level_loss(predicted[:, steady], logged.values[steady], ~switches)
+    observed = ~np.isnan(logged.values).all(axis=(0, 1))
+    graded_sensors = np.asarray(observed & ~switches)
+    noise = noise_level_loss(predicted[:, steady], logged.values[steady], graded_sensors)
     return losses + noise[:, np.newaxis]
 
 

@@ -44,7 +44,8 @@ class Segments:
 
     Attributes:
         states: State at the beginning of each segment, ``(segments, width)`` for each signal of
-            the joints' and the base's positions and velocities.
+            the joints' and the base's positions and velocities. NaN for the hinges whose state is
+            unknown.
         commands: Logged commands, ``(segments, lead + horizon, motors)``: the first ``lead`` rows
             precede the segment, for models with a control delay.
         lead: Rows of ``commands`` before the segment: at least the robot's control delay, which is
@@ -65,6 +66,16 @@ class Segments:
     def horizon(self) -> int:
         """Control steps of a segment."""
         return int(self.commands.shape[1]) - self.lead
+
+    @property
+    def independent(self) -> bool:
+        """Whether the state at the beginning of each segment is known completely.
+
+        Otherwise, a segment continues the unknown part of the state of the segment before.
+        """
+        return "base_position" in self.states and not any(
+            np.isnan(values).any() for values in self.states.values()
+        )
 
 
 @dataclass(frozen=True)
