@@ -323,17 +323,11 @@ def _with_estimated_states(
         if segments.independent:
             return own
         predicted = predict_with(replace(segments, record=(*BASE, *JOINTS)))
-        begins = {signal: predicted[signal][0, :, 0] for signal in (*BASE, *JOINTS)}
-        known = segments.states
-        states = {
-            **known,
-            **{
-                signal: np.where(np.isnan(known[signal]), value, known[signal])
-                if signal in known
-                else value
-                for signal, value in begins.items()
-            },
-        }
+        states = dict(segments.states)
+        for signal in predicted.signals:
+            begin = predicted[signal][0, :, 0]
+            known = states.get(signal, np.full_like(begin, np.nan))
+            states[signal] = np.where(np.isnan(known), begin, known)
         return replace(own, segments=replace(segments, states=states))
 
     return [independent(own) for own in data]

@@ -14,6 +14,7 @@ from selfmodel.logs.recordings.mapping.mapping import (
     FORCES,
     FRAMES,
     LENGTHS,
+    NONE,
     TABLE,
     TIMES,
     UNKNOWN,
@@ -139,7 +140,21 @@ def _angles(entries: Table, role: Literal["joints", "commands"], *, table: bool)
         for key in ("velocities", "efforts")
     }
     names = entries.table("names")
-    links = {name: _link(names, name, scale) for name in names.keys}
+    named = {name: _link(names, name, scale) for name in names.keys}
+    links = {name: link for name, link in named.items() if link.name != NONE}
+    absent = tuple(name for name in named if name not in links)
+    if absent and role == "commands":
+        raise entries.document.error(
+            (*names.path, absent[0]),
+            f"{absent[0]} must have a command, got {NONE!r}, which is for hinges without an "
+            f"encoder: fill in its name",
+        )
+    if not links and absent:
+        raise entries.document.error(
+            names.path,
+            f"[{'.'.join(names.path)}] must name the joint of one hinge or more, got "
+            f"{NONE!r} for all: fill in their names",
+        )
     parts: dict[str, str] = {}
     ordered = frozenset(order)
     for name, link in links.items():
@@ -156,8 +171,13 @@ def _angles(entries: Table, role: Literal["joints", "commands"], *, table: bool)
         parts[link.name] = name
         if order and link.name not in ordered:
             raise entries.document.unknown((*names.path, name), "name in order", link.name, order)
+    for key, columns in others.items():
+        for part in [part for part, name in columns.items() if name == NONE]:
+            if part not in named:
+                raise entries.document.unknown((role, key, part), "hinge", part, named)
+            del columns[part]
     entries.done()
-    return Angles(role, topic, scale, links, order, **others)
+    return Angles(role, topic, scale, links, order, **others, absent=absent)
 
 
 def _link(names: Table, name: str, scale: float) -> Link:
