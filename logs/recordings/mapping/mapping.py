@@ -67,8 +67,7 @@ class Angles:
         role: ``joints`` or ``commands``.
         topic: Name of the topic.
         scale: Recorded unit, rad.
-        links: Conversions by the model's hinge or motor; those of hinges without an encoder are left
-            out.
+        links: Conversions by the model's hinge or motor; hinges without an encoder have none.
         order: Names of the columns of a Float64MultiArray; empty for other types.
         velocities: Columns of velocities in a table, by hinge.
         efforts: Columns of torques in a table, by hinge.

@@ -135,7 +135,7 @@ def _matched(parts: Sequence[str], offered: Mapping[str, str]) -> dict[str, tupl
     """Column of each part, and whether the match is certain: by name, else by number."""
     exact = {part: column for part in parts for column in offered.values() if _is_of(column, part)}
     if len(exact) == len(parts) or (exact and len(exact) == len(offered)):
-        return {part: (exact[part], True) for part in parts}
+        return {part: (column, True) for part, column in exact.items()}
     labels = [label for label in offered if label.isdecimal()]
     if len(labels) == len(offered) == len(parts):
         ordered = sorted(labels, key=int)
