@@ -31,7 +31,9 @@ def known_steps(states: Mapping[Signal, FloatArray]) -> BoolArray:
     Args:
         states: Signals of the state, ``(steps, width)`` each.
     """
-    return np.logical_and.reduce([known_rows(signal, rows) for signal, rows in states.items()])
+    return np.asarray(
+        np.logical_and.reduce([known_rows(signal, rows) for signal, rows in states.items()])
+    )
 
 
 def known_rows(signal: Signal, values: FloatArray) -> BoolArray:
