@@ -10,14 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
+from selfmodel.comparators.loose_encoders import detached_hinges, stands
 from selfmodel.trials.encoder_noise import standing_tolerance
 
 ERROR_SCALE = 0.5
 """Error of the natural logarithm of a motion that counts as large: a factor of 1.6."""
-
-FROZEN = 1e-6
-"""Range of predicted angles below which a hinge is welded or detached, rad. A welded hinge moves by
-less than 1e-9 rad in a segment."""
 
 MIN_ROWS = 4
 """Known angles of a hinge that a segment needs for its motion."""
@@ -85,8 +82,7 @@ def encoder_motion_loss(predicted: FloatArray, logged: LoggedMotion) -> FloatArr
     Returns:
         The mean over the informative hinges of ``log(1 + (e / ERROR_SCALE)^2)``; 0 without any.
     """
-    frozen = np.asarray(np.ptp(predicted, axis=(1, 2)) < FROZEN)
-    detached = frozen & np.asarray(np.abs(predicted[:, 0, 0] - logged.resting) < FROZEN)
+    frozen, detached = stands(predicted), detached_hinges(predicted, logged.resting)
     motion = np.where(frozen[:, np.newaxis], logged.overall, logged.within)
     ratio = (motion + logged.tolerance) / (_motion(predicted, logged.known) + logged.tolerance)
     losses = np.log1p(np.square(0.5 * np.log(ratio) / ERROR_SCALE))

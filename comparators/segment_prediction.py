@@ -13,6 +13,12 @@ from selfmodel.comparators.encoder_motion import (
     encoder_motion_loss,
     logged_motion,
 )
+from selfmodel.comparators.loose_encoders import (
+    LooseEncoders,
+    detached_hinges,
+    loose_encoders,
+    with_loose_encoders,
+)
 from selfmodel.comparators.sensor_noise_level import noise_level_loss
 from selfmodel.diagnosis.comparator import TrialRefusedError
 from selfmodel.simulation.requests import Segments, command_steps, cut_segments
@@ -20,7 +26,7 @@ from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signal_difference import difference
 from selfmodel.trials.signal_scales import PREDICTION_ERROR_SCALES
 from selfmodel.trials.signals import Signal
-from selfmodel.trials.state_estimation import ONBOARD, STATE, estimated_states
+from selfmodel.trials.state_estimation import ONBOARD, STATE, estimated_states, known_rows
 from selfmodel.trials.trial import Trial
 
 MIN_SEGMENTS = 4
@@ -49,7 +55,12 @@ class SegmentPrediction:
     fit. Its use here answers the paper's future work, section V: displacement contains too little
     information.
 
-    Limits: the state is required, so encoders and the base's pose and velocity.
+    A hinge whose encoder was lost is unknown where it is NaN: it continues from its predicted state
+    at the end of the segment before, and has no loss. The mean over the columns of a signal is then
+    that of the known columns.
+
+    Limits: the state is required, so encoders and the base's pose and velocity; of the encoders,
+    one or more.
     ``segment-prediction-onboard`` requires neither the base's position nor its linear velocity, and
     continues each segment from the base's predicted state at the end of the segment before, which
     makes it less sharp. Slow effects, such as a light wind, hardly show within an eighth of a
@@ -93,6 +104,7 @@ class SegmentPrediction:
             steady=steady,
             readings=_logged_readings(behaviour["sensors"], starts, horizon),
             motion=_logged_motion(trial, request, starts),
+            loose=loose_encoders(behaviour, starts, horizon),
             arithmetic=_arithmetic_loss(trial, starts, horizon),
             piece_steps=(starts[:, np.newaxis] + np.array([0, horizon]))[steady],
         )
@@ -111,8 +123,7 @@ class SegmentPrediction:
         count = min(self.max_segments, (behaviour.steps - 1) // horizon)
         starts = np.linspace(0, behaviour.steps - 1 - horizon, count).round().astype(np.intp)
         known: dict[Signal, BoolArray] = {
-            signal: np.asarray(np.isfinite(states[signal][starts]).all(axis=1))
-            for signal in self.state
+            signal: known_rows(signal, states[signal][starts]) for signal in self.state
         }
         known["commands"] = _all_finite(behaviour["commands"], starts, horizon)
         usable = np.asarray(np.logical_and.reduce(list(known.values())))
@@ -140,7 +151,8 @@ class LoggedReadings:
 
     Attributes:
         values: Readings, ``(segments, horizon + 1, sensors)``; NaN if unknown.
-        binary: Mask of the sensors whose readings in the whole trial are 0 or 1, ``(sensors,)``.
+        binary: Mask of the sensors whose readings in the whole trial are 0 or 1, ``(sensors,)``;
+            False for a sensor that was never observed.
         mid_trial: Mask of the segments that begin after the start of the trial, ``(segments,)``.
     """
 
@@ -163,6 +175,7 @@ class PreparedSegments:
         steady: Mask of the segments without a late step, ``(segments,)``.
         readings: The logged readings.
         motion: The logged motion of the encoders; None for states without joint positions.
+        loose: Encoders that follow commands, as those of a lost limb may; None if there are none.
         arithmetic: Loss of the controller's arithmetic, ``(segments,)``.
         piece_steps: First and last step of each segment without a late step, ``(segments, 2)``.
     """
@@ -173,6 +186,7 @@ class PreparedSegments:
     steady: BoolArray
     readings: LoggedReadings
     motion: LoggedMotion | None
+    loose: LooseEncoders | None
     arithmetic: FloatArray
     piece_steps: IndexArray
 
@@ -196,11 +210,15 @@ class PreparedSegments:
         """Returns the loss of each signal in each segment, ``(n, segments)`` each."""
         shape = simulated["sensors"].shape[:2]
         terms = {"commands": np.broadcast_to(self.arithmetic, shape)}
+        predictions = simulated
+        if self.loose is not None and self.motion is not None:
+            detached = detached_hinges(simulated["joint_positions"], self.motion.resting)
+            predictions = with_loose_encoders(simulated, self.loose, detached)
         for signal, logged in self.states.items():
-            predicted = simulated[signal][:, :, self.compared]
+            predicted = predictions[signal][:, :, self.compared]
             error = difference(signal, predicted, logged) / PREDICTION_ERROR_SCALES[signal]
             terms[signal] = _finite_mean(np.log1p(np.square(error)))
-        terms["sensors"] = _readings_loss(simulated["sensors"], self.readings, self.steady)
+        terms["sensors"] = _readings_loss(predictions["sensors"], self.readings, self.steady)
         if self.motion is not None:
             motion = encoder_motion_loss(simulated["joint_positions"], self.motion)
             terms["encoder motion"] = motion
@@ -230,9 +248,10 @@ def _logged_motion(trial: Trial, request: Segments, starts: IndexArray) -> Logge
 
 
 def _logged_readings(logged: FloatArray, starts: IndexArray, horizon: int) -> LoggedReadings:
-    binary = np.isin(logged, (0.0, 1.0)) | np.isnan(logged)
+    unknown = np.isnan(logged)
+    binary = (np.isin(logged, (0.0, 1.0)) | unknown).all(axis=0) & ~unknown.all(axis=0)
     rows = starts[:, np.newaxis] + np.arange(horizon + 1)
-    return LoggedReadings(logged[rows], np.asarray(binary.all(axis=0)), starts > 0)
+    return LoggedReadings(logged[rows], np.asarray(binary), starts > 0)
 
 
 def _readings_loss(predicted: FloatArray, logged: LoggedReadings, steady: BoolArray) -> FloatArray:
@@ -248,9 +267,11 @@ def _readings_loss(predicted: FloatArray, logged: LoggedReadings, steady: BoolAr
     errors = predicted - logged.values
     graded = np.log1p(np.square(errors / PREDICTION_ERROR_SCALES["sensors"]))
     switched = np.abs(errors) * np.where(never, CONTRADICTION, 1.0)[:, None, None]
-    switched[:, logged.mid_trial, 0] = 0.0
+    switched[:, logged.mid_trial, 0] *= 0.0  # an unknown reading remains NaN
     losses = _finite_mean(np.where(switches[:, None, None], switched, graded))
-    noise = noise_level_loss(predicted[:, steady], logged.values[steady], ~switches)
+    observed = ~np.isnan(logged.values).all(axis=(0, 1))
+    graded_sensors = np.asarray(observed & ~switches)
+    noise = noise_level_loss(predicted[:, steady], logged.values[steady], graded_sensors)
     return losses + noise[:, np.newaxis]
 
 

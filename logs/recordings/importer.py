@@ -27,7 +27,13 @@ from selfmodel.logs.recordings.resampling.signals import (
     joint_signals,
     sensor_signals,
 )
-from selfmodel.logs.recordings.resampling.tracks import RawTracks, Tracks, converted, required
+from selfmodel.logs.recordings.resampling.tracks import (
+    RawTracks,
+    Tracks,
+    converted,
+    lasting,
+    required,
+)
 from selfmodel.logs.recordings.rosbag.bag import read_bag
 from selfmodel.logs.recordings.rosbag.tracks import bag_tracks
 from selfmodel.logs.recordings.series import Series, Source
@@ -224,8 +230,11 @@ def _steps(mapping: RecordingMapping, tracks: Tracks, timestep: float, budget: B
                 f"{role.topic} has no number for {part}: name another {where}",
             )
     first = max(int(track.times[0]) for _, _, track in needed)
-    # The last command is held, so the end of the commands does not end the trial.
-    last = min(int(track.times[-1]) for role, _, track in needed if role.kind != "commands")
+    # The last command is held, so the end of the commands does not end the trial; nor does that of
+    # single encoders.
+    lasts = [track for role, _, track in needed if role.kind not in ("commands", "joints")]
+    lasts += lasting({part: track for role, part, track in needed if role.kind == "joints"})
+    last = min(int(track.times[-1]) for track in lasts)
     origin = first + round(mapping.start * 1e9)
     period = timestep * 1e9
     available = int((last - origin + 0.5) // period) + 1

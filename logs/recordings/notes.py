@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from selfmodel.logs.recordings.mapping.mapping import RecordingMapping
+from selfmodel.logs.recordings.mapping.mapping import NONE, RecordingMapping
 from selfmodel.logs.recordings.quality import Quality
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Behaviour
@@ -26,6 +26,7 @@ def notes(
         *_clock(mapping, qualities),
         *_gaps(behaviour, qualities),
         *_left_out(qualities),
+        *_lost_encoders(mapping, behaviour),
         *_unobserved(behaviour),
     )
 
@@ -98,6 +99,26 @@ def _left_out(qualities: Mapping[str, Quality]) -> Iterator[str]:
             yield f"{topic}: messages left out: {', '.join(reasons)}"
         if found.reordered:
             yield f"{topic}: {found.reordered} messages came out of order and were sorted"
+
+
+def _lost_encoders(mapping: RecordingMapping, behaviour: Behaviour) -> Iterator[str]:
+    joints = {
+        "angle": behaviour["joint_positions"],
+        "velocity": behaviour["joint_velocities"],
+    }
+    for quantity, values in joints.items():
+        seen = np.isfinite(values)
+        if not seen.any():
+            continue
+        end = np.flatnonzero(seen.any(axis=1))[-1]
+        for name, column in zip(behaviour.names.hinges, seen.T, strict=True):
+            steps = np.flatnonzero(column)
+            if not len(steps):
+                reason = f", as {NONE!r} says" if name in mapping.joints.absent else ""
+                yield f"no {quantity} of {name} was observed{reason}"
+            elif steps[-1] < end:
+                since = behaviour.time[steps[-1] + 1]
+                yield f"no {quantity} of {name} was observed from {since:.3f} s on"
 
 
 def _unobserved(behaviour: Behaviour) -> Iterator[str]:

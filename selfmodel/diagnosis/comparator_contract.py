@@ -8,6 +8,7 @@ from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.diagnosis.comparator import Comparator, PiecewiseTrial, PreparedTrial
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments, recordable
 from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.state_estimation import JOINTS
 from selfmodel.trials.trial import Trial
 
 DEPENDS_ON_BATCH = (
@@ -158,8 +159,15 @@ def _check_segments(request: Segments, trial: Trial) -> None:
                 f"the states of {signal} must have shape (segments, width) = {expected}, got "
                 f"{values.shape}"
             )
-    if not all(np.isfinite(values).all() for values in (commands, *request.states.values())):
-        raise ValueError("the states and the commands of segments must be finite")
+    if not np.isfinite(commands).all():
+        raise ValueError("the commands of segments must be finite")
+    for signal, values in request.states.items():
+        wrong = np.isinf(values) if signal in JOINTS else ~np.isfinite(values)
+        if wrong.any():
+            raise ValueError(
+                f"the states of {signal} must be finite; only those of joints may be NaN, where a "
+                f"hinge is unknown"
+            )
 
 
 def _is_same_request(one: Request, other: Request) -> bool:

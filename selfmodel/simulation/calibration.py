@@ -50,7 +50,7 @@ from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.data_frame import data_frame
 from selfmodel.trials.signal_difference import difference
 from selfmodel.trials.signal_scales import CALIBRATION_ERROR_SCALES
-from selfmodel.trials.state_estimation import BASE
+from selfmodel.trials.state_estimation import BASE, JOINTS
 from selfmodel.trials.trial import Trial
 
 PRIOR_DEVIATION = 0.15
@@ -204,7 +204,7 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
             f"remained finite, before and after the fit: check the model and the units of the log"
         )
     # Independent segments: long simulations are chaotic, so their derivatives are meaningless.
-    independent = _with_estimated_base(robot, fitted_parameters, data, threads)
+    independent = _with_estimated_states(robot, fitted_parameters, data, threads)
     slopes = _slopes(residuals_at(delay, independent), fitted)
     count = len(slopes) - len(zero)  # number of errors; the other rows are the prior
     spread = np.linalg.inv(slopes.T @ slopes) * count * PRIOR_WEIGHT**2
@@ -312,18 +312,22 @@ def _error(
     return float(np.sqrt(np.mean(_errors(robot, [parameters], data, threads, stats) ** 2)))
 
 
-def _with_estimated_base(
+def _with_estimated_states(
     robot: Robot, fitted_parameters: Parameters, data: Sequence[CalibrationSegments], threads: int
 ) -> list[CalibrationSegments]:
-    """Returns independent segments; an unobserved base begins in its predicted state."""
+    """Returns independent segments; an unknown state begins as predicted."""
     predict_with = _predictor(robot, [fitted_parameters], threads, SimulationStats())
 
     def independent(own: CalibrationSegments) -> CalibrationSegments:
         segments = own.segments
-        if "base_position" in segments.states:
+        if segments.independent:
             return own
-        predicted = predict_with(replace(segments, record=BASE))
-        states = {**segments.states, **{signal: predicted[signal][0, :, 0] for signal in BASE}}
+        predicted = predict_with(replace(segments, record=(*BASE, *JOINTS)))
+        states = dict(segments.states)
+        for signal in predicted.signals:
+            begin = predicted[signal][0, :, 0]
+            known = states.get(signal, np.full_like(begin, np.nan))
+            states[signal] = np.where(np.isnan(known), begin, known)
         return replace(own, segments=replace(segments, states=states))
 
     return [independent(own) for own in data]
@@ -363,7 +367,7 @@ def _batch_errors(
             if signal in own.observed:
                 with np.errstate(over="ignore", invalid="ignore"):  # bounded below
                     error = difference(signal, predicted[signal][:, :, 1:], own.observed[signal])
-                    rows.append((error / scale)[:, own.judged].reshape(len(models), -1))
+                    rows.append((error / scale)[:, own.compared(signal)])
     errors = np.nan_to_num(np.concatenate(rows, axis=1).T, nan=MAX_ERROR)
     return np.clip(errors, -MAX_ERROR, MAX_ERROR)
 

@@ -11,7 +11,13 @@ from selfmodel.simulation.requests import LEAD, Segments, command_steps, cut_seg
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.magnitudes import check_magnitudes
 from selfmodel.trials.signals import Signal
-from selfmodel.trials.state_estimation import ONBOARD, STATE, estimated_states
+from selfmodel.trials.state_estimation import (
+    JOINTS,
+    ONBOARD,
+    STATE,
+    estimated_states,
+    known_steps,
+)
 from selfmodel.trials.trial import Trial
 
 MAX_SEGMENTS = 40
@@ -23,6 +29,10 @@ HORIZON = 10
 MIN_BASE_SHARE = 0.25
 """Smallest share of usable segments with an observed base at which the base is used."""
 
+MIN_COMPLETE_SHARE = 0.25
+"""Smallest share of the known steps at which every hinge is known, for other steps to be left out.
+"""
+
 
 @dataclass(frozen=True, eq=False)
 class CalibrationSegments:
@@ -32,12 +42,22 @@ class CalibrationSegments:
         segments: Initial states and commands.
         observed: Estimated state after each step, ``(segments, horizon, width)`` for each signal.
         judged: Mask of the steps whose prediction has an error, ``(segments, horizon)``: the state
-            after the step is known, and so are the commands that led there.
+            after the step is known, and so are the commands that led there. Single hinges may be
+            unknown; see ``compared``.
     """
 
     segments: Segments
     observed: Mapping[Signal, FloatArray]
     judged: BoolArray
+
+    def compared(self, signal: Signal) -> BoolArray:
+        """Returns a mask of the errors of one signal, ``(segments, horizon, columns)``.
+
+        Errors of an orientation have three columns: all of them are known, or none.
+        """
+        values = self.observed[signal]
+        known = np.isfinite(values) if signal in JOINTS else np.ones((*values.shape[:2], 3), bool)
+        return np.asarray(known & self.judged[..., np.newaxis])
 
 
 def calibration_segments_of(trial: Trial) -> CalibrationSegments:
@@ -46,7 +66,8 @@ def calibration_segments_of(trial: Trial) -> CalibrationSegments:
     The segments are spread over the trial and known completely. If the base's position and linear
     velocity are known in less than a quarter of the segments in which all other signals are, both
     are left out, and segments follow each other from the start of the trial, in the model's initial
-    pose: each begins with the base in the predicted state at the end of the segment before.
+    pose: each begins with the base in the predicted state at the end of the segment before. Of a
+    trial in which a hinge is unknown most of the time, the other hinges are used in the same way.
 
     Raises:
         InputError: Too few states and commands are known for any segments, or a value is infinite
@@ -65,14 +86,22 @@ def calibration_segments_of(trial: Trial) -> CalibrationSegments:
 
 
 def _spread(behaviour: Behaviour) -> CalibrationSegments | None:
-    """Returns independent segments of the whole state; None if there are too few."""
+    """Returns segments of the whole state; None if there are too few.
+
+    They are independent and spread over the trial. With unknown hinges, which continue from the
+    segment before, they follow each other.
+    """
     last = behaviour.steps - 1 - HORIZON
     begins = np.unique(np.linspace(LEAD, last, MAX_SEGMENTS).round().astype(np.intp))
     states = estimated_states(behaviour, STATE)
     onboard = _known({signal: states[signal] for signal in ONBOARD}) & _steady(behaviour)
-    whole = _all_known(onboard & _known(states), begins)
+    known = onboard & _known(states)
+    whole = _all_known(known, begins)
     if not whole.any() or whole.sum() < MIN_BASE_SHARE * _all_known(onboard, begins).sum():
         return None
+    if any(np.isnan(states[signal][known]).any() for signal in JOINTS):
+        begins = np.arange(LEAD, last + 1, HORIZON)
+        whole = _all_known(known, begins)
     return _with_observed(behaviour, states, begins[whole])
 
 
@@ -91,9 +120,14 @@ def _sequential(behaviour: Behaviour) -> CalibrationSegments | None:
     return segments if segments.judged.sum() >= HORIZON else None
 
 
-def _known(signals: Mapping[Signal, FloatArray]) -> BoolArray:
-    """Returns a mask of the steps at which all signals are known, ``(steps,)``."""
-    return np.asarray(np.isfinite(np.hstack(list(signals.values()))).all(axis=1))
+def _known(states: Mapping[Signal, FloatArray]) -> BoolArray:
+    """Returns a mask of the steps at which a state is known, ``(steps,)``.
+
+    It is known completely there; if that is rare, single hinges may be unknown.
+    """
+    complete = np.isfinite(np.hstack(list(states.values()))).all(axis=1)
+    some = known_steps(states)
+    return np.asarray(complete if complete.sum() >= MIN_COMPLETE_SHARE * some.sum() else some)
 
 
 def _steady(behaviour: Behaviour) -> BoolArray:
@@ -120,13 +154,16 @@ def _with_observed(
 
 
 def _never_known(behaviour: Behaviour) -> str:
-    """Returns the required signals that were never observed, with columns if only some are."""
+    """Returns the required signals that were never observed, with columns if only some are.
+
+    Of the joints, one hinge is enough.
+    """
     never = []
     signals: tuple[Signal, ...] = (*ONBOARD, "commands")
     for signal in signals:
         names = np.array(behaviour.names.columns(signal))
         lacking = ~np.isfinite(behaviour[signal]).any(axis=0)
-        if lacking.any():
+        if lacking.all() or (lacking.any() and signal not in JOINTS):
             some = "" if lacking.all() else f" of {', '.join(names[lacking])}"
             never.append(signal + some)
     return ", ".join(never)

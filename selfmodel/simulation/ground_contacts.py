@@ -8,7 +8,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.robot.state.access import bind_data, state_writer
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.rotation import directions
-from selfmodel.trials.state_estimation import STATE, estimated_states
+from selfmodel.trials.state_estimation import STATE, estimated_states, known_steps
 
 MAX_GROUND_DISTANCE = 10.0
 """Largest distance between a foot and the model's level ground, m."""
@@ -18,7 +18,7 @@ def ground_contact_points(robot: Robot, behaviour: Behaviour) -> FloatArray:
     """Returns the ground contact points of the bodies with touch sensors in a trial.
 
     A contact point is the lowest point of a body, at each step with a touch reading of 1. Wrong
-    touch readings result in points in the air.
+    touch readings result in points in the air. A body beyond an unknown hinge has no contact point.
 
     Args:
         robot: The healthy robot.
@@ -32,15 +32,18 @@ def ground_contact_points(robot: Robot, behaviour: Behaviour) -> FloatArray:
     if ground is None or not feet:
         return np.empty((0, 3))
     states = estimated_states(behaviour, STATE)
-    known = np.logical_and.reduce([np.isfinite(values).all(axis=1) for values in states.values()])
+    unknown = np.isnan(states["joint_positions"])
+    chains = {column: _chain(robot, column) for column in feet}
     data = mujoco.MjData(model)
     write = state_writer(robot, bind_data(data))
     points: list[FloatArray] = []
-    for step in np.flatnonzero(known & (behaviour["sensors"][:, list(feet)] == 1).any(axis=1)):
+    for step in np.flatnonzero(
+        known_steps(states) & (behaviour["sensors"][:, list(feet)] == 1).any(axis=1)
+    ):
         write({signal: values[[step]] for signal, values in states.items()})
         mujoco.mj_kinematics(model, data)
         for column, geoms in feet.items():
-            if behaviour["sensors"][step, column] == 1:
+            if behaviour["sensors"][step, column] == 1 and not unknown[step, chains[column]].any():
                 points += _lowest_point(model, data, ground, geoms)
     contacts = np.array(points).reshape(-1, 3)
     contacts.flags.writeable = False  # the simulator caches the array
@@ -68,6 +71,17 @@ def _feet(robot: Robot) -> dict[int, list[int]]:
             geoms = np.flatnonzero(solid & (model.geom_bodyid == model.site_bodyid[site]))
             feet[column] = geoms.tolist()
     return {column: geoms for column, geoms in feet.items() if geoms}
+
+
+def _chain(robot: Robot, column: int) -> list[int]:
+    """Returns the columns of the hinges between the root body and the body of a touch sensor."""
+    model, hinges = robot.model, robot.anatomy.hinges
+    site = int(model.sensor(robot.anatomy.sensors[column].name).objid[0])
+    body, bodies = int(model.site_bodyid[site]), set[int]()
+    while body:
+        bodies.add(body)
+        body = int(model.body_parentid[body])
+    return [k for k, name in enumerate(hinges) if int(model.joint(name).bodyid[0]) in bodies]
 
 
 def _lowest_point(

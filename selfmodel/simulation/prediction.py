@@ -33,12 +33,13 @@ def predict(
     """Predicts segments of a trial with several models of a robot.
 
     Segments with the whole state are simulated in parallel. Segments without the position and the
-    linear velocity of the base are simulated in sequence: each begins with the base in the
-    predicted state at the end of the segment before.
+    linear velocity of the base, or with an unknown hinge, are simulated in sequence: each begins
+    with the base, or the hinge, in the predicted state at the end of the segment before. The first
+    begins in the initial pose.
 
     Welded joints begin at their welded angle. The hinges of a detached limb have no logged motion:
     if the segments include joint positions, these hinges begin at rest, at their median angle over
-    all segments.
+    all segments; a hinge without a known angle in its initial pose.
 
     Args:
         robot: The healthy robot.
@@ -72,8 +73,7 @@ def predict(
             f"the robot's commands take effect {longest} steps late, and segments have a lead "
             f"of {segments.lead}: a comparator needs a lead of {MAX_CONTROL_DELAY}"
         )
-    whole = "base_position" in segments.states
-    stages: list[IndexArray] = np.split(np.arange(count), 1 if whole else count)
+    stages: list[IndexArray] = np.split(np.arange(count), 1 if segments.independent else count)
     together = len(stages[0])
     bodies = _repeated(moving, together)
     batch = new_batch(robot.model, bodies, threads)
@@ -189,13 +189,18 @@ class _BatchInputs:
 def _median_angles(robot: Robot, segments: Segments) -> dict[str, tuple[int, int, float]]:
     """Returns the ``qpos`` and ``qvel`` index and the median angle of each hinge, by name.
 
-    The result is empty for segments without joint positions.
+    A hinge without a known angle has that of the initial pose. The result is empty for segments
+    without joint positions.
     """
     angles = segments.resting_angles
     if angles is None:
         return {}
     hinges = [robot.model.joint(name) for name in robot.anatomy.hinges]
     return {
-        hinge.name: (int(hinge.qposadr[0]), int(hinge.dofadr[0]), angle)
+        hinge.name: (
+            int(hinge.qposadr[0]),
+            int(hinge.dofadr[0]),
+            float(hinge.qpos0[0]) if np.isnan(angle) else angle,
+        )
         for hinge, angle in zip(hinges, angles.tolist(), strict=True)
     }

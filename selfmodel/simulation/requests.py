@@ -44,7 +44,8 @@ class Segments:
 
     Attributes:
         states: State at the beginning of each segment, ``(segments, width)`` for each signal of
-            the joints' and the base's positions and velocities.
+            the joints' and the base's positions and velocities. NaN for the hinges whose state is
+            unknown.
         commands: Logged commands, ``(segments, lead + horizon, motors)``: the first ``lead`` rows
             precede the segment, for models with a control delay.
         lead: Rows of ``commands`` before the segment: at least the robot's control delay, which is
@@ -70,10 +71,24 @@ class Segments:
     def resting_angles(self) -> FloatArray | None:
         """Angle at which the hinges of detached limbs are predicted: the median over the segments.
 
-        The shape is ``(hinges,)``, rad; None for segments without joint positions.
+        The shape is ``(hinges,)``, rad, with NaN for a hinge without a known angle; None for
+        segments without joint positions.
         """
         angles = self.states.get("joint_positions")
-        return None if angles is None else np.asarray(np.median(angles, axis=0))
+        if angles is None:
+            return None
+        known = (column[~np.isnan(column)] for column in angles.T)
+        return np.array([np.median(own) if len(own) else np.nan for own in known])
+
+    @property
+    def independent(self) -> bool:
+        """Whether the state at the beginning of each segment is known completely.
+
+        Otherwise, a segment continues the unknown part of the state of the segment before.
+        """
+        return "base_position" in self.states and not any(
+            np.isnan(values).any() for values in self.states.values()
+        )
 
 
 @dataclass(frozen=True)

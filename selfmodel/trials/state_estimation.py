@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from selfmodel.arrays import FloatArray
+from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import Signal
 
@@ -20,6 +20,27 @@ ONBOARD: tuple[Signal, ...] = JOINTS + IMU
 """Signals of the state that onboard sensors measure."""
 STATE: tuple[Signal, ...] = ONBOARD + BASE
 """Signals of the whole state."""
+
+
+def known_steps(states: Mapping[Signal, FloatArray]) -> BoolArray:
+    """Returns a mask of the steps at which a prediction can begin, ``(steps,)``.
+
+    Some hinge of each joint signal is known there, and all other signals are known completely. A
+    hinge without an encoder is unknown, and does not make the steps of a trial unknown.
+
+    Args:
+        states: Signals of the state, ``(steps, width)`` each.
+    """
+    return np.asarray(
+        np.logical_and.reduce([known_rows(signal, rows) for signal, rows in states.items()])
+    )
+
+
+def known_rows(signal: Signal, values: FloatArray) -> BoolArray:
+    """Returns a mask of the steps at which one signal is known; see ``known_steps``."""
+    known = np.isfinite(values)
+    return np.asarray(known.any(axis=1) if signal in JOINTS else known.all(axis=1))
+
 
 NOISE_SHARE, NOISE_SHARE_PER_COLUMN = 0.6, 0.5
 """Smallest shares of successive residuals of opposite sign that count as noise: in the mean over
@@ -51,8 +72,8 @@ def estimated_states(
 
     Returns:
         Each signal, ``(steps, width)``. A signal without detectable noise is the logged signal,
-        bit-identical. The result is NaN where a value it depends on was not observed, or a late
-        step is in between.
+        bit-identical, and so is a position whose velocity was never observed. Otherwise the result
+        is NaN where a value it depends on was not observed, or a late step is in between.
     """
     states = {signal: behaviour[signal] for signal in signals}
     timestep = float(behaviour.time[1] - behaviour.time[0]) if behaviour.steps > 1 else 0.0
@@ -82,6 +103,8 @@ def _integrated(velocities: FloatArray, timestep: float) -> FloatArray:
 def _is_noise(residuals: FloatArray, smallest_noise: float) -> bool:
     """Returns whether the residual displacements are mostly measurement noise, in every column.
 
+    A column without residuals, such as that of a lost encoder, does not count.
+
     A position error makes the residual before it too large and the residual after it too small, so
     successive residuals have opposite signs: in two of three pairs for pure noise. Residuals from
     impacts and from the step length persist in sign. Single joints may oscillate at every step, but
@@ -89,11 +112,13 @@ def _is_noise(residuals: FloatArray, smallest_noise: float) -> bool:
     """
     product = residuals[1:] * residuals[:-1]
     known = np.isfinite(product)
-    sign_changes = np.sum(known & (product < 0), axis=0)
-    shares = sign_changes / np.maximum(known.sum(axis=0), 1)
+    counts = known.sum(axis=0)
+    counted = counts > 0
+    shares = np.sum(known & (product < 0), axis=0)[counted] / counts[counted]
     magnitudes = np.abs(residuals[np.isfinite(residuals)])
     return bool(
         len(magnitudes)
+        and len(shares)
         and np.median(magnitudes) > smallest_noise
         and shares.mean() > NOISE_SHARE
         and np.all(shares > NOISE_SHARE_PER_COLUMN)
@@ -117,7 +142,10 @@ def _is_linear_in(changes: FloatArray, residuals: FloatArray) -> bool:
 def _averaged(
     values: FloatArray, velocities: FloatArray, displacements: FloatArray, half_width: int
 ) -> FloatArray:
-    """Returns positions averaged along the displacements, ``(steps, width)``; NaN if unknown."""
+    """Returns positions averaged along the displacements, ``(steps, width)``; NaN if unknown.
+
+    A position whose velocity was never observed is returned as it is.
+    """
     steps = len(values)
     path = np.concatenate([np.zeros((1, values.shape[1])), np.nancumsum(displacements, axis=0)])
     deviations = values - path
@@ -130,7 +158,8 @@ def _averaged(
     unknown_counts = _summed(np.isnan(displacements).astype(np.float64))
     all_known &= unknown_counts[last - 1] == unknown_counts[first]
     mean = (sums[last] - sums[first]) / (last - first)[:, np.newaxis] + path
-    return np.where(all_known, mean, np.nan)
+    unmeasured = np.isnan(velocities).all(axis=0)
+    return np.where(unmeasured, values, np.where(all_known, mean, np.nan))
 
 
 def _summed(values: FloatArray) -> FloatArray:

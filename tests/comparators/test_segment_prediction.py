@@ -1,11 +1,14 @@
 """Promises of how ``segment-prediction`` judges readings: what is sure, and what contradicts."""
 
 import numpy as np
+from hypothesis import given, settings, strategies as st
 
 from selfmodel.comparators import SEGMENT_PREDICTION
 from selfmodel.comparators.segment_prediction import CONTRADICTION
 from selfmodel.diagnosis.comparator_contract import shown
 from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.signal_scales import PREDICTION_ERROR_SCALES
+from selfmodel.trials.state_estimation import JOINTS
 from tests.helpers.gaits import changed, gait, logged
 
 TOUCH = 0
@@ -62,3 +65,39 @@ def test_a_touch_that_is_never_predicted_counts_three_times_where_it_comes():
     assert never[others].sum() > 0
     np.testing.assert_allclose(never[others], CONTRADICTION * now_and_then[others], rtol=1e-12)
     assert CONTRADICTION == 3
+
+
+@settings(max_examples=20, deadline=None)
+@given(lost=st.integers(0, 3), seed=st.integers(0, 2**32))
+def test_the_loss_without_an_encoder_is_that_of_the_other_columns(lost: int, seed: int):
+    walking, others = gait(), [leg for leg in range(4) if leg != lost]
+    joints = {signal: walking[signal].copy() for signal in JOINTS}
+    for values in joints.values():
+        values[:, lost] = np.nan
+    trial = logged(changed(walking, **joints))
+    prepared = SEGMENT_PREDICTION.prepare(trial)
+    exact = shown(SEGMENT_PREDICTION.prepare(logged(walking)).request, logged(walking))
+    rng = np.random.default_rng(seed)
+    wrong = {signal: exact[signal] + rng.normal(0, 0.1, exact[signal].shape) for signal in JOINTS}
+    found = prepared.losses(Behaviour(exact.names, exact.time, {**exact.signals, **wrong}))
+
+    expected = np.zeros_like(found)
+    for signal in JOINTS:
+        steps = prepared.compared
+        errors = (wrong[signal] - exact[signal])[:, :, steps][..., others]
+        expected += np.log1p(np.square(errors / PREDICTION_ERROR_SCALES[signal])).mean(axis=(2, 3))
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+    assert not prepared.request.independent
+
+
+def test_a_sensor_that_was_never_observed_has_no_loss_whatever_is_predicted():
+    walking = gait()
+    sensors = walking["sensors"].copy()
+    sensors[:, TOUCH] = np.nan
+    unseen = changed(walking, sensors=sensors)
+    dead, noisy = predicted(walking), predicted(walking)
+    dead[..., 1], noisy[..., 1] = 0.5, 0.5  # an error of another sensor
+    dead[..., TOUCH] = 0
+    noisy[..., TOUCH] = np.random.default_rng(0).normal(size=noisy.shape[:2])
+
+    np.testing.assert_array_equal(losses(unseen, dead), losses(unseen, noisy))

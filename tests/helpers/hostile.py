@@ -1,5 +1,6 @@
 """Inputs that are hard to judge: models that diverge, and trials with missing signals."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from selfmodel.faults.notation import parse
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.signals import Signal
+from selfmodel.trials.state_estimation import JOINTS
 from selfmodel.trials.trial import Trial
 
 
@@ -26,6 +28,15 @@ def lacking(trial: Trial, signals: tuple[Signal, ...], steps: slice = slice(None
     lost = {signal: run[signal].copy() for signal in signals}
     for values in lost.values():
         values[steps] = np.nan
+    return replace(trial, behaviour=replace(run, signals={**run.signals, **lost}))
+
+
+def without_encoders(trial: Trial, hinges: Sequence[int], steps: slice = slice(None)) -> Trial:
+    """Returns the trial with joint signals of some hinges that are NaN at some steps."""
+    run = trial.behaviour
+    lost = {signal: run[signal].copy() for signal in JOINTS}
+    for values in lost.values():
+        values[steps, hinges] = np.nan
     return replace(trial, behaviour=replace(run, signals={**run.signals, **lost}))
 
 

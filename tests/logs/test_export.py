@@ -90,3 +90,24 @@ def test_a_file_is_not_replaced_and_its_end_is_its_format(biped: Robot, tmp_path
     with pytest.raises(InputError, match=r"expected a file that ends in \.csv, \.npz, \.parquet"):
         export(tmp_path / "t.xlsx", original)
     assert (tmp_path / "t.csv").read_text() == "mine"
+
+
+@pytest.mark.process
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("steps", [slice(None), slice(12, None)], ids=["never", "lost midway"])
+def test_a_lost_encoder_is_imported_as_it_was(
+    form: str, steps: slice, biped: Robot, tmp_path: Path
+):
+    original = behaviour(biped, 30, 0)
+    lost = {signal: original[signal].copy() for signal in ("joint_positions", "joint_velocities")}
+    for values in lost.values():
+        values[steps, 2] = np.nan
+    original = Behaviour(original.names, original.time, {**original.signals, **lost})
+    path = tmp_path / f"t.{form}"
+    export(path, original)
+    text = suggest(path, biped, "biped.xml", with_timestep=True)
+    again = import_recording(path, parse_mapping(text, "MAP.toml"), biped).behaviour
+
+    assert ('right_hip_x = "none"  # CHECK' in text) == (steps == slice(None))
+    for signal in SIGNALS:
+        np.testing.assert_array_equal(again[signal], original[signal])

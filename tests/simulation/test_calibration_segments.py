@@ -23,7 +23,7 @@ from selfmodel.trials.signals import Signal
 from selfmodel.trials.state_estimation import BASE, ONBOARD, STATE, estimated_states
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_motion
-from tests.helpers.hostile import lacking
+from tests.helpers.hostile import lacking, without_encoders
 
 STEPS = 201
 QUADRUPED = ROBOTS["quadruped"].robot()
@@ -220,10 +220,33 @@ def test_a_trial_of_which_too_little_can_be_judged_is_refused(whole: Trial):
 
 def test_what_was_never_observed_is_named_by_its_column_where_only_some_was_not(whole: Trial):
     run = lacking(whole, (*BASE, "base_angular_velocity")).behaviour
-    positions = run["joint_positions"].copy()
-    positions[:, 3] = np.nan
-    broken = replace(run, signals={**run.signals, "joint_positions": positions})
-    name = run.names.hinges[3]
+    commands = run["commands"].copy()
+    commands[:, 3] = np.nan
+    broken = replace(run, signals={**run.signals, "commands": commands})
+    name = run.names.motors[3]
 
-    with pytest.raises(InputError, match=f"never has joint_positions of {name}, base_angular_vel"):
+    with pytest.raises(InputError, match=f"never has base_angular_velocity, commands of {name}"):
         calibration_segments_of(replace(whole, behaviour=broken))
+
+
+@pytest.mark.parametrize("lost", [(), BASE], ids=["seen", "unseen"])
+def test_a_hinge_without_an_encoder_is_unknown_and_the_others_are_used(
+    whole: Trial, lost: tuple[Signal, ...]
+):
+    run = lacking(whole, lost)
+    found = calibration_segments_of(without_encoders(run, [3]))
+    complete = calibration_segments_of(run)
+
+    assert np.isnan(found.segments.states["joint_positions"][:, 3]).all()
+    assert set(np.diff(starts(found))) == {HORIZON}
+    assert found.judged.all()
+    assert set(found.observed) == set(complete.observed)
+    for signal in ("joint_positions", "joint_velocities"):
+        assert found.compared(signal).all(axis=(0, 1)).tolist() == [k != 3 for k in range(8)]
+
+
+def test_an_encoder_that_was_lost_late_costs_only_the_segments_after(whole: Trial):
+    found = calibration_segments_of(without_encoders(whole, [3], slice(100, None)))
+
+    assert starts(found).max() + HORIZON < 100
+    assert all(np.isfinite(values).all() for values in found.segments.states.values())

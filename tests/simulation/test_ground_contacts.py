@@ -26,6 +26,7 @@ from selfmodel.simulation.ground_contacts import ground_contact_points
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import suite_bodies
 from selfmodel.trials.behaviour import Behaviour, collect
+from selfmodel.trials.state_estimation import JOINTS
 from selfmodel.trials.trial import Trial, TrialPlan
 
 STEPS = 1500
@@ -180,3 +181,19 @@ def test_a_robot_without_touch_feels_nothing():
     behaviour = Behaviour(swimmer.anatomy.names, np.arange(2.0), {})
 
     assert ground_contact_points(swimmer, behaviour).shape == (0, 3)
+
+
+def test_only_the_feet_beyond_a_lost_encoder_feel_nothing(quadruped: Robot, walk: Controller):
+    whole = observed(quadruped, "intact", walk)
+    leg = [name.startswith("front_left") for name in quadruped.anatomy.hinges]
+    lost = {signal: values.copy() for signal, values in whole.signals.items()}
+    others = {signal: values.copy() for signal, values in whole.signals.items()}
+    for signal in JOINTS:
+        lost[signal][:, np.argmax(leg)] = np.nan
+    others["sensors"][:, quadruped.anatomy.names.sensors.index("front_left_touch")] = 0
+
+    found = ground_contact_points(quadruped, dataclasses.replace(whole, signals=lost))
+    assert 0 < len(found) < len(ground_contact_points(quadruped, whole))
+    np.testing.assert_array_equal(
+        found, ground_contact_points(quadruped, dataclasses.replace(whole, signals=others))
+    )

@@ -25,7 +25,7 @@ from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour, collect
 from selfmodel.trials.rotation import rotation_between
 from selfmodel.trials.signals import SIGNALS, Signal
-from selfmodel.trials.state_estimation import ONBOARD, STATE
+from selfmodel.trials.state_estimation import JOINTS, ONBOARD, STATE
 from tests.helpers.drivers import random_motion
 from tests.helpers.hostile import exploding
 
@@ -246,3 +246,34 @@ def test_a_prediction_that_diverges_is_flagged_counted_and_alone(quadruped: Robo
     assert simulator.stats.steps == 2 * 3 * HORIZON
     for signal in RECORD:
         assert outcome.behaviour[signal][1].tobytes() == expected[signal][0].tobytes()
+
+
+def unknown(segments: Segments, run: Behaviour, hinge: str) -> Segments:
+    """The segments, with an encoder that was lost."""
+    column = run.names.hinges.index(hinge)
+    states = {signal: values.copy() for signal, values in segments.states.items()}
+    for signal in JOINTS:
+        states[signal][:, column] = np.nan
+    return dataclasses.replace(segments, states=states)
+
+
+def test_an_unknown_hinge_continues_from_the_segment_before(quadruped: Robot):
+    run, starts = trial(quadruped), range(0, STEPS - HORIZON, HORIZON)
+    segments = unknown(cut(run, starts), run, "back_left_knee")
+
+    predicted = Simulator(quadruped, 1).predict([INTACT], segments).behaviour
+    assert furthest(predicted, run, starts) < EXACT
+
+
+def test_the_hinges_of_a_lost_limb_need_no_known_angle(quadruped: Robot):
+    lost = parse("break:front_left_knee", quadruped.anatomy)
+    run, starts = trial(quadruped, lost), range(0, STEPS - HORIZON, HORIZON)
+    segments = unknown(cut(run, starts), run, "front_left_knee")
+
+    predicted = Simulator(quadruped, 1).predict([lost], segments).behaviour
+    column = run.names.hinges.index("front_left_knee")
+    assert np.all(predicted["joint_positions"][0, :, 0, column] == 0)
+    apart = np.delete(predicted["joint_positions"][0, :, -1], column, axis=1) - np.delete(
+        run["joint_positions"][np.array(starts) + HORIZON], column, axis=1
+    )
+    assert np.abs(apart).max() < EXACT

@@ -14,7 +14,7 @@ from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS, entry
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import SIGNALS, Signal
-from selfmodel.trials.state_estimation import IMU, JOINTS, STATE, estimated_states
+from selfmodel.trials.state_estimation import IMU, JOINTS, STATE, estimated_states, known_steps
 from tests.helpers.drivers import random_controllers, random_motion
 
 QUADRUPED = ROBOTS["quadruped"].robot()
@@ -140,3 +140,44 @@ def test_a_trial_of_one_step_is_its_own_state():
     run = Behaviour(RUN.names, RUN.time[:1], {signal: RUN[signal][:1] for signal in SIGNALS})
 
     assert all(estimated_states(run)[s].tobytes() == run[s].tobytes() for s in STATE)
+
+
+@pytest.mark.parametrize("hinge", [0, 5])
+def test_a_lost_encoder_leaves_the_estimates_of_the_others(hinge: int):
+    (run,) = runs(QUADRUPED, "intact", smooth(QUADRUPED, 1))
+    noisy = run["joint_positions"] + np.random.default_rng(0).normal(0, 0.01, (300, 8))
+    signals = {**run.signals, "joint_positions": noisy}
+    complete = estimated_states(Behaviour(run.names, run.time, signals), JOINTS)
+    lost = {signal: signals[signal].copy() for signal in JOINTS}
+    for values in lost.values():
+        values[:, hinge] = np.nan
+    found = estimated_states(Behaviour(run.names, run.time, {**signals, **lost}), JOINTS)
+
+    others = np.arange(8) != hinge
+    assert np.any(complete["joint_positions"] != noisy)
+    for signal in JOINTS:
+        np.testing.assert_array_equal(found[signal][:, others], complete[signal][:, others])
+        assert np.isnan(found[signal][:, hinge]).all()
+
+
+def test_a_position_without_a_velocity_is_the_logged_one():
+    (run,) = runs(QUADRUPED, "intact", smooth(QUADRUPED, 1))
+    noisy = run["joint_positions"] + np.random.default_rng(0).normal(0, 0.01, (300, 8))
+    velocities = run["joint_velocities"].copy()
+    velocities[:, 3] = np.nan
+    signals = {**run.signals, "joint_positions": noisy, "joint_velocities": velocities}
+    found = estimated_states(Behaviour(run.names, run.time, signals), JOINTS)
+
+    np.testing.assert_array_equal(found["joint_positions"][:, 3], noisy[:, 3])
+    assert np.any(found["joint_positions"][:, 2] != noisy[:, 2])
+
+
+@given(columns=st.sets(st.integers(0, 7)), step=st.integers(0, 299))
+def test_a_step_is_known_if_some_hinge_is(columns: set[int], step: int):
+    angles, base = np.zeros((300, 8)), np.zeros((300, 3))
+    angles[step, sorted(columns)] = np.nan
+    known = known_steps({"joint_positions": angles, "base_position": base})
+    assert known.sum() == 300 - (len(columns) == 8)
+
+    base[step, 0] = np.nan
+    assert not known_steps({"joint_positions": angles, "base_position": base})[step]

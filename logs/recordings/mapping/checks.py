@@ -3,7 +3,8 @@
 from collections.abc import Collection, Mapping, Sequence
 from types import MappingProxyType
 
-from selfmodel.logs.recordings.mapping.mapping import RecordingMapping, Role, RoleKind
+from selfmodel.errors import unknown_name
+from selfmodel.logs.recordings.mapping.mapping import NONE, RecordingMapping, Role, RoleKind
 from selfmodel.logs.recordings.mapping.strict_toml import Document
 from selfmodel.logs.recordings.rosbag.bag import Bag
 from selfmodel.logs.recordings.rosbag.message_types import (
@@ -41,7 +42,7 @@ def check_names(
 
     Args:
         mapping: The mapping.
-        hinges: Hinges of the robot; all must be mapped.
+        hinges: Hinges of the robot; all must be mapped, some to ``NONE``.
         motors: Motors of the robot; all must be mapped.
         touches: Touch sensors of the robot; some may be mapped.
         sensors: All sensors of the robot; some may be mapped.
@@ -53,12 +54,16 @@ def check_names(
     required = ((mapping.joints, "hinge", hinges), (mapping.commands, "motor", motors))
     for angles, what, known in required:
         path: tuple[str, ...] = (angles.role, "names")
-        _check_known(document, path, angles.links, what, known)
-        if missing := [name for name in known if name not in angles.links]:
+        listed = (*angles.links, *angles.absent)
+        _check_known(document, path, listed, what, known)
+        if missing := [name for name in known if name not in listed]:
+            advice = (
+                f", with {NONE!r} for a hinge without an encoder" if angles.role == "joints" else ""
+            )
             raise document.error(
                 path,
                 f"[{'.'.join(path)}] must list every {what} of the robot, and lacks "
-                f"{', '.join(missing)}: add a line for each",
+                f"{', '.join(missing)}: add a line for each{advice}",
             )
     parts: tuple[tuple[tuple[str, ...], Collection[str], str, Sequence[str]], ...] = (
         (("joints", "velocities"), mapping.joints.velocities, "hinge", hinges),
@@ -154,8 +159,11 @@ def check_columns(mapping: RecordingMapping, series: Mapping[str, Series]) -> No
         known = angles.order or tuple(columns)
         for part, link in angles.links.items():
             if link.name not in known:
-                raise mapping.document.unknown(
-                    (angles.role, "names", part), f"joint on {angles.topic}", link.name, known
+                error = unknown_name(f"joint on {angles.topic}", link.name, known)
+                lost = f"; {NONE!r} is for a hinge without an encoder"
+                raise mapping.document.error(
+                    (angles.role, "names", part),
+                    f"{error}{lost if angles.role == 'joints' else ''}",
                 )
     for name, touch in mapping.touch.items():
         columns = series[touch.topic].columns

@@ -17,6 +17,9 @@ FORCES = ("N", "kN", "raw")
 UNKNOWN = "?"
 """Placeholder of a suggested mapping for a name that the user must fill in."""
 
+NONE = "none"
+"""Name of a hinge that has no encoder in the recording."""
+
 COMMAND_UNITS: Mapping[str, float] = MappingProxyType({**ANGLES, "raw": 1.0})
 """Units of commands; ``raw`` is the unit of the motor, such as N m."""
 
@@ -64,10 +67,11 @@ class Angles:
         role: ``joints`` or ``commands``.
         topic: Name of the topic.
         scale: Recorded unit, rad.
-        links: Conversions by the model's hinge or motor.
+        links: Conversions by the model's hinge or motor; hinges without an encoder have none.
         order: Names of the columns of a Float64MultiArray; empty for other types.
         velocities: Columns of velocities in a table, by hinge.
         efforts: Columns of torques in a table, by hinge.
+        absent: Hinges without an encoder in the recording, in the order of the mapping.
     """
 
     role: Literal["joints", "commands"]
@@ -77,6 +81,7 @@ class Angles:
     order: tuple[str, ...] = ()
     velocities: Mapping[str, str] = field(default_factory=dict)
     efforts: Mapping[str, str] = field(default_factory=dict)
+    absent: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Strict reader of mapping files: an entry without effect is an error."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Literal
 
@@ -14,6 +14,7 @@ from selfmodel.logs.recordings.mapping.mapping import (
     FORCES,
     FRAMES,
     LENGTHS,
+    NONE,
     TABLE,
     TIMES,
     UNKNOWN,
@@ -134,12 +135,15 @@ def _angles(entries: Table, role: Literal["joints", "commands"], *, table: bool)
     order: tuple[str, ...] = ()
     if role == "commands" and not table and entries.has("order"):
         order = entries.texts("order")
+    names = entries.table("names")
+    named = {name: _link(names, name, scale) for name in names.keys}
+    links, absent = _measured(names, named, role)
     others = {
-        key: _columns(entries.table(key)) if table and role == "joints" and entries.has(key) else {}
+        key: _measured_columns(entries.table(key), named)
+        if table and role == "joints" and entries.has(key)
+        else {}
         for key in ("velocities", "efforts")
     }
-    names = entries.table("names")
-    links = {name: _link(names, name, scale) for name in names.keys}
     parts: dict[str, str] = {}
     ordered = frozenset(order)
     for name, link in links.items():
@@ -157,7 +161,35 @@ def _angles(entries: Table, role: Literal["joints", "commands"], *, table: bool)
         if order and link.name not in ordered:
             raise entries.document.unknown((*names.path, name), "name in order", link.name, order)
     entries.done()
-    return Angles(role, topic, scale, links, order, **others)
+    return Angles(role, topic, scale, links, order, **others, absent=absent)
+
+
+def _measured(
+    names: Table, named: Mapping[str, Link], role: str
+) -> tuple[dict[str, Link], tuple[str, ...]]:
+    """Returns the conversions of parts with a name, and the hinges without an encoder."""
+    links = {name: link for name, link in named.items() if link.name != NONE}
+    absent = tuple(name for name in named if name not in links)
+    if absent and role == "commands":
+        raise names.document.error(
+            (*names.path, absent[0]),
+            f"{absent[0]} must have a command, got {NONE!r}, which is for hinges without an "
+            f"encoder: fill in its name",
+        )
+    if absent and not links:
+        raise names.document.error(
+            names.path, f"expected the name of one joint or more, got {NONE!r} for all: fill it in"
+        )
+    return links, absent
+
+
+def _measured_columns(entries: Table, named: Mapping[str, Link]) -> dict[str, str]:
+    """Returns names of columns by hinge, without the hinges that have none."""
+    columns = _columns(entries)
+    for hinge, name in columns.items():
+        if name == NONE and hinge not in named:
+            raise entries.document.unknown((*entries.path, hinge), "hinge", hinge, named)
+    return {hinge: name for hinge, name in columns.items() if name != NONE}
 
 
 def _link(names: Table, name: str, scale: float) -> Link:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from selfmodel.logs.recordings.mapping.checks import TYPES
 from selfmodel.logs.recordings.mapping.likeness import NameMatch, matched
-from selfmodel.logs.recordings.mapping.mapping import UNKNOWN, RoleKind
+from selfmodel.logs.recordings.mapping.mapping import NONE, UNKNOWN, RoleKind
 from selfmodel.logs.recordings.mapping.quoting import escaped, key, quoted
 from selfmodel.logs.recordings.rosbag.bag import Bag, read_bag
 from selfmodel.logs.recordings.rosbag.message_types import (
@@ -115,8 +115,13 @@ def _angles(
             yield f"order = [{', '.join(map(quoted, offered))}]  # CHECK: the bag has no names"
     yield f"[{table}.names]  # each may also be {{ name = ..., sign = -1, offset = 0.1 }}"
     found = matched(parts, offered)
+    used = {guess.name for guess in found.values()}
+    all_used = table == "joints" and bool(found) and used.issuperset(offered)
     for part in parts:
-        yield f"{key(part)} = {_link(found.get(part), offered)}"
+        if part not in found and all_used:
+            yield f'{key(part)} = "{NONE}"  # CHECK: no encoder: the bag has no other joint'
+        else:
+            yield f"{key(part)} = {_link(found.get(part), offered)}"
 
 
 def _order(width: int, order: tuple[str, ...]) -> tuple[str, ...]:

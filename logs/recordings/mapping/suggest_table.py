@@ -7,7 +7,7 @@ import numpy as np
 
 from selfmodel.logs.recordings.mapping.column_words import Classified, classified, unit_in
 from selfmodel.logs.recordings.mapping.likeness import matched
-from selfmodel.logs.recordings.mapping.mapping import UNKNOWN
+from selfmodel.logs.recordings.mapping.mapping import NONE, UNKNOWN
 from selfmodel.logs.recordings.mapping.quoting import escaped, key, quoted
 from selfmodel.logs.recordings.mapping.suggest_bag import TRIAL_LINES
 from selfmodel.logs.recordings.tables.content import NO_TIME
@@ -111,6 +111,8 @@ def _parts(
         if part in found:
             name, sure = found[part]
             yield f"{key(part)} = {quoted(name)}" + ("" if sure else "  # CHECK: not sure")
+        elif table == "joints.names" and found and not rest:
+            yield f'{key(part)} = "{NONE}"  # CHECK: no encoder: the table has no other angle'
         else:
             known = _listed(rest or names)
             yield f'{key(part)} = "{UNKNOWN}"  # CHANGE: the table has {known}'
@@ -132,8 +134,8 @@ def _known(
 def _matched(parts: Sequence[str], offered: Mapping[str, str]) -> dict[str, tuple[str, bool]]:
     """Column of each part, and whether the match is certain: by name, else by number."""
     exact = {part: column for part in parts for column in offered.values() if _is_of(column, part)}
-    if len(exact) == len(parts):
-        return {part: (exact[part], True) for part in parts}
+    if len(exact) == len(parts) or (exact and len(exact) == len(offered)):
+        return {part: (column, True) for part, column in exact.items()}
     labels = [label for label in offered if label.isdecimal()]
     if len(labels) == len(offered) == len(parts):
         ordered = sorted(labels, key=int)

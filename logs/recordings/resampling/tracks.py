@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from selfmodel.logs.recordings.mapping.mapping import RecordingMapping, Role
+from selfmodel.logs.recordings.mapping.mapping import NONE, Link, RecordingMapping, Role
 from selfmodel.logs.recordings.resampling.clock import Track
+from selfmodel.logs.recordings.resampling.resample import reach
 
 if TYPE_CHECKING:
     from selfmodel.arrays import FloatArray
@@ -79,7 +80,8 @@ def converted(mapping: RecordingMapping, raw: RawTracks) -> Tracks:
     """
     joints, commands = mapping.joints, mapping.commands
     positions, velocities, efforts = {}, {}, {}
-    for hinge, link in joints.links.items():
+    for hinge in (*joints.links, *joints.absent):
+        link = joints.links.get(hinge, Link(NONE))
         scale = link.sign * joints.scale
         positions[hinge] = _scaled(raw.positions.get(hinge, NOTHING), scale, link.offset)
         velocities[hinge] = _scaled(raw.velocities.get(hinge, NOTHING), scale)
@@ -115,9 +117,13 @@ def converted(mapping: RecordingMapping, raw: RawTracks) -> Tracks:
 
 
 def required(mapping: RecordingMapping, tracks: Tracks) -> list[tuple[Role, str, Track]]:
-    """Returns the tracks that a trial requires, each with its role and part."""
+    """Returns the tracks that a trial requires, each with its role and part.
+
+    A hinge without a number is not required if another hinge has some: its encoder was lost.
+    """
     roles = {role.path: role for role in mapping.roles}
-    found = [(roles["joints",], hinge, track) for hinge, track in tracks.positions.items()]
+    hinges = {name: track for name, track in tracks.positions.items() if len(track.times)}
+    found = [(roles["joints",], *hinge) for hinge in (hinges or tracks.positions).items()]
     found += [(roles["commands",], motor, track) for motor, track in tracks.commands.items()]
     if mapping.base is not None:
         pose = tracks.base_position if len(tracks.base_position.times) else tracks.base_orientation
@@ -127,6 +133,22 @@ def required(mapping: RecordingMapping, tracks: Tracks) -> list[tuple[Role, str,
         found.append((roles["imu",], "the base", angular if len(angular.times) else orientation))
     found += [(roles["touch", name], name, track) for name, track in tracks.touch.items()]
     return found
+
+
+def lasting(tracks: Mapping[str, Track]) -> list[Track]:
+    """Returns the tracks without those that end early, such as those of encoders that were lost.
+
+    A track ends early if another has a sample more than a gap (``reach``) after its last one.
+
+    Args:
+        tracks: Tracks of hinges, with samples.
+    """
+    end = max(int(track.times[-1]) for track in tracks.values())
+    return [
+        track
+        for track in tracks.values()
+        if end - int(track.times[-1]) <= reach(track.times.astype(np.float64))
+    ]
 
 
 def _scaled(track: Track, scale: float, offset: float = 0.0) -> Track:

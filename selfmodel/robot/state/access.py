@@ -16,7 +16,8 @@ ObservedSignal = StateField | ShiftedField | DerivedSignal
 """A signal as a robot logs it."""
 
 StateWriter = Callable[[Mapping[Signal, FloatArray]], None]
-"""Writes signals, ``(n, width)`` each, into the state; absent signals keep their values."""
+"""Writes signals, ``(n, width)`` each, into the state; absent signals, and joints whose value is
+NaN, keep their values."""
 
 
 def signal_fields(
@@ -76,7 +77,13 @@ def state_writer(robot: Robot, bind: Bind, *models: mujoco.MjModel) -> StateWrit
     def write(state: Mapping[Signal, FloatArray]) -> None:
         for signal in ("joint_positions", "joint_velocities"):
             if signal in state:
-                arrays[joints[signal].field][:, joints[signal].columns] = state[signal]
+                field, own = arrays[joints[signal].field], joints[signal].columns
+                unknown = np.isnan(state[signal])
+                field[:, own] = (
+                    np.where(unknown, field[:, own], state[signal])
+                    if unknown.any()
+                    else state[signal]
+                )
         base.write(qpos, qvel, state)
 
     return write

@@ -1,5 +1,6 @@
 """Every mistake in a mapping is told with its line, and with what could have been meant."""
 
+import re
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -203,3 +204,19 @@ def test_the_time_of_a_mapping_is_linear_in_its_names(text: Callable[[int], str]
 
     # Four times the names take four times the time; pairs of names, sixteen times.
     assert min(seconds(40_000) for _ in range(3)) < 8 * min(seconds(10_000) for _ in range(3))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "reason"),
+    [
+        ("[commands.names]\nleft_hip_x", "[commands.names]\nleft_hip_x", "must have a command"),
+        ("[joints.names]", "[joints.names]", "the name of one joint or more, got 'none' for all"),
+    ],
+    ids=["motor", "all hinges"],
+)
+def test_only_some_hinges_may_have_no_encoder(old: str, new: str, reason: str):
+    before, after = MAPPING.split(old)
+    names = after.split("\n\n")[0]
+    lost = re.sub(r"= (\"\w+\"|\{.*\})", '= "none"', names)
+    with pytest.raises(InputError, match=reason):
+        parse_mapping(before + new + after.replace(names, lost, 1), "MAP.toml")

@@ -85,3 +85,15 @@ def test_names_that_hold_anything_stay_names(biped: Robot, tmp_path: Path):
         text = text.replace('"?"', f'"{number}"', 1)
     told = {link.name for link in parse_mapping(text, "m").joints.links.values()}
     assert {names[1], names[2], names[3]} <= told
+
+
+def test_a_hinge_for_which_no_joint_is_left_has_no_encoder(biped: Robot, tmp_path: Path):
+    items = [item for item in recorded() if item[0] != "/joint_states"]
+    for k in range(200):
+        stamp = T0 + k * 5_000_000
+        items.append(("/joint_states", stamp, joint_state(stamp, ["LHY", "RHX", "RHY"], [0.0] * 3)))
+    bag = write_bag(tmp_path / "bag", items)
+
+    text = suggest(bag, biped, "biped.xml", with_timestep=True)
+    assert 'left_hip_x = "none"  # CHECK: no encoder: the bag has no other joint' in text
+    assert 'left_hip_x = "?"  # CHANGE' in text  # a motor has a command
