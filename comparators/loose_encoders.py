@@ -1,8 +1,8 @@
 """Encoders of a detached limb: they freeze, or they follow the motor that lost its load.
 
 The encoder of a joint whose limb is lost is not predicted by the model of the robot. Often the
-encoder belongs to the motor and stays: it then measures the motor's own motion, a linear function
-of its commands. Such an encoder is no evidence against the loss of the limb.
+encoder belongs to the motor and stays: it then measures the motor's own motion, which follows the
+commands with a lag. Such an encoder is no evidence against the loss of the limb.
 """
 
 from dataclasses import dataclass
@@ -16,8 +16,9 @@ FROZEN = 1e-6
 """Range of predicted angles below which a hinge is welded or detached, rad. A welded hinge moves by
 less than 1e-9 rad in a segment."""
 
-MAX_LAG = 5
-"""Largest delay of an encoder after the commands that is tried, control steps."""
+TIME_CONSTANTS = (0.0, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0)
+"""Time constants of a motor without a load that are tried, control steps: its angle follows the
+command as the output of a low-pass filter of first order."""
 
 MAX_REMAINDER = 0.1
 """Largest share of the variance of an encoder that a linear function of commands may leave if the
@@ -137,13 +138,25 @@ def _following(angles: FloatArray, commands: FloatArray) -> FloatArray | None:
     None if the encoder is not such a function, or stands.
     """
     best, fitted = MAX_REMAINDER, None
-    for lag in range(MAX_LAG + 1):
-        delayed = np.vstack([np.repeat(commands[:1], lag, axis=0), commands[: len(commands) - lag]])
-        for column in delayed.T:
+    for constant in TIME_CONSTANTS:
+        for column in _low_pass(commands, constant).T:
             line = _line(angles, column)
             if line is not None and line[2] < best:
                 best, fitted = line[2], line[0] + line[1] * column
     return fitted if fitted is not None and np.isfinite(fitted).all() else None
+
+
+def _low_pass(commands: FloatArray, constant: float) -> FloatArray:
+    """Returns commands after a low-pass filter of first order, ``(steps, motors)``.
+
+    Row k contains the commands up to row k - 1: command k has its effect after row k.
+    """
+    gain = 1 - np.exp(-1 / constant) if constant else 1.0
+    filtered = np.empty_like(commands)
+    filtered[0] = commands[0]
+    for k in range(1, len(commands)):
+        filtered[k] = filtered[k - 1] + gain * (commands[k - 1] - filtered[k - 1])
+    return filtered
 
 
 def _derived(readings: FloatArray, angles: FloatArray) -> tuple[float, float] | None:
