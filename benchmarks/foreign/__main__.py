@@ -1,4 +1,4 @@
-"""``python -m benchmarks.foreign``: generates recordings, scores their diagnoses, and prints rates."""
+"""``python -m benchmarks.foreign``: makes recordings, scores their diagnoses, prints rates."""
 
 import argparse
 import itertools
@@ -8,15 +8,16 @@ from functools import partial
 from pathlib import Path
 
 from benchmarks.foreign.cases import CASES, GROUPS
-from benchmarks.foreign.gap import LEVELS
 from benchmarks.foreign.generate import Plan, generate
-from benchmarks.foreign.judge import summary
-from benchmarks.foreign.rates import table
 from benchmarks.foreign.robots import NAMES
-from benchmarks.foreign.score import Question, read_rows, score
+from benchmarks.foreign.scoring.judge import summary
+from benchmarks.foreign.scoring.rates import table
+from benchmarks.foreign.scoring.score import Question, read_rows, score
+from benchmarks.foreign.world.gap import LEVELS
 
 
 def main() -> None:
+    """Runs a command."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.foreign", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
     _add_generate(commands.add_parser("generate", help="write recordings"))

@@ -84,7 +84,10 @@ def robot(name: str) -> Robot:
         for k in range(model.njnt)
         if model.jnt_type[k] == mujoco.mjtJoint.mjJNT_HINGE
     )
-    motors = {model.actuator(k).name: model.joint(model.actuator_trnid[k, 0]).name for k in range(model.nu)}
+    motors = {
+        model.actuator(k).name: model.joint(model.actuator_trnid[k, 0]).name
+        for k in range(model.nu)
+    }
     touches = {
         model.sensor(k).name: model.body(model.site_bodyid[model.sensor_objid[k]]).name
         for k in range(model.nsensor)
@@ -111,7 +114,9 @@ def _path(name: str) -> Path:
     )
     found = importlib.util.find_spec(package)
     if found is None or found.origin is None:
-        raise ModuleNotFoundError(f"the robot {name} is a file of {package}, which is not installed")
+        raise ModuleNotFoundError(
+            f"the robot {name} is a file of {package}, which is not installed"
+        )
     return Path(found.origin).parent / inside
 
 

@@ -97,7 +97,7 @@ def _selfmodel(
     first: Sequence[str], last: Sequence[str], cwd: Path
 ) -> subprocess.CompletedProcess[str]:
     """Runs the command line of the selfmodel that is importable here."""
-    here = str(Path(__file__).resolve().parents[2])
+    here = str(Path(__file__).resolve().parents[3])
     return subprocess.run(
         [sys.executable, "-m", "selfmodel", *first, *last],
         cwd=cwd,

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from benchmarks.foreign.gaits import Gait
 from benchmarks.foreign.robots import Robot
+from benchmarks.foreign.world.gaits import Gait
 
 TAIL = 0.1
 """Time that the gait goes on after the trial, s."""
@@ -133,7 +133,8 @@ def simulate(
     plant = _Plant(robot, phase, {})
     motors = list(robot.motors)
     rows: list[np.ndarray] = []
-    commands, touches = [], []
+    commands: list[np.ndarray] = []
+    touches: list[np.ndarray] = []
     count = round((duration + TAIL) / robot.control_timestep)
     for step in range(count):
         now = step * robot.control_timestep
