@@ -28,7 +28,7 @@ SILENT = ("encoder",)
 """Kinds that change the record and not the robot: no diagnosis has to name them."""
 
 ENCODERS = ("freezes", "follows", "nan", "none")
-"""Behaviour of the encoders of a lost limb: constant, the commanded angle, NaN, and not in the
+"""Behaviour of the encoders of a detached limb: constant, the commanded angle, NaN, and not in the
 messages."""
 
 

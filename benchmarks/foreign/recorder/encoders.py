@@ -1,4 +1,4 @@
-"""Encoders of a robot with faults: their directions, offsets, and angles after their limb is lost."""
+"""Encoders: their directions and offsets, and their angles after their limb is detached."""
 
 from dataclasses import dataclass
 
@@ -42,7 +42,7 @@ def encoders_of(
 
 
 def encoder_angles(robot: Robot, motion: Motion, encoders: Encoders) -> np.ndarray:
-    """Returns the angle of each encoder; that of a lost limb is frozen, or follows its command."""
+    """Returns the angle of each encoder; that of a detached limb is frozen, or follows its command."""
     angles = motion.angles.copy()
     after = motion.time >= encoders.onset
     commanded = {hinge: k for k, hinge in enumerate(robot.motors.values())}

@@ -5,25 +5,31 @@ from typing import Any
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
+Message = Any
+"""A message of any type: rosbags makes the types at run time."""
+
 ROS = get_typestore(Stores.ROS2_HUMBLE)
 
 
-def made(kind: str, **fields: Any) -> Any:  # noqa: ANN401  # types exist at run time only
+def made(kind: str, **fields: Message) -> Message:
     """Returns a message of a type, such as ``std_msgs/msg/Bool``."""
     return ROS.types[kind](**fields)
 
 
-def header(stamp: int, frame: str) -> Any:
+def header(stamp: int, frame: str) -> Message:
+    """Returns a header."""
     time = made("builtin_interfaces/msg/Time", sec=stamp // 10**9, nanosec=stamp % 10**9)
     return made("std_msgs/msg/Header", stamp=time, frame_id=frame)
 
 
-def vector(values: np.ndarray, kind: str = "Vector3") -> Any:
+def vector(values: np.ndarray, kind: str = "Vector3") -> Message:
+    """Returns a vector, or a point."""
     x, y, z = map(float, values)
     return made(f"geometry_msgs/msg/{kind}", x=x, y=y, z=z)
 
 
-def joint_state(stamp: int, names: list[str], position: np.ndarray, speed: np.ndarray) -> Any:
+def joint_state(stamp: int, names: list[str], position: np.ndarray, speed: np.ndarray) -> Message:
+    """Returns a JointState without efforts."""
     return made(
         "sensor_msgs/msg/JointState",
         header=header(stamp, ""),
@@ -36,7 +42,8 @@ def joint_state(stamp: int, names: list[str], position: np.ndarray, speed: np.nd
 
 def odom(
     stamp: int, position: np.ndarray, turn: np.ndarray, linear: np.ndarray, angular: np.ndarray
-) -> Any:
+) -> Message:
+    """Returns an Odometry without covariances."""
     w, x, y, z = map(float, turn)
     pose = made(
         "geometry_msgs/msg/Pose",
@@ -54,7 +61,8 @@ def odom(
     )
 
 
-def wrench(stamp: int, force: float) -> Any:
+def wrench(stamp: int, force: float) -> Message:
+    """Returns a WrenchStamped: a force along z, N."""
     zero = np.zeros(3)
     wrench = made(
         "geometry_msgs/msg/Wrench", force=vector(np.array([0, 0, force])), torque=vector(zero)

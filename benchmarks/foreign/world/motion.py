@@ -43,7 +43,7 @@ class Motion:
 
     Attributes:
         time: Times of the rows of states, s.
-        angles: Angle of each hinge, ``(rows, hinges)`` rad; NaN for those of lost limbs.
+        angles: Angle of each hinge, ``(rows, hinges)`` rad; NaN for those of detached limbs.
         speeds: Angular velocity of each hinge, rad/s.
         pose: Position, m, and orientation, w x y z, of the root body, ``(rows, 7)``.
         twist: Linear velocity in the world frame, m/s, and angular velocity in the body frame,
@@ -91,14 +91,14 @@ class _Plant:
 
     @property
     def angles(self) -> np.ndarray:
-        """Angle of each hinge, rad; NaN for those of lost limbs."""
+        """Angle of each hinge, rad; NaN for those of detached limbs."""
         full = self.fixed.copy()
         full[self.there] = self.data.qpos[self.qpos]
         return full
 
     @property
     def speeds(self) -> np.ndarray:
-        """Angular velocity of each hinge, rad/s; 0 for welded ones and those of lost limbs."""
+        """Angular velocity of each hinge, rad/s; 0 for welded ones and those of detached limbs."""
         full = np.zeros(len(self.hinges))
         full[self.there] = self.data.qvel[self.qvel]
         return full
