@@ -140,7 +140,11 @@ def _phase(
     return Phase(
         start=start,
         model=model,
-        offsets={fault.part: fault.value for fault in faults if fault.kind == "encoder-offset"},
+        offsets={
+            machine.part(fault.part).hinges[0]: fault.value
+            for fault in faults
+            if fault.kind == "encoder-slip"
+        },
         fixed={
             hinge: fault.value
             for fault in faults
@@ -149,7 +153,7 @@ def _phase(
         },
         dead=frozenset(fault.part for fault in faults if fault.kind == "dead-sensor"),
         swapped=next((tuple(f.part.split()) for f in faults if f.kind == "crossed"), ()),
-        delay=sum(fault.value for fault in faults if fault.kind == "delay"),
+        delay=machine.control_timestep * sum(f.value for f in faults if f.kind == "delay"),
     )
 
 

@@ -37,7 +37,11 @@ def encoders_of(
             broken.update(dict.fromkeys(robot.part(fault.part).beyond, fault.encoders))
         if fault.kind == "encoder":
             broken[fault.part] = fault.encoders
-    offsets = {fault.part: fault.value for fault in faults if fault.kind == "encoder-offset"}
+    offsets = {
+        robot.part(fault.part).hinges[0]: fault.value
+        for fault in faults
+        if fault.kind in ("encoder-offset", "encoder-slip")
+    }
     return Encoders(signs, offsets, broken, onset)
 
 
