@@ -46,7 +46,7 @@ def encoders_of(
 
 
 def encoder_angles(robot: Robot, motion: Motion, encoders: Encoders) -> np.ndarray:
-    """Returns the angle of each encoder; that of a detached limb is frozen, or follows its command."""
+    """Returns the angle of each encoder; those of detached limbs are frozen, or follow commands."""
     angles = motion.angles.copy()
     after = motion.time >= encoders.onset
     commanded = {hinge: k for k, hinge in enumerate(robot.motors.values())}
