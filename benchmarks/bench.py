@@ -6,6 +6,7 @@ variants that alternated in one process, with the same model, threads, initial p
 targets.
 """
 
+import argparse
 import json
 import os
 import platform
@@ -34,6 +35,7 @@ STEPS_OF_SUITE = 100
 
 def main() -> None:
     """Measures everything, prints it, and writes ``benchmarks/results.json``."""
+    argparse.ArgumentParser(description=__doc__).parse_args()
     threads = os.cpu_count() or 1
     robots = [ROBOTS[name].robot() for name in ("quadruped", "hexapod")]
     quadruped = robots[0]

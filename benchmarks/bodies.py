@@ -4,8 +4,8 @@
 ``docs/figures/bodies.png``.
 """
 
+import argparse
 import json
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from statistics import median
@@ -23,7 +23,10 @@ FIGURE = Path("docs/figures/bodies.png")
 
 def main() -> None:
     """Prints the tables and draws the figure."""
-    rows = [row for folder in sys.argv[1:] for row in _single_faults(Path(folder))]
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folders", type=Path, nargs="+", help="a folder of such a study")
+    folders = parser.parse_args().folders
+    rows = [row for folder in folders for row in _single_faults(folder)]
     rows.sort(key=lambda row: row.robot)
     found = {(one.robot, one.case): one for one in summarise(rows)}
     bodies = list(dict.fromkeys(row.robot for row in rows))

@@ -3,6 +3,7 @@
 ``python -m benchmarks.comparators`` prints the same results as ``make bench``.
 """
 
+import argparse
 import json
 import os
 from pathlib import Path
@@ -185,4 +186,5 @@ def _diagnosis(
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__).parse_args()
     print(json.dumps(measure(os.cpu_count() or 1, Settings()), indent=2))

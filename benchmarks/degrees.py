@@ -5,9 +5,9 @@
 ``selfmodel ablate --damage ... --out FOLDER`` makes the rows.
 """
 
+import argparse
 import csv
 import math
-import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -45,7 +45,9 @@ class Found:
 
 def main() -> None:
     """Prints a table per number of trials."""
-    rows = _rows(Path(sys.argv[1]))
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path, help="of such a study")
+    rows = _rows(parser.parse_args().folder)
     for trials in sorted({row.trials for row in rows}):
         same = [row for row in rows if row.trials == trials]
         print(f"After {trials} trial{'s' if trials > 1 else ''}:\n")

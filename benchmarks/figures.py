@@ -1,5 +1,6 @@
 """Draws docs/figures/growth.png from benchmarks/results.json."""
 
+import argparse
 import json
 from pathlib import Path
 
@@ -16,6 +17,7 @@ FIGURE = Path("docs/figures/growth.png")
 
 def main() -> None:
     """Writes the figure: cost by population, by steps and by joints."""
+    argparse.ArgumentParser(description=__doc__).parse_args()
     rows = json.loads(RESULTS.read_text(encoding="utf-8"))["growth"]
     quadruped = [row for row in rows if row["robot"] == "quadruped"]
     populations = sorted((r for r in quadruped if r["steps"] == 500), key=lambda r: r["runs"])

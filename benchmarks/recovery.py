@@ -4,6 +4,7 @@
 ``measure`` repeats this in separate processes.
 """
 
+import argparse
 import json
 import os
 import resource
@@ -129,4 +130,5 @@ def measure_once() -> dict[str, float]:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__).parse_args()
     print(json.dumps(measure_once()))

@@ -4,6 +4,7 @@ Run with ``python -m benchmarks.round_trip``; it takes five minutes on two cores
 table of ``docs/results/import.md``.
 """
 
+import argparse
 import os
 import tempfile
 from pathlib import Path
@@ -36,6 +37,7 @@ SEED = 0
 
 def main() -> None:
     """Prints a row for each single fault of the quadruped."""
+    argparse.ArgumentParser(description=__doc__).parse_args()
     robot = ROBOTS["quadruped"].robot()
     simulator = Simulator(robot, os.cpu_count() or 1)
     rng = repair_stream(SEED, 0)

@@ -4,8 +4,8 @@
 absolute difference of each run, m.
 """
 
+import argparse
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +24,9 @@ HEALTHY = "00-before.mcap"
 
 def main() -> None:
     """Computes the differences of the runs that have none yet."""
-    out = Path(sys.argv[1])
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("out", type=Path, help="folder of the study")
+    out = parser.parse_args().out
     file = out / "exactness.json"
     found = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
     robots: dict[str, Robot] = {}

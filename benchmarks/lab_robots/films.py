@@ -5,6 +5,7 @@ gait of seed 0, or with a random CPG if it has none, draws the trial into ``OUT/
 ``docs/figures/lab-robots.png``. It needs OpenGL.
 """
 
+import argparse
 import subprocess
 import sys
 from pathlib import Path
@@ -24,7 +25,11 @@ BUDGET = ("--budget", "memory=2GB,time=10min")
 
 def main() -> None:
     """Draws the films and the contact sheet."""
-    wheels, out = Path(sys.argv[1]), Path(sys.argv[2])
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("wheels", type=Path, help="folder of the unpacked wheels")
+    parser.add_argument("out", type=Path, help="folder of the study")
+    options = parser.parse_args()
+    wheels, out = options.wheels, options.out
     folder = out / "films"
     folder.mkdir(parents=True, exist_ok=True)
     models = write_models(wheels, out / "models")

@@ -4,9 +4,9 @@
 folder of its own; meshes are read from ``WHEELS``.
 """
 
+import argparse
 import os
 import re
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -112,4 +112,8 @@ def _write(model: Model, name: str, wheels: Path, folder: Path) -> Path:
 
 
 if __name__ == "__main__":
-    print(*write_models(Path(sys.argv[1]), Path(sys.argv[2])).values(), sep="\n")
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("wheels", type=Path, help="folder of the unpacked wheels")
+    parser.add_argument("out", type=Path, help="folder of the models to write")
+    options = parser.parse_args()
+    print(*write_models(options.wheels, options.out).values(), sep="\n")

@@ -5,6 +5,7 @@ interrupted one. A stop at any time leaves a balanced table: a seed of all model
 before the next seed.
 """
 
+import argparse
 import shutil
 import subprocess
 import sys
@@ -30,7 +31,11 @@ DESIGN = ("--controller", "cpg", "--score", "upright")
 
 def main() -> None:
     """Runs the study."""
-    wheels, out = Path(sys.argv[1]), Path(sys.argv[2])
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("wheels", type=Path, help="folder of the unpacked wheels")
+    parser.add_argument("out", type=Path, help="folder of the study")
+    options = parser.parse_args()
+    wheels, out = options.wheels, options.out
     models = write_models(wheels, out / "models")
     for cases, seed, gap in product(CASES, range(SEEDS), GAPS):
         _copy_gaits(out, gap)

@@ -5,6 +5,7 @@ finished study, and writes its rows into ``docs/lab-robots.csv``; ``python -m
 benchmarks.lab_robots.table`` prints the tables of the rows in that file.
 """
 
+import argparse
 import csv
 import json
 import sys
@@ -68,8 +69,16 @@ class Row:
 
 def main() -> None:
     """Prints the tables."""
-    if len(sys.argv) > 1:
-        _write(_collected(Path(sys.argv[1])))
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument(
+        "out",
+        type=Path,
+        nargs="?",
+        help="folder of the study; without it, the rows in docs/lab-robots.csv are printed",
+    )
+    out = parser.parse_args().out
+    if out is not None:
+        _write(_collected(out))
     rows = _read()
     _print_robots(rows)
     print()

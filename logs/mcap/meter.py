@@ -19,9 +19,7 @@ class Meter:
 
     def __init__(self, budget: Budget) -> None:
         self.budget = budget
-        self._frames = self._records = self._unpacked = self._attached = self._other = (
-            self._names
-        ) = 0
+        self._counts: dict[str, int] = {}
         self._ids: set[tuple[type[McapRecord], int]] = set()
 
     def frame(self, opcode: int, size: int) -> None:
@@ -34,18 +32,11 @@ class Meter:
         Raises:
             ExcessError: The file exceeds a limit.
         """
-        self._frames += 1
-        self._check(self._frames, self.budget.frames, "records and chunks")
+        self._add("records and chunks", 1, self.budget.frames)
         if opcode == Opcode.ATTACHMENT:
-            self._attached += size
-            self._check(self._attached, self.budget.attached_bytes, "bytes attached")
+            self._add("bytes attached", size, self.budget.attached_bytes)
         elif opcode not in (Opcode.CHUNK, Opcode.MESSAGE):
-            self._other += size
-            self._check(
-                self._other,
-                self.budget.other_bytes,
-                "bytes outside its messages and attachments",
-            )
+            self._add("bytes outside its messages and attachments", size, self.budget.other_bytes)
 
     def chunk(self, size: int) -> None:
         """Counts a chunk before it is decompressed.
@@ -56,8 +47,7 @@ class Meter:
         Raises:
             ExcessError: The file exceeds a limit.
         """
-        self._unpacked += size
-        self._check(self._unpacked, self.budget.unpacked_bytes, "bytes, unpacked")
+        self._add("bytes, unpacked", size, self.budget.unpacked_bytes)
 
     def record(self, opcode: int, size: int) -> None:
         """Counts a record within a chunk.
@@ -69,8 +59,7 @@ class Meter:
         Raises:
             ExcessError: The file exceeds a limit.
         """
-        self._records += 1
-        self._check(self._records, self.budget.records, "messages")
+        self._add("messages", 1, self.budget.records)
         if opcode != Opcode.MESSAGE:
             self.frame(opcode, size)
 
@@ -80,15 +69,18 @@ class Meter:
         Raises:
             ExcessError: The file exceeds the limit.
         """
+        names = 0
         if isinstance(record, (Channel, Schema)):
+            names = int((type(record), record.id) not in self._ids)
             self._ids.add((type(record), record.id))
         elif isinstance(record, Metadata):
-            self._names += 1 + len(record.metadata)
+            names = 1 + len(record.metadata)
         elif isinstance(record, Attachment):
-            self._names += 1
-        self._check(len(self._ids) + self._names, self.budget.names, "names")
+            names = 1
+        self._add("names", names, self.budget.names)
 
-    def _check(self, count: int, limit: int, unit: str) -> None:
+    def _add(self, unit: str, number: int, limit: int) -> None:
+        count = self._counts[unit] = self._counts.get(unit, 0) + number
         if count > limit:
             raise ExcessError(
                 f"it has more than the {limit} {unit} that a budget of "

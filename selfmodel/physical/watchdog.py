@@ -95,6 +95,6 @@ class Watchdog:
         while (function := self._calls.get()) is not None:
             try:
                 outcome = _Outcome(result=function())
-            except BaseException as failure:  # noqa: BLE001  # raised in the calling thread
+            except BaseException as failure:  # noqa: BLE001  # `call` raises it in the caller's thread
                 outcome = _Outcome(error=failure)
             self._outcomes.put(outcome)

@@ -69,7 +69,8 @@ def run_isolated(
     with _lock, TemporaryDirectory(prefix="selfmodel-") as scratch:
         try:
             answer, ended = _server().call(task, message, budget, Path(scratch))
-        except BaseException:  # also Ctrl-C: the answer of this call must not reach the next one
+        except BaseException:  # raised again; also Ctrl-C
+            # The next call must not receive the answer of this one.
             _stop_server()
             raise
     if answer is None:

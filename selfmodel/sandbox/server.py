@@ -89,7 +89,7 @@ def _run(channel: socket.socket, task: Task, facts: Mapping[str, Any]) -> None:
         status = 0
     except MemoryError:
         status = OUT_OF_MEMORY
-    except BaseException:  # noqa: BLE001  # the child ends here, whatever happened
+    except BaseException:  # noqa: BLE001  # any exception becomes the exit status
         status = _EX_SOFTWARE
     finally:
         os._exit(status)
@@ -108,7 +108,7 @@ def _answer(task: Task, message: Message, budget: Budget, scratch: Path) -> Mess
         # The traceback may hold the memory.
         error.__traceback__ = None
         return Message({"error": type(error).__name__, "message": "", "fields": {}})
-    except Exception:  # noqa: BLE001  # an error of this package: the client raises it
+    except Exception:  # noqa: BLE001  # a defect of the task: the client raises its traceback
         return Message({"error": "", "message": traceback.format_exc(), "fields": {}})
     return Message({"result": dict(result.facts)}, result.blobs)
 

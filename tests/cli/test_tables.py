@@ -9,11 +9,11 @@ import pytest
 
 from selfmodel.logs import read_log
 from tests.helpers.command import selfmodel
+from tests.helpers.go2 import STAND, recorded
 
 pytestmark = pytest.mark.process
 
 ANT = Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets" / "ant.xml"
-STAND = Path(__file__).parents[3] / "shared" / "samples" / "go2-stand"
 SEARCH = ("--generations", "2", "--population", "10", "--seed", "1", "--json")
 
 
@@ -80,7 +80,7 @@ def test_an_existing_table_and_an_unknown_format_are_refused(folder: Path):
     assert (folder / "mine.csv").read_text() == "mine"
 
 
-@pytest.mark.skipif(not STAND.exists(), reason="the sample is not in the repository")
+@recorded
 def test_a_recording_of_a_real_robot_is_imported_without_an_edit(tmp_path: Path):
     (tmp_path / "go2.xml").write_bytes((STAND / "go2.xml").read_bytes())
     table = STAND / "go2-stand.npz"

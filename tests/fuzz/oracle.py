@@ -104,7 +104,7 @@ def _outcome(case: Case) -> tuple[str, str, str]:
         if str(error).strip():
             return type(error).__name__, "", ""
         return "", traceback.format_exc(), f"empty-{_place(error)}"
-    except BaseException as error:  # noqa: BLE001  # what is not declared is the finding
+    except BaseException as error:  # noqa: BLE001  # any undeclared exception is a finding
         return "", traceback.format_exc(), _place(error)
 
 

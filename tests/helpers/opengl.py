@@ -12,7 +12,8 @@ WORKS = next(filter(works, WITHOUT_SCREEN), None)
 """The value of ``MUJOCO_GL`` with which MuJoCo draws."""
 
 draws = pytest.mark.skipif(
-    WORKS is None, reason="neither EGL nor OSMesa is there: apt-get install libosmesa6"
+    WORKS is None,
+    reason="MuJoCo draws with neither EGL nor OSMesa here: apt-get install libosmesa6",
 )
 
 

@@ -226,7 +226,7 @@ def run(count: int, seed: int) -> dict[str, Counter[str]]:
             one, other = (every[k] for k in rng.choice(len(every), 2, replace=False))
             try:
                 outcome = check(folder / "spliced.mcap", splice(one, other, rng), (one, other))
-            except Exception:
+            except Exception:  # raised again, after the number that repeats the case
                 print(f"case {number} of seed {seed}: {splice.__name__}", file=sys.stderr)
                 raise
             outcomes[splice.__name__][outcome] += 1

@@ -27,7 +27,11 @@ def shimmy() -> ModuleType:
     """The package; it needs imageio, and warns about environments that it cannot register."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        return pytest.importorskip("shimmy", reason="Shimmy is not installed", exc_type=ImportError)
+        return pytest.importorskip(
+            "shimmy",
+            reason="Shimmy is not installed: pip install --group dev",
+            exc_type=ImportError,
+        )
 
 
 @pytest.mark.bodies

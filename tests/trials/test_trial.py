@@ -115,7 +115,9 @@ def test_fewer_than_two_rows_are_no_trial(biped: Robot):  # noqa: F811
 
 
 def test_a_trial_is_a_table_of_pandas(biped: Robot):  # noqa: F811
-    pandas = pytest.importorskip("pandas")
+    pandas = pytest.importorskip(
+        "pandas", reason="pandas is not installed: pip install 'selfmodel[tables]'"
+    )
     trial = Trial.from_arrays(biped, **arrays(biped), base_position=np.ones((6, 3)))
 
     table = trial.to_pandas()

@@ -53,7 +53,8 @@ def run_part(folder: Path, work: Work, task: tuple[Job, str]) -> PartAnswer:
             error = str(cause) or type(cause).__name__
         except (InputError, WorkError, MemoryError) as cause:
             error = str(cause) or type(cause).__name__
-        except Exception as cause:  # noqa: BLE001  # a plug-in may raise anything; see the file
+        except Exception as cause:  # noqa: BLE001  # a plug-in may raise any exception
+            # The part fails with its traceback in a file; the other parts of the grid continue.
             error = _unexpected(cause, run, part)
         seconds = perf_counter() - start
         if error is not None:

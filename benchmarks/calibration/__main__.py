@@ -1,9 +1,9 @@
 """Prediction error of calibrated self-models on held-out trials, and the cost of calibration.
 
 ``python -m benchmarks.calibration [--bank DIR]`` prints a table and writes
-``benchmarks/calibration.json``. With the packages of ``mujoco.sysid`` (requirements-sysid.txt in
-this folder) it is fitted to the same trials too. Without ``--bank``, three gaits per robot are
-evolved first, in about two minutes.
+``benchmarks/calibration/calibration.json``. With the packages of ``mujoco.sysid``
+(requirements-sysid.txt in this folder) it is fitted to the same trials too. Without ``--bank``,
+three gaits per robot are evolved first, in about two minutes.
 """
 
 import argparse
@@ -34,7 +34,7 @@ from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import collect
 from selfmodel.trials.trial import Trial, TrialPlan
 
-RESULTS = Path(__file__).with_suffix(".json")
+RESULTS = Path(__file__).with_name("calibration.json")
 NO_NOISE = 1e-12
 """Level of a gap with negligible measurement noise and initial noise."""
 SEEN, UNSEEN = 2, 2
@@ -45,7 +45,7 @@ Facts = dict[str, Any]
 
 def main() -> None:
     """Measures, prints and writes."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.calibration", description=__doc__)
     parser.add_argument("--bank", type=Path, help="a folder with ROBOT-N.npz, N from 0 to 2")
     parser.add_argument("--robots", default=",".join(ROBOTS))
     parser.add_argument("--gap", type=float, default=0.05)
@@ -80,7 +80,7 @@ Way = Callable[[Robot, Sequence[Trial]], tuple[Parameters, list[float]]]
 def _peer() -> dict[str, Way]:
     """``mujoco.sysid``, if it is installed."""
     try:
-        from benchmarks.sysid_peer import sysid_parameters  # noqa: PLC0415  # optional
+        from benchmarks.calibration.sysid_peer import sysid_parameters  # noqa: PLC0415  # optional
     except ImportError as error:
         print(f"without mujoco.sysid: {error}")
         return {}

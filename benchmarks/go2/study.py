@@ -1,26 +1,12 @@
-"""Calibration and diagnosis of a real robot: a Unitree Go2 on a stand, from 15 s of its log.
+"""Stages of the study: fits, errors, verdicts and injected faults; each returns JSON values."""
 
-Fits the model to the first 10 s, compares predictions of the last 5 s, fits three disjoint thirds,
-diagnoses the last 5 s, and puts weak motors into them; then the last two again with the times
-exchanged: the fit to the last 10 s, and the first 5 s diagnosed. Each stage adds its numbers to the
-JSON.
+from typing import Any
 
-    python -m benchmarks.go2 --out benchmarks/go2.json --figure docs/figures/go2.png
-"""
-
-import argparse
-import json
-from pathlib import Path
-from time import perf_counter, process_time
-from typing import TYPE_CHECKING, Any
-
-import matplotlib.pyplot as plt
 import numpy as np
 
-from benchmarks.go2_sample import (
+from benchmarks.go2.sample import (
     RATE,
     positions_and_commands,
-    robot_on_stand,
     simulated,
     trial_of,
     with_fault,
@@ -47,63 +33,16 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import calibrate
 from selfmodel.simulation.simulator import Simulator
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
 FITTED, ALL = 10 * RATE, 15 * RATE
 KINDS = (BROKEN, JAMMED, FAILED_SENSOR, WEAK_MOTOR)
 COMPARATOR = SegmentPrediction("segment-prediction")
 SHORTLIST = 8
 TORQUES = (0.95, 0.9, 0.8, 0.7)
 """Parts of the torque that remain of the motors that are weak in the recording."""
-STAGES = ("fit", "thirds", "hypotheses", "verdict", "injected", "exchanged")
 
 
-def main() -> None:
-    """Runs the stages, in their order; a stage after ``fit`` reads its fit from the JSON."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, required=True, help="JSON file, read and written")
-    parser.add_argument("--figure", type=Path, help="PNG file of the held-out part")
-    parser.add_argument("--stages", default=",".join(STAGES))
-    parser.add_argument("--threads", type=int, default=2)
-    options = parser.parse_args()
-    found = json.loads(options.out.read_text()) if options.out.exists() else {}
-    nominal = robot_on_stand()
-    stages: dict[str, Callable[[], Any]] = {
-        "fit": lambda: _fit(nominal, 0, FITTED, options.threads),
-        "thirds": lambda: [
-            _fit(nominal, k * ALL // 3, (k + 1) * ALL // 3, options.threads) for k in range(3)
-        ],
-        "hypotheses": lambda: {
-            "nominal": _hypotheses(nominal, options.threads),
-            "calibrated": _hypotheses(_robot_of(nominal, found["fit"]), options.threads),
-        },
-        "verdict": lambda: _verdict(
-            _robot_of(nominal, found["fit"]), (0, FITTED), (FITTED, ALL), options.threads
-        ),
-        "injected": lambda: _injected(
-            _robot_of(nominal, found["fit"]),
-            (FITTED, ALL),
-            found["verdict"]["detectable"],
-            options.threads,
-        ),
-        "exchanged": lambda: _exchanged(nominal, options.threads),
-    }
-    for stage in options.stages.split(","):
-        start = perf_counter(), process_time()
-        found[stage] = stages[stage]()
-        found.setdefault("seconds", {})[stage] = {
-            "wall": round(perf_counter() - start[0], 1),
-            "processor": round(process_time() - start[1], 1),
-        }
-        options.out.write_text(json.dumps(found, indent=1) + "\n")
-    found["rms"] = _errors(nominal, _robot_of(nominal, found["fit"]))
-    options.out.write_text(json.dumps(found, indent=1) + "\n")
-    if options.figure:
-        _draw(nominal, _robot_of(nominal, found["fit"]), options.figure)
-
-
-def _fit(robot: Robot, first: int, last: int, threads: int) -> dict[str, Any]:
+def fit_to(robot: Robot, first: int, last: int, threads: int) -> dict[str, Any]:
+    """Returns the fit to a part of the recording: its first row, and the row after the last."""
     trial = trial_of(robot, *positions_and_commands(robot), first, last)
     fit = calibrate(robot, [trial], threads).joints
     if fit is None:
@@ -111,7 +50,8 @@ def _fit(robot: Robot, first: int, last: int, threads: int) -> dict[str, Any]:
     return fit.to_dict()
 
 
-def _robot_of(robot: Robot, fit: dict[str, Any]) -> Robot:
+def robot_of(robot: Robot, fit: dict[str, Any]) -> Robot:
+    """Returns the robot with the parameters and the delay of a fit."""
     values = {
         quantity: np.array([r["value"] for r in fit["parameters"] if r["quantity"] == quantity])
         for quantity in QUANTITIES
@@ -120,7 +60,7 @@ def _robot_of(robot: Robot, fit: dict[str, Any]) -> Robot:
     return with_model(robot, model, fit["delay"])
 
 
-def _errors(nominal: Robot, fitted: Robot) -> dict[str, Any]:
+def rms_errors(nominal: Robot, fitted: Robot) -> dict[str, Any]:
     """Returns the root mean square errors of simulations of the whole recording, mrad."""
     positions, commands = positions_and_commands(nominal)
     errors = {}
@@ -140,7 +80,7 @@ def _errors(nominal: Robot, fitted: Robot) -> dict[str, Any]:
     return errors
 
 
-def _hypotheses(robot: Robot, threads: int) -> dict[str, Any]:
+def better_hypotheses(robot: Robot, threads: int) -> dict[str, Any]:
     """Returns the weak-motor hypotheses that predict the healthy robot better than ``INTACT``."""
     evidence = Evidence(Simulator(robot, threads), COMPARATOR)
     trial = trial_of(robot, *positions_and_commands(robot), FITTED, ALL)
@@ -157,7 +97,7 @@ def _hypotheses(robot: Robot, threads: int) -> dict[str, Any]:
     }
 
 
-def _verdict(
+def verdict_of(
     robot: Robot, healthy_part: tuple[int, int], part: tuple[int, int], threads: int
 ) -> dict[str, Any]:
     """Returns the diagnosis of a part of the recording, given the part that the model is fitted to.
@@ -174,17 +114,17 @@ def _verdict(
     return search([trial], [], np.random.default_rng(0), lambda _: None).to_dict()
 
 
-def _exchanged(nominal: Robot, threads: int) -> dict[str, Any]:
+def exchanged_parts(nominal: Robot, threads: int) -> dict[str, Any]:
     """Returns fit, verdict and injected faults: the last 10 s fitted, the first 5 s tested."""
     healthy, part = (ALL - FITTED, ALL), (0, ALL - FITTED)
-    fit = _fit(nominal, *healthy, threads)
-    robot = _robot_of(nominal, fit)
-    verdict = _verdict(robot, healthy, part, threads)
-    injected = _injected(robot, part, verdict["detectable"], threads)
+    fit = fit_to(nominal, *healthy, threads)
+    robot = robot_of(nominal, fit)
+    verdict = verdict_of(robot, healthy, part, threads)
+    injected = injected_faults(robot, part, verdict["detectable"], threads)
     return {"fit": fit, "verdict": verdict, "injected": injected}
 
 
-def _injected(
+def injected_faults(
     robot: Robot, part: tuple[int, int], detectable: list[dict[str, Any]], threads: int
 ) -> list[dict[str, Any]]:
     """Returns the best of all single faults for each weak motor put into a part of the recording.
@@ -234,35 +174,3 @@ def _injected(
             )
             print(rows[-1], flush=True)
     return rows
-
-
-def _draw(nominal: Robot, fitted: Robot, path: Path) -> None:
-    positions, commands = positions_and_commands(nominal)
-    time = np.arange(FITTED, ALL) / RATE
-    chosen = ("FL_hip_joint", "FL_thigh_joint", "FL_calf_joint", "RL_calf_joint")
-    lines = {
-        "measured": (positions, "black", 1.4),
-        "nominal": (simulated(nominal, positions, commands), "tab:red", 1.0),
-        "calibrated": (simulated(fitted, positions, commands), "tab:blue", 1.0),
-    }
-    figure, axes = plt.subplots(len(chosen), 2, figsize=(11, 9), sharex=True)
-    for (left, right), name in zip(axes, chosen, strict=True):
-        column = nominal.anatomy.hinges.index(name)
-        left.plot(time, commands[FITTED:, column], color="0.7", lw=0.8, label="command")
-        for label, (values, color, width) in lines.items():
-            left.plot(time, values[FITTED:, column], color=color, lw=width, label=label)
-            if label != "measured":
-                error = 1e3 * (values - positions)[FITTED:, column]
-                right.plot(time, error, color=color, lw=width)
-        left.set_ylabel(f"{name.removesuffix('_joint')}, rad")
-        right.set_ylabel("error, mrad")
-        right.grid(alpha=0.3)
-    axes[0, 0].legend(fontsize=7, ncol=4, loc="upper center", bbox_to_anchor=(0.5, 1.25))
-    for axis in axes[-1]:
-        axis.set_xlabel("time, s")
-    figure.tight_layout()
-    figure.savefig(path, dpi=100)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,19 +1,19 @@
 """Compares the results of two versions of selfmodel to the last bit.
 
 ``python -m benchmarks.same_bits record --python PYTHON -o FILE.json`` runs a fixed list of commands
-(``benchmarks/same_bits_plan.py``) with the selfmodel that PYTHON imports, and writes one JSON file:
+(``benchmarks/same_bits/plan.py``) with the selfmodel that PYTHON imports, and writes one JSON file:
 every number of every ``--json`` output as a hexadecimal float, and digests of every log and file
 that a command wrote. ``python -m benchmarks.same_bits compare OLD NEW`` prints a line a command and
 exits with 1 if a result differs. Times, versions and sentences are left out. Keys that
 only NEW has are no difference. selfmodel itself is never imported here: only its command line, its
 JSON and its logs are used, which stay the same while modules move.
 
-``benchmarks/same_bits_0.1.json`` was recorded with version 0.1 (commit b097c0d), all parts but
-``table-one``, whose reference is ``docs/results.jsonl``: all 74 runs take about two hours of one
-processor, the other parts about ten minutes. The scenarios of ``suite-walker-walk`` differ from it
-since copies of MJCF files have no warm start. Bits are those of one version of MuJoCo and of numpy
-and of one processor family: where ``compare`` prints that these differ, record both versions on
-one machine. MuJoCo's threads do not matter; those of BLAS are set to one.
+``benchmarks/same_bits/same_bits_0.1.json`` was recorded with version 0.1 (commit b097c0d), all
+parts but ``table-one``, whose reference is ``docs/results.jsonl``: all 74 runs take about two hours
+of one processor, the other parts about ten minutes. The scenarios of ``suite-walker-walk`` differ
+from it since copies of MJCF files have no warm start. Bits are those of one version of MuJoCo and
+of numpy and of one processor family: where ``compare`` prints that these differ, record both
+versions on one machine. MuJoCo's threads do not matter; those of BLAS are set to one.
 """
 
 import argparse
@@ -28,8 +28,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from benchmarks.log_digest import bytes_digest, log_digests
-from benchmarks.same_bits_plan import PARTS, Scenario, scenarios, table_one_name
+from benchmarks.same_bits.log_digest import bytes_digest, log_digests
+from benchmarks.same_bits.plan import PARTS, Scenario, scenarios, table_one_name
 
 Items = dict[str, Any]
 """Results by ``SCENARIO:COMMAND``."""
@@ -56,7 +56,9 @@ SEARCHED = ("diagnostic", "distinct_hypotheses")
 
 def main() -> None:
     """Records or compares."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.same_bits", description=__doc__.partition("\n\n")[0]
+    )
     commands = parser.add_subparsers(required=True)
     recording = commands.add_parser("record", help="run the commands and write their results")
     recording.add_argument("--python", default=sys.executable, help="interpreter with selfmodel")

@@ -25,7 +25,7 @@ from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trial import Trial, TrialPlan
 
-SAMPLE = Path(__file__).parent.parent.parent / "shared" / "samples" / "go2-stand"
+SAMPLE = Path(__file__).parents[3] / "shared" / "samples" / "go2-stand"
 RATE = 200
 """Control steps per second."""
 
