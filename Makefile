@@ -76,4 +76,11 @@ bench: $(READY) ## measure speed and memory; on a quiet machine
 results: $(READY) ## run Table I on both robots and write docs/results/table-one.md; takes over an hour
 	$(BIN)/python -m benchmarks.table_one
 
-.PHONY: help setup demo test test-slow test-all docs lint types wheel viewers fuzz bench results
+FOREIGN ?= runs/foreign
+foreign: $(READY) ## make recordings by an independent generator and score their diagnoses; takes hours
+	$(BIN)/python -m benchmarks.foreign generate $(FOREIGN) --robots quadruped,hexapod,ant --gaps none,moderate,large --seeds 0
+	$(BIN)/python -m benchmarks.foreign generate $(FOREIGN) --cases healthy --gaps none,moderate,large --seeds 1-17
+	$(BIN)/python -m benchmarks.foreign score $(FOREIGN)
+	$(BIN)/python -m benchmarks.foreign table $(FOREIGN)/scores.jsonl
+
+.PHONY: help setup demo test test-slow test-all docs lint types wheel viewers fuzz bench results foreign

@@ -1,4 +1,4 @@
-"""``python -m benchmarks.foreign``: generates recordings, scores their diagnoses, and prints rates."""
+"""``python -m benchmarks.foreign``: makes recordings, scores their diagnoses, prints rates."""
 
 import argparse
 import itertools
@@ -8,15 +8,17 @@ from functools import partial
 from pathlib import Path
 
 from benchmarks.foreign.cases import CASES, GROUPS
-from benchmarks.foreign.gap import LEVELS
 from benchmarks.foreign.generate import Plan, generate
-from benchmarks.foreign.judge import summary
-from benchmarks.foreign.rates import table
 from benchmarks.foreign.robots import NAMES
-from benchmarks.foreign.score import Question, read_rows, score
+from benchmarks.foreign.scoring.judge import summary
+from benchmarks.foreign.scoring.questions import QUESTIONS, Question
+from benchmarks.foreign.scoring.rates import table
+from benchmarks.foreign.scoring.score import read_rows, score
+from benchmarks.foreign.world.gap import LEVELS
 
 
 def main() -> None:
+    """Runs a command."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.foreign", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
     _add_generate(commands.add_parser("generate", help="write recordings"))
@@ -32,7 +34,7 @@ def _add_generate(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--cases", default="all", help="all, or names of cases or groups")
     parser.add_argument("--seeds", default="0", help="such as 0 or 0-4")
     parser.add_argument("--gaps", default="large", help=", ".join(LEVELS))
-    parser.add_argument("--trials", type=int, default=1, help="trials with the faults, 1 to 3")
+    parser.add_argument("--trials", type=int, help="with the faults, 1 to 3 [those of the group]")
     parser.add_argument("--duration", type=float, default=10.0, help="of each trial, s")
     parser.add_argument("--jobs", type=int, default=2, help="processes")
     parser.set_defaults(run=_generate)
@@ -41,8 +43,8 @@ def _add_generate(parser: argparse.ArgumentParser) -> None:
 def _add_score(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("out", type=Path, help="folder of the recordings")
     parser.add_argument("--rows", type=Path, help="file of the rows [OUT/scores.jsonl]")
-    parser.add_argument("--kinds", default="", help="those of `selfmodel diagnose`")
-    parser.add_argument("--trials", type=int, default=1, help="trials with the faults, 1 to 3")
+    parser.add_argument("--kinds", help="those of `selfmodel diagnose` [those of the group]")
+    parser.add_argument("--trials", type=int, help="with the faults, 1 to 3 [those of the group]")
     parser.add_argument("--options", default="", help="further options of `selfmodel diagnose`")
     parser.add_argument("--jobs", type=int, default=2, help="processes")
     parser.set_defaults(run=_score)
@@ -55,9 +57,17 @@ def _add_table(parser: argparse.ArgumentParser) -> None:
 
 
 def _score(options: argparse.Namespace) -> None:
-    question = Question(options.kinds, options.trials, tuple(options.options.split()))
     rows = options.rows or options.out / "scores.jsonl"
-    for row in score(options.out, rows, question, options.jobs):
+
+    def question_of(group: str) -> Question:
+        usual = QUESTIONS[group]
+        return Question(
+            usual.kinds if options.kinds is None else options.kinds,
+            options.trials or usual.trials,
+            tuple(options.options.split()),
+        )
+
+    for row in score(options.out, rows, question_of, options.jobs):
         print(summary(row), flush=True)
 
 
@@ -76,11 +86,15 @@ def plans(options: argparse.Namespace) -> list[Plan]:
     """Returns the recordings that the options name."""
     names = _chosen(options.cases)
     return [
-        Plan(robot, case, seed, gap, options.duration, options.trials)
+        Plan(robot, case, seed, gap, options.duration, _trials(case, options))
         for gap, seed, case, robot in itertools.product(
             options.gaps.split(","), _seeds(options.seeds), names, options.robots.split(",")
         )
     ]
+
+
+def _trials(case: str, options: argparse.Namespace) -> int:
+    return options.trials or QUESTIONS[CASES[case].group].trials
 
 
 def _chosen(text: str) -> list[str]:

@@ -147,12 +147,15 @@ def _joint_friction(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]
 
 def _delay(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
     del robot
-    return (Fault("delay", value=round(rng.uniform(0.03, 0.08), 3)),)
+    return (Fault("delay", value=round(rng.uniform(2, 3), 2)),)
 
 
 def _encoder_offset(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
-    hinge = robot.hinges[rng.integers(len(robot.hinges))]
-    return (Fault("encoder-offset", hinge, round(_signed(rng, 0.1, 0.25), 3)),)
+    return (Fault("encoder-offset", _hinge_part(robot, rng), round(_signed(rng, 0.1, 0.25), 3)),)
+
+
+def _encoder_slip(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    return (Fault("encoder-slip", _hinge_part(robot, rng), round(_signed(rng, 0.1, 0.25), 3)),)
 
 
 def _grip(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
@@ -246,6 +249,7 @@ CASES = {
         Case("joint-friction", "wide", _joint_friction),
         Case("delay", "wide", _delay),
         Case("encoder-offset", "wide", _encoder_offset),
+        Case("encoder-slip", "wide", _encoder_slip),
         Case("grip", "wide", _grip),
         Case("backlash", "wide", _backlash),
         Case("friction", "default", _friction),

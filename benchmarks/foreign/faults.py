@@ -14,12 +14,14 @@ NOTATION = {
     "payload": "payload:{part}={value:.3f}",
     "damping": "damping:{part}={value:.2f}",
     "joint-friction": "joint-friction:{part}={value:.3f}",
-    "delay": "delay={value:.3f}",
-    "encoder-offset": "encoder:{part}={value:.3f}",
+    "delay": "delay={value:.2f}",
+    "encoder-offset": "encoder-offset:{part}={value:.3f}",
+    "encoder-slip": "encoder-offset:{part}={value:.3f}",
     "grip": "grip:{part}={value:.3f}",
     "backlash": "backlash:{part}={value:.3f}",
 }
-"""Notation of each kind of fault that selfmodel has, or is to have."""
+"""Notation of each kind of fault that selfmodel has, or is to have. With ``encoder-slip``, the
+servo uses the encoder with the offset; with ``encoder-offset``, it has another one."""
 
 UNKNOWN = ("crossed", "tether", "heavy-limb", "soft-ground", "side-slope", "short-range")
 """Kinds of faults that no kind of selfmodel expresses."""
@@ -28,7 +30,7 @@ SILENT = ("encoder",)
 """Kinds that change the record and not the robot: no diagnosis has to name them."""
 
 ENCODERS = ("freezes", "follows", "nan", "none")
-"""Behaviour of the encoders of a lost limb: constant, the commanded angle, NaN, and not in the
+"""Behaviour of the encoders of a detached limb: constant, the commanded angle, NaN, and not in the
 messages."""
 
 

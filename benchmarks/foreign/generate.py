@@ -11,16 +11,17 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from benchmarks.foreign.bag import Noise, encoders_of, write_bag
-from benchmarks.foreign.body import compiled
 from benchmarks.foreign.cases import CASES, Case, faults_of, onset_of
 from benchmarks.foreign.faults import Fault, notation
-from benchmarks.foreign.gaits import Gait, command_ranges, draw_gait, upright
-from benchmarks.foreign.gap import LEVELS, Gap, draw_gap
-from benchmarks.foreign.mapping import mapping
-from benchmarks.foreign.motion import Motion, Phase, simulate
+from benchmarks.foreign.recorder.bag import Noise, recorded_items, write_bag
+from benchmarks.foreign.recorder.encoders import encoders_of
+from benchmarks.foreign.recorder.mapping import mapping
 from benchmarks.foreign.robots import SERVO_GAINS, Robot, robot
 from benchmarks.foreign.seeds import stream
+from benchmarks.foreign.world.body import compiled
+from benchmarks.foreign.world.gaits import Gait, command_ranges, draw_gait, upright
+from benchmarks.foreign.world.gap import LEVELS, Gap, draw_gap
+from benchmarks.foreign.world.motion import Motion, Phase, simulate
 
 CANDIDATES, GAITS = 16, 3
 """Drawn gaits, and gaits of a recording: those with the largest displacements."""
@@ -56,6 +57,23 @@ class Plan:
         return f"{self.robot}-{self.case}-{self.seed}-{self.gap}"
 
 
+@dataclass(frozen=True)
+class Trial:
+    """One trial of a recording.
+
+    Attributes:
+        name: Name of its bag.
+        faults: The faults.
+        onset: Time at which they begin, s; None if they hold from the start.
+        gait: The gait.
+    """
+
+    name: str
+    faults: tuple[Fault, ...]
+    onset: float | None
+    gait: Gait
+
+
 def generate(out: Path, plan: Plan) -> Path:
     """Writes a recording: bags, mappings and ``truth.json``, which is written last.
 
@@ -72,14 +90,14 @@ def generate(out: Path, plan: Plan) -> Path:
     onset = onset_of(case, machine, plan.seed)
     gap = draw_gap(machine, LEVELS[plan.gap], _stream(plan, "gap"))
     gaits = _gaits(machine, case, plan, faults)
-    before = _trial(machine, plan, gap, (), None, gaits[0], "before", folder)
-    moved = []
+    record = partial(_record, folder, machine, plan, gap)
+    before = record(Trial("before", (), None, gaits[0]))
+    moved: list[Motion] = []
     for k in range(plan.trials):
-        name = f"after-{k + 1}"
         # Trials after the onset have the faults from their start.
         start = onset if k == 0 else None
         present = _stated(machine, faults, moved) if moved else faults
-        moved.append(_trial(machine, plan, gap, present, start, gaits[k], name, folder))
+        moved.append(record(Trial(f"after-{k + 1}", present, start, gaits[k])))
     if machine.mapped_as != machine.name:
         _write_files(machine, folder)
     stated = _stated(machine, faults, moved)
@@ -122,7 +140,11 @@ def _phase(
     return Phase(
         start=start,
         model=model,
-        offsets={fault.part: fault.value for fault in faults if fault.kind == "encoder-offset"},
+        offsets={
+            machine.part(fault.part).hinges[0]: fault.value
+            for fault in faults
+            if fault.kind == "encoder-slip"
+        },
         fixed={
             hinge: fault.value
             for fault in faults
@@ -131,7 +153,7 @@ def _phase(
         },
         dead=frozenset(fault.part for fault in faults if fault.kind == "dead-sensor"),
         swapped=next((tuple(f.part.split()) for f in faults if f.kind == "crossed"), ()),
-        delay=sum(fault.value for fault in faults if fault.kind == "delay"),
+        delay=machine.control_timestep * sum(f.value for f in faults if f.kind == "delay"),
     )
 
 
@@ -184,35 +206,29 @@ def _rehearsal(
     return simulate(machine, [_phase(0.0, machine, faults, lambda _angles: model)], gait, duration)
 
 
-def _trial(
-    machine: Robot,
-    plan: Plan,
-    gap: Gap,
-    faults: tuple[Fault, ...],
-    onset: float | None,
-    gait: Gait,
-    name: str,
-    folder: Path,
-) -> Motion:
+def _record(folder: Path, machine: Robot, plan: Plan, gap: Gap, trial: Trial) -> Motion:
     """Simulates and records one trial, and writes its mapping."""
-    rng = _stream(plan, plan.gap, name)
+    rng = _stream(plan, plan.gap, trial.name)
 
     def latency() -> float:
         return gap.latency + gap.latency_spread * rng.uniform(-1, 1)
 
     models = partial(compiled, machine, gap)
-    phases = [_phase(onset or 0.0, machine, faults, partial(models, faults))]
-    if onset is not None:
+    start = trial.onset or 0.0
+    phases = [_phase(start, machine, trial.faults, partial(models, trial.faults))]
+    if trial.onset is not None:
         phases = [_phase(0.0, machine, (), partial(models, ())), *phases]
-    motion = simulate(machine, phases, gait, plan.duration, latency)
-    signs = dict(
-        zip(
-            machine.hinges, _stream(plan, "signs").choice((-1, 1), len(machine.hinges)), strict=True
-        )
+    motion = simulate(machine, phases, trial.gait, plan.duration, latency)
+    turned = _stream(plan, "signs").choice((-1, 1), len(machine.hinges))
+    signs = {hinge: int(sign) for hinge, sign in zip(machine.hinges, turned, strict=True)}
+    encoders = encoders_of(machine, trial.faults, trial.onset or -1.0, signs)
+    write_bag(
+        folder / trial.name,
+        recorded_items(machine, motion, encoders, Noise().scaled(gap.size), rng),
+        rng,
+        lost=Noise().lost * gap.size,
+        mcap=plan.seed % 2 == 0,
     )
-    encoders = encoders_of(machine, faults, onset or -1.0, signs)
-    noise = Noise().scaled(gap.size)
-    write_bag(folder / name, machine, motion, encoders, noise, rng, mcap=plan.seed % 2 == 0)
-    text = mapping(machine, encoders, plan.duration, healthy=name == "before")
-    (folder / f"{name}.toml").write_text(text)
+    text = mapping(machine, encoders, plan.duration, healthy=not trial.name.startswith("after"))
+    (folder / f"{trial.name}.toml").write_text(text)
     return motion

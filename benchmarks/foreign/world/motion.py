@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from benchmarks.foreign.gaits import Gait
 from benchmarks.foreign.robots import Robot
+from benchmarks.foreign.world.gaits import Gait
 
 TAIL = 0.1
 """Time that the gait goes on after the trial, s."""
@@ -43,7 +43,7 @@ class Motion:
 
     Attributes:
         time: Times of the rows of states, s.
-        angles: Angle of each hinge, ``(rows, hinges)`` rad; NaN for those of lost limbs.
+        angles: Angle of each hinge, ``(rows, hinges)`` rad; NaN for those of detached limbs.
         speeds: Angular velocity of each hinge, rad/s.
         pose: Position, m, and orientation, w x y z, of the root body, ``(rows, 7)``.
         twist: Linear velocity in the world frame, m/s, and angular velocity in the body frame,
@@ -91,14 +91,14 @@ class _Plant:
 
     @property
     def angles(self) -> np.ndarray:
-        """Angle of each hinge, rad; NaN for those of lost limbs."""
+        """Angle of each hinge, rad; NaN for those of detached limbs."""
         full = self.fixed.copy()
         full[self.there] = self.data.qpos[self.qpos]
         return full
 
     @property
     def speeds(self) -> np.ndarray:
-        """Angular velocity of each hinge, rad/s; 0 for welded ones and those of lost limbs."""
+        """Angular velocity of each hinge, rad/s; 0 for welded ones and those of detached limbs."""
         full = np.zeros(len(self.hinges))
         full[self.there] = self.data.qvel[self.qvel]
         return full
@@ -133,7 +133,8 @@ def simulate(
     plant = _Plant(robot, phase, {})
     motors = list(robot.motors)
     rows: list[np.ndarray] = []
-    commands, touches = [], []
+    commands: list[np.ndarray] = []
+    touches: list[np.ndarray] = []
     count = round((duration + TAIL) / robot.control_timestep)
     for step in range(count):
         now = step * robot.control_timestep

@@ -51,10 +51,13 @@ class Sinusoids:
     offset: np.ndarray
 
     def commands(self, time: float, angles: np.ndarray, touch: np.ndarray) -> np.ndarray:
+        """Returns the sinusoids at a time; see ``Gait``."""
         del angles, touch
         wave = np.sin(2 * np.pi * self.frequency * time + self.phase)
         grown = min(time / 0.5, 1.0)
-        return self.ranges.centre + grown * self.ranges.half * (self.amplitude * wave + self.offset)
+        return np.asarray(
+            self.ranges.centre + grown * self.ranges.half * (self.amplitude * wave + self.offset)
+        )
 
 
 @dataclass(frozen=True)
@@ -67,11 +70,12 @@ class Network:
     outward: np.ndarray
 
     def commands(self, time: float, angles: np.ndarray, touch: np.ndarray) -> np.ndarray:
+        """Returns the outputs of the network; see ``Gait``."""
         clock = 2 * np.pi * self.frequency * time
         inputs = np.concatenate([touch, angles, [2 * np.sin(clock), 2 * np.cos(clock), 1.0]])
         outputs = np.tanh(self.outward @ np.tanh(self.inward @ inputs))
         grown = min(time / 0.5, 1.0)
-        return self.ranges.centre + grown * self.ranges.half * outputs
+        return np.asarray(self.ranges.centre + grown * self.ranges.half * outputs)
 
 
 def draw_gait(robot: Robot, ranges: Ranges, kind: str, rng: np.random.Generator) -> Gait:

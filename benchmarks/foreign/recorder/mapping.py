@@ -1,6 +1,7 @@
 """The mapping of a recording to the signals of a robot, as ``selfmodel logs import`` reads it."""
 
-from benchmarks.foreign.bag import Encoders, recorded
+from benchmarks.foreign.recorder.bag import recorded
+from benchmarks.foreign.recorder.encoders import Encoders
 from benchmarks.foreign.robots import Robot
 
 

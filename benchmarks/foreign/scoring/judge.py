@@ -135,7 +135,7 @@ def _severity_error(best: Terms, real: Terms) -> float | None:
     for key, severity in real.items():
         guess = best[key]
         if severity is not None and guess is not None:
-            scale = 1.0 if key[0] in ("jam", "slope", "encoder") else abs(severity)
+            scale = 1.0 if key[0] in ("jam", "slope", "encoder-offset") else abs(severity)
             errors.append(abs(guess - severity) / scale)
     return max(errors) if errors else None
 

@@ -1,57 +1,49 @@
 """Diagnoses of recordings by the command line of selfmodel, one JSON line each."""
 
+import dataclasses
 import json
 import os
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from benchmarks.foreign.scoring.questions import Question
 
 LIMIT = 1800
 """Longest time of one command, s."""
 
 
-@dataclass(frozen=True)
-class Question:
-    """How recordings are diagnosed.
-
-    Attributes:
-        kinds: Value of ``--kinds``; empty for the default.
-        trials: Number of trials with the faults.
-        options: Further options of ``diagnose``.
-    """
-
-    kinds: str = ""
-    trials: int = 1
-    options: tuple[str, ...] = ()
-
-
-def score(out: Path, rows: Path, question: Question, jobs: int) -> Iterator[dict[str, Any]]:
+def score(
+    out: Path, rows: Path, question_of: Callable[[str], Question], jobs: int
+) -> Iterator[dict[str, Any]]:
     """Diagnoses every recording of a folder that has no row yet, and appends the rows.
 
     Args:
         out: Folder of the recordings.
         rows: File with a JSON object per line; created if it does not exist.
-        question: How to diagnose.
+        question_of: Returns how the recordings of a group are diagnosed.
         jobs: Number of commands at a time.
     """
-    asked = {"kinds": question.kinds, "trials": question.trials, "options": [*question.options]}
-    done = {
-        row["name"] for row in read_rows(rows) if {key: row["asked"][key] for key in asked} == asked
-    }
-    folders = sorted(path.parent for path in out.glob("*/truth.json"))
-    left = [folder for folder in folders if folder.name not in done]
+    done = {(row["name"], _key(row["asked"])) for row in read_rows(rows)}
+    left = []
+    for path in sorted(out.glob("*/truth.json")):
+        question = question_of(json.loads(path.read_text())["group"])
+        if (path.parent.name, _key(dataclasses.asdict(question))) not in done:
+            left.append((path.parent, question))
     with ThreadPoolExecutor(jobs) as pool, rows.open("a") as file:
-        for future in as_completed([pool.submit(diagnosed, f, question) for f in left]):
-            row = {**future.result(), "asked": asked}
-            file.write(json.dumps(row) + "\n")
+        for future in as_completed([pool.submit(diagnosed, *asked) for asked in left]):
+            file.write(json.dumps(future.result()) + "\n")
             file.flush()
-            yield row
+            yield future.result()
+
+
+def _key(asked: dict[str, Any]) -> str:
+    return json.dumps(asked, sort_keys=True)
 
 
 def read_rows(path: Path) -> list[dict[str, Any]]:
@@ -69,7 +61,13 @@ def diagnosed(folder: Path, question: Question) -> dict[str, Any]:
         diagnosis.
     """
     truth = json.loads((folder / "truth.json").read_text())
-    row: dict[str, Any] = {"name": folder.name, "truth": truth, "answer": None, "error": ""}
+    row: dict[str, Any] = {
+        "name": folder.name,
+        "truth": truth,
+        "asked": dataclasses.asdict(question),
+        "answer": None,
+        "error": "",
+    }
     with tempfile.TemporaryDirectory() as made:
         names = ["before", *(f"after-{k + 1}" for k in range(question.trials))]
         for name in names:
@@ -97,7 +95,7 @@ def _selfmodel(
     first: Sequence[str], last: Sequence[str], cwd: Path
 ) -> subprocess.CompletedProcess[str]:
     """Runs the command line of the selfmodel that is importable here."""
-    here = str(Path(__file__).resolve().parents[2])
+    here = str(Path(__file__).resolve().parents[3])
     return subprocess.run(
         [sys.executable, "-m", "selfmodel", *first, *last],
         cwd=cwd,

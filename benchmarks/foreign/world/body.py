@@ -3,10 +3,10 @@
 import mujoco
 import numpy as np
 
-from benchmarks.foreign.damage import damaged
 from benchmarks.foreign.faults import Fault
-from benchmarks.foreign.gap import Gap, apply_gap, set_grip
 from benchmarks.foreign.robots import Robot
+from benchmarks.foreign.world.damage import damaged
+from benchmarks.foreign.world.gap import Gap, apply_gap, set_grip
 
 
 def compiled(
@@ -29,24 +29,14 @@ def compiled(
 
 
 def _change(model: mujoco.MjModel, robot: Robot, gap: Gap, fault: Fault) -> None:
-    """Changes the numbers of a compiled model by a fault."""
+    """Changes the numbers of a compiled model by a fault of a joint, a body or the ground."""
     match fault.kind:
-        case "motor":
-            for motor in _motors(model, robot, fault.part):
-                model.actuator_gainprm[motor] *= fault.value
-                model.actuator_biasprm[motor] *= fault.value
-                model.actuator_forcerange[motor] *= fault.value
+        case "motor" | "damping" | "joint-friction":
+            _change_joint(model, robot, fault)
         case "friction":
             model.geom_friction[:, 0] = fault.value
             for name, factor in gap.grip.items():
                 set_grip(model, name, factor)
-        case "damping":
-            model.dof_damping[_dofs(model, robot, fault.part)] *= fault.value
-        case "joint-friction":
-            torque = max(
-                abs(model.actuator_forcerange[m, 1]) for m in _motors(model, robot, fault.part)
-            )
-            model.dof_frictionloss[_dofs(model, robot, fault.part)] += fault.value * torque
         case "grip":
             set_grip(model, robot.part(fault.part).body, fault.value)
         case "heavy-limb":
@@ -56,7 +46,22 @@ def _change(model: mujoco.MjModel, robot: Robot, gap: Gap, fault: Fault) -> None
         case "soft-ground":
             model.geom_solref[:] = (-fault.value, -fault.value / 20)
         case "short-range":
-            model.joint(fault.part).range = (-fault.value, fault.value)
+            middle = float(model.joint(fault.part).range.mean())
+            model.joint(fault.part).range = (middle - fault.value, middle + fault.value)
+
+
+def _change_joint(model: mujoco.MjModel, robot: Robot, fault: Fault) -> None:
+    """Changes the motors, the damping or the dry friction of the hinges of a part."""
+    motors, dofs = _motors(model, robot, fault.part), _dofs(model, robot, fault.part)
+    match fault.kind:
+        case "motor":
+            model.actuator_gainprm[motors] *= fault.value
+            model.actuator_biasprm[motors] *= fault.value
+            model.actuator_forcerange[motors] *= fault.value
+        case "damping":
+            model.dof_damping[dofs] *= fault.value
+        case "joint-friction":
+            model.dof_frictionloss[dofs] += fault.value * model.actuator_forcerange[motors, 1]
 
 
 def _dofs(model: mujoco.MjModel, robot: Robot, part: str) -> list[int]:

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.foreign.cases import CASES, GROUPS
-from benchmarks.foreign.gap import LEVELS
-from benchmarks.foreign.judge import Judgement, judged, matters
+from benchmarks.foreign.scoring.judge import Judgement, judged, matters
+from benchmarks.foreign.world.gap import LEVELS
 from selfmodel.experiments.confidence_intervals import proportion
 
 HEADINGS = (

@@ -1,0 +1,1 @@
+"""The recorder: encoders, messages, bags and mappings."""

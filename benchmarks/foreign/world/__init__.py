@@ -1,0 +1,1 @@
+"""The robot and its environment: model, faults, gap, gait and motion."""
