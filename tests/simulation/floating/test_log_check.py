@@ -11,7 +11,7 @@ from selfmodel.simulation.calibration_segments import calibration_segments_of
 from selfmodel.simulation.floating.log_check import Suspicion, suspicion
 from selfmodel.simulation.floating.predictions import Predictions
 from selfmodel.tasks import ROBOTS
-from selfmodel.trials.signals import Signal
+from selfmodel.trials.state_estimation import JOINTS
 from selfmodel.trials.trial import Trial
 from tests.simulation.test_calibration import trial
 
@@ -42,8 +42,7 @@ def test_a_healthy_trial_is_not_suspicious():
 def test_a_joint_with_the_other_sign_is_named():
     signs = np.ones(len(QUADRUPED.anatomy.hinges))
     signs[KNEE] = -1.0
-    names: tuple[Signal, ...] = ("joint_positions", "joint_velocities")
-    suspect = found(changed(**{name: HEALTHY.behaviour[name] * signs for name in names}))
+    suspect = found(changed(**{name: HEALTHY.behaviour[name] * signs for name in JOINTS}))
 
     assert suspect is not None
     assert suspect.joint == "front_left_knee"
@@ -55,8 +54,7 @@ def test_a_joint_with_the_other_sign_is_named():
 def test_exchanged_joints_are_named():
     order = np.arange(len(QUADRUPED.anatomy.hinges))
     order[[KNEE, OTHER]] = order[[OTHER, KNEE]]
-    names: tuple[Signal, ...] = ("joint_positions", "joint_velocities")
-    suspect = found(changed(**{name: HEALTHY.behaviour[name][:, order] for name in names}))
+    suspect = found(changed(**{name: HEALTHY.behaviour[name][:, order] for name in JOINTS}))
 
     assert suspect is not None
     pair = {"front_left_knee", "back_right_shoulder"}
