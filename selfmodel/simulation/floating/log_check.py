@@ -117,7 +117,7 @@ class _Correction:
 
     Attributes:
         joint: The joint that it is about.
-        cause: The change in words.
+        cause: The change as text.
         order: Column that each hinge is read from, ``(hinges,)``.
         signs: Sign of each hinge, ``(hinges,)``.
         motor_order: Column that each motor is read from, ``(motors,)``.
