@@ -19,8 +19,8 @@ from selfmodel.arrays import FloatArray
 from selfmodel.robot.parameters import Parameters, factor_names, from_factors, model_with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state.access import signal_fields, state_writer
-from selfmodel.simulation.calibration import CANDIDATE_DELAYS, MAX_LOG_FACTOR
 from selfmodel.simulation.calibration_segments import HORIZON, MAX_SEGMENTS
+from selfmodel.simulation.floating.fit import CANDIDATE_DELAYS, MAX_LOG_FACTOR
 from selfmodel.simulation.requests import LEAD
 from selfmodel.trials.signal_difference import difference
 from selfmodel.trials.signal_scales import CALIBRATION_ERROR_SCALES

@@ -18,16 +18,16 @@ from selfmodel.cli.options import (
     Yes,
 )
 from selfmodel.cli.output.plain import counted
-from selfmodel.cli.output.printing import print_json, print_lines
+from selfmodel.cli.output.printing import print_json, print_lines, print_notes
 from selfmodel.cli.output.tables import show
 from selfmodel.errors import InputError
 from selfmodel.experiments import trial_logs
 from selfmodel.experiments.expected_time import calibration_seconds
 from selfmodel.logs.files import as_write_error, create_partial, publish, refuse_existing
-from selfmodel.robot.parameters import factor_names
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import Budget
-from selfmodel.simulation.calibration import calibrate as fit_to
+from selfmodel.simulation.calibration import EXACT_ERROR, UNDETERMINED, calibrate as fit_to
+from selfmodel.simulation.floating.fit import FACTORS
 from selfmodel.simulation.joints.sets import NOMINAL
 from selfmodel.simulation.threads import thread_count
 
@@ -74,20 +74,20 @@ def calibrate(
         "robot": before.name,
         "logs": [str(path) for path in files],
         "model": str(out),
-        "parameters": [
-            {"name": name, "factor": float(factor), "deviation": float(deviation)}
-            for name, factor, deviation in zip(
-                factor_names(before), fit.parameters.factors, fit.deviations, strict=True
-            )
-        ],
+        "parameters": fit.rows(),
         "delay": fit.parameters.delay,
         "delay_before": before.control_delay,
         "error_before": fit.error_before,
         "error": fit.error,
         "as_it_was": fit.robot is before,
+        "set": fit.chosen,
+        "held_out_gain": fit.held_out_gain,
+        "suspicion": fit.suspicion.to_dict() if fit.suspicion else None,
         "joints": fit.joints.to_dict() if fit.joints else None,
         "seconds": perf_counter() - start,
     }
+    if fit.suspicion is not None:
+        print_notes(f"warning: {fit.suspicion}")
     if as_json:
         print_json(result)
     else:
@@ -143,7 +143,12 @@ def _print_joints(fit: dict[str, Any]) -> None:
 
 def _print_factors(result: dict[str, Any]) -> None:
     rows = [
-        (one["name"], "1", f"{one['factor']:.3f}", f"± {100 * one['deviation']:.1f} %")
+        (
+            one["name"],
+            "1",
+            f"{one['factor']:.3f}",
+            f"± {100 * one['deviation']:.1f} %" if one["determined"] else UNDETERMINED,
+        )
         for one in result["parameters"]
     ]
     show(("factor of", "before", "fitted", "uncertainty"), rows)
@@ -152,5 +157,19 @@ def _print_factors(result: dict[str, Any]) -> None:
         f"error of predicted motion: {result['error']:.3f} ({result['error_before']:.3f} before), "
         f"the root mean square over predictions of 10 steps, each signal in its own scale"
     )
-    if result["as_it_was"]:
+    if result["as_it_was"] and result["error"] < EXACT_ERROR:
         print_lines("The model already predicts the logs exactly: it is written unchanged.")
+    elif result["as_it_was"]:
+        print_lines(
+            "No parameters predict left-out segments significantly better: the model is written "
+            "unchanged."
+        )
+    elif result["set"] != FACTORS:
+        print_lines(
+            "No factors predict left-out segments significantly better: only the delay is changed."
+        )
+    else:
+        print_lines(
+            f"In segments that were left out of the fit, the loss is "
+            f"{100 * result['held_out_gain']:.0f} % lower than before."
+        )

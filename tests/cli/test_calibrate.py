@@ -77,7 +77,8 @@ def test_a_calibrated_model_is_one_for_replay_and_diagnose(folder: Path):
     assert found["error"] < found["error_before"]
     assert not found["as_it_was"]
     assert len(found["parameters"]) == 4 + 8
-    assert all(0 < one["deviation"] <= 0.15 for one in found["parameters"])
+    assert all(0 < one["deviation"] <= 0.3 for one in found["parameters"])
+    assert {"set", "held_out_gain", "suspicion"} <= set(found)
     assert not (folder / "fit.xml.part").exists()
     replayed = selfmodel("replay", "intact.mcap", "--robot", "fit.xml", "--json", cwd=folder)
     assert replayed.returncode == 0, replayed.stderr
@@ -118,7 +119,7 @@ def test_a_table_says_each_factor_and_how_sure_it_is(folder: Path):
 
     assert done.returncode == 0, done.stderr
     assert "motor front_left_shoulder" in done.stdout
-    assert "± 15.0 %" in done.stdout
+    assert "not determined by these trials" in done.stdout
     assert "delay, control steps: 0 (0 before)" in done.stdout
     assert "it is written unchanged" in done.stdout
 

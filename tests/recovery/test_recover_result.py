@@ -75,7 +75,7 @@ def test_a_calibration_is_readable_serialisable_and_a_table(fit: Calibration):
 
     assert title == "<Calibration of quadruped: control delay 2"
     assert errors == "  error 0.75 before, 0.5 after"
-    assert rows[2] == "   1.250 (log deviation 0.150)  friction"
+    assert rows[2] == "   1.250 (log deviation 0.150)  friction, not determined by these trials"
     assert len(rows) == 12
     assert json.loads(json.dumps(fit.to_dict(), allow_nan=False)) == {
         "root_mass": 1.0,
@@ -87,8 +87,17 @@ def test_a_calibration_is_readable_serialisable_and_a_table(fit: Calibration):
         "deviations": [0.15] * 12,
         "error_before": 0.75,
         "error": 0.5,
+        "set": "factors",
+        "determined": [False] * 12,
+        "held_out_gain": 0.0,
+        "suspicion": None,
     }
-    assert fit.to_pandas()[2] == {"name": "friction", "factor": 1.25, "deviation": 0.15}
+    assert fit.to_pandas()[2] == {
+        "name": "friction",
+        "factor": 1.25,
+        "deviation": 0.15,
+        "determined": False,
+    }
 
 
 def test_a_replay_is_serialisable_and_a_table(different: Replay):

@@ -14,12 +14,13 @@ from selfmodel.robot.parameters import Parameters, factor_names, nominal, with_p
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation import calibration
 from selfmodel.simulation.calibration import (
-    MAX_LOG_FACTOR,
-    PRIOR_DEVIATION,
+    EXACT_ERROR,
     Calibration,
     calibrate,
     prediction_error,
 )
+from selfmodel.simulation.floating import fit, predictions
+from selfmodel.simulation.floating.fit import MAX_LOG_FACTOR, prior_deviations
 from selfmodel.simulation.outcome import SimulationResult, SimulationStats
 from selfmodel.simulation.prediction import predict
 from selfmodel.tasks import ROBOTS
@@ -32,6 +33,7 @@ from tests.helpers.hostile import lacking, unstable
 
 STEPS = 400
 QUADRUPED = ROBOTS["quadruped"].robot()
+PRIOR = prior_deviations(len(factor_names(QUADRUPED)))
 TRUE = Parameters(1.25, 0.9, 0.8, 1.3, (1.2, 1.0, 0.85, 1.0, 1.0, 0.8, 1.0, 1.15), delay=2)
 
 
@@ -72,8 +74,8 @@ def test_with_a_weak_prior_the_factors_of_a_robot_without_noise_are_found(
     monkeypatch: pytest.MonkeyPatch,
 ):
     """As calibration is set, the prior keeps factors near nominal, for the sake of noisy logs."""
-    monkeypatch.setattr("selfmodel.simulation.calibration.PRIOR_WEIGHT", 0.005)
-    monkeypatch.setattr("selfmodel.simulation.calibration.MAX_ITERATIONS", 20)
+    monkeypatch.setattr("selfmodel.simulation.floating.fit.PRIOR_WEIGHT", 0.005)
+    monkeypatch.setattr("selfmodel.simulation.floating.fit.MAX_ITERATIONS", 20)
     found = calibrate(QUADRUPED, trials(with_parameters(QUADRUPED, TRUE)), threads=2)
     off = np.abs(np.log(found.parameters.factors) - np.log(TRUE.factors))
 
@@ -102,7 +104,7 @@ def test_a_model_that_is_exact_is_left_as_it_is_to_the_bit(robot: Robot):
 
     assert found.robot is robot
     assert found.parameters == nominal(robot)
-    assert set(found.deviations) == {PRIOR_DEVIATION}
+    assert found.deviations.tolist() == prior_deviations(len(found.deviations)).tolist()
 
 
 @pytest.mark.search
@@ -123,7 +125,7 @@ def test_under_noise_factors_stay_near_nominal_and_within_bounds():
     assert found.parameters.delay == gap.delay
     assert np.abs(np.log(found.parameters.factors)).max() <= MAX_LOG_FACTOR
     assert found.error < found.error_before
-    assert ((found.deviations > 0) & (found.deviations <= PRIOR_DEVIATION)).all()
+    assert ((found.deviations > 0) & (found.deviations <= PRIOR)).all()
 
 
 @pytest.mark.search
@@ -136,15 +138,14 @@ def test_what_the_trials_do_not_show_is_as_uncertain_as_before_them_however_many
     several = [trial(adrift, SimulatedRobot(adrift, gap=gap, stream=k), k) for k in range(3)]
     found = [calibrate(adrift, several[:count], threads=1).deviations for count in (1, 3)]
 
-    np.testing.assert_allclose([each[friction] for each in found], PRIOR_DEVIATION, rtol=1e-3)
-    assert all((np.delete(each, friction) < PRIOR_DEVIATION).all() for each in found)
+    np.testing.assert_allclose([each[friction] for each in found], PRIOR[friction], rtol=1e-3)
 
 
 def test_what_the_trials_show_is_less_uncertain_than_before_them():
     motors = slice(factor_names(QUADRUPED).index("damping") + 1, None)
 
-    assert (fitted().deviations[motors] < 0.7 * PRIOR_DEVIATION).all()
-    assert (fitted().deviations > 0.2 * PRIOR_DEVIATION).all()
+    assert (fitted().deviations[motors] < PRIOR[motors]).all()
+    assert (fitted().deviations > 0.2 * PRIOR).all()
 
 
 @pytest.mark.search
@@ -161,14 +162,14 @@ def test_a_robot_that_nobody_sees_is_calibrated_from_what_it_has_on_board():
     assert after < 0.75 * before
     # It knows no more of the factors than one that is seen.
     assert np.median(found.deviations / fitted().deviations) > 0.7
-    assert (found.deviations < PRIOR_DEVIATION).all()
+    assert (found.deviations <= PRIOR).all()
 
 
 def test_an_exact_model_of_a_robot_that_nobody_sees_is_left_as_it_is(robot: Robot):
     found = calibrate(robot, [lacking(one, BASE) for one in trials(robot, 1)], threads=1)
 
     assert found.robot is robot
-    assert set(found.deviations) == {PRIOR_DEVIATION}
+    assert found.deviations.tolist() == prior_deviations(len(found.deviations)).tolist()
 
 
 @pytest.mark.search
@@ -203,6 +204,30 @@ def test_a_trial_with_no_stretch_of_all_of_it_is_refused():
         calibrate(QUADRUPED, [never_both], 1)
 
 
+def test_factors_that_predict_left_out_segments_no_better_stay_nominal_to_the_bit():
+    """A trial in the model's own physics, with noise: there is nothing to fit."""
+    rng = np.random.default_rng(0)
+    (exact,) = trials(QUADRUPED, 1)
+    noisy = dict(exact.behaviour.signals)
+    velocities = noisy["joint_velocities"]
+    noisy["joint_velocities"] = velocities + 0.3 * rng.standard_normal(velocities.shape)
+    behaviour = dataclasses.replace(exact.behaviour, signals=noisy)
+    found = calibrate(QUADRUPED, [dataclasses.replace(exact, behaviour=behaviour)], threads=1)
+
+    assert found.error_before > EXACT_ERROR
+    assert found.robot is QUADRUPED
+    assert (found.chosen, found.parameters) == ("nominal", nominal(QUADRUPED))
+    assert not any(row["determined"] for row in found.rows())
+    assert repr(found).count("not determined by these trials") == len(PRIOR)
+    assert found.suspicion is None
+
+
+def test_a_fit_that_is_kept_predicts_left_out_segments_better():
+    assert fitted().chosen == "factors"
+    assert 0 < fitted().held_out_gain < 1
+    assert fitted().to_dict()["determined"] == [row["determined"] for row in fitted().rows()]
+
+
 def test_no_trials_are_refused():
     with pytest.raises(InputError, match="at least one trial of the healthy robot, got none"):
         calibrate(QUADRUPED, [], 1)
@@ -227,7 +252,7 @@ def test_moments_that_were_not_observed_lead_no_unseen_robot_astray_if_no_stretc
 def test_a_calibration_that_no_simulation_survives_ends_with_a_sentence(
     monkeypatch: pytest.MonkeyPatch,
 ):
-    monkeypatch.setattr(calibration, "CANDIDATE_DELAYS", range(1))
+    monkeypatch.setattr(fit, "CANDIDATE_DELAYS", range(1))
     storm = unstable(QUADRUPED)
     with pytest.raises(InputError, match="no simulation of the healthy robot remained finite"):
         calibrate(storm, trials(QUADRUPED, 1), threads=1)
@@ -242,8 +267,8 @@ def test_errors_of_a_calibration_are_finite_whatever_the_simulation(
         found.behaviour["base_position"][:] = 1e300
         return found
 
-    monkeypatch.setattr(calibration, "predict", lost)
-    assert 0 < prediction_error(QUADRUPED, trials(QUADRUPED, 1), threads=1) <= calibration.MAX_ERROR
+    monkeypatch.setattr(predictions, "predict", lost)
+    assert 0 < prediction_error(QUADRUPED, trials(QUADRUPED, 1), threads=1) <= predictions.MAX_ERROR
 
 
 @pytest.mark.search
@@ -257,7 +282,7 @@ def test_the_estimated_steps_are_within_a_factor_of_two(monkeypatch: pytest.Monk
         steps += stats.steps - before
         return found
 
-    monkeypatch.setattr(calibration, "predict", counted)
+    monkeypatch.setattr(predictions, "predict", counted)
     two = trials(with_parameters(QUADRUPED, TRUE))
     estimate = calibration.simulated_steps(QUADRUPED, two)
     assert steps == 0

@@ -18,7 +18,7 @@ from selfmodel.diagnosis.comparator_choice import ChosenComparator
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
 from selfmodel.evolution import Generation
 from selfmodel.recovery.events import DiscriminatingTrial, Event, SearchBegins
-from selfmodel.simulation.calibration import Calibration
+from selfmodel.simulation.calibration import UNDETERMINED, Calibration
 from selfmodel.trials.trial import Trial
 
 
@@ -76,8 +76,10 @@ class _Lines:
             case Calibration():
                 self._print_line(
                     f"calibration: error {event.error_before:.3f} before, {event.error:.3f} after; "
-                    f"delay {counted(event.parameters.delay, 'step')}"
+                    f"delay {counted(event.parameters.delay, 'step')}{_undetermined(event)}"
                 )
+                if event.suspicion is not None:
+                    self._print_line(f"warning: {event.suspicion}")
             case DiscriminatingTrial():
                 apart = ", ".join(map(str, event.hypotheses))
                 self._print_line(f"the next trial discriminates between: {apart}")
@@ -119,6 +121,15 @@ class _Bar:
                 if event.number == event.total:
                     self._progress.remove_task(self._task)
         self._lines(event)
+
+
+def _undetermined(fit: Calibration) -> str:
+    """Returns the names of the factors that the trials do not determine, after a comma."""
+    names = fit.undetermined
+    if not names:
+        return ""
+    every = len(names) == len(fit.rows())
+    return f"; {UNDETERMINED}: {'all factors' if every else ', '.join(names)}"
 
 
 def _best(generation: Generation) -> str:

@@ -25,9 +25,9 @@ from selfmodel.robot.joint_parameters import (
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import DEFAULT_BUDGET
 from selfmodel.simulation.batch_memory import hypothesis_bytes
-from selfmodel.simulation.joints.losses import damped, is_better, root_mean_square
 from selfmodel.simulation.joints.segments import JointSegments
 from selfmodel.simulation.joints.sets import NOMINAL, SETS, Basis, Point
+from selfmodel.simulation.losses import damped, is_better, root_mean_square
 from selfmodel.simulation.outcome import SimulationStats
 from selfmodel.simulation.prediction import predict
 from selfmodel.trials.signal_scales import CALIBRATION_ERROR_SCALES
@@ -39,6 +39,9 @@ unit, so this weight is less than that of short predictions."""
 
 DIFFERENCE_STEP = 0.05
 """Step of the finite differences of a logarithm, relative to the deviation of its prior."""
+
+MIN_Z = 3.0
+"""Standard errors by which a larger set must predict segments better that it was not fitted to."""
 
 FOLDS = 3
 """Parts of the segments that are left out in turn."""
@@ -140,7 +143,7 @@ class Experiment:
             ]
             held_out = self._held_out(folds)
             own = self._losses(held_out)
-            if not is_better(own, losses):
+            if not is_better(own, losses, MIN_Z):
                 continue
             chosen.append(self._fit(name, point, basis, held_out))
             losses = own

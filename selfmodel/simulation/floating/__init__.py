@@ -1,0 +1,1 @@
+"""Calibration of robots with a floating base."""

@@ -1,0 +1,175 @@
+"""Predictions of the segments of healthy trials with models of one robot, and their errors."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import takewhile
+
+import numpy as np
+
+from selfmodel.arrays import FloatArray, IndexArray
+from selfmodel.faults.build import apply_faults
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.robot.parameters import Parameters, model_with_parameters
+from selfmodel.robot.robot import Robot
+from selfmodel.sandbox.budget import DEFAULT_BUDGET
+from selfmodel.simulation.batch_memory import hypothesis_bytes
+from selfmodel.simulation.calibration_segments import CalibrationSegments
+from selfmodel.simulation.losses import damped
+from selfmodel.simulation.outcome import SimulationStats
+from selfmodel.simulation.prediction import predict
+from selfmodel.simulation.requests import Segments
+from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.signal_difference import difference
+from selfmodel.trials.signal_scales import CALIBRATION_ERROR_SCALES
+from selfmodel.trials.signals import Signal
+from selfmodel.trials.state_estimation import BASE, JOINTS
+
+MAX_ERROR = 1e6
+"""Bound on the absolute error of a prediction, in ``CALIBRATION_ERROR_SCALES``: the error of a
+simulation that is no longer finite. The solver does not end on numbers that are not finite."""
+
+_JOINTS: Signal = "joint_positions"
+
+
+@dataclass(frozen=True, eq=False)
+class Predictions:
+    """Predictions of segments with models of a robot.
+
+    Attributes:
+        robot: The robot as its model describes it.
+        data: Segments of at least one trial of the healthy robot.
+        threads: Threads of MuJoCo's steps.
+    """
+
+    robot: Robot
+    data: Sequence[CalibrationSegments]
+    threads: int
+
+    @cached_property
+    def segment_of_error(self) -> IndexArray:
+        """Number of the segment of each error, over all trials, ``(errors,)``."""
+        first, numbers = 0, []
+        for own in self.data:
+            numbers += [
+                first + np.nonzero(own.compared(signal))[0]
+                for signal in CALIBRATION_ERROR_SCALES
+                if signal in own.observed
+            ]
+            first += len(own.judged)
+        return np.concatenate(numbers)
+
+    @property
+    def segments(self) -> int:
+        """Number of segments of all trials."""
+        return sum(len(own.judged) for own in self.data)
+
+    def folds(self, count: int) -> IndexArray:
+        """Returns the part of each segment, ``(segments,)``: each trial cut in time."""
+        parts = [np.arange(len(own.judged)) * count // len(own.judged) for own in self.data]
+        return np.concatenate(parts)
+
+    def losses(self, errors: FloatArray) -> FloatArray:
+        """Returns the mean loss of each segment, ``(segments,)``, from errors, ``(errors,)``.
+
+        A segment without a judged step has a loss of 0.
+        """
+        number = self.segment_of_error
+        sums = np.bincount(number, damped(errors) ** 2, self.segments)
+        return np.asarray(sums / np.maximum(np.bincount(number, minlength=self.segments), 1))
+
+    def joint_errors(self, errors: FloatArray) -> FloatArray:
+        """Returns the errors of joint positions, ``(judged steps, hinges)``, rad.
+
+        The error of an unknown hinge is 0.
+
+        Args:
+            errors: All errors of one model, ``(errors,)``.
+        """
+        first, found = 0, []
+        for own in self.data:
+            counts = {
+                signal: int(own.compared(signal).sum())
+                for signal in CALIBRATION_ERROR_SCALES
+                if signal in own.observed
+            }
+            begin = first + sum(counts[signal] for signal in takewhile(_JOINTS.__ne__, counts))
+            known = own.compared(_JOINTS)[own.judged]
+            rows = np.zeros(known.shape)
+            rows[known] = errors[begin : begin + counts[_JOINTS]]
+            found.append(rows)
+            first += sum(counts.values())
+        return np.concatenate(found) * CALIBRATION_ERROR_SCALES[_JOINTS]
+
+    def errors(
+        self, models: Sequence[Parameters], stats: SimulationStats | None = None
+    ) -> FloatArray:
+        """Returns prediction errors divided by their scales, ``(errors, models)``, all finite.
+
+        The models are predicted in batches, so that their memory is bounded.
+
+        Args:
+            models: Parameters with one control delay.
+            stats: Statistics that are updated.
+        """
+        stats = SimulationStats() if stats is None else stats
+        needed = max(hypothesis_bytes(self.robot, own.segments, steps=0) for own in self.data)
+        size = max(1, DEFAULT_BUDGET.models_bytes // needed)
+        batches = [models[first : first + size] for first in range(0, len(models), size)]
+        return np.concatenate([self._batch_errors(batch, stats) for batch in batches], axis=1)
+
+    def with_estimated_states(self, parameters: Parameters) -> "Predictions":
+        """Returns predictions of independent segments.
+
+        An unknown state begins as the parameters predict it.
+        """
+        predict_with = self._predictor([parameters], SimulationStats())
+
+        def independent(own: CalibrationSegments) -> CalibrationSegments:
+            segments = own.segments
+            if segments.independent:
+                return own
+            predicted = predict_with(replace(segments, record=(*BASE, *JOINTS)))
+            states = dict(segments.states)
+            for signal in predicted.signals:
+                begin = predicted[signal][0, :, 0]
+                known = states.get(signal, np.full_like(begin, np.nan))
+                states[signal] = np.where(np.isnan(known), begin, known)
+            return replace(own, segments=replace(segments, states=states))
+
+        return replace(self, data=[independent(own) for own in self.data])
+
+    def _batch_errors(self, models: Sequence[Parameters], stats: SimulationStats) -> FloatArray:
+        predict_with = self._predictor(models, stats)
+        rows = []
+        for own in self.data:
+            predicted = predict_with(own.segments)
+            for signal, scale in CALIBRATION_ERROR_SCALES.items():
+                if signal in own.observed:
+                    with np.errstate(over="ignore", invalid="ignore"):  # bounded below
+                        error = difference(
+                            signal, predicted[signal][:, :, 1:], own.observed[signal]
+                        )
+                        rows.append((error / scale)[:, own.compared(signal)])
+        errors = np.nan_to_num(np.concatenate(rows, axis=1).T, nan=MAX_ERROR)
+        return np.clip(errors, -MAX_ERROR, MAX_ERROR)
+
+    def _predictor(
+        self, models: Sequence[Parameters], stats: SimulationStats
+    ) -> Callable[[Segments], Behaviour]:
+        """Returns a function that predicts segments with models of equal delay.
+
+        The signals of its result are ``(models, segments, horizon + 1, width)``.
+        """
+        robot, delay = self.robot, models[0].delay
+        embodiments = [
+            apply_faults(model_with_parameters(robot, parameters), robot.anatomy, INTACT)
+            for parameters in models
+        ]
+
+        def predict_with(segments: Segments) -> Behaviour:
+            return predict(
+                robot, embodiments, segments, threads=self.threads, stats=stats, delay=delay
+            ).behaviour
+
+        return predict_with
