@@ -67,8 +67,9 @@ def detectable_severities(
 ) -> list[DetectableSeverity]:
     """Returns the smallest detectable severities of every kind with a nominal severity.
 
-    The nominal friction is the model's; the level with the smallest loss is taken for it. Parts with a fault in the best hypothesis are left out. A severity beyond one that shows is
-    assumed to show too, so that a bisection over the kind's levels finds the limit.
+    The nominal friction is the model's; the level with the smallest loss is taken for it. Parts
+    with a fault in the best hypothesis are left out. A severity beyond one that shows is assumed to
+    show too, so that a bisection over the kind's levels finds the limit.
 
     Args:
         best: The best hypothesis.

@@ -11,13 +11,15 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.trials.data_frame import data_frame
 
 Verdict = Literal["intact", "explained", "ambiguous", "unexplained"]
-"""``intact``: the empty hypothesis predicts the trials about as well as the self-model predicts the
-healthy robot, and no other hypothesis except ``undetectable`` ones does. ``explained``: the same for
-a hypothesis with faults. ``ambiguous``: other hypotheses are indistinguishable from the best.
+"""Verdicts on the best hypothesis.
+
+``intact``: the empty hypothesis predicts the trials about as well as the self-model predicts the
+healthy robot, and no other hypothesis except ``undetectable`` ones does. ``explained``: the same
+for a hypothesis with faults. ``ambiguous``: other hypotheses are indistinguishable from the best.
 ``unexplained``: the best hypothesis predicts significantly worse than the self-model predicts the
-healthy robot, or significantly worse than with a fault of an unsearched kind, so a fault is missing;
-requires a trial of the healthy robot. A diagnosis is also ``unexplained`` if the simulation of every
-hypothesis diverged."""
+healthy robot, or significantly worse than with a fault of an unsearched kind, so a fault is
+missing; requires a trial of the healthy robot. A diagnosis is also ``unexplained`` if the
+simulation of every hypothesis diverged."""
 
 
 @dataclass(frozen=True)

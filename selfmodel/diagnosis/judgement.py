@@ -72,7 +72,8 @@ def judged(best: Hypothesis, compared: Iterable[Hypothesis], question: Question)
     space, losses, kept = question.space, question.losses, question.kept
     indistinguishable = _indistinguishable(best, others, question)
     unsearched = best_unsearched_fault(best, space, losses)
-    fit = fit_of(*losses.damaged([best, INTACT]), question.healthy_losses)
+    best_losses, intact_losses = losses.damaged([best, INTACT])
+    fit = fit_of(best_losses, intact_losses, question.healthy_losses)
     return Diagnosis(
         ranked=tuple(Candidate(one, totals[one]) for one in [best, *others][:kept]),
         trials=len(question.trials),
@@ -105,7 +106,8 @@ def ranked_by_distance(found: Iterable[Hypothesis], question: Question) -> Diagn
         for one in ranked[1:]
         if totals[one] == totals[best] and not parts <= _without_severities(one)
     )
-    fit = fit_of(*question.losses.damaged([best, INTACT]), question.healthy_losses)
+    best_losses, intact_losses = question.losses.damaged([best, INTACT])
+    fit = fit_of(best_losses, intact_losses, question.healthy_losses)
     return Diagnosis(
         ranked=tuple(Candidate(one, totals[one]) for one in ranked[:kept]),
         trials=len(question.trials),

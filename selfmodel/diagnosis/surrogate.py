@@ -11,6 +11,7 @@ from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Trial
+from selfmodel.trials.trial_part import TrialPart
 
 OPENING = 1 / 3
 """Part of a trial that is simulated, from its beginning, if the comparator has no surrogate.
@@ -27,11 +28,11 @@ class Surrogate:
 
     Attributes:
         evidence: Losses of the surrogate comparator.
-        trials: The trials, or their openings.
+        trials: The trials, or parts of them.
     """
 
     evidence: Evidence
-    trials: Sequence[Trial]
+    trials: Sequence[Trial | TrialPart]
 
     def losses(self, hypotheses: Sequence[Hypothesis]) -> FloatArray:
         """Returns the losses of each hypothesis, ``(n, pieces)``; see ``Evidence.losses``."""

@@ -102,7 +102,7 @@ def _verdict(found: Mapping[str, Any]) -> str:
     best = found["diagnosis"][0]["hypothesis"]
     match found["verdict"]:
         case "intact":
-            return "Intact: the unchanged robot predicts the trials, and no other hypothesis does as well."
+            return "Intact: the healthy robot predicts the trials, and no other hypothesis does so."
         case "explained":
             alone = "" if found["unseen"] else ", and no other hypothesis does as well"
             return f"Explained: {best} predicts the trials{alone}."

@@ -106,7 +106,7 @@ def _motion(data: Sequence[CalibrationSegments]) -> FloatArray:
     The motion of an unknown hinge is 0.
     """
     name: Signal = "joint_positions"
-    return np.nan_to_num(
+    return np.asarray(np.nan_to_num(
         np.concatenate(
             [
                 (own.observed[name] - own.segments.states[name][:, np.newaxis])[own.judged]
