@@ -10,7 +10,6 @@ from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis.change_point import Change, best_split, change_at, is_change
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnosis import Diagnosis
-from selfmodel.diagnosis.direct_evidence import direct_evidence
 from selfmodel.diagnosis.evidence import Evidence
 from selfmodel.diagnosis.judgement import Question, judged, ranked_by_distance
 from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
@@ -186,12 +185,12 @@ class DiagnosticSearch:
         )
 
     def _space_of(self, trials: Sequence[Trial | TrialPart]) -> HypothesisSpace:
-        """Returns the hypotheses, with the jams at the angles at which encoders stand."""
+        """Returns the hypotheses, with jams at the angles at which the encoders end."""
         if JAMMED_AT_ANGLE not in self._space.kinds:
             return self._space
         anatomy = self._space.anatomy
-        evidence = direct_evidence([whole(trial).rows for trial in trials], anatomy)
-        return dataclasses.replace(self._space, observed=observed_jams(evidence, anatomy))
+        jams = observed_jams([whole(trial).rows for trial in trials], anatomy)
+        return dataclasses.replace(self._space, observed=jams)
 
     def _refined(
         self, known: Sequence[Hypothesis], question: Question

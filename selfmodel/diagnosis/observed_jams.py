@@ -1,46 +1,52 @@
-"""Jams at the angles at which encoders stand: candidates that need no search over angles."""
+"""Jams at the angles at which encoders end: candidates that need no search over angles."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from selfmodel.diagnosis.direct_evidence import MIN_COMMANDED, DirectEvidence, JointEvidence
+from selfmodel.arrays import FloatArray
 from selfmodel.faults.jammed import JAMMED_AT_ANGLE
 from selfmodel.faults.kind import Fault
 from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.trials.trial import Trial
+
+END = 1 / 3
+"""Last part of a trial whose median angle is that of a jam: a joint may jam during the trial."""
 
 MAX_SPREAD = 0.05
-"""Largest difference between the mean angles of a jam in several trials and hinges, rad."""
+"""Largest difference between the angles of the hinges of one jammed joint, rad."""
 
 
-def observed_jams(evidence: Sequence[DirectEvidence], anatomy: Anatomy) -> tuple[Fault, ...]:
-    """Returns a jam for every joint that stands at one angle in all trials, although commanded.
+def observed_jams(trials: Sequence[Trial], anatomy: Anatomy) -> tuple[Fault, ...]:
+    """Returns for every joint a jam at the angle at which its encoders end.
 
     The coarse levels of a jam's angle are tenths of a radian apart. Between two of them, a motor
     without torque predicts a short segment better than the jam: each segment begins at the logged
-    angle. The encoder contains the angle.
+    angle. The encoder contains the angle, whether the joint is jammed or not.
 
     Args:
-        evidence: Direct evidence of the trials; see ``direct_evidence``.
+        trials: Trials to explain, or parts of them; the last one counts.
         anatomy: The robot's parts.
 
     Returns:
-        Faults of the kind ``jam-angle``, in the order of the joints.
+        Faults of the kind ``jam-angle``, in the order of the joints, without joints whose encoders
+        are unknown and joints whose hinges end at different angles.
     """
+    if not trials:
+        return ()
+    behaviour = trials[-1].behaviour
+    angles = behaviour["joint_positions"][round((1 - END) * behaviour.steps) :]
+    ends = dict(zip(behaviour.names.hinges, map(_median, angles.T), strict=True))
     jams = []
     for joint in JAMMED_AT_ANGLE.parts(anatomy):
-        found = [one for trial in evidence for one in trial.joints if one.joint == joint]
-        angle = _common_angle(found)
-        if angle is not None:
+        found = [ends[hinge] for hinge in anatomy.joint(joint).hinges]
+        if np.isfinite(found).all() and np.ptp(found) <= MAX_SPREAD:
             lows, highs = zip(*anatomy.joint(joint).limits, strict=True)
-            jams.append(Fault(JAMMED_AT_ANGLE, joint, min(max(angle, *lows), *highs)))
+            angle = min(max(round(float(np.mean(found)), 3) + 0.0, *lows), *highs)
+            jams.append(Fault(JAMMED_AT_ANGLE, joint, angle))
     return tuple(jams)
 
 
-def _common_angle(found: Sequence[JointEvidence]) -> float | None:
-    """Returns the mean angle of hinges that all stand, commanded, at one angle; otherwise None."""
-    angles = [one.angle for one in found if one.motion == "stands" and one.angle is not None]
-    is_commanded = any(one.commanded >= MIN_COMMANDED for one in found)
-    if not angles or len(angles) < len(found) or not is_commanded:
-        return None
-    return round(float(np.mean(angles)), 3) + 0.0 if np.ptp(angles) <= MAX_SPREAD else None
+def _median(angles: FloatArray) -> float:
+    known = angles[np.isfinite(angles)]
+    return float(np.median(known)) if len(known) else np.nan

@@ -8,7 +8,7 @@ where the trials require it. The whole algorithm:
    surrogate (``severity.with_fitted_severities``).
 2. **Descent** over the neighbours with one fault more, replaced, or less: the surrogate selects
    ``SHORTLIST_SIZE`` of them, the comparator chooses the best, and its severities are fitted, until
-   the total loss falls no further. A hypothesis has at most ``max_faults`` faults.
+   the total loss falls no further, or a further fault does not improve it by ``MIN_Z_OF_STEP``. A hypothesis has at most ``max_faults`` faults.
 3. **Pruning**: the fault whose removal costs least is removed, as long as the hypothesis with it is
    not significantly better (``significance.is_better``), or its gain is model error
    (``model_error.is_model_error``).
@@ -33,6 +33,11 @@ from selfmodel.diagnosis.significance import is_better
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import Fault
+
+MIN_Z_OF_STEP = 2.0
+"""Standard errors by which a further fault has to be better for a descent to continue. It is lower
+than that of pruning, because another fault may be replaced afterwards. Without a bound, descents in
+a wide space add faults that only pruning removes: ten times the simulations."""
 
 STARTS = 3
 """Single faults to start from, in addition to the known hypotheses."""
@@ -127,10 +132,16 @@ class _LocalSearch:
         current = start
         while True:
             best = self._shortlist(neighbours(current))
-            if not best or self.total_loss(best[0]) >= self.total_loss(current):
+            if not best or not self._is_step(best[0], current):
                 return current
             # The fit by the surrogate may raise the loss of the comparator.
             current = min(best[0], self.coarsely_fitted(best[0]), key=self.total_loss)
+
+    def _is_step(self, one: Hypothesis, current: Hypothesis) -> bool:
+        """Returns whether a descent continues: a further fault has to be worth its place."""
+        if len(one) <= len(current):
+            return self.total_loss(one) < self.total_loss(current)
+        return is_better(*self._losses.damaged([one, current]), min_z=MIN_Z_OF_STEP)
 
     def _shortlist(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
         """The best hypotheses by the surrogate, sorted by the total loss of the comparator."""

@@ -35,13 +35,14 @@ TEST = f"paired z over the pieces of the trials >= {MIN_Z:g}, or {LOSS_RATIO:g} 
 """Name of the test in reports and in JSON."""
 
 
-def is_better(one: FloatArray, other: FloatArray) -> bool:
+def is_better(one: FloatArray, other: FloatArray, min_z: float = MIN_Z) -> bool:
     """Returns whether the first of two hypotheses predicts significantly better.
 
     Args:
         one: Losses of the first hypothesis, ``(segments,)``; infinite where a simulation diverged.
         other: Losses of the second hypothesis on the same segments, ``(segments,)``, likewise. A
             hypothesis that diverged is never better; a finite one is better than a diverged one.
+        min_z: Standard errors of the paired difference that are required.
     """
     if not np.isfinite(one).all():
         return False
@@ -49,7 +50,7 @@ def is_better(one: FloatArray, other: FloatArray) -> bool:
         return True
     if not other.mean() > one.mean() + NEGLIGIBLE_LOSS:
         return False
-    z_is_high = paired_z(other, one) >= MIN_Z
+    z_is_high = paired_z(other, one) >= min_z
     return bool(z_is_high or other.mean() > LOSS_RATIO * one.mean() + NEGLIGIBLE_LOSS)
 
 

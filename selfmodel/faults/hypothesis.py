@@ -53,11 +53,13 @@ def canonical(faults: Iterable[Fault], anatomy: Anatomy) -> Hypothesis:
 
     Order and repetition do not matter. Faults with a nominal severity and faults that another
     fault absorbs are dropped: a joint beyond a broken joint is detached, whatever its fault. Of
-    several severities of one kind at one part the first is kept.
+    several severities of one kind at one part the first is kept; of several faults of a kind with
+    ``is_single``, the first in the order of faults.
     """
     distinct: dict[tuple[FaultKind, str], Fault] = {}
-    for fault in filter(None, (given.canonical for given in faults)):
-        distinct.setdefault((fault.kind, fault.part), fault)
+    given = filter(None, (fault.canonical for fault in faults))
+    for fault in sorted(given, key=lambda one: (one.kind, one.part if one.kind.is_single else "")):
+        distinct.setdefault((fault.kind, "" if fault.kind.is_single else fault.part), fault)
     for fault in list(distinct.values()):
         simpler = fault.canonical_alone
         rest = [other for other in distinct.values() if other is not fault]

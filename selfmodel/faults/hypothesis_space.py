@@ -33,7 +33,8 @@ class HypothesisSpace:
     Attributes:
         anatomy: The robot's parts.
         kinds: Fault kinds, in the order of the second value of a gene.
-        observed: Faults that the trials suggest without a simulation; further coarse candidates.
+        observed: Faults whose severity the trials contain: coarse candidates in the place of the
+            levels of the same kind and part.
     """
 
     anatomy: Anatomy
@@ -94,16 +95,18 @@ class HypothesisSpace:
     def coarse_candidates(self) -> tuple[Fault, ...]:
         """Every kind at every part, at ``COARSE_LEVELS`` evenly spaced levels or fewer.
 
-        The observed faults are included.
+        An observed fault takes the place of the levels of its kind and part.
         """
+        known = {(fault.kind, fault.part) for fault in self.observed}
         spaced = (
             Fault(kind, part, levels[i])
             for kind in self.kinds
             for part in kind.parts(self.anatomy)
+            if (kind, part) not in known
             for levels in (kind.levels(self.anatomy, part),)
             for i in _evenly_spaced(len(levels))
         )
-        return tuple(dict.fromkeys((*spaced, *self.observed)))
+        return (*spaced, *self.observed)
 
     def decode(self, genome: FloatArray) -> Hypothesis:
         """Returns the hypothesis that a genome encodes.

@@ -87,6 +87,7 @@ class FaultKind:
         unit: Unit of the severity.
         affects_dynamics: Whether the fault changes the robot's motion under given commands. If
             not, it changes readings only and shares the simulation of the same commands.
+        is_single: Whether a hypothesis has at most one fault of the kind, at one part.
         searchable: Whether a diagnosis may propose the kind; otherwise only a simulated physical
             robot has it.
     """
@@ -121,6 +122,7 @@ class FaultKind:
     prefix: str = field(default="", compare=False, repr=False)
     unit: str = field(default="", compare=False, repr=False)
     affects_dynamics: bool = field(default=True, compare=False, repr=False)
+    is_single: bool = field(default=False, compare=False, repr=False)
     searchable: bool = field(default=True, compare=False, repr=False)
 
     @property

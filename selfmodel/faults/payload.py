@@ -3,8 +3,9 @@
 The severity is a fraction of the mass of the healthy robot, from 0 to 1. The parts are the places,
 along the forward direction of the initial pose: no part is the centre of mass, ``front`` and
 ``back`` are the ends of the box of even density with the inertia of the root body. A severity of 0
-is nominal. A robot with a fixed base has no payload, because its root body does not move. No fault
-absorbs a payload: no joint carries it.
+is nominal. A robot with a fixed base has no payload, because its root body does not move. A robot
+has at most one payload: two of them are one elsewhere. No fault absorbs a payload: no joint carries
+it.
 """
 
 from typing import TYPE_CHECKING
@@ -41,5 +42,6 @@ PAYLOAD = FaultKind(
     severity_bounds=uniform_bounds(0.0, 1.0),
     levels=uniform_levels(0.1, 0.2, 0.4, 0.8),
     degenerates_to={0.0: None},
+    is_single=True,
     unit="of the robot's mass",
 )

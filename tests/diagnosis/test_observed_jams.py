@@ -1,55 +1,46 @@
-"""Promises of observed jams: one per joint that stands at one angle although it is commanded."""
+"""Promises of observed jams: one per joint with a known encoder, at the angle at which it ends."""
 
-import dataclasses
-
+import numpy as np
 import pytest
 
-from selfmodel.diagnosis.direct_evidence import DirectEvidence, JointEvidence
 from selfmodel.diagnosis.observed_jams import observed_jams
-from selfmodel.faults.jammed import JAMMED_AT_ANGLE
-from selfmodel.faults.kind import Fault
 from selfmodel.robot.robot import Robot
+from selfmodel.trials.trial import Trial
 
 KNEE = "front_left_knee"
-STANDS = JointEvidence(KNEE, KNEE, 0.3, 0.007, 1.0, "stands")
+STEPS = 90
 
 
-def evidence(knee: JointEvidence) -> DirectEvidence:
-    """A trial in which this is the evidence of the knee, and another joint moves."""
-    moving = JointEvidence("back_left_knee", "back_left_knee", 0.1, 0.2, 1.0, "moves")
-    return DirectEvidence("trial", (knee, moving), (), ())
+def trial(robot: Robot, knee: np.ndarray) -> Trial:
+    """A trial in which one knee has these angles, and the other joints stand at 0."""
+    hinges = robot.anatomy.hinges
+    angles = np.zeros((STEPS, len(hinges)))
+    angles[:, hinges.index(KNEE)] = knee
+    return Trial.from_arrays(robot, angles, np.zeros((STEPS, len(robot.anatomy.motors))))
 
 
-def test_a_joint_that_stands_in_all_trials_is_jammed_at_its_mean_angle(quadruped: Robot):
-    trials = [evidence(STANDS), evidence(dataclasses.replace(STANDS, angle=0.32))]
-
-    assert observed_jams(trials, quadruped.anatomy) == (Fault(JAMMED_AT_ANGLE, KNEE, 0.31),)
-
-
-@pytest.mark.parametrize(
-    "other",
-    [
-        dataclasses.replace(STANDS, motion="moves"),
-        dataclasses.replace(STANDS, motion="unknown", angle=None, deviation=None),
-        dataclasses.replace(STANDS, angle=0.5),
-    ],
-)
-def test_a_joint_that_moves_or_is_unknown_or_stands_elsewhere_in_a_trial_is_no_jam(
-    quadruped: Robot, other: JointEvidence
-):
-    assert observed_jams([evidence(STANDS), evidence(other)], quadruped.anatomy) == ()
+def angle_of(robot: Robot, *trials: Trial) -> float | None:
+    found = {jam.part: jam.severity for jam in observed_jams(trials, robot.anatomy)}
+    assert found.keys() - {KNEE} == {joint.name for joint in robot.anatomy.joints} - {KNEE}
+    return found.get(KNEE)
 
 
-def test_a_joint_without_commands_is_no_jam_and_an_angle_beyond_the_range_is_its_limit(
+def test_a_jam_is_at_the_median_angle_of_the_last_third_of_the_last_trial(quadruped: Robot):
+    moved = np.where(np.arange(STEPS) < 60, np.linspace(-0.4, 0.4, STEPS), 0.25)
+
+    assert angle_of(quadruped, trial(quadruped, moved)) == 0.25
+    earlier = trial(quadruped, np.full(STEPS, -0.3))
+    assert angle_of(quadruped, earlier, trial(quadruped, moved)) == 0.25
+
+
+def test_an_unknown_encoder_has_no_jam_and_an_angle_beyond_the_range_is_its_limit(
     quadruped: Robot,
 ):
     ((_, high),) = quadruped.anatomy.joint(KNEE).limits
-    still = dataclasses.replace(STANDS, commanded=0.0)
-    beyond = dataclasses.replace(STANDS, angle=high + 0.02)
 
-    assert observed_jams([evidence(still)], quadruped.anatomy) == ()
-    (jam,) = observed_jams([evidence(beyond)], quadruped.anatomy)
-    assert jam.severity == pytest.approx(high)
+    assert angle_of(quadruped, trial(quadruped, np.full(STEPS, np.nan))) is None
+    beyond = trial(quadruped, np.full(STEPS, high + 0.02))
+    assert angle_of(quadruped, beyond) == pytest.approx(high)
 
 
 def test_without_trials_there_is_no_jam(quadruped: Robot):

@@ -92,14 +92,16 @@ def judged(row: dict[str, Any]) -> Judgement:
 
 
 def terms(faults: Iterable[str]) -> Terms:
-    """Returns the terms of a notation."""
+    """Returns the terms of a notation; the place of a payload is no part of its kind."""
     found: Terms = {}
     for fault in faults:
         head, _, value = fault.partition("=")
         keyword, _, part = head.partition(":")
         number = _NUMBER.search(value)
         if keyword != "intact":
-            found[keyword, part] = float(number[0]) if number else None
+            found[keyword, "" if keyword == "payload" else part] = (
+                float(number[0]) if number else None
+            )
     return found
 
 

@@ -106,14 +106,10 @@ def _motion(data: Sequence[CalibrationSegments]) -> FloatArray:
     The motion of an unknown hinge is 0.
     """
     name: Signal = "joint_positions"
-    return np.asarray(np.nan_to_num(
-        np.concatenate(
-            [
-                (own.observed[name] - own.segments.states[name][:, np.newaxis])[own.judged]
-                for own in data
-            ]
-        )
-    )
+    motion = [
+        (own.observed[name] - own.segments.states[name][:, np.newaxis])[own.judged] for own in data
+    ]
+    return np.asarray(np.nan_to_num(np.concatenate(motion)))
 
 
 @dataclass(frozen=True, eq=False)
