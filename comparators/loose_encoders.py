@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
+from selfmodel.simulation.requests import END
 from selfmodel.trials.behaviour import Behaviour
 
 FROZEN = 1e-6
@@ -61,7 +62,8 @@ def loose_encoders(behaviour: Behaviour, starts: IndexArray, horizon: int) -> Lo
         horizon: Control steps of a segment.
     """
     commands, logged = behaviour["commands"], behaviour["joint_positions"]
-    fits = [_following(column, commands) for column in logged.T]
+    first = round((1 - END) * behaviour.steps)
+    fits = [_following(column, commands, first) for column in logged.T]
     hinges = np.array([i for i, fit in enumerate(fits) if fit is not None], dtype=np.intp)
     if not len(hinges):
         return None
@@ -71,7 +73,7 @@ def loose_encoders(behaviour: Behaviour, starts: IndexArray, horizon: int) -> Lo
         (sensor, source, line)
         for sensor, readings in enumerate(behaviour["sensors"].T)
         for source, hinge in enumerate(hinges)
-        for line in (_derived(readings, logged[:, hinge]),)
+        for line in (_derived(readings[first:], logged[first:, hinge]),)
         if line is not None
     ]
     rows = starts[:, np.newaxis] + np.arange(horizon + 1)
@@ -132,15 +134,16 @@ def with_loose_encoders(
     return Behaviour(simulated.names, simulated.time, signals)
 
 
-def _following(angles: FloatArray, commands: FloatArray) -> FloatArray | None:
+def _following(angles: FloatArray, commands: FloatArray, first: int) -> FloatArray | None:
     """Returns the linear function of one motor's commands that an encoder follows, ``(steps,)``.
 
-    None if the encoder is not such a function, or stands.
+    It is fitted to the rows from ``first`` on: the limb may be lost during the trial. None if the
+    encoder is not such a function, or stands.
     """
     best, fitted = MAX_REMAINDER, None
     for constant in TIME_CONSTANTS:
         for column in _low_pass(commands, constant).T:
-            line = _line(angles, column)
+            line = _line(angles[first:], column[first:])
             if line is not None and line[2] < best:
                 best, fitted = line[2], line[0] + line[1] * column
     return fitted if fitted is not None and np.isfinite(fitted).all() else None

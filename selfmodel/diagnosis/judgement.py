@@ -73,7 +73,7 @@ def judged(best: Hypothesis, compared: Iterable[Hypothesis], question: Question)
     indistinguishable = _indistinguishable(best, others, question)
     unsearched = best_unsearched_fault(best, space, losses)
     best_losses, intact_losses = losses.damaged([best, INTACT])
-    fit = fit_of(best_losses, intact_losses, question.healthy_losses)
+    fit = fit_of(best, best_losses, intact_losses, question.healthy_losses)
     return Diagnosis(
         ranked=tuple(Candidate(one, totals[one]) for one in [best, *others][:kept]),
         trials=len(question.trials),
@@ -107,7 +107,7 @@ def ranked_by_distance(found: Iterable[Hypothesis], question: Question) -> Diagn
         if totals[one] == totals[best] and not parts <= _without_severities(one)
     )
     best_losses, intact_losses = question.losses.damaged([best, INTACT])
-    fit = fit_of(best_losses, intact_losses, question.healthy_losses)
+    fit = fit_of(best, best_losses, intact_losses, question.healthy_losses)
     return Diagnosis(
         ranked=tuple(Candidate(one, totals[one]) for one in ranked[:kept]),
         trials=len(question.trials),

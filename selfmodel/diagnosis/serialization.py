@@ -96,6 +96,7 @@ def _fit(values: Mapping[str, Any]) -> Fit:
         healthy_loss=_optional(values["healthy_loss"]),
         excess=_optional(values["excess"]),
         threshold=_from_json(values["threshold"]),
+        has_faults=bool(values["has_faults"]),
     )
 
 
