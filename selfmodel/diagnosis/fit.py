@@ -6,7 +6,6 @@ from typing import Any
 
 from selfmodel.diagnosis.significance import LOSS_FLOOR, LOSS_RATIO
 
-
 FAULTY_RATIO = 2.5
 """Loss of a hypothesis with faults over that of healthy trials that is much."""
 

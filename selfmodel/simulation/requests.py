@@ -72,10 +72,11 @@ class Segments:
 
     @property
     def resting_angles(self) -> FloatArray | None:
-        """Angle at which the hinges of detached limbs are predicted: the median of the last segments.
+        """Angle at which the hinges of detached limbs are predicted: the median at the end.
 
-        The last third counts, because a limb may be lost during a trial. The shape is ``(hinges,)``, rad, with NaN for a hinge without a known angle; None for
-        segments without joint positions.
+        The last third of the segments counts, because a limb may be lost during a trial. The shape
+        is ``(hinges,)``, rad, with NaN for a hinge without a known angle; None for segments without
+        joint positions.
         """
         angles = self.states.get("joint_positions")
         if angles is None:
