@@ -208,7 +208,7 @@ def test_progress_goes_to_standard_error_in_plain_lines_when_piped(
     lines = done.stderr.splitlines()
     begins = [
         *("repair EA for intact:", "trial 00-before:", "calibration: error ", "trial 01-after:"),
-        "diagnostic EA:",
+        *("comparator segment-prediction: ", "diagnostic EA:"),
         *("diagnosis from 1 trial:", "repair EA for ", "trial 02-recovery:", "diagnostic EA:"),
         "diagnosis from 2 trials:",
     ]
