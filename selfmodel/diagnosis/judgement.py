@@ -1,4 +1,4 @@
-"""Judgement of the best hypothesis of a search: its ranking, its rivals and the verdict."""
+"""Judgement of the best hypothesis of a search: its ranking, its alternatives and the verdict."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence

@@ -88,16 +88,15 @@ def _detectable(item: Mapping[str, Any]) -> DetectableSeverity:
     return DetectableSeverity(str(item["kind"]), str(item["part"]), below, above)
 
 
-def _optional(value: object) -> float | None:
-    return None if value is None else _from_json(value)
-
-
 def _fit(values: Mapping[str, Any]) -> Fit:
+    healthy, excess = values["healthy_loss"], values["excess"]
+    # Both are None without healthy trials; None beside a number is infinite.
+    is_compared = healthy is not None or excess is not None
     return Fit(
         loss=_from_json(values["loss"]),
         intact_loss=_from_json(values["intact_loss"]),
-        healthy_loss=_optional(values["healthy_loss"]),
-        excess=_optional(values["excess"]),
+        healthy_loss=_from_json(healthy) if is_compared else None,
+        excess=_from_json(excess) if is_compared else None,
         threshold=_from_json(values["threshold"]),
         has_faults=bool(values["has_faults"]),
     )
