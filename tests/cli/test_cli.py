@@ -52,7 +52,8 @@ def test_recover_prints_one_json_object_with_every_key(run: str, request: pytest
         *("robot", "case", "truth", "comparator", "kinds", "gap", "structure", "seed", "trials"),
         *DIAGNOSIS,
         *("displacement", "recovery", "physical_trials", "evaluations", "seconds", "next_trial"),
-        *("controller", "neurons", "correct", "score", "comparator_reason", "fit", "change"),
+        *("controller", "neurons", "correct", "score", "comparator_reason"),
+        *({"detectable"} & set(told)),
     }
     assert (told["robot"], told["case"], told["seed"], told["gap"]) == ("quadruped", 4, 0, 0)
     assert told["truth"] == "break:front_left_shoulder+sensor:front_right_touch"

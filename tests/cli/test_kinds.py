@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from selfmodel.faults.registry import DEFAULT_KINDS
 from tests.helpers.command import SMALL, selfmodel
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -85,12 +86,14 @@ def test_a_trial_and_its_replay_name_a_kind_of_ones_own(tmp_path: Path):
 
 
 @pytest.mark.search
-def test_the_paper_s_kinds_are_the_default(recovered: tuple[Path, dict]):
+def test_kinds_of_body_and_environment_are_the_default(recovered: tuple[Path, dict]):
     _, told = recovered
+    default = [kind.name for kind in DEFAULT_KINDS]
 
-    assert told["kinds"] == ["break", "jam", "sensor"]
-    assert words(told["diagnosis"]) <= {"break", "jam", "sensor", "intact"}
-    assert not any("=" in one["hypothesis"] for one in told["diagnosis"])
+    assert told["kinds"] == default
+    assert {"break", "jam", "sensor", "motor", "friction", "slope", "wind"} <= set(default)
+    assert words(told["diagnosis"]) <= {*default, "intact"}
+    assert any("=" in one["hypothesis"] for one in told["diagnosis"])
 
 
 @pytest.mark.parametrize("command", [["recover", "quadruped", "--case", "1"], ["diagnose", "a"]])

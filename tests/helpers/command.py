@@ -15,7 +15,7 @@ SMALL = ("--population", "8", "--generations", "2")
 
 DIAGNOSIS = (
     *("diagnosis", "verdict", "rivals", "unseen", "test", "intact_distance"),
-    *("outside", "calibration", "reason"),
+    *("outside", "calibration", "reason", "fit", "change", "residual"),
 )
 """JSON keys of a diagnosis, in the output of a recovery and of `selfmodel diagnose`."""
 

@@ -111,6 +111,7 @@ def recovery(
         settings=dataclasses.replace(BUDGET, trials=trials),
         seed=seed,
         on_event=events.append,
+        kinds=PAPER_KINDS,
         gait=gait,
         next_trial=next_trial,
     )
@@ -203,6 +204,7 @@ def test_the_truth_changes_a_diagnosis_only_through_what_the_robot_did(quadruped
             settings=dataclasses.replace(BUDGET, trials=1),
             seed=1,
             on_event=events.append,
+            kinds=PAPER_KINDS,
         )
         diagnoses.append([event for event in events if isinstance(event, Diagnosis)])
 
@@ -305,6 +307,7 @@ def recovery_in_files(
         settings=dataclasses.replace(BUDGET, trials=1),
         seed=1,
         on_event=lambda _: None,
+        kinds=PAPER_KINDS,
     )
     return outcome, journal
 
