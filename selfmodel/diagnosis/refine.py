@@ -192,7 +192,8 @@ class _LocalSearch:
         """Returns whether a descent continues: a further fault has to be worth its place."""
         if len(one) <= len(current):
             return self.total_loss(one) < self.total_loss(current)
-        return is_better(*self._losses.damaged([one, current]), min_z=MIN_Z_OF_STEP)
+        further, fewer = self._losses.damaged([one, current])
+        return is_better(further, fewer, MIN_Z_OF_STEP)
 
     def _shortlist(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
         """The best hypotheses by the surrogate, sorted by the total loss of the comparator."""

@@ -52,13 +52,13 @@ def test_recover_prints_one_json_object_with_every_key(run: str, request: pytest
         *("robot", "case", "truth", "comparator", "kinds", "gap", "structure", "seed", "trials"),
         *DIAGNOSIS,
         *("displacement", "recovery", "physical_trials", "evaluations", "seconds", "next_trial"),
-        *("controller", "neurons", "correct", "score", "comparator_reason"),
+        *("controller", "neurons", "correct", "score", "comparator_reason", "fit", "change"),
     }
     assert (told["robot"], told["case"], told["seed"], told["gap"]) == ("quadruped", 4, 0, 0)
     assert told["truth"] == "break:front_left_shoulder+sensor:front_right_touch"
     assert told["comparator"] == "segment-prediction"
     assert (told["controller"], told["neurons"]) == ("network", 3)
-    assert told["verdict"] in {"explained", "ambiguous", "unexplained"}
+    assert told["verdict"] in {"intact", "explained", "ambiguous", "unexplained"}
     if run == "recovered":
         assert told["outside"] is None, "without a gap, a fault that is searched explains all"
     assert set(told["calibration"]) >= {"deviations", "error_before", "error"}
@@ -208,7 +208,7 @@ def test_progress_goes_to_standard_error_in_plain_lines_when_piped(
     lines = done.stderr.splitlines()
     begins = [
         *("repair EA for intact:", "trial 00-before:", "calibration: error ", "trial 01-after:"),
-        "diagnostic EA:",
+        *("comparator segment-prediction: ", "diagnostic EA:"),
         *("diagnosis from 1 trial:", "repair EA for ", "trial 02-recovery:", "diagnostic EA:"),
         "diagnosis from 2 trials:",
     ]
@@ -216,7 +216,7 @@ def test_progress_goes_to_standard_error_in_plain_lines_when_piped(
     assert all(line.startswith(begin) for line, begin in zip(lines, begins, strict=True))
     assert "truth: intact; the diagnosis is" in done.stdout
     assert any(
-        line.startswith(("Explained: ", "Ambiguous: ", "Unexplained: "))
+        line.startswith(("Intact: ", "Explained: ", "Ambiguous: ", "Unexplained: "))
         for line in done.stdout.splitlines()
     )
     assert len(list((tmp_path / "runs").iterdir())) == 1

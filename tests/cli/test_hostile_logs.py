@@ -105,7 +105,7 @@ def test_absurd_numbers_are_refused_or_compared_and_never_a_traceback(
 ):
     log = make(**{signal: value})
     assert selfmodel("logs", "verify", str(log), cwd=log.parent).returncode == 0
-    found = run(log, "diagnose")
+    found = run(log, "diagnose", "--comparator", "segment-prediction")
     assert found.returncode == 2
     assert signal in found.stderr
     assert found.stderr.startswith("error: ")
@@ -113,6 +113,14 @@ def test_absurd_numbers_are_refused_or_compared_and_never_a_traceback(
     assert (replayed.returncode, replayed.stderr) == (0, "")
     drawn = run(log, "render", "--out", "strip.png", "--pictures", "2")
     assert drawn.returncode == (2 if signal == "base_position" else 0)
+
+
+def test_infinite_positions_are_compared_by_a_comparator_without_them_and_named(make: Make):
+    found = run(make(base_position=np.inf), "diagnose")
+
+    assert found.returncode == 0
+    assert "segment-prediction-onboard: " in found.stderr
+    assert "needs base_position" in found.stderr
 
 
 @pytest.mark.parametrize("gravity", ["nan", "1e300"])

@@ -98,7 +98,7 @@ def test_an_unknown_kind_is_one_sentence_and_status_2(command: list[str], tmp_pa
     done = selfmodel(*command, "--kinds", "break,frction", cwd=tmp_path)
 
     assert done.returncode == 2
-    assert "unknown kind 'frction': did you mean friction?" in done.stderr
+    assert "unknown kind 'frction': did you mean friction, joint-friction?" in done.stderr
     assert "Traceback" not in done.stderr
     assert list(tmp_path.iterdir()) == []
 

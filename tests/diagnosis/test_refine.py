@@ -91,7 +91,7 @@ def find(
     most: int = MOST,
     before: Losses | None = None,
 ) -> Hypothesis:
-    space = Proposing(ANATOMY, PAPER_KINDS, tuple(faults))
+    space = Proposing(ANATOMY, PAPER_KINDS, faults=tuple(faults))
     return refined(known, space, most, LossFunctions(losses, losses, before))
 
 

@@ -7,11 +7,12 @@ from hypothesis.extra.numpy import arrays
 from scipy import stats
 
 from selfmodel.diagnosis.significance import (
+    LOSS_FLOOR,
     LOSS_RATIO,
     MIN_Z,
     MIN_Z_ACROSS_TRIALS,
     NEGLIGIBLE_LOSS,
-    exceeds_healthy_loss,
+    excess_over_healthy,
     gain_exceeds_healthy_gain,
     gain_is_model_error,
     is_better,
@@ -20,6 +21,11 @@ from selfmodel.diagnosis.significance import (
 
 LOSSES = st.one_of(st.just(np.inf), st.floats(0, 1e6))
 DIVERGED = np.full(5, np.inf)
+
+
+def exceeds(losses: np.ndarray, healthy: np.ndarray) -> bool:
+    """Returns whether the verdict about losses with this excess is ``unexplained``."""
+    return excess_over_healthy(losses, healthy) > MIN_Z_ACROSS_TRIALS
 
 
 def of_mean_and_error(mean: float, error: float, pieces: int = 100) -> np.ndarray:
@@ -67,17 +73,23 @@ def test_three_times_the_loss_counts_whatever_the_errors(times: float, told: boo
 
     assert paired_z(other, one) == pytest.approx(1)
     assert is_better(one, other) == told
-    assert exceeds_healthy_loss(other, one) == told
+    assert not exceeds(other, one), "between trials, a ratio alone is no evidence"
 
 
 def test_the_rounding_of_arithmetic_is_no_reason():
     perfect, rounded = np.zeros(2), np.array([0.0, 1.9 * NEGLIGIBLE_LOSS])
 
     assert not is_better(perfect, rounded)
-    assert not exceeds_healthy_loss(rounded, perfect)
     assert is_better(perfect, 2 * rounded)
-    assert exceeds_healthy_loss(np.full(50, 1.01 * NEGLIGIBLE_LOSS), np.zeros(50))
-    assert not exceeds_healthy_loss(np.full(50, 0.99 * NEGLIGIBLE_LOSS), np.zeros(50))
+
+
+def test_an_excess_below_the_floor_is_none_however_exact_the_prediction():
+    healthy = np.full(50, 1e-7)
+
+    assert exceeds(healthy + 1.01 * LOSS_FLOOR, healthy)
+    assert excess_over_healthy(healthy + 0.99 * LOSS_FLOOR, healthy) == 0
+    assert not exceeds(np.array([0.99 * LOSS_FLOOR]), np.zeros(1))
+    assert exceeds(np.array([1.01 * LOSS_FLOOR]), np.zeros(1))
 
 
 def test_of_a_single_piece_nothing_but_the_ratio_can_tell():
@@ -86,15 +98,15 @@ def test_of_a_single_piece_nothing_but_the_ratio_can_tell():
     assert paired_z(twice, small) == 0
     assert not is_better(small, twice)
     assert is_better(small, four_times)
-    assert not exceeds_healthy_loss(twice, small)
-    assert exceeds_healthy_loss(four_times, small)
+    assert not exceeds(twice, small)
+    assert exceeds(four_times, small)
 
 
 def test_losses_of_one_trial_and_one_piece_of_another_are_told_by_the_ratio():
     usual = np.full(50, 1.0)
 
-    assert not exceeds_healthy_loss(np.array([2.9]), usual)
-    assert exceeds_healthy_loss(np.array([3.1]), usual)
+    assert not exceeds(np.array([2.9]), usual)
+    assert exceeds(np.array([3.1]), usual)
 
 
 def test_whatever_predicts_at_all_is_better_than_what_diverged():
@@ -108,10 +120,10 @@ def test_whatever_predicts_at_all_is_better_than_what_diverged():
 def test_a_hypothesis_that_diverged_in_one_trial_is_worse_than_ever():
     mixed = np.array([0.0, 0.0, np.inf])
 
-    assert exceeds_healthy_loss(mixed, np.ones(3))
-    assert exceeds_healthy_loss(DIVERGED, np.ones(3))
-    assert not exceeds_healthy_loss(np.ones(3), DIVERGED)
-    assert not exceeds_healthy_loss(DIVERGED, DIVERGED)
+    assert exceeds(mixed, np.ones(3))
+    assert exceeds(DIVERGED, np.ones(3))
+    assert not exceeds(np.ones(3), DIVERGED)
+    assert not exceeds(DIVERGED, DIVERGED)
     assert is_better(np.full(3, 1e9), mixed)
 
 
@@ -121,9 +133,10 @@ def test_losses_of_other_trials_are_compared_as_welch_did():
     z = stats.ttest_ind(losses, usual, equal_var=False).statistic
     lift = (MIN_Z_ACROSS_TRIALS - z) * (losses.mean() - usual.mean()) / z
 
-    assert not exceeds_healthy_loss(losses + 0.99 * lift, usual)
-    assert exceeds_healthy_loss(losses + 1.01 * lift, usual)
-    assert not exceeds_healthy_loss(losses - 5, usual)
+    assert excess_over_healthy(losses, usual) == pytest.approx(z)
+    assert not exceeds(losses + 0.99 * lift, usual)
+    assert exceeds(losses + 1.01 * lift, usual)
+    assert not exceeds(losses - 5, usual)
 
 
 @given(arrays(float, (2, 6), elements=LOSSES))
@@ -132,7 +145,7 @@ def test_of_two_at_most_one_is_better(pair: np.ndarray):
 
     assert not (is_better(one, other) and is_better(other, one))
     assert not is_better(one, one)
-    assert not exceeds_healthy_loss(one, one)
+    assert not exceeds(one, one)
 
 
 @given(arrays(float, (2, 6), elements=LOSSES), st.permutations(range(6)))

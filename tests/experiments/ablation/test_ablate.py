@@ -342,7 +342,7 @@ def test_a_diagnosis_of_an_ablation_considers_the_kinds_that_were_chosen(otherwi
 def test_rows_say_how_sure_each_diagnosis_is(otherwise: Path, done: Path):
     rows = [*collect(otherwise), *collect(done)]
 
-    assert {row.verdict for row in rows} <= {"explained", "ambiguous", "unexplained"}
+    assert {row.verdict for row in rows} <= {"intact", "explained", "ambiguous", "unexplained"}
     assert all(0 <= row.rivals <= 10 for row in rows)
     for row in rows:
         if row.verdict == "ambiguous":

@@ -1,0 +1,156 @@
+"""Tests of losses on parts of trials, of their times, and of their signals."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from selfmodel.comparators import (
+    FORWARD_DISPLACEMENT,
+    SEGMENT_PREDICTION,
+    SEGMENT_PREDICTION_ONBOARD,
+)
+from selfmodel.diagnosis.comparator import Comparator
+from selfmodel.diagnosis.evidence import Evidence
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.notation import parse
+from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.robot.robot import Robot
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.trial import Trial, TrialPlan
+from selfmodel.trials.trial_part import TrialPart
+from tests.helpers.drivers import random_controllers
+from tests.helpers.hostile import exploding
+from tests.helpers.memory import in_memory
+
+STEPS = 240
+
+
+@pytest.fixture(scope="module")
+def trials(quadruped: Robot) -> list[Trial]:
+    """Two trials of a jammed robot, of different lengths."""
+    damaged = SimulatedRobot(quadruped, parse("jam:front_left_knee", quadruped.anatomy))
+    return [
+        in_memory(quadruped)(damaged, TrialPlan(f"{k}", "after", controller, STEPS - 60 * k, 0))
+        for k, controller in enumerate(random_controllers(quadruped, 3)[1:])
+    ]
+
+
+@pytest.fixture(scope="module")
+def evidence(quadruped: Robot) -> Evidence:
+    return Evidence(Simulator(quadruped, 1), SEGMENT_PREDICTION)
+
+
+@pytest.fixture(scope="module")
+def two(quadruped: Robot) -> list[Hypothesis]:
+    return [INTACT, parse("break:back_left_knee", quadruped.anatomy)]
+
+
+def test_a_part_without_bounds_is_the_whole_trial(
+    evidence: Evidence, trials: list[Trial], two: list[Hypothesis]
+):
+    parts = [TrialPart(trial) for trial in trials]
+
+    np.testing.assert_array_equal(evidence.losses(two, parts), evidence.losses(two, trials))
+    np.testing.assert_array_equal(evidence.distances(two, parts), evidence.distances(two, trials))
+    assert evidence.losses_by_signal(INTACT, parts) == evidence.losses_by_signal(INTACT, trials)
+
+
+@settings(max_examples=30)
+@given(times=st.tuples(st.floats(-1, 3), st.floats(-1, 3)))
+def test_losses_of_a_part_are_the_columns_of_the_whole_within_its_bounds(
+    evidence: Evidence, trials: list[Trial], two: list[Hypothesis], times: tuple[float, float]
+):
+    begin, end = sorted(times)
+    trial, other = trials
+    timeline = evidence.timeline([trial])
+    assert timeline is not None
+    inside = (timeline.begin >= begin) & (timeline.end <= end)
+    part = TrialPart(trial, begin, end)
+    whole = evidence.losses(two, [trial, other])
+    found = evidence.losses(two, [part, other])
+
+    pieces = len(timeline.begin)
+    np.testing.assert_array_equal(found[:, : inside.sum()], whole[:, :pieces][:, inside])
+    np.testing.assert_array_equal(found[:, inside.sum() :], whole[:, pieces:])
+    if inside.any():
+        expected = evidence.losses(two, [trial])[:, inside].mean(axis=1)
+        np.testing.assert_allclose(evidence.distances(two, [part]), expected)
+
+
+def test_the_timeline_has_the_times_of_the_columns_of_the_losses(
+    evidence: Evidence, trials: list[Trial]
+):
+    timeline = evidence.timeline(trials)
+    assert timeline is not None
+    shape = evidence.losses([INTACT], trials)[0].shape
+    counts = [evidence.losses([INTACT], [trial]).shape[1] for trial in trials]
+
+    assert timeline.trial.shape == timeline.begin.shape == timeline.end.shape == shape
+    assert timeline.trial.tolist() == [0] * counts[0] + [1] * counts[1]
+    seconds = SEGMENT_PREDICTION.horizon * 0.01
+    np.testing.assert_allclose(timeline.end - timeline.begin, seconds)
+    for index, trial in enumerate(trials):
+        own = timeline.trial == index
+        assert timeline.begin[own][0] == trial.behaviour.time[0]
+        assert timeline.end[own][-1] == trial.behaviour.time[-1]
+        assert (np.diff(timeline.begin[own]) > 0).all()
+
+
+def test_an_error_within_a_piece_is_in_the_column_of_its_time(
+    evidence: Evidence, quadruped: Robot, trials: list[Trial]
+):
+    """A logged angle that is wrong in one step raises the losses of the pieces with that step."""
+    trial, jam = trials[0], parse("jam:front_left_knee", quadruped.anatomy)
+    signals = {name: values.copy() for name, values in trial.behaviour.signals.items()}
+    signals["base_orientation"][100:103] = [0, 1, 0, 0]
+    behaviour = type(trial.behaviour)(trial.behaviour.names, trial.behaviour.time, signals)
+    wrong = Trial(trial.plan, trial.robot, behaviour, "wrong")
+    timeline = evidence.timeline([wrong])
+    assert timeline is not None
+    changed = evidence.losses([jam], [wrong])[0] > evidence.losses([jam], [trial])[0] + 0.1
+
+    touched = (timeline.begin <= 1.02) & (timeline.end >= 1.0)
+    assert changed.any()
+    assert not changed[~touched].any()
+
+
+def test_a_comparator_without_times_has_no_timeline_and_no_signals(
+    quadruped: Robot, trials: list[Trial], two: list[Hypothesis]
+):
+    evidence = Evidence(Simulator(quadruped, 1), FORWARD_DISPLACEMENT)
+
+    assert evidence.timeline(trials) is None
+    assert evidence.losses_by_signal(INTACT, trials) == {}
+    part = TrialPart(trials[0], 1.0, 2.0)
+    np.testing.assert_array_equal(
+        evidence.losses(two, [part]), evidence.losses(two, trials[:1])
+    )
+
+
+@pytest.mark.parametrize("comparator", [SEGMENT_PREDICTION, SEGMENT_PREDICTION_ONBOARD])
+@pytest.mark.parametrize("bounds", [(-np.inf, np.inf), (0.5, 1.7)])
+def test_the_losses_of_the_signals_sum_to_the_mean_loss(
+    quadruped: Robot,
+    trials: list[Trial],
+    two: list[Hypothesis],
+    comparator: Comparator,
+    bounds: tuple[float, float],
+):
+    evidence = Evidence(Simulator(quadruped, 1), comparator)
+    parts = [TrialPart(trials[0], *bounds), trials[1]]
+    for hypothesis in two:
+        found = evidence.losses_by_signal(hypothesis, parts)
+
+        assert {"commands", "joint_positions", "sensors", "encoder motion"} <= set(found)
+        expected = evidence.losses([hypothesis], parts).mean()
+        assert sum(found.values()) == pytest.approx(expected)
+        assert expected > 0
+
+
+def test_a_hypothesis_that_diverged_has_no_losses_by_signal(
+    quadruped: Robot, trials: list[Trial]
+):
+    simulator = Simulator(quadruped, 1)
+    bad = exploding(simulator, "jam:front_left_knee")
+
+    assert Evidence(simulator, SEGMENT_PREDICTION).losses_by_signal(bad, trials) == {}
