@@ -14,7 +14,7 @@ from selfmodel.logs import read_log
 from selfmodel.logs.info import read_info
 from tests.helpers.command import DIAGNOSIS, SMALL, selfmodel
 
-PAPERS = ("--comparator", "forward-displacement", "--no-calibrate")
+PAPERS = ("--kinds", "paper", "--comparator", "forward-displacement", "--no-calibrate")
 
 BLOCKED = """
 import sys
