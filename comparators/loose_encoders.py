@@ -61,7 +61,8 @@ def loose_encoders(behaviour: Behaviour, starts: IndexArray, horizon: int) -> Lo
         horizon: Control steps of a segment.
     """
     commands, logged = behaviour["commands"], behaviour["joint_positions"]
-    fits = [_following(column, commands) for column in logged.T]
+    filtered = np.hstack([_low_pass(commands, constant) for constant in TIME_CONSTANTS])
+    fits = [_following(column, filtered) for column in logged.T]
     hinges = np.array([i for i, fit in enumerate(fits) if fit is not None], dtype=np.intp)
     if not len(hinges):
         return None
@@ -132,17 +133,21 @@ def with_loose_encoders(
     return Behaviour(simulated.names, simulated.time, signals)
 
 
-def _following(angles: FloatArray, commands: FloatArray) -> FloatArray | None:
+def _following(angles: FloatArray, filtered: FloatArray) -> FloatArray | None:
     """Returns the linear function of one motor's commands that an encoder follows, ``(steps,)``.
 
-    None if the encoder is not such a function, or stands.
+    Args:
+        angles: Logged angles, ``(steps,)`` rad.
+        filtered: Commands after each low-pass filter, ``(steps, filters * motors)``.
+
+    Returns:
+        None if the encoder is not such a function, or stands.
     """
     best, fitted = MAX_REMAINDER, None
-    for constant in TIME_CONSTANTS:
-        for column in _low_pass(commands, constant).T:
-            line = _line(angles, column)
-            if line is not None and line[2] < best:
-                best, fitted = line[2], line[0] + line[1] * column
+    for column in filtered.T:
+        line = _line(angles, column)
+        if line is not None and line[2] < best:
+            best, fitted = line[2], line[0] + line[1] * column
     return fitted if fitted is not None and np.isfinite(fitted).all() else None
 
 
