@@ -11,6 +11,7 @@ import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.comparators.loose_encoders import detached_hinges, stands
+from selfmodel.simulation.requests import END
 from selfmodel.trials.encoder_noise import standing_tolerance
 
 ERROR_SCALE = 0.5
@@ -28,7 +29,7 @@ class LoggedMotion:
 
     Attributes:
         within: Motion around the mean of the segment, ``(segments, hinges)``.
-        overall: Motion in the segment around the median of the trial, ``(segments, hinges)``.
+        overall: Motion in the segment around the median of the trial's end, ``(segments, hinges)``.
         tolerance: Motion that counts as none, ``(hinges,)``: both motions that are compared are
             increased by it, so that the noise of the log alone is a small error.
         known: Mask of the known angles, ``(segments, horizon + 1, hinges)``.
@@ -58,7 +59,7 @@ def logged_motion(
     known = np.isfinite(rows)
     return LoggedMotion(
         within=_motion(rows, known),
-        overall=_mean(np.square(rows - _median(angles)), known),
+        overall=_mean(np.square(rows - _median(angles[round((1 - END) * len(angles)) :])), known),
         tolerance=np.square(standing_tolerance(angles)),
         known=known,
         resting=resting,

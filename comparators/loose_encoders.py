@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
+from selfmodel.simulation.requests import END
 from selfmodel.trials.behaviour import Behaviour
 
 FROZEN = 1e-6
@@ -62,7 +63,8 @@ def loose_encoders(behaviour: Behaviour, starts: IndexArray, horizon: int) -> Lo
     """
     commands, logged = behaviour["commands"], behaviour["joint_positions"]
     filtered = np.hstack([_low_pass(commands, constant) for constant in TIME_CONSTANTS])
-    fits = [_following(column, filtered) for column in logged.T]
+    first = round((1 - END) * behaviour.steps)
+    fits = [_following(column, filtered, first) for column in logged.T]
     hinges = np.array([i for i, fit in enumerate(fits) if fit is not None], dtype=np.intp)
     if not len(hinges):
         return None
@@ -72,7 +74,7 @@ def loose_encoders(behaviour: Behaviour, starts: IndexArray, horizon: int) -> Lo
         (sensor, source, line)
         for sensor, readings in enumerate(behaviour["sensors"].T)
         for source, hinge in enumerate(hinges)
-        for line in (_derived(readings, logged[:, hinge]),)
+        for line in (_derived(readings[first:], logged[first:, hinge]),)
         if line is not None
     ]
     rows = starts[:, np.newaxis] + np.arange(horizon + 1)
@@ -133,19 +135,20 @@ def with_loose_encoders(
     return Behaviour(simulated.names, simulated.time, signals)
 
 
-def _following(angles: FloatArray, filtered: FloatArray) -> FloatArray | None:
+def _following(angles: FloatArray, filtered: FloatArray, first: int) -> FloatArray | None:
     """Returns the linear function of one motor's commands that an encoder follows, ``(steps,)``.
 
     Args:
         angles: Logged angles, ``(steps,)`` rad.
         filtered: Commands after each low-pass filter, ``(steps, filters * motors)``.
+        first: First row of the fit: the limb may be lost during the trial.
 
     Returns:
         None if the encoder is not such a function, or stands.
     """
     best, fitted = MAX_REMAINDER, None
     for column in filtered.T:
-        line = _line(angles, column)
+        line = _line(angles[first:], column[first:])
         if line is not None and line[2] < best:
             best, fitted = line[2], line[0] + line[1] * column
     return fitted if fitted is not None and np.isfinite(fitted).all() else None

@@ -84,17 +84,15 @@ class DiagnosticSearch:
         """
         surrogate = surrogate_of(self.evidence, self._own_surrogate, trials)
         found = self._evolved(surrogate, seeds, rng, on_generation)
-        question = self._question(trials, surrogate)
+        question = self._question(trials, surrogate.losses)
         if not self.evidence.is_piecewise(trials):
             return ranked_by_distance(found, question)
         best, compared = self._refined(found[:REFINEMENT_STARTS], question)
         change = self._change(best, found, trials, question)
         if change is None:
             return judged(best, compared, question)
-        later = self._question(
-            _since(change, trials),
-            dataclasses.replace(surrogate, trials=_since(change, surrogate.trials)),
-        )
+        rest = partial(surrogate.evidence.losses, trials=_since(change, surrogate.trials))
+        later = self._question(_since(change, trials), rest)
         best, compared = self._refined([change.after, *found[:REFINEMENT_STARTS]], later)
         diagnosis = judged(best, compared, later)
         return dataclasses.replace(diagnosis, change=self._dated(change, diagnosis.best, trials))
@@ -160,7 +158,7 @@ class DiagnosticSearch:
         self._proposed |= totals.keys()
         return _ranked(totals)
 
-    def _question(self, trials: Sequence[Trial | TrialPart], surrogate: Surrogate) -> Question:
+    def _question(self, trials: Sequence[Trial | TrialPart], surrogate: Losses) -> Question:
         """Returns the question of the hypothesis that explains some trials, or parts of them.
 
         Closed-loop windows are correlated, so gains on them are not compared with gains on healthy
@@ -177,7 +175,7 @@ class DiagnosticSearch:
             kept=self._settings.kept,
             losses=LossFunctions(
                 damaged=partial(self.evidence.losses, trials=trials),
-                surrogate=surrogate.losses,
+                surrogate=surrogate,
                 healthy=partial(self.evidence.losses, trials=self._intact)
                 if comparable and self._intact
                 else None,

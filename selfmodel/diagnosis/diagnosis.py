@@ -7,6 +7,7 @@ from typing import Any, Literal
 from selfmodel.diagnosis.change_point import Change
 from selfmodel.diagnosis.detectable import DetectableSeverity
 from selfmodel.diagnosis.fit import Fit
+from selfmodel.diagnosis.residual import Residual
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.trials.data_frame import data_frame
 
@@ -81,6 +82,7 @@ class Diagnosis:
         fit: Numbers behind the verdict; None if every simulation diverged.
         change: Change of the robot during the trials; the diagnosis is about the time after it.
             None if one hypothesis is enough.
+        residual: Signals and time of the loss that is left, if it is unexplained.
         reason: Cause of the verdict and remedy, if every simulation diverged; else empty.
     """
 
@@ -96,6 +98,7 @@ class Diagnosis:
     detectable: tuple[DetectableSeverity, ...] = ()
     fit: Fit | None = None
     change: Change | None = None
+    residual: Residual | None = None
 
     @property
     def best(self) -> Hypothesis:
@@ -132,6 +135,7 @@ class Diagnosis:
             "ranked": [candidate.to_dict() for candidate in self.ranked],
             **({"reason": self.reason} if self.reason else {}),
             **({"fit": self.fit.to_dict()} if self.fit else {}),
+            **({"residual": self.residual.to_dict()} if self.residual else {}),
             **({"change": self.change.to_dict()} if self.change else {}),
             **(
                 {"detectable": [one.to_dict() for one in self.detectable]}

@@ -119,21 +119,20 @@ class Evidence:
         rows = [np.array(self._part_rows(hypotheses, trial)) for trial in trials]
         return np.concatenate(rows, axis=1)
 
-    def timeline(self, trials: Sequence[Trial]) -> Timeline | None:
+    def timeline(self, trials: Sequence[Trial | TrialPart]) -> Timeline | None:
         """Returns the times of the columns of ``losses``; None if the comparator has no times.
 
         Raises:
             InputError: The comparator cannot judge one of the trials.
         """
-        prepared = [self._prepare(trial) for trial in trials]
-        timed = [one for one in prepared if isinstance(one, TimedTrial)]
-        if len(timed) < len(prepared):
-            return None
-        times = [
-            trial.behaviour.time[one.piece_steps] for trial, one in zip(trials, timed, strict=True)
-        ]
+        times = []
+        for part in map(whole, trials):
+            prepared = self._prepare(part.trial)
+            if not isinstance(prepared, TimedTrial):
+                return None
+            times.append(part.trial.behaviour.time[prepared.piece_steps][self._pieces(part)])
         return Timeline(
-            trial=np.repeat(np.arange(len(trials)), [len(one) for one in times]),
+            trial=np.repeat(np.arange(len(times)), [len(one) for one in times]),
             begin=np.concatenate([one[:, 0] for one in times]),
             end=np.concatenate([one[:, 1] for one in times]),
         )

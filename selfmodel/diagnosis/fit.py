@@ -4,6 +4,11 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+from selfmodel.diagnosis.significance import LOSS_FLOOR, LOSS_RATIO
+
+FAULTY_RATIO = 2.5
+"""Loss of a hypothesis with faults over that of healthy trials that is much."""
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -17,6 +22,7 @@ class Fit:
         excess: Excess of ``loss`` over ``healthy_loss``, standard errors; None without healthy
             trials.
         threshold: Excess above which the verdict is ``unexplained``, standard errors.
+        has_faults: Whether the best hypothesis has faults.
     """
 
     loss: float
@@ -24,6 +30,7 @@ class Fit:
     healthy_loss: float | None
     excess: float | None
     threshold: float
+    has_faults: bool
 
     @property
     def left(self) -> float | None:
@@ -35,8 +42,18 @@ class Fit:
 
     @property
     def is_unexplained(self) -> bool:
-        """Whether the loss is significantly higher than that of healthy trials."""
-        return self.excess is not None and self.excess > self.threshold
+        """Whether the loss is higher than that of healthy trials, significantly and by much.
+
+        Faults make a motion harder to predict: a slipping foot, a body on the ground. So the loss
+        of a hypothesis with faults has to exceed the reference by the factor ``FAULTY_RATIO`` too.
+        """
+        if self.healthy_loss is None or self.excess is None:
+            return False
+        ratio = self.loss > LOSS_RATIO * self.healthy_loss + LOSS_FLOOR
+        if self.has_faults:
+            by_much = self.loss > FAULTY_RATIO * self.healthy_loss + LOSS_FLOOR
+            return ratio or (by_much and self.excess > self.threshold)
+        return ratio or self.excess > self.threshold
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the JSON values; an infinite number is None."""
@@ -46,6 +63,7 @@ class Fit:
             "healthy_loss": _finite(self.healthy_loss),
             "excess": _finite(self.excess),
             "threshold": self.threshold,
+            "has_faults": self.has_faults,
             "left": _finite(self.left),
         }
 

@@ -10,6 +10,7 @@ from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
 from selfmodel.diagnosis.evidence import Evidence
 from selfmodel.diagnosis.loss_functions import LossFunctions
 from selfmodel.diagnosis.model_error import any_fault_is_model_error
+from selfmodel.diagnosis.residual import Residual, residual_of
 from selfmodel.diagnosis.significance import TEST, is_better
 from selfmodel.diagnosis.undetectable import undetectable_faults
 from selfmodel.diagnosis.unsearched import best_unsearched_fault
@@ -73,19 +74,32 @@ def judged(best: Hypothesis, compared: Iterable[Hypothesis], question: Question)
     indistinguishable = _indistinguishable(best, others, question)
     unsearched = best_unsearched_fault(best, space, losses)
     best_losses, intact_losses = losses.damaged([best, INTACT])
-    fit = fit_of(best_losses, intact_losses, question.healthy_losses)
+    fit = fit_of(best, best_losses, intact_losses, question.healthy_losses)
+    verdict = verdict_of(best, fit, indistinguishable, unsearched)
     return Diagnosis(
         ranked=tuple(Candidate(one, totals[one]) for one in [best, *others][:kept]),
         trials=len(question.trials),
         intact_distance=totals[INTACT],
         indistinguishable=indistinguishable[:kept],
-        verdict=verdict_of(best, fit, indistinguishable, unsearched),
+        verdict=verdict,
         test=TEST,
         unsearched=unsearched,
         undetectable=tuple(undetectable_faults(best, space, losses)[:kept]),
         detectable=() if best else tuple(detectable_severities(best, space, losses.damaged)),
         fit=fit,
+        residual=_residual(best, best_losses, question) if verdict == "unexplained" else None,
     )
+
+
+def _residual(best: Hypothesis, losses: FloatArray, question: Question) -> Residual | None:
+    """Returns the signals and the time of the loss that is left; None if they are unknown."""
+    evidence, timeline = question.evidence, question.evidence.timeline(question.trials)
+    if timeline is None:
+        return None
+    healthy = evidence.losses_by_signal(INTACT, question.intact) if question.intact else {}
+    names = [whole(trial).trial.plan.name for trial in question.trials]
+    signals = evidence.losses_by_signal(best, question.trials)
+    return residual_of(signals, healthy, losses, timeline, names)
 
 
 def ranked_by_distance(found: Iterable[Hypothesis], question: Question) -> Diagnosis:
@@ -107,7 +121,7 @@ def ranked_by_distance(found: Iterable[Hypothesis], question: Question) -> Diagn
         if totals[one] == totals[best] and not parts <= _without_severities(one)
     )
     best_losses, intact_losses = question.losses.damaged([best, INTACT])
-    fit = fit_of(best_losses, intact_losses, question.healthy_losses)
+    fit = fit_of(best, best_losses, intact_losses, question.healthy_losses)
     return Diagnosis(
         ranked=tuple(Candidate(one, totals[one]) for one in ranked[:kept]),
         trials=len(question.trials),

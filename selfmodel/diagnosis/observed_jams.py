@@ -8,10 +8,8 @@ from selfmodel.arrays import FloatArray
 from selfmodel.faults.jammed import JAMMED_AT_ANGLE
 from selfmodel.faults.kind import Fault
 from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.simulation.requests import END
 from selfmodel.trials.trial import Trial
-
-END = 1 / 3
-"""Last part of a trial whose median angle is that of a jam: a joint may jam during the trial."""
 
 MAX_SPREAD = 0.05
 """Largest difference between the angles of the hinges of one jammed joint, rad."""

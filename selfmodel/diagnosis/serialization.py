@@ -14,6 +14,7 @@ from selfmodel.diagnosis.change_point import Change
 from selfmodel.diagnosis.detectable import DetectableSeverity
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, UnsearchedFault, Verdict
 from selfmodel.diagnosis.fit import Fit
+from selfmodel.diagnosis.residual import Residual
 from selfmodel.faults.hypothesis import Hypothesis
 
 
@@ -29,6 +30,7 @@ def confidence_to_dict(diagnosis: Diagnosis) -> dict[str, Any]:
         "reason": diagnosis.reason or None,
         "fit": diagnosis.fit.to_dict() if diagnosis.fit else None,
         "change": diagnosis.change.to_dict() if diagnosis.change else None,
+        "residual": diagnosis.residual.to_dict() if diagnosis.residual else None,
         **({"detectable": detectable} if detectable else {}),
     }
 
@@ -75,6 +77,7 @@ def diagnosis_from_dict(values: Mapping[str, Any], parse: Callable[[str], Hypoth
         detectable=tuple(_detectable(item) for item in values.get("detectable", ())),
         fit=_fit(values["fit"]) if values.get("fit") else None,
         change=_change(values["change"], parse) if values.get("change") else None,
+        residual=_residual(values["residual"]) if values.get("residual") else None,
     )
 
 
@@ -95,6 +98,16 @@ def _fit(values: Mapping[str, Any]) -> Fit:
         healthy_loss=_from_json(healthy) if is_compared else None,
         excess=_from_json(excess) if is_compared else None,
         threshold=_from_json(values["threshold"]),
+        has_faults=bool(values["has_faults"]),
+    )
+
+
+def _residual(values: Mapping[str, Any]) -> Residual:
+    return Residual(
+        signals={str(name): _from_json(excess) for name, excess in values["signals"].items()},
+        trial=str(values["trial"]),
+        begin=_from_json(values["begin"]),
+        end=_from_json(values["end"]),
     )
 
 

@@ -18,24 +18,25 @@ SEVERITY_DECIMALS = 4
 
 
 def with_fitted_severities(
-    hypothesis: Hypothesis, losses: Losses, space: HypothesisSpace
+    hypothesis: Hypothesis, losses: Losses, space: HypothesisSpace, zooms: int = ZOOMS
 ) -> Hypothesis:
     """Returns the hypothesis with the severities of the lowest total loss.
 
     Severities are fitted by coordinate descent: per fault, the best of the kind's levels, then
-    ``ZOOMS`` grids, each between the neighbours of the best severity so far.
+    ``zooms`` grids, each between the neighbours of the best severity so far.
 
     Args:
         hypothesis: In canonical form.
         losses: Losses of hypotheses on the trials, ``(n, segments)``.
         space: The hypotheses about the robot.
+        zooms: Number of grids between levels; 0 for the best levels.
     """
     current = hypothesis
     for _ in range(MAX_ROUNDS):
         before = current
         for index in range(len(current)):
             if index < len(current):  # a fault with a nominal severity was dropped
-                current = _fitted(current, index, losses, space)
+                current = _fitted(current, index, losses, space, zooms)
         if current == before:
             break
     return current
@@ -97,7 +98,7 @@ def _weights(rows: FloatArray) -> FloatArray:
 
 
 def _fitted(
-    hypothesis: Hypothesis, index: int, losses: Losses, space: HypothesisSpace
+    hypothesis: Hypothesis, index: int, losses: Losses, space: HypothesisSpace, zooms: int
 ) -> Hypothesis:
     fault = hypothesis.faults[index]
     bounds = space.severity_bounds(fault)
@@ -106,7 +107,7 @@ def _fitted(
     severities = [fault.severity, *space.levels(fault)]
     # A kind that edits the specification has no severities between its levels: each severity
     # needs a compiled model.
-    for _ in range(1 if fault.kind.edit_spec else 1 + ZOOMS):
+    for _ in range(1 if fault.kind.edit_spec else 1 + zooms):
         tried = [space.with_severity(hypothesis, index, severity) for severity in severities]
         chosen = int(np.argmin(losses(tried).sum(axis=1)))
         severity, best = severities[chosen], tried[chosen]

@@ -11,7 +11,6 @@ from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Trial
-from selfmodel.trials.trial_part import TrialPart
 
 OPENING = 1 / 3
 """Part of a trial that is simulated, from its beginning, if the comparator has no surrogate.
@@ -28,11 +27,11 @@ class Surrogate:
 
     Attributes:
         evidence: Losses of the surrogate comparator.
-        trials: The trials, or parts of them.
+        trials: The trials, or their openings.
     """
 
     evidence: Evidence
-    trials: Sequence[Trial | TrialPart]
+    trials: Sequence[Trial]
 
     def losses(self, hypotheses: Sequence[Hypothesis]) -> FloatArray:
         """Returns the losses of each hypothesis, ``(n, pieces)``; see ``Evidence.losses``."""

@@ -13,10 +13,13 @@ NO_TEST = "none: every simulation diverged"
 """Name of the test of a diagnosis without a finite distance."""
 
 
-def fit_of(losses: FloatArray, intact: FloatArray, healthy: FloatArray | None) -> Fit:
+def fit_of(
+    best: Hypothesis, losses: FloatArray, intact: FloatArray, healthy: FloatArray | None
+) -> Fit:
     """Returns how well the best hypothesis predicts the trials.
 
     Args:
+        best: The best hypothesis.
         losses: Losses of the best hypothesis on the trials to explain, ``(pieces,)``.
         intact: Losses of the empty hypothesis on the same trials.
         healthy: Losses of the empty hypothesis on healthy trials, ``(healthy_pieces,)``; None
@@ -28,6 +31,7 @@ def fit_of(losses: FloatArray, intact: FloatArray, healthy: FloatArray | None) -
         healthy_loss=None if healthy is None else float(healthy.mean()),
         excess=None if healthy is None else excess_over_healthy(losses, healthy),
         threshold=MIN_Z_ACROSS_TRIALS,
+        has_faults=bool(best),
     )
 
 

@@ -50,7 +50,7 @@ KIND_SETS: Mapping[str, tuple[FaultKind, ...]] = {
 }
 """Sets of kinds, by the names that ``--kinds`` accepts in place of their kinds."""
 
-DEFAULT_KINDS: tuple[FaultKind, ...] = KIND_SETS["paper"]
+DEFAULT_KINDS: tuple[FaultKind, ...] = KIND_SETS["default"]
 """Kinds that a diagnosis, a recovery or an ablation searches if none are given."""
 
 

@@ -10,6 +10,9 @@ from selfmodel.robot.control_delay import MAX_CONTROL_DELAY
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import SIGNALS, Signal
 
+END = 1 / 3
+"""Last part of a trial that shows the encoders of a failed joint: it may fail during the trial."""
+
 LEAD = MAX_CONTROL_DELAY
 """Commands before a segment that ``cut_segments`` includes: enough for every control delay."""
 
@@ -69,15 +72,17 @@ class Segments:
 
     @property
     def resting_angles(self) -> FloatArray | None:
-        """Angle at which the hinges of detached limbs are predicted: the median over the segments.
+        """Angle at which the hinges of detached limbs are predicted: the median at the end.
 
-        The shape is ``(hinges,)``, rad, with NaN for a hinge without a known angle; None for
-        segments without joint positions.
+        The last third of the segments counts, because a limb may be lost during a trial. The shape
+        is ``(hinges,)``, rad, with NaN for a hinge without a known angle; None for segments without
+        joint positions.
         """
         angles = self.states.get("joint_positions")
         if angles is None:
             return None
-        known = (column[~np.isnan(column)] for column in angles.T)
+        last = angles[round((1 - END) * len(angles)) :]
+        known = (column[~np.isnan(column)] for column in last.T)
         return np.array([np.median(own) if len(own) else np.nan for own in known])
 
     @property

@@ -123,7 +123,20 @@ def _verdict(found: Mapping[str, Any]) -> str:
     return (
         f"Unexplained: even {best} predicts the trials significantly worse than the self-model "
         f"predicts the healthy robot; there is another fault, or one of a kind that was not "
-        f"searched (--kinds)."
+        f"searched (--kinds).{_residual(found)}"
+    )
+
+
+def _residual(found: Mapping[str, Any]) -> str:
+    """Returns the share, the signals and the time of the loss that is left, as a sentence."""
+    left = found.get("residual")
+    if not left:
+        return ""
+    share = (found.get("fit") or {}).get("left")
+    amount = "Most" if share is None else f"{share:.0%} of the loss"
+    return (
+        f" {amount} is left: in {', '.join(left['signals'])}, most of it at t = "
+        f"{left['begin']:.1f} to {left['end']:.1f} s of {left['trial']}."
     )
 
 
