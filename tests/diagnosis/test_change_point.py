@@ -8,6 +8,7 @@ from hypothesis import given, settings, strategies as st
 
 from selfmodel.diagnosis.change_point import (
     MIN_PIECES,
+    MIN_Z_OF_CHANGE,
     Split,
     Timeline,
     best_split,
@@ -139,6 +140,26 @@ def test_a_hypothesis_that_is_no_better_after_than_before_is_no_change():
 
     assert is_change(Split(INTACT, JAM, 30), INTACT, of(rows))
     assert not is_change(Split(INTACT, JAM, 30), BREAK, of(rows))
+
+
+def test_without_a_difference_before_the_time_there_is_no_change():
+    after = np.arange(PIECES) >= 30
+    rows = {INTACT: 0.1 + 1.0 * after, JAM: np.full(PIECES, 0.1), BREAK: np.full(PIECES, 2.0)}
+
+    assert not is_change(Split(INTACT, JAM, 30), BREAK, of(rows))
+
+
+@pytest.mark.parametrize(("z", "expected"), [(1.01, True), (0.99, False)])
+def test_a_difference_after_the_time_has_to_be_clear(z: float, *, expected: bool):
+    after, swing = np.arange(PIECES) >= 30, np.resize([1.0, -1.0], PIECES)
+    gain = 0.1 * (MIN_Z_OF_CHANGE * z + swing * np.sqrt(29))
+    rows = {
+        INTACT: 2.0 + after * gain,
+        JAM: 2.0 + ~after * (1.0 + 0.1 * swing),
+        BREAK: 3.0 + 0.1 * swing,
+    }
+
+    assert is_change(Split(INTACT, JAM, 30), BREAK, of(rows)) == expected
 
 
 def test_a_change_between_two_trials_has_the_start_of_the_second():
