@@ -33,7 +33,7 @@ class Question:
         evidence: Distances of hypotheses from trials.
         space: The hypotheses about the robot.
         trials: Trials to explain, or parts of them.
-        intact: Trials of the healthy robot.
+        intact: Trials of the healthy robot, or parts of them.
         kept: Number of hypotheses in a ranking.
         losses: Loss functions of the trials.
     """
@@ -41,7 +41,7 @@ class Question:
     evidence: Evidence
     space: HypothesisSpace
     trials: Sequence[Trial | TrialPart]
-    intact: Sequence[Trial]
+    intact: Sequence[Trial | TrialPart]
     kept: int
     losses: LossFunctions
 

@@ -1,4 +1,4 @@
-"""The verdict of a diagnosis: ``explained``, ``ambiguous`` or ``unexplained``."""
+"""The verdict of a diagnosis: ``intact``, ``explained``, ``ambiguous`` or ``unexplained``."""
 
 import math
 from collections.abc import Sequence

@@ -41,9 +41,7 @@ def losses_of(change: int, *, pieces: int = PIECES, noise: float = 0.2, seed: in
         JAM: ~jammed * 1.0,
         BREAK: np.full(pieces, 0.9),
     }
-    return of(
-        {one: common + row + noise * rng.uniform(0, 1, pieces) for one, row in rows.items()}
-    )
+    return of({one: common + row + noise * rng.uniform(0, 1, pieces) for one, row in rows.items()})
 
 
 def timeline_of(*pieces: int) -> Timeline:

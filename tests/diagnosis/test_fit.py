@@ -30,7 +30,8 @@ def test_without_a_loss_beyond_the_reference_no_share_is_left(intact: float, hea
 
 
 @pytest.mark.parametrize(
-    ("excess", "unexplained"), [(None, False), (0.0, False), (5.0, False), (5.1, True), (math.inf, True)]
+    ("excess", "unexplained"),
+    [(None, False), (0.0, False), (5.0, False), (5.1, True), (math.inf, True)],
 )
 def test_a_loss_is_unexplained_above_the_threshold(excess: float | None, *, unexplained: bool):
     healthy = None if excess is None else 0.1
