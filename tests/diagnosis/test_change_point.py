@@ -193,7 +193,15 @@ def test_a_hypothesis_that_diverged_is_on_neither_side_of_a_change():
 def test_the_surrogate_selects_and_the_comparator_itself_decides():
     """A surrogate with fewer pieces that ranks another hypothesis first."""
     losses = losses_of(30)
-    coarse = of({INTACT: np.arange(9) * 0.1, JAM: np.full(9, 0.5), BREAK: np.full(9, 0.3)})
+    few = 2 * MIN_PIECES + 4
+    coarse = of(
+        {
+            INTACT: np.linspace(0, 1, few),
+            JAM: np.full(few, 0.7),
+            BREAK: np.full(few, 0.4),
+        }
+    )
+    assert best_split([INTACT], [JAM, BREAK], coarse, coarse).after == BREAK
     asked: set[Hypothesis] = set()
 
     def recorded(hypotheses: Sequence[Hypothesis]) -> np.ndarray:

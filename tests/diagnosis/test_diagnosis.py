@@ -13,6 +13,7 @@ from selfmodel.diagnosis.change_point import Change
 from selfmodel.diagnosis.detectable import DetectableSeverity
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, UnsearchedFault
 from selfmodel.diagnosis.fit import Fit
+from selfmodel.diagnosis.residual import Residual
 from selfmodel.diagnosis.serialization import confidence_to_dict, diagnosis_from_dict
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
@@ -57,9 +58,12 @@ def test_a_diagnosis_survives_json(found: Diagnosis):
 
 
 NUMBERS = st.floats(0, allow_infinity=True)
-FITS = st.builds(Fit, NUMBERS, NUMBERS, st.none(), st.none(), st.just(5.0)) | st.builds(
-    Fit, NUMBERS, NUMBERS, st.floats(0, 1e9), NUMBERS, st.just(5.0)
+FITS = st.builds(
+    Fit, NUMBERS, NUMBERS, st.none(), st.none(), st.just(5.0), has_faults=st.booleans()
+) | st.builds(
+    Fit, NUMBERS, NUMBERS, st.floats(0, 1e9), NUMBERS, st.just(5.0), has_faults=st.booleans()
 )
+RESIDUAL = Residual({"sensors": 0.2, "base_position": 0.1}, "02-recovery", 3.2, 4.1)
 CHANGE = Change("02-recovery", 1, 4.92, 4.8, 5.04, INTACT, SPACE.parse(BEST))
 DETECTABLE = (
     DetectableSeverity("motor", "back_left_knee", below=0.7, above=None),
@@ -67,9 +71,17 @@ DETECTABLE = (
 )
 
 
-@given(FITS, st.sampled_from([None, CHANGE]), st.sampled_from([(), DETECTABLE]))
+@given(
+    FITS,
+    st.sampled_from([None, CHANGE]),
+    st.sampled_from([(), DETECTABLE]),
+    st.sampled_from([None, RESIDUAL]),
+)
 def test_the_fit_the_change_and_the_limits_survive_json(
-    fit: Fit, change: Change | None, detectable: tuple[DetectableSeverity, ...]
+    fit: Fit,
+    change: Change | None,
+    detectable: tuple[DetectableSeverity, ...],
+    residual: Residual | None,
 ):
     whole = Diagnosis(
         ranked=(Candidate(INTACT, 0.5),),
@@ -81,6 +93,7 @@ def test_the_fit_the_change_and_the_limits_survive_json(
         detectable=detectable,
         fit=fit,
         change=change,
+        residual=residual,
     )
     text = json.dumps(whole.to_dict(), allow_nan=False)
 
@@ -88,7 +101,7 @@ def test_the_fit_the_change_and_the_limits_survive_json(
 
 
 def test_the_command_line_has_the_fit_the_change_and_the_limits(found: Diagnosis):
-    fit = Fit(0.1, 0.5, 0.1, math.inf, 5.0)
+    fit = Fit(0.1, 0.5, 0.1, math.inf, 5.0, has_faults=True)
     whole = dataclasses.replace(found, fit=fit, change=CHANGE, detectable=DETECTABLE)
     values = json.loads(json.dumps(confidence_to_dict(whole), allow_nan=False))
 

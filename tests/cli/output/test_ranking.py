@@ -59,27 +59,27 @@ def test_a_change_is_named_before_undetectable_faults():
     ("fit", "sentence"),
     [
         (None, ""),
-        (Fit(float("inf"), 1.0, 0.1, 0.0, 5.0), ""),
+        (Fit(float("inf"), 1.0, 0.1, 0.0, 5.0, has_faults=True), ""),
         (
-            Fit(0.1234, 0.5, None, None, 5.0),
+            Fit(0.1234, 0.5, None, None, 5.0, has_faults=True),
             "Mean loss 0.123, of intact 0.5; no trial of the healthy robot to compare with.",
         ),
         (
-            Fit(0.1234, float("inf"), 0.1, 2.5, 5.0),
+            Fit(0.1234, float("inf"), 0.1, 2.5, 5.0, has_faults=True),
             (
                 "Mean loss 0.123, of intact diverged, on healthy trials 0.1: an excess of 2.5 "
                 "standard errors, unexplained above 5."
             ),
         ),
         (
-            Fit(0.1234, 0.5, 0.0, float("inf"), 5.0),
+            Fit(0.1234, 0.5, 0.0, float("inf"), 5.0, has_faults=True),
             (
                 "Mean loss 0.123, of intact 0.5, on healthy trials 0: an excess of infinitely many "
                 "standard errors, unexplained above 5."
             ),
         ),
         (
-            Fit(0.1234, 0.5, float("inf"), 0.0, 5.0),
+            Fit(0.1234, 0.5, float("inf"), 0.0, 5.0, has_faults=True),
             (
                 "Mean loss 0.123, of intact 0.5, on healthy trials diverged: an excess of 0 "
                 "standard errors, unexplained above 5."
