@@ -24,8 +24,8 @@ MIN_Z_OF_ONE_GAIT = 3.5
 40 healthy recordings of another generator, the largest excess was 2.1."""
 
 MIN_Z_OF_OTHER_GAITS = 6.0
-"""The same for trials with other gaits, which may be harder to predict: of 8 recordings, the largest
-excess of a healthy robot was 5.0."""
+"""The same for trials with other gaits, which may be harder to predict: of 8 healthy recordings,
+the largest excess was 5.0."""
 
 LOSS_RATIO = 3.0
 """Ratio of mean losses that is significant whatever the standard error: a few segments are enough
