@@ -175,7 +175,7 @@ class PreparedSegments:
         steady: Mask of the segments without a late step, ``(segments,)``.
         readings: The logged readings.
         motion: The logged motion of the encoders; None for states without joint positions.
-        loose: Encoders that follow commands, as a detached limb's may; None without any.
+        loose: Encoders that follow commands, as of a detached limb; None if there are none.
         arithmetic: Loss of the controller's arithmetic, ``(segments,)``.
         piece_steps: First and last step of each segment without a late step, ``(segments, 2)``.
     """

@@ -20,7 +20,7 @@ from selfmodel.diagnosis.significance import is_better, paired_z
 from selfmodel.faults.hypothesis import Hypothesis
 
 MIN_PIECES = 8
-"""Pieces before and after a change, at least: two of the surrogate comparator, which has a third."""
+"""Pieces before and after a change, at least: two of the surrogate comparator, with a third."""
 
 MIN_Z_OF_CHANGE = 5.0
 """Standard errors by which a hypothesis with a change has to be better than one without. The

@@ -60,7 +60,7 @@ def evidence_sentences(found: Mapping[str, Any]) -> list[str]:
 
 
 def _number(value: float | None) -> str:
-    return "diverged" if value is None else f"{value:.3g}"
+    return "infinite" if value is None else f"{value:.3g}"
 
 
 def _change(change: Mapping[str, Any]) -> str:
