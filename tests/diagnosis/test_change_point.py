@@ -144,7 +144,8 @@ def test_a_hypothesis_that_is_no_better_after_than_before_is_no_change():
 
 def test_without_a_difference_before_the_time_there_is_no_change():
     after = np.arange(PIECES) >= 30
-    rows = {INTACT: 0.1 + 1.0 * after, JAM: np.full(PIECES, 0.1), BREAK: np.full(PIECES, 2.0)}
+    swing = np.resize([0.1, -0.1], PIECES)
+    rows = {INTACT: 0.2 + (1 + swing) * after, JAM: np.full(PIECES, 0.2), BREAK: 2.0 + swing}
 
     assert not is_change(Split(INTACT, JAM, 30), BREAK, of(rows))
 

@@ -67,7 +67,7 @@ def test_a_change_is_named_before_undetectable_faults():
         (
             Fit(0.1234, float("inf"), 0.1, 2.5, 5.0, has_faults=True),
             (
-                "Mean loss 0.123, of intact diverged, on healthy trials 0.1: an excess of 2.5 "
+                "Mean loss 0.123, of intact infinite, on healthy trials 0.1: an excess of 2.5 "
                 "standard errors, unexplained above 5."
             ),
         ),
@@ -81,7 +81,7 @@ def test_a_change_is_named_before_undetectable_faults():
         (
             Fit(0.1234, 0.5, float("inf"), 0.0, 5.0, has_faults=True),
             (
-                "Mean loss 0.123, of intact 0.5, on healthy trials diverged: an excess of 0 "
+                "Mean loss 0.123, of intact 0.5, on healthy trials infinite: an excess of 0 "
                 "standard errors, unexplained above 5."
             ),
         ),
