@@ -91,8 +91,8 @@ class DiagnosticSearch:
         change = self._change(best, found, trials, question)
         if change is None:
             return judged(best, compared, question)
-        rest = partial(surrogate.evidence.losses, trials=_since(change, surrogate.trials))
-        later = self._question(_since(change, trials), rest, _until(change, trials))
+        rest = partial(surrogate.evidence.losses, trials=change.since(surrogate.trials))
+        later = self._question(change.since(trials), rest, _until(change, trials))
         best, compared = self._refined([change.after, *found[:REFINEMENT_STARTS]], later)
         diagnosis = judged(best, compared, later)
         return dataclasses.replace(diagnosis, change=self._dated(change, diagnosis.best, trials))
@@ -256,12 +256,6 @@ class DiagnosticSearch:
         if split is None or timeline is None:
             return change
         return change_at(split, losses, timeline, [trial.plan.name for trial in trials])
-
-
-def _since(change: Change, trials: Sequence[Trial]) -> list[Trial | TrialPart]:
-    """Returns the trials from the one with a change on, without the time before the change."""
-    first, *rest = trials[change.index :]
-    return [TrialPart(first, begin=change.time), *rest]
 
 
 def _until(change: Change, trials: Sequence[Trial]) -> list[Trial | TrialPart]:

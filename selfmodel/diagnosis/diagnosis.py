@@ -12,7 +12,7 @@ from selfmodel.diagnosis.residual import Residual
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.trials.data_frame import data_frame
 from selfmodel.trials.trial import Trial
-from selfmodel.trials.trial_part import TrialPart
+from selfmodel.trials.trial_part import whole
 
 Verdict = Literal["intact", "explained", "ambiguous", "unexplained"]
 """Verdicts on the best hypothesis.
@@ -116,8 +116,7 @@ class Diagnosis:
         """
         if self.change is None:
             return list(trials)
-        first, *rest = trials[self.change.index :]
-        return [TrialPart(first, begin=self.change.time).rows, *rest]
+        return [whole(part).rows for part in self.change.since(trials)]
 
     def __repr__(self) -> str:
         count = f"{self.trials} {'trial' if self.trials == 1 else 'trials'}"

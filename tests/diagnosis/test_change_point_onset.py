@@ -76,7 +76,6 @@ def test_a_jam_in_the_middle_of_a_trial_is_found_and_dated(
     assert abs(found.change.time - onset) <= 0.2
 
 
-@pytest.mark.xfail(strict=True, reason="the piece in which the change lies counts as after it")
 def test_a_robot_that_jams_in_the_middle_of_a_trial_is_explained(
     quadruped: Robot, gait: Controller
 ):
