@@ -62,8 +62,9 @@ def loose_encoders(behaviour: Behaviour, starts: IndexArray, horizon: int) -> Lo
         horizon: Control steps of a segment.
     """
     commands, logged = behaviour["commands"], behaviour["joint_positions"]
+    filtered = np.hstack([_low_pass(commands, constant) for constant in TIME_CONSTANTS])
     first = round((1 - END) * behaviour.steps)
-    fits = [_following(column, commands, first) for column in logged.T]
+    fits = [_following(column, filtered, first) for column in logged.T]
     hinges = np.array([i for i, fit in enumerate(fits) if fit is not None], dtype=np.intp)
     if not len(hinges):
         return None
@@ -134,18 +135,22 @@ def with_loose_encoders(
     return Behaviour(simulated.names, simulated.time, signals)
 
 
-def _following(angles: FloatArray, commands: FloatArray, first: int) -> FloatArray | None:
+def _following(angles: FloatArray, filtered: FloatArray, first: int) -> FloatArray | None:
     """Returns the linear function of one motor's commands that an encoder follows, ``(steps,)``.
 
-    It is fitted to the rows from ``first`` on: the limb may be lost during the trial. None if the
-    encoder is not such a function, or stands.
+    Args:
+        angles: Logged angles, ``(steps,)`` rad.
+        filtered: Commands after each low-pass filter, ``(steps, filters * motors)``.
+        first: First row of the fit: the limb may be lost during the trial.
+
+    Returns:
+        None if the encoder is not such a function, or stands.
     """
     best, fitted = MAX_REMAINDER, None
-    for constant in TIME_CONSTANTS:
-        for column in _low_pass(commands, constant).T:
-            line = _line(angles[first:], column[first:])
-            if line is not None and line[2] < best:
-                best, fitted = line[2], line[0] + line[1] * column
+    for column in filtered.T:
+        line = _line(angles[first:], column[first:])
+        if line is not None and line[2] < best:
+            best, fitted = line[2], line[0] + line[1] * column
     return fitted if fitted is not None and np.isfinite(fitted).all() else None
 
 

@@ -112,7 +112,10 @@ def diagnose(
         "calibration": found.calibration.to_dict() if found.calibration else None,
         "diagnosis": ranking_to_list(diagnosis.ranked),
         **confidence_to_dict(diagnosis),
-        "evidence": [one.to_dict() for one in direct_evidence(found.damaged, model.anatomy)],
+        "evidence": [
+            one.to_dict()
+            for one in direct_evidence(diagnosis.explained(found.damaged), model.anatomy)
+        ],
         "evaluations": found.search.evaluations,
         "distinct_hypotheses": found.search.distinct_hypotheses,
         "seconds": perf_counter() - start,

@@ -8,6 +8,7 @@ Source: Page, "Continuous inspection schemes", Biometrika 41 (1954), the cumulat
 differences of two hypotheses' losses, over all times afterwards.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -18,9 +19,11 @@ from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.diagnosis.loss_functions import Losses
 from selfmodel.diagnosis.significance import is_better, paired_z
 from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.trials.trial import Trial
+from selfmodel.trials.trial_part import TrialPart
 
 MIN_PIECES = 8
-"""Pieces before and after a change, at least: two of the surrogate comparator, which has a third."""
+"""Pieces before and after a change, at least: two of the surrogate comparator, with a third."""
 
 MIN_Z_OF_CHANGE = 5.0
 """Standard errors by which a hypothesis with a change has to be better than one without. The
@@ -75,6 +78,17 @@ class Change:
             f"changed at about t = {self.time:.1f} s ({self.earliest:.1f} to {self.latest:.1f}) "
             f"of {self.trial}, before: {self.before}"
         )
+
+    def since(self, trials: Sequence[Trial]) -> list[Trial | TrialPart]:
+        """Returns the trials from the change on.
+
+        The piece that contains the change is left out: neither hypothesis predicts it.
+
+        Args:
+            trials: All trials of the diagnosis.
+        """
+        first, *rest = trials[self.index :]
+        return [TrialPart(first, begin=math.nextafter(self.time, math.inf)), *rest]
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the JSON values."""

@@ -91,8 +91,8 @@ class DiagnosticSearch:
         change = self._change(best, found, trials, question)
         if change is None:
             return judged(best, compared, question)
-        rest = partial(surrogate.evidence.losses, trials=_since(change, surrogate.trials))
-        later = self._question(_since(change, trials), rest)
+        rest = partial(surrogate.evidence.losses, trials=change.since(surrogate.trials))
+        later = self._question(change.since(trials), rest, _until(change, trials))
         best, compared = self._refined([change.after, *found[:REFINEMENT_STARTS]], later)
         diagnosis = judged(best, compared, later)
         return dataclasses.replace(diagnosis, change=self._dated(change, diagnosis.best, trials))
@@ -158,26 +158,38 @@ class DiagnosticSearch:
         self._proposed |= totals.keys()
         return _ranked(totals)
 
-    def _question(self, trials: Sequence[Trial | TrialPart], surrogate: Losses) -> Question:
+    def _question(
+        self,
+        trials: Sequence[Trial | TrialPart],
+        surrogate: Losses,
+        earlier: Sequence[Trial | TrialPart] = (),
+    ) -> Question:
         """Returns the question of the hypothesis that explains some trials, or parts of them.
 
         Closed-loop windows are correlated, so gains on them are not compared with gains on healthy
         trials.
+
+        Args:
+            trials: Trials to explain, or parts of them.
+            surrogate: Losses of the surrogate comparator on these.
+            earlier: Trials, or parts of them, of the robot before it changed: the healthy reference
+                if there are no trials of the healthy robot.
         """
-        known = [*self._intact, *(whole(trial).trial for trial in trials)]
+        intact = self._intact or earlier
+        known = [whole(trial).trial for trial in (*intact, *trials)]
         is_piecewise = self.evidence.is_piecewise(known)
         comparable = is_piecewise and self.evidence.uses_segments(known)
         return Question(
             evidence=self.evidence,
             space=self._space_of(trials),
             trials=trials,
-            intact=self._intact,
+            intact=intact,
             kept=self._settings.kept,
             losses=LossFunctions(
                 damaged=partial(self.evidence.losses, trials=trials),
                 surrogate=surrogate,
-                healthy=partial(self.evidence.losses, trials=self._intact)
-                if comparable and self._intact
+                healthy=partial(self.evidence.losses, trials=intact)
+                if comparable and intact
                 else None,
             ),
         )
@@ -246,10 +258,12 @@ class DiagnosticSearch:
         return change_at(split, losses, timeline, [trial.plan.name for trial in trials])
 
 
-def _since(change: Change, trials: Sequence[Trial]) -> list[Trial | TrialPart]:
-    """Returns the trials from the one with a change on, without the time before the change."""
-    first, *rest = trials[change.index :]
-    return [TrialPart(first, begin=change.time), *rest]
+def _until(change: Change, trials: Sequence[Trial]) -> list[Trial | TrialPart]:
+    """Returns the trials up to a change, if the robot was healthy before it."""
+    if change.before != INTACT:
+        return []
+    *earlier, last = trials[: change.index + 1]
+    return [*earlier, TrialPart(last, end=change.time)]
 
 
 def _recorded(losses: Losses, into: set[Hypothesis]) -> Losses:

@@ -1,6 +1,7 @@
 """A diagnosis: hypotheses ranked by distance to all trials, and a verdict on the best."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -10,6 +11,8 @@ from selfmodel.diagnosis.fit import Fit
 from selfmodel.diagnosis.residual import Residual
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.trials.data_frame import data_frame
+from selfmodel.trials.trial import Trial
+from selfmodel.trials.trial_part import whole
 
 Verdict = Literal["intact", "explained", "ambiguous", "unexplained"]
 """Verdicts on the best hypothesis.
@@ -70,15 +73,15 @@ class Diagnosis:
         intact_distance: Distance of the empty hypothesis.
         indistinguishable: Hypotheses not significantly worse than the best, smallest distance
             first.
-        verdict: ``explained``, ``ambiguous`` or ``unexplained``; see ``Verdict``.
+        verdict: ``intact``, ``explained``, ``ambiguous`` or ``unexplained``; see ``Verdict``.
         test: Name of the test behind ``indistinguishable``.
         unsearched: The best hypothesis with a fault of an unsearched kind, if it predicts the
             trials significantly better; see ``unsearched.best_unsearched_fault``.
         undetectable: The best hypothesis with one more fault, for each undetectable fault,
             smallest distance first, at most as many as are ranked; see
             ``undetectable.undetectable_faults``.
-        detectable: Smallest detectable severities of each kind and part, for the verdict
-            ``intact``; see ``detectable.detectable_severities``.
+        detectable: Smallest detectable severities of each kind and part, if the best hypothesis
+            is the empty one; see ``detectable.detectable_severities``.
         fit: Numbers behind the verdict; None if every simulation diverged.
         change: Change of the robot during the trials; the diagnosis is about the time after it.
             None if one hypothesis is enough.
@@ -104,6 +107,16 @@ class Diagnosis:
     def best(self) -> Hypothesis:
         """The best hypothesis."""
         return self.ranked[0].hypothesis
+
+    def explained(self, trials: Sequence[Trial]) -> list[Trial]:
+        """Returns the rows of the trials that the diagnosis is about: those after a change.
+
+        Args:
+            trials: The trials of the diagnosis.
+        """
+        if self.change is None:
+            return list(trials)
+        return [whole(part).rows for part in self.change.since(trials)]
 
     def __repr__(self) -> str:
         count = f"{self.trials} {'trial' if self.trials == 1 else 'trials'}"

@@ -8,6 +8,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis.detectable import detectable_severities
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
 from selfmodel.diagnosis.evidence import Evidence
+from selfmodel.diagnosis.fit import Fit
 from selfmodel.diagnosis.loss_functions import LossFunctions
 from selfmodel.diagnosis.model_error import any_fault_is_model_error
 from selfmodel.diagnosis.residual import Residual, residual_of
@@ -18,6 +19,7 @@ from selfmodel.diagnosis.verdict import all_diverged, fit_of, verdict_of
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
+from selfmodel.trials.command_likeness import have_one_gait
 from selfmodel.trials.trial import Trial
 from selfmodel.trials.trial_part import TrialPart, whole
 
@@ -33,7 +35,7 @@ class Question:
         evidence: Distances of hypotheses from trials.
         space: The hypotheses about the robot.
         trials: Trials to explain, or parts of them.
-        intact: Trials of the healthy robot.
+        intact: Trials of the healthy robot, or parts of them.
         kept: Number of hypotheses in a ranking.
         losses: Loss functions of the trials.
     """
@@ -41,7 +43,7 @@ class Question:
     evidence: Evidence
     space: HypothesisSpace
     trials: Sequence[Trial | TrialPart]
-    intact: Sequence[Trial]
+    intact: Sequence[Trial | TrialPart]
     kept: int
     losses: LossFunctions
 
@@ -73,8 +75,7 @@ def judged(best: Hypothesis, compared: Iterable[Hypothesis], question: Question)
     space, losses, kept = question.space, question.losses, question.kept
     indistinguishable = _indistinguishable(best, others, question)
     unsearched = best_unsearched_fault(best, space, losses)
-    best_losses, intact_losses = losses.damaged([best, INTACT])
-    fit = fit_of(best, best_losses, intact_losses, question.healthy_losses)
+    fit = _fit(best, question)
     verdict = verdict_of(best, fit, indistinguishable, unsearched)
     return Diagnosis(
         ranked=tuple(Candidate(one, totals[one]) for one in [best, *others][:kept]),
@@ -87,11 +88,26 @@ def judged(best: Hypothesis, compared: Iterable[Hypothesis], question: Question)
         undetectable=tuple(undetectable_faults(best, space, losses)[:kept]),
         detectable=() if best else tuple(detectable_severities(best, space, losses.damaged)),
         fit=fit,
-        residual=_residual(best, best_losses, question) if verdict == "unexplained" else None,
+        residual=_residual(best, question) if verdict == "unexplained" else None,
     )
 
 
-def _residual(best: Hypothesis, losses: FloatArray, question: Question) -> Residual | None:
+def _fit(best: Hypothesis, question: Question) -> Fit:
+    """Returns how well the best hypothesis predicts the trials."""
+    losses, intact_losses = question.losses.damaged([best, INTACT])
+    trials, healthy = (
+        [whole(one).rows for one in some] for some in (question.trials, question.intact)
+    )
+    return fit_of(
+        best,
+        losses,
+        intact_losses,
+        question.healthy_losses,
+        is_one_gait=have_one_gait(trials, healthy),
+    )
+
+
+def _residual(best: Hypothesis, question: Question) -> Residual | None:
     """Returns the signals and the time of the loss that is left; None if they are unknown."""
     evidence, timeline = question.evidence, question.evidence.timeline(question.trials)
     if timeline is None:
@@ -99,6 +115,7 @@ def _residual(best: Hypothesis, losses: FloatArray, question: Question) -> Resid
     healthy = evidence.losses_by_signal(INTACT, question.intact) if question.intact else {}
     names = [whole(trial).trial.plan.name for trial in question.trials]
     signals = evidence.losses_by_signal(best, question.trials)
+    losses = question.losses.damaged([best])[0]
     return residual_of(signals, healthy, losses, timeline, names)
 
 
@@ -120,8 +137,7 @@ def ranked_by_distance(found: Iterable[Hypothesis], question: Question) -> Diagn
         for one in ranked[1:]
         if totals[one] == totals[best] and not parts <= _without_severities(one)
     )
-    best_losses, intact_losses = question.losses.damaged([best, INTACT])
-    fit = fit_of(best, best_losses, intact_losses, question.healthy_losses)
+    fit = _fit(best, question)
     return Diagnosis(
         ranked=tuple(Candidate(one, totals[one]) for one in ranked[:kept]),
         trials=len(question.trials),

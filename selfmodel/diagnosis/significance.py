@@ -19,6 +19,14 @@ MIN_Z_ACROSS_TRIALS = 5.0
 """Standard errors by which a mean loss has to exceed that of other trials. It is larger than
 ``MIN_Z`` because trials and gaits differ, and because hundreds of candidates are tested."""
 
+MIN_Z_OF_ONE_GAIT = 3.5
+"""Standard errors by which a mean loss has to exceed that of healthy trials with the same gait. Of
+40 healthy recordings of another generator, the largest excess was 2.1."""
+
+MIN_Z_OF_OTHER_GAITS = 6.0
+"""The same for trials with other gaits, which may be harder to predict: of 8 healthy recordings,
+the largest excess was 5.0."""
+
 LOSS_RATIO = 3.0
 """Ratio of mean losses that is significant whatever the standard error: a few segments are enough
 where the prediction is almost exact."""

@@ -1,4 +1,4 @@
-"""The verdict of a diagnosis: ``explained``, ``ambiguous`` or ``unexplained``."""
+"""The verdict of a diagnosis: ``intact``, ``explained``, ``ambiguous`` or ``unexplained``."""
 
 import math
 from collections.abc import Sequence
@@ -6,7 +6,11 @@ from collections.abc import Sequence
 from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, UnsearchedFault, Verdict
 from selfmodel.diagnosis.fit import Fit
-from selfmodel.diagnosis.significance import MIN_Z_ACROSS_TRIALS, excess_over_healthy
+from selfmodel.diagnosis.significance import (
+    MIN_Z_OF_ONE_GAIT,
+    MIN_Z_OF_OTHER_GAITS,
+    excess_over_healthy,
+)
 from selfmodel.faults.hypothesis import Hypothesis
 
 NO_TEST = "none: every simulation diverged"
@@ -14,7 +18,12 @@ NO_TEST = "none: every simulation diverged"
 
 
 def fit_of(
-    best: Hypothesis, losses: FloatArray, intact: FloatArray, healthy: FloatArray | None
+    best: Hypothesis,
+    losses: FloatArray,
+    intact: FloatArray,
+    healthy: FloatArray | None,
+    *,
+    is_one_gait: bool,
 ) -> Fit:
     """Returns how well the best hypothesis predicts the trials.
 
@@ -24,13 +33,14 @@ def fit_of(
         intact: Losses of the empty hypothesis on the same trials.
         healthy: Losses of the empty hypothesis on healthy trials, ``(healthy_pieces,)``; None
             without healthy trials.
+        is_one_gait: Whether the healthy trials have the gaits of the trials to explain.
     """
     return Fit(
         loss=float(losses.mean()),
         intact_loss=float(intact.mean()),
         healthy_loss=None if healthy is None else float(healthy.mean()),
         excess=None if healthy is None else excess_over_healthy(losses, healthy),
-        threshold=MIN_Z_ACROSS_TRIALS,
+        threshold=MIN_Z_OF_ONE_GAIT if is_one_gait else MIN_Z_OF_OTHER_GAITS,
         has_faults=bool(best),
     )
 

@@ -59,13 +59,15 @@ def by_repair(situation: Situation) -> Controller:
 def by_disagreement(situation: Situation) -> Controller:
     """Returns the controller with the largest disagreement of the hypotheses, or a repair.
 
-    A repair is returned once the diagnosis is ``explained`` and either has no undetectable fault
-    or has the same undetectable faults as the diagnosis before, which the last trial did not
-    resolve. The last trial is always a repair: only a repair that is tried restores the robot.
+    A repair is returned once the diagnosis is ``explained`` or ``intact`` and either has no
+    undetectable fault or has the same undetectable faults as the diagnosis before, which the last
+    trial did not resolve. The last trial is always a repair: only a repair that is tried restores
+    the robot.
     """
     *earlier, diagnosis = situation.known.diagnoses
     unresolved = bool(earlier) and earlier[-1].undetectable == diagnosis.undetectable
-    certain = diagnosis.verdict == "explained" and (unresolved or not diagnosis.undetectable)
+    is_certain = diagnosis.verdict in ("intact", "explained")
+    certain = is_certain and (unresolved or not diagnosis.undetectable)
     if certain or situation.trials_left == 1:
         return situation.repaired()
     situation.on_event(DiscriminatingTrial(candidates_to_separate(diagnosis)))

@@ -34,7 +34,11 @@ from selfmodel.errors import InputError
             "selfmodel.faults.neuron:SILENT_NEURON",
             "no diagnosis may propose neuron: leave neuron out",
         ),
-        ("--kinds", "break,frction", "unknown kind 'frction': did you mean friction, joint-friction?"),
+        (
+            "--kinds",
+            "break,frction",
+            "unknown kind 'frction': did you mean friction, joint-friction?",
+        ),
         (
             "--case",
             " none ",

@@ -4,6 +4,7 @@ import numpy as np
 from hypothesis import given, settings, strategies as st
 
 from selfmodel.comparators import SEGMENT_PREDICTION
+from selfmodel.comparators.encoder_motion import encoder_motion_loss, logged_motion
 from selfmodel.comparators.segment_prediction import CONTRADICTION
 from selfmodel.diagnosis.comparator_contract import shown
 from selfmodel.trials.behaviour import Behaviour
@@ -67,7 +68,16 @@ def test_a_touch_that_is_never_predicted_counts_three_times_where_it_comes():
     assert CONTRADICTION == 3
 
 
-@settings(max_examples=20, deadline=None)
+def motion_loss(run: Behaviour, predicted: np.ndarray, hinges: list[int]) -> np.ndarray:
+    """The loss of the motion of some encoders alone."""
+    request = SEGMENT_PREDICTION.prepare(logged(run)).request
+    starts = np.linspace(0, run.steps - 1 - request.horizon, predicted.shape[1]).round().astype(int)
+    angles, resting = run["joint_positions"][:, hinges], request.resting_angles[hinges]
+    own = logged_motion(angles, starts, request.horizon, resting)
+    return encoder_motion_loss(predicted[..., hinges], own)
+
+
+@settings(max_examples=10, deadline=None)
 @given(lost=st.integers(0, 3), seed=st.integers(0, 2**32))
 def test_the_loss_without_an_encoder_is_that_of_the_other_columns(lost: int, seed: int):
     walking, others = gait(), [leg for leg in range(4) if leg != lost]
@@ -86,6 +96,7 @@ def test_the_loss_without_an_encoder_is_that_of_the_other_columns(lost: int, see
         steps = prepared.compared
         errors = (wrong[signal] - exact[signal])[:, :, steps][..., others]
         expected += np.log1p(np.square(errors / PREDICTION_ERROR_SCALES[signal])).mean(axis=(2, 3))
+    expected += motion_loss(walking, wrong["joint_positions"], others)
     np.testing.assert_allclose(found, expected, rtol=1e-9)
     assert not prepared.request.independent
 

@@ -8,6 +8,7 @@ from hypothesis import given, settings, strategies as st
 
 from selfmodel.diagnosis.change_point import (
     MIN_PIECES,
+    MIN_Z_OF_CHANGE,
     Split,
     Timeline,
     best_split,
@@ -41,9 +42,7 @@ def losses_of(change: int, *, pieces: int = PIECES, noise: float = 0.2, seed: in
         JAM: ~jammed * 1.0,
         BREAK: np.full(pieces, 0.9),
     }
-    return of(
-        {one: common + row + noise * rng.uniform(0, 1, pieces) for one, row in rows.items()}
-    )
+    return of({one: common + row + noise * rng.uniform(0, 1, pieces) for one, row in rows.items()})
 
 
 def timeline_of(*pieces: int) -> Timeline:
@@ -143,6 +142,27 @@ def test_a_hypothesis_that_is_no_better_after_than_before_is_no_change():
     assert not is_change(Split(INTACT, JAM, 30), BREAK, of(rows))
 
 
+def test_without_a_difference_before_the_time_there_is_no_change():
+    after = np.arange(PIECES) >= 30
+    swing = np.resize([0.1, -0.1], PIECES)
+    rows = {INTACT: 0.2 + (1 + swing) * after, JAM: np.full(PIECES, 0.2), BREAK: 2.0 + swing}
+
+    assert not is_change(Split(INTACT, JAM, 30), BREAK, of(rows))
+
+
+@pytest.mark.parametrize(("z", "expected"), [(1.01, True), (0.99, False)])
+def test_a_difference_after_the_time_has_to_be_clear(z: float, *, expected: bool):
+    after, swing = np.arange(PIECES) >= 30, np.resize([1.0, -1.0], PIECES)
+    gain = 0.1 * (MIN_Z_OF_CHANGE * z + swing * np.sqrt(29))
+    rows = {
+        INTACT: 2.0 + after * gain,
+        JAM: 2.0 + ~after * (1.0 + 0.1 * swing),
+        BREAK: 3.0 + 0.1 * swing,
+    }
+
+    assert is_change(Split(INTACT, JAM, 30), BREAK, of(rows)) == expected
+
+
 def test_a_change_between_two_trials_has_the_start_of_the_second():
     losses = losses_of(20, pieces=50)
     split = split_of(losses)
@@ -195,7 +215,15 @@ def test_a_hypothesis_that_diverged_is_on_neither_side_of_a_change():
 def test_the_surrogate_selects_and_the_comparator_itself_decides():
     """A surrogate with fewer pieces that ranks another hypothesis first."""
     losses = losses_of(30)
-    coarse = of({INTACT: np.arange(9) * 0.1, JAM: np.full(9, 0.5), BREAK: np.full(9, 0.3)})
+    few = 2 * MIN_PIECES + 4
+    coarse = of(
+        {
+            INTACT: np.linspace(0, 1, few),
+            JAM: np.full(few, 0.7),
+            BREAK: np.full(few, 0.4),
+        }
+    )
+    assert best_split([INTACT], [JAM, BREAK], coarse, coarse).after == BREAK
     asked: set[Hypothesis] = set()
 
     def recorded(hypotheses: Sequence[Hypothesis]) -> np.ndarray:

@@ -1,15 +1,22 @@
 """Promises of the record of a diagnosis: readable, serialisable, a table."""
 
+import dataclasses
 import json
 import math
 import sys
 from types import SimpleNamespace
 
 import pytest
+from hypothesis import given, strategies as st
 
+from selfmodel.diagnosis.change_point import Change
+from selfmodel.diagnosis.detectable import DetectableSeverity
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, UnsearchedFault
+from selfmodel.diagnosis.fit import Fit
+from selfmodel.diagnosis.residual import Residual
 from selfmodel.diagnosis.serialization import confidence_to_dict, diagnosis_from_dict
 from selfmodel.errors import InputError
+from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.tasks import ROBOTS
@@ -48,6 +55,84 @@ def test_a_diagnosis_survives_json(found: Diagnosis):
     text = json.dumps(found.to_dict(), allow_nan=False)
 
     assert diagnosis_from_dict(json.loads(text), SPACE.parse) == found
+
+
+NUMBERS = st.just(math.inf) | st.floats(0, 1e9)
+FITS = st.builds(
+    Fit, NUMBERS, NUMBERS, st.none(), st.none(), st.just(5.0), has_faults=st.booleans()
+) | st.builds(
+    Fit, NUMBERS, NUMBERS, st.floats(0, 1e9), NUMBERS, st.just(5.0), has_faults=st.booleans()
+)
+RESIDUAL = Residual({"sensors": 0.2, "base_position": 0.1}, "02-recovery", 3.2, 4.1)
+CHANGE = Change("02-recovery", 1, 4.92, 4.8, 5.04, INTACT, SPACE.parse(BEST))
+DETECTABLE = (
+    DetectableSeverity("motor", "back_left_knee", below=0.7, above=None),
+    DetectableSeverity("friction", "", below=0.5, above=1.25),
+)
+
+
+@given(
+    FITS,
+    st.sampled_from([None, CHANGE]),
+    st.sampled_from([(), DETECTABLE]),
+    st.sampled_from([None, RESIDUAL]),
+)
+def test_the_fit_the_change_and_the_limits_survive_json(
+    fit: Fit,
+    change: Change | None,
+    detectable: tuple[DetectableSeverity, ...],
+    residual: Residual | None,
+):
+    whole = Diagnosis(
+        ranked=(Candidate(INTACT, 0.5),),
+        trials=2,
+        intact_distance=0.5,
+        indistinguishable=(),
+        verdict="intact",
+        test="by hand",
+        detectable=detectable,
+        fit=fit,
+        change=change,
+        residual=residual,
+    )
+    text = json.dumps(whole.to_dict(), allow_nan=False)
+
+    assert diagnosis_from_dict(json.loads(text), SPACE.parse) == whole
+
+
+def test_the_command_line_has_the_fit_the_change_and_the_limits(found: Diagnosis):
+    fit = Fit(0.1, 0.5, 0.1, math.inf, 5.0, has_faults=True)
+    whole = dataclasses.replace(found, fit=fit, change=CHANGE, detectable=DETECTABLE)
+    values = json.loads(json.dumps(confidence_to_dict(whole), allow_nan=False))
+
+    assert values["fit"] == fit.to_dict()
+    assert values["change"] == CHANGE.to_dict()
+    assert values["detectable"] == [one.to_dict() for one in DETECTABLE]
+    plain = confidence_to_dict(found)
+    assert (plain["fit"], plain["change"], "detectable" in plain) == (None, None, False)
+
+
+def test_a_change_is_a_line_of_the_repr(found: Diagnosis):
+    lines = repr(dataclasses.replace(found, change=CHANGE)).splitlines()
+
+    assert lines[-1] == (
+        "  changed at about t = 4.9 s (4.8 to 5.0) of 02-recovery, before: intact>"
+    )
+
+
+@pytest.mark.parametrize(
+    ("key", "values"),
+    [
+        ("fit", {"loss": "much"}),
+        ("fit", {"loss": 0.1}),
+        ("change", {**CHANGE.to_dict(), "before": "break:nose"}),
+        ("change", {**CHANGE.to_dict(), "time": "late"}),
+        ("detectable", [{"kind": "motor", "part": "", "below": "none", "above": None}]),
+    ],
+)
+def test_wrong_values_of_a_file_are_refused(found: Diagnosis, key: str, values: object):
+    with pytest.raises((ValueError, KeyError)):
+        diagnosis_from_dict({**found.to_dict(), key: values}, SPACE.parse)
 
 
 def test_the_command_line_lists_only_the_extra_fault(found: Diagnosis):

@@ -122,9 +122,7 @@ def test_a_comparator_without_times_has_no_timeline_and_no_signals(
     assert evidence.timeline(trials) is None
     assert evidence.losses_by_signal(INTACT, trials) == {}
     part = TrialPart(trials[0], 1.0, 2.0)
-    np.testing.assert_array_equal(
-        evidence.losses(two, [part]), evidence.losses(two, trials[:1])
-    )
+    np.testing.assert_array_equal(evidence.losses(two, [part]), evidence.losses(two, trials[:1]))
 
 
 @pytest.mark.parametrize("comparator", [SEGMENT_PREDICTION, SEGMENT_PREDICTION_ONBOARD])
@@ -147,9 +145,7 @@ def test_the_losses_of_the_signals_sum_to_the_mean_loss(
         assert expected > 0
 
 
-def test_a_hypothesis_that_diverged_has_no_losses_by_signal(
-    quadruped: Robot, trials: list[Trial]
-):
+def test_a_hypothesis_that_diverged_has_no_losses_by_signal(quadruped: Robot, trials: list[Trial]):
     simulator = Simulator(quadruped, 1)
     bad = exploding(simulator, "jam:front_left_knee")
 

@@ -1,11 +1,14 @@
 """Tests of the canonical form: equal hypotheses have equal effects, with the fewest faults."""
 
+import dataclasses
+
 import pytest
 from hypothesis import given, strategies as st
 
 from selfmodel.faults.hypothesis import INTACT, canonical
 from selfmodel.faults.kind import Fault
 from selfmodel.faults.notation import parse
+from selfmodel.faults.payload import PAYLOAD
 from selfmodel.faults.registry import KINDS
 from selfmodel.tasks import ROBOTS
 from tests.helpers.strategies import faults
@@ -108,3 +111,33 @@ def test_of_a_joint_said_to_be_jammed_at_zero_and_at_an_angle_zero_counts():
 
     assert str(canonical(both, ANATOMIES["quadruped"])) == "jam:front_left_knee"
     assert str(canonical(both[::-1], ANATOMIES["quadruped"])) == "jam:front_left_knee"
+
+
+PAYLOADS = [
+    Fault(PAYLOAD, part, severity)
+    for part in PAYLOAD.parts(ANATOMIES["quadruped"])
+    for severity in (0.2, 0.4)
+]
+
+
+@given(
+    payloads=st.lists(st.sampled_from(PAYLOADS), min_size=1, unique_by=lambda one: one.part),
+    others=st.lists(faults(ANATOMIES["quadruped"], graded=False), max_size=3),
+    data=st.data(),
+)
+def test_of_a_single_kind_the_first_part_is_kept_in_any_order(
+    payloads: list[Fault], others: list[Fault], data: st.DataObject
+):
+    order = data.draw(st.permutations([*payloads, *others]))
+    found = canonical(order, ANATOMIES["quadruped"])
+
+    assert found == canonical([*payloads, *others], ANATOMIES["quadruped"])
+    assert [fault for fault in found.faults if fault.kind == PAYLOAD] == [min(payloads)]
+
+
+def test_a_kind_that_is_not_single_keeps_all_its_parts():
+    many = dataclasses.replace(PAYLOAD, name="cargo", keyword="cargo", is_single=False)
+    parts = PAYLOAD.parts(ANATOMIES["quadruped"])
+    found = canonical([Fault(many, part, 0.2) for part in parts], ANATOMIES["quadruped"])
+
+    assert {fault.part for fault in found.faults} == set(parts)

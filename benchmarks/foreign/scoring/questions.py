@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 PAPER = "break,jam,sensor"
-WIDE = "break,jam,sensor,jam-angle,motor,friction,slope"
 DEFAULT = ""
 ALL = "all"
 
@@ -25,10 +24,10 @@ class Question:
 
 QUESTIONS = {
     "paper": Question(PAPER),
-    "healthy": Question(WIDE),
+    "healthy": Question(DEFAULT),
     "wide": Question(ALL),
     "default": Question(DEFAULT, trials=3),
-    "onset": Question(WIDE),
+    "onset": Question(DEFAULT),
     "lost-encoder": Question(PAPER),
     "outside": Question(DEFAULT),
 }

@@ -1,6 +1,7 @@
 """Diagnoses of recordings by the command line of selfmodel, one JSON line each."""
 
 import dataclasses
+import hashlib
 import json
 import os
 import subprocess
@@ -23,6 +24,8 @@ def score(
 ) -> Iterator[dict[str, Any]]:
     """Diagnoses every recording of a folder that has no row yet, and appends the rows.
 
+    The order is that of the names' digests, so that the rows of an interrupted run are a sample.
+
     Args:
         out: Folder of the recordings.
         rows: File with a JSON object per line; created if it does not exist.
@@ -31,7 +34,7 @@ def score(
     """
     done = {(row["name"], _key(row["asked"])) for row in read_rows(rows)}
     left = []
-    for path in sorted(out.glob("*/truth.json")):
+    for path in sorted(out.glob("*/truth.json"), key=_digest):
         question = question_of(json.loads(path.read_text())["group"])
         if (path.parent.name, _key(dataclasses.asdict(question))) not in done:
             left.append((path.parent, question))
@@ -40,6 +43,10 @@ def score(
             file.write(json.dumps(future.result()) + "\n")
             file.flush()
             yield future.result()
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.parent.name.encode()).hexdigest()
 
 
 def _key(asked: dict[str, Any]) -> str:

@@ -34,11 +34,12 @@ def fit_sentence(found: Mapping[str, Any]) -> str:
     if not fit or fit["loss"] is None:
         return ""
     loss = f"Mean loss {fit['loss']:.3g}, of intact {_number(fit['intact_loss'])}"
-    if fit["healthy_loss"] is None:
+    if fit["healthy_loss"] is None and fit["excess"] is None:
         return f"{loss}; no trial of the healthy robot to compare with."
+    excess = "infinitely many" if fit["excess"] is None else f"{fit['excess']:.3g}"
     return (
-        f"{loss}, on healthy trials {_number(fit['healthy_loss'])}: an excess of "
-        f"{_number(fit['excess'])} standard errors, unexplained above {fit['threshold']:g}."
+        f"{loss}, on healthy trials {_number(fit['healthy_loss'])}: an excess of {excess} standard "
+        f"errors, unexplained above {fit['threshold']:g}."
     )
 
 
@@ -59,7 +60,7 @@ def evidence_sentences(found: Mapping[str, Any]) -> list[str]:
 
 
 def _number(value: float | None) -> str:
-    return "diverged" if value is None else f"{value:.3g}"
+    return "infinite" if value is None else f"{value:.3g}"
 
 
 def _change(change: Mapping[str, Any]) -> str:
