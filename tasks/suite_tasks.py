@@ -10,7 +10,7 @@ import mujoco
 from selfmodel.errors import InputError
 from selfmodel.faults.build import apply_faults
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.faults.neuron import SILENT_NEURON
+from selfmodel.faults.kinds.neuron import SILENT_NEURON
 from selfmodel.physical.reality_gap import draw_gap_of, perturbed_model
 from selfmodel.robot.anatomy.anatomy import Anatomy
 from selfmodel.robot.anatomy.reader import read_anatomy

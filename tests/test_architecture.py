@@ -192,7 +192,6 @@ BY_THEME = {
     "cli/test_kinds": "one option of many commands",
     "cli/test_tables": "the commands that write and read tables",
     "faults/test_graded": "all kinds with a severity, each a file of its own",
-    "faults/test_kinds": "the contract of every kind, each a file of its own",
     "logs/recordings/rosbag/test_bags": "a reader of recordings that are made here",
     "logs/recordings/test_import": "an import from beginning to end",
     "logs/recordings/test_roundtrip": "an import from beginning to end",

@@ -14,14 +14,14 @@ from benchmarks.go2.sample import (
 from selfmodel.comparators.segment_prediction import SegmentPrediction
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.evidence import Evidence
-from selfmodel.diagnosis.significance import is_better
-from selfmodel.faults.broken import BROKEN
+from selfmodel.diagnosis.verdicts.significance import is_better
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
-from selfmodel.faults.jammed import JAMMED
 from selfmodel.faults.kind import Fault
-from selfmodel.faults.motor import WEAK_MOTOR
-from selfmodel.faults.sensor import FAILED_SENSOR
+from selfmodel.faults.kinds.broken import BROKEN
+from selfmodel.faults.kinds.jammed import JAMMED
+from selfmodel.faults.kinds.motor import WEAK_MOTOR
+from selfmodel.faults.kinds.sensor import FAILED_SENSOR
 from selfmodel.robot.joint_parameters import (
     QUANTITIES,
     JointParameters,

@@ -35,8 +35,8 @@ from selfmodel.cli.output.ranking import (
 )
 from selfmodel.cli.output.tables import print_tables
 from selfmodel.controllers.playback import Playback
-from selfmodel.diagnosis.direct_evidence import direct_evidence
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
+from selfmodel.diagnosis.verdicts.direct_evidence import direct_evidence
 from selfmodel.experiments import plugins, trial_logs
 from selfmodel.experiments.arguments import AUTO, comparator_choice
 from selfmodel.experiments.expected_time import diagnosis_seconds

@@ -44,7 +44,7 @@ from selfmodel.experiments.chosen_score import choose_score
 from selfmodel.experiments.experiment import Experiment, run
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.hypothesis_space import HypothesisSpace
-from selfmodel.faults.neuron import silent_neurons
+from selfmodel.faults.kinds.neuron import silent_neurons
 from selfmodel.logs.files import replace_file
 from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.robot.robot import Robot

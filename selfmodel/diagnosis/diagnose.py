@@ -7,21 +7,21 @@ from functools import partial
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.diagnosis.change_point import Change, best_split, change_at, is_change
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.diagnosis.evidence import Evidence
 from selfmodel.diagnosis.judgement import Question, judged, ranked_by_distance
 from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
-from selfmodel.diagnosis.observed_jams import observed_jams
-from selfmodel.diagnosis.refine import refined
-from selfmodel.diagnosis.search_cost import SearchSize
-from selfmodel.diagnosis.surrogate import Surrogate, own_surrogate, surrogate_of
+from selfmodel.diagnosis.search.observed_jams import observed_jams
+from selfmodel.diagnosis.search.refine import refined
+from selfmodel.diagnosis.search.search_cost import SearchSize
+from selfmodel.diagnosis.search.surrogate import Surrogate, own_surrogate, surrogate_of
+from selfmodel.diagnosis.verdicts.change_point import Change, best_split, change_at, is_change
 from selfmodel.evolution import Evolution, GenerationCallback, evolve
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import GENE_VALUES, HypothesisSpace
-from selfmodel.faults.jammed import JAMMED_AT_ANGLE
 from selfmodel.faults.kind import FaultKind
+from selfmodel.faults.kinds.jammed import JAMMED_AT_ANGLE
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from selfmodel.diagnosis.change_point import Change
-from selfmodel.diagnosis.detectable import DetectableSeverity
-from selfmodel.diagnosis.fit import Fit
-from selfmodel.diagnosis.residual import Residual
+from selfmodel.diagnosis.verdicts.change_point import Change
+from selfmodel.diagnosis.verdicts.detectable import DetectableSeverity
+from selfmodel.diagnosis.verdicts.fit import Fit
+from selfmodel.diagnosis.verdicts.residual import Residual
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.trials.data_frame import data_frame
 from selfmodel.trials.trial import Trial

@@ -7,7 +7,6 @@ from typing import Literal
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
-from selfmodel.diagnosis.change_point import Timeline
 from selfmodel.diagnosis.comparator import (
     Comparator,
     LocatedTrial,
@@ -17,7 +16,8 @@ from selfmodel.diagnosis.comparator import (
     as_comparator,
 )
 from selfmodel.diagnosis.preparation import contract_error, prepared_trial
-from selfmodel.diagnosis.search_cost import steps_of
+from selfmodel.diagnosis.search.search_cost import steps_of
+from selfmodel.diagnosis.verdicts.change_point import Timeline
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.simulation.batch_memory import largest_batch

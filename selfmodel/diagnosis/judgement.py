@@ -5,17 +5,17 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from selfmodel.arrays import FloatArray
-from selfmodel.diagnosis.detectable import detectable_severities
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
 from selfmodel.diagnosis.evidence import Evidence
-from selfmodel.diagnosis.fit import Fit
 from selfmodel.diagnosis.loss_functions import LossFunctions
-from selfmodel.diagnosis.model_error import any_fault_is_model_error
-from selfmodel.diagnosis.residual import Residual, residual_of
-from selfmodel.diagnosis.significance import TEST, is_better
-from selfmodel.diagnosis.undetectable import undetectable_faults
-from selfmodel.diagnosis.unsearched import best_unsearched_fault
-from selfmodel.diagnosis.verdict import all_diverged, fit_of, verdict_of
+from selfmodel.diagnosis.verdicts.detectable import detectable_severities
+from selfmodel.diagnosis.verdicts.fit import Fit
+from selfmodel.diagnosis.verdicts.model_error import any_fault_is_model_error
+from selfmodel.diagnosis.verdicts.residual import Residual, residual_of
+from selfmodel.diagnosis.verdicts.significance import TEST, is_better
+from selfmodel.diagnosis.verdicts.undetectable import undetectable_faults
+from selfmodel.diagnosis.verdicts.unsearched import best_unsearched_fault
+from selfmodel.diagnosis.verdicts.verdict import all_diverged, fit_of, verdict_of
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind

@@ -10,11 +10,11 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, get_args
 
-from selfmodel.diagnosis.change_point import Change
-from selfmodel.diagnosis.detectable import DetectableSeverity
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, UnsearchedFault, Verdict
-from selfmodel.diagnosis.fit import Fit
-from selfmodel.diagnosis.residual import Residual
+from selfmodel.diagnosis.verdicts.change_point import Change
+from selfmodel.diagnosis.verdicts.detectable import DetectableSeverity
+from selfmodel.diagnosis.verdicts.fit import Fit
+from selfmodel.diagnosis.verdicts.residual import Residual
 from selfmodel.faults.hypothesis import Hypothesis
 
 

@@ -2,21 +2,21 @@
 
 from collections.abc import Iterable, Mapping
 
-from selfmodel.faults.broken import BROKEN
-from selfmodel.faults.damping import DAMPED_JOINT
-from selfmodel.faults.delay import GROWN_DELAY
-from selfmodel.faults.encoder import ENCODER_OFFSET
-from selfmodel.faults.grip import LOST_GRIP
-from selfmodel.faults.ground import FRICTION, SLOPE
-from selfmodel.faults.jammed import JAMMED, JAMMED_AT_ANGLE
-from selfmodel.faults.joint_friction import JOINT_FRICTION
 from selfmodel.faults.kind import FaultKind
-from selfmodel.faults.motor import WEAK_MOTOR
-from selfmodel.faults.neuron import SILENT_NEURON
-from selfmodel.faults.payload import PAYLOAD
-from selfmodel.faults.sensor import FAILED_SENSOR, SENSOR_BIAS, SENSOR_GAIN, SENSOR_NOISE
-from selfmodel.faults.terrain import ROUGHNESS
-from selfmodel.faults.wind import CROSSWIND, WIND
+from selfmodel.faults.kinds.broken import BROKEN
+from selfmodel.faults.kinds.damping import DAMPED_JOINT
+from selfmodel.faults.kinds.delay import GROWN_DELAY
+from selfmodel.faults.kinds.encoder import ENCODER_OFFSET
+from selfmodel.faults.kinds.grip import LOST_GRIP
+from selfmodel.faults.kinds.ground import FRICTION, SLOPE
+from selfmodel.faults.kinds.jammed import JAMMED, JAMMED_AT_ANGLE
+from selfmodel.faults.kinds.joint_friction import JOINT_FRICTION
+from selfmodel.faults.kinds.motor import WEAK_MOTOR
+from selfmodel.faults.kinds.neuron import SILENT_NEURON
+from selfmodel.faults.kinds.payload import PAYLOAD
+from selfmodel.faults.kinds.sensor import FAILED_SENSOR, SENSOR_BIAS, SENSOR_GAIN, SENSOR_NOISE
+from selfmodel.faults.kinds.terrain import ROUGHNESS
+from selfmodel.faults.kinds.wind import CROSSWIND, WIND
 
 KINDS: Mapping[str, FaultKind] = {
     kind.name: kind

@@ -3,8 +3,8 @@
 import mujoco
 import numpy as np
 
-from selfmodel.faults.broken import BROKEN
 from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.faults.kinds.broken import BROKEN
 from selfmodel.physical.reality_gap import DEBRIS_PREFIX
 from selfmodel.robot.robot import Robot
 

@@ -31,7 +31,7 @@ from selfmodel.errors import InputError
         ("--damages", "brek:front_left_knee", "did you mean break?"),
         (
             "--kinds",
-            "selfmodel.faults.neuron:SILENT_NEURON",
+            "selfmodel.faults.kinds.neuron:SILENT_NEURON",
             "no diagnosis may propose neuron: leave neuron out",
         ),
         (

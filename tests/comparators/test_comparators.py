@@ -10,7 +10,7 @@ from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.comparator_contract import check_comparator, shown
 from selfmodel.diagnosis.evidence import Evidence, simulate
-from selfmodel.diagnosis.significance import NEGLIGIBLE_LOSS
+from selfmodel.diagnosis.verdicts.significance import NEGLIGIBLE_LOSS
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse

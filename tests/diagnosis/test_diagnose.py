@@ -23,9 +23,9 @@ from selfmodel.diagnosis.serialization import (
     ranking_to_list,
 )
 from selfmodel.errors import InputError
-from selfmodel.faults.broken import BROKEN
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.faults.jammed import JAMMED
+from selfmodel.faults.kinds.broken import BROKEN
+from selfmodel.faults.kinds.jammed import JAMMED
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.recovery.repair import RepairSearch

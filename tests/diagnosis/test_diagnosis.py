@@ -9,12 +9,12 @@ from types import SimpleNamespace
 import pytest
 from hypothesis import given, strategies as st
 
-from selfmodel.diagnosis.change_point import Change
-from selfmodel.diagnosis.detectable import DetectableSeverity
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, UnsearchedFault
-from selfmodel.diagnosis.fit import Fit
-from selfmodel.diagnosis.residual import Residual
 from selfmodel.diagnosis.serialization import confidence_to_dict, diagnosis_from_dict
+from selfmodel.diagnosis.verdicts.change_point import Change
+from selfmodel.diagnosis.verdicts.detectable import DetectableSeverity
+from selfmodel.diagnosis.verdicts.fit import Fit
+from selfmodel.diagnosis.verdicts.residual import Residual
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.hypothesis_space import HypothesisSpace

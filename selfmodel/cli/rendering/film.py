@@ -8,10 +8,10 @@ import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.cli.rendering.poses import poses_of
-from selfmodel.faults.broken import BROKEN
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.faults.jammed import JAMMED, JAMMED_AT_ANGLE
+from selfmodel.faults.kinds.broken import BROKEN
+from selfmodel.faults.kinds.jammed import JAMMED, JAMMED_AT_ANGLE
 from selfmodel.robot.base.known_base import with_known_base
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Behaviour

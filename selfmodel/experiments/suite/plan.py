@@ -14,7 +14,7 @@ from selfmodel.experiments.chosen_score import check_score
 from selfmodel.experiments.gaits import check_not_evolved, gait_settings
 from selfmodel.experiments.grid import Job, check_shared
 from selfmodel.experiments.study_files import check_keys, key_of
-from selfmodel.faults.neuron import silent_neurons
+from selfmodel.faults.kinds.neuron import silent_neurons
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.physical.reality_gap import MAX_GAP_LEVEL

@@ -15,7 +15,7 @@ from selfmodel.experiments.study_files import as_dicts
 from selfmodel.experiments.suite.plan import Study, check, gait_jobs, gait_path, recovery_jobs
 from selfmodel.experiments.suite.rows import SuiteRow
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
-from selfmodel.faults.neuron import silent_neurons
+from selfmodel.faults.kinds.neuron import silent_neurons
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.recovery.upright import falls_of

@@ -10,11 +10,11 @@ from selfmodel.cli.output.ranking import (
     evidence_sentences,
     fit_sentence,
 )
-from selfmodel.diagnosis.change_point import Change
-from selfmodel.diagnosis.detectable import DetectableSeverity
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
-from selfmodel.diagnosis.fit import Fit
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
+from selfmodel.diagnosis.verdicts.change_point import Change
+from selfmodel.diagnosis.verdicts.detectable import DetectableSeverity
+from selfmodel.diagnosis.verdicts.fit import Fit
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.tasks import ROBOTS

@@ -1,0 +1,1 @@
+"""The search for the best hypothesis: refinement, severities and surrogates."""

@@ -1,0 +1,1 @@
+"""The judgement of the best hypothesis: tests, numbers and verdict."""

@@ -1,0 +1,232 @@
+"""Change-point: the time at which the robot changed, from losses along time.
+
+The pieces of all trials, in the order of the trials, are one timeline. Before a change, one
+hypothesis predicts the pieces; after it, another. The losses of the candidates are known from the
+search, so a scan over all times is a cumulative sum and needs no further simulation.
+
+Source: Page, "Continuous inspection schemes", Biometrika 41 (1954), the cumulative sum; here of the
+differences of two hypotheses' losses, over all times afterwards.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from selfmodel.arrays import BoolArray, FloatArray, IndexArray
+from selfmodel.diagnosis.loss_functions import Losses
+from selfmodel.diagnosis.verdicts.significance import is_better, paired_z
+from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.trials.trial import Trial
+from selfmodel.trials.trial_part import TrialPart
+
+MIN_PIECES = 8
+"""Pieces before and after a change, at least: two of the surrogate comparator, with a third."""
+
+MIN_Z_OF_CHANGE = 5.0
+"""Standard errors by which a hypothesis with a change has to be better than one without. The
+threshold is higher than for a fault, because each time and each candidate is tested."""
+
+SHORTLIST = 8
+"""Candidates whose change is computed with the comparator itself."""
+
+TOLERANCE = 2.0
+"""Loss that the bounds of the interval may cost, in mean differences of a piece."""
+
+
+@dataclass(frozen=True, eq=False)
+class Timeline:
+    """Times of the pieces of some trials, in the order of the trials.
+
+    Attributes:
+        trial: Index of the trial of each piece, ``(pieces,)``.
+        begin: First time of each piece, s since the start of its trial, ``(pieces,)``.
+        end: Last time of each piece, likewise.
+    """
+
+    trial: IndexArray
+    begin: FloatArray
+    end: FloatArray
+
+
+@dataclass(frozen=True)
+class Change:
+    """A change of the robot, or of its environment, at a time.
+
+    Attributes:
+        trial: Name of the trial in which the change occurred.
+        index: Index of that trial among the trials of the diagnosis.
+        time: Time of the change, s since the start of that trial.
+        earliest: Lower bound of the time, s.
+        latest: Upper bound of the time, s.
+        before: Best hypothesis about the time before the change.
+        after: Hypothesis about the time after the change, with which the time was found.
+    """
+
+    trial: str
+    index: int
+    time: float
+    earliest: float
+    latest: float
+    before: Hypothesis
+    after: Hypothesis
+
+    def __str__(self) -> str:
+        return (
+            f"changed at about t = {self.time:.1f} s ({self.earliest:.1f} to {self.latest:.1f}) "
+            f"of {self.trial}, before: {self.before}"
+        )
+
+    def since(self, trials: Sequence[Trial]) -> list[Trial | TrialPart]:
+        """Returns the trials from the change on.
+
+        The piece that contains the change is left out: neither hypothesis predicts it.
+
+        Args:
+            trials: All trials of the diagnosis.
+        """
+        first, *rest = trials[self.index :]
+        return [TrialPart(first, begin=math.nextafter(self.time, math.inf)), *rest]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns the JSON values."""
+        return {
+            "trial": self.trial,
+            "index": self.index,
+            "time": self.time,
+            "earliest": self.earliest,
+            "latest": self.latest,
+            "before": str(self.before),
+            "after": str(self.after),
+        }
+
+
+@dataclass(frozen=True)
+class Split:
+    """A change between two pieces of a timeline.
+
+    Attributes:
+        before: Hypothesis about the pieces before the change.
+        after: Hypothesis about the pieces from the change on.
+        piece: Index of the first piece after the change.
+    """
+
+    before: Hypothesis
+    after: Hypothesis
+    piece: int
+
+
+def best_split(
+    before: Sequence[Hypothesis],
+    after: Sequence[Hypothesis],
+    coarse: Losses,
+    losses: Losses,
+) -> Split | None:
+    """Returns the change between two hypotheses with the smallest total loss.
+
+    Args:
+        before: Hypotheses about the time before the change.
+        after: Hypotheses about the time after it.
+        coarse: Losses of the surrogate comparator, ``(n, pieces)``, which select the hypotheses.
+        losses: Losses of the comparator itself, which decide.
+
+    Returns:
+        None if the timeline is too short, or if every simulation diverged.
+    """
+    shortlist = [split.after for split in _splits(before, after, coarse)[:SHORTLIST]]
+    found = _splits(before, shortlist, losses)
+    return found[0] if found else None
+
+
+def is_change(split: Split, single: Hypothesis, losses: Losses) -> bool:
+    """Returns whether a change predicts the trials significantly better than no change.
+
+    Three conditions hold: before the change, the first hypothesis is significantly better than the
+    second; after it, the second is better than the first by ``MIN_Z_OF_CHANGE`` standard errors;
+    and with the change, all pieces together are predicted significantly better than without.
+
+    Args:
+        split: The change.
+        single: The best hypothesis without a change.
+        losses: Losses on the timeline, ``(n, pieces)``.
+    """
+    before, after, alone = losses([split.before, split.after, single])
+    k = split.piece
+    changed = np.concatenate([before[:k], after[k:]])
+    return (
+        is_better(before[:k], after[:k])
+        and is_better(after[k:], before[k:])
+        and paired_z(before[k:], after[k:]) >= MIN_Z_OF_CHANGE
+        and is_better(changed, alone)
+    )
+
+
+def change_at(split: Split, losses: Losses, timeline: Timeline, names: Sequence[str]) -> Change:
+    """Returns the change of a split, with its time and the bounds of the time.
+
+    The bounds are those of the pieces between which the change costs at most ``TOLERANCE`` mean
+    differences of a piece more than at the best place.
+
+    Args:
+        split: The change.
+        losses: Losses on the timeline, ``(n, pieces)``.
+        timeline: Times of the pieces.
+        names: Names of the trials.
+    """
+    before, after = losses([split.before, split.after])
+    k = split.piece
+    totals = _totals(before, after[np.newaxis])[0]
+    typical = min((after - before)[:k].mean(), (before - after)[k:].mean())
+    possible = _run_around(totals <= totals[k] + TOLERANCE * max(float(typical), 0.0), k)
+    index = int(timeline.trial[k])
+    inside = np.flatnonzero(timeline.trial == index)
+    first, last = np.clip(possible, inside[0], inside[-1]).tolist()
+    return Change(
+        trial=names[index],
+        index=index,
+        time=float(timeline.begin[k]),
+        earliest=float(timeline.begin[max(first - 1, inside[0])]),
+        latest=float(timeline.end[last]),
+        before=split.before,
+        after=split.after,
+    )
+
+
+def _splits(
+    before: Sequence[Hypothesis], after: Sequence[Hypothesis], losses: Losses
+) -> list[Split]:
+    """Returns the best change from any hypothesis before to each one after, best first."""
+    if not after:
+        return []
+    rows = losses([*before, *after])
+    firsts, seconds = rows[: len(before)], rows[len(before) :]
+    if rows.shape[1] < 2 * MIN_PIECES:
+        return []
+    found: list[tuple[float, int, Split]] = []
+    for second, row in zip(after, seconds, strict=True):
+        for first, own in zip(before, firsts, strict=True):
+            if first == second or not (np.isfinite(own).all() and np.isfinite(row).all()):
+                continue
+            totals = _totals(own, row[np.newaxis])[0]
+            inner = totals[MIN_PIECES : len(row) - MIN_PIECES + 1]
+            piece = MIN_PIECES + int(np.argmin(inner))
+            found.append((float(totals[piece]), len(found), Split(first, second, piece)))
+    return [split for _, _, split in sorted(found, key=lambda one: one[:2])]
+
+
+def _totals(before: FloatArray, after: FloatArray) -> FloatArray:
+    """Returns the total loss of a change before each piece, ``(n, pieces + 1)``."""
+    zero = np.zeros((len(after), 1))
+    past = np.append(0.0, np.cumsum(before))
+    rest = np.hstack([np.cumsum(after[:, ::-1], axis=1)[:, ::-1], zero])
+    return past + rest
+
+
+def _run_around(mask: BoolArray, k: int) -> tuple[int, int]:
+    """Returns the first and the last index of the run of true values around index k."""
+    no = np.flatnonzero(~mask)
+    first = int(no[no < k].max(initial=-1)) + 1
+    last = int(no[no > k].min(initial=len(mask))) - 1
+    return max(first, 1), min(last, len(mask) - 2)

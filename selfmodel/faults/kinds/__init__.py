@@ -1,0 +1,1 @@
+"""The fault kinds, one file per kind or group of kinds."""
