@@ -15,13 +15,12 @@ from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
 from selfmodel.diagnosis.search.observed_jams import observed_jams
 from selfmodel.diagnosis.search.refine import refined
 from selfmodel.diagnosis.search.search_cost import SearchSize
-from selfmodel.diagnosis.search.surrogate import Surrogate, own_surrogate, surrogate_of
+from selfmodel.diagnosis.search.surrogate import Surrogate, own_surrogates, surrogate_of
 from selfmodel.diagnosis.verdicts.change_point import Change, best_split, change_at, is_change
 from selfmodel.evolution import Evolution, GenerationCallback, evolve
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import GENE_VALUES, HypothesisSpace
 from selfmodel.faults.kind import FaultKind
-from selfmodel.faults.kinds.jammed import JAMMED_AT_ANGLE
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
@@ -63,7 +62,7 @@ class DiagnosticSearch:
         self._space = HypothesisSpace.of(kinds, simulator.robot.anatomy)
         self._intact = tuple(intact)
         self.evidence = Evidence(simulator, comparator)
-        self._own_surrogate = own_surrogate(comparator, simulator)
+        self._own_surrogates = own_surrogates(comparator, simulator)
         self._proposed: set[Hypothesis] = set()
         self.evaluations = 0
 
@@ -82,7 +81,7 @@ class DiagnosticSearch:
             rng: Source of all random numbers.
             on_generation: Callback, called after each generation.
         """
-        surrogate = surrogate_of(self.evidence, self._own_surrogate, trials)
+        surrogate = surrogate_of(self.evidence, self._own_surrogates, trials)
         found = self._evolved(surrogate, seeds, rng, on_generation)
         question = self._question(trials, surrogate.losses)
         if not self.evidence.is_piecewise(trials):
@@ -105,7 +104,7 @@ class DiagnosticSearch:
                 the reason.
         """
         self.evidence.check([*self._intact, *trials])
-        surrogate = surrogate_of(self.evidence, self._own_surrogate, trials)
+        surrogate = surrogate_of(self.evidence, self._own_surrogates, trials)
         surrogate.evidence.check(surrogate.trials)
 
     def simulated_steps(self, trials: Sequence[Trial]) -> int:
@@ -114,7 +113,7 @@ class DiagnosticSearch:
         Args:
             trials: Trials that the comparator accepts; see ``check``.
         """
-        surrogate = surrogate_of(self.evidence, self._own_surrogate, trials)
+        surrogate = surrogate_of(self.evidence, self._own_surrogates, trials)
         return SearchSize(
             settings=self._settings,
             candidates=len(self._space.coarse_candidates),
@@ -196,8 +195,6 @@ class DiagnosticSearch:
 
     def _space_of(self, trials: Sequence[Trial | TrialPart]) -> HypothesisSpace:
         """Returns the hypotheses, with jams at the angles at which the encoders end."""
-        if JAMMED_AT_ANGLE not in self._space.kinds:
-            return self._space
         anatomy = self._space.anatomy
         jams = observed_jams([whole(trial).rows for trial in trials], anatomy)
         return dataclasses.replace(self._space, observed=jams)

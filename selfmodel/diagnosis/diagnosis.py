@@ -1,8 +1,8 @@
 """A diagnosis: hypotheses ranked by distance to all trials, and a verdict on the best."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from selfmodel.diagnosis.verdicts.change_point import Change
@@ -50,14 +50,22 @@ class UnsearchedFault:
     Attributes:
         hypothesis: The complete hypothesis, including the fault of the unsearched kind.
         kind: Name of the unsearched kind.
+        others: The best hypothesis of each other unsearched kind that predicts the trials
+            significantly better too, by the kind's name.
     """
 
     hypothesis: Hypothesis
     kind: str
+    others: Mapping[str, Hypothesis] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the JSON values."""
-        return {"hypothesis": str(self.hypothesis), "kind": self.kind}
+        others = {kind: str(hypothesis) for kind, hypothesis in self.others.items()}
+        return {
+            "hypothesis": str(self.hypothesis),
+            "kind": self.kind,
+            **({"others": others} if others else {}),
+        }
 
 
 @dataclass(frozen=True)

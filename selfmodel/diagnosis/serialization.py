@@ -71,7 +71,11 @@ def diagnosis_from_dict(values: Mapping[str, Any], parse: Callable[[str], Hypoth
         test=str(values["test"]),
         unsearched=outside
         if outside is None
-        else UnsearchedFault(parse(outside["hypothesis"]), str(outside["kind"])),
+        else UnsearchedFault(
+            parse(outside["hypothesis"]),
+            str(outside["kind"]),
+            {str(kind): parse(text) for kind, text in outside.get("others", {}).items()},
+        ),
         undetectable=tuple(parse(text) for text in values.get("unseen", ())),
         reason=str(values.get("reason", "")),
         detectable=tuple(_detectable(item) for item in values.get("detectable", ())),

@@ -33,8 +33,8 @@ class HypothesisSpace:
     Attributes:
         anatomy: The robot's parts.
         kinds: Fault kinds, in the order of the second value of a gene.
-        observed: Faults whose severity the trials contain: coarse candidates in the place of the
-            levels of the same kind and part.
+        observed: Faults whose severity the trials contain: those of the searched kinds are coarse
+            candidates in the place of the levels of the same kind and part.
     """
 
     anatomy: Anatomy
@@ -106,7 +106,7 @@ class HypothesisSpace:
             for levels in (kind.levels(self.anatomy, part),)
             for i in _evenly_spaced(len(levels))
         )
-        return (*spaced, *self.observed)
+        return (*spaced, *(fault for fault in self.observed if fault.kind in self.kinds))
 
     def decode(self, genome: FloatArray) -> Hypothesis:
         """Returns the hypothesis that a genome encodes.

@@ -116,9 +116,11 @@ def _verdict(found: Mapping[str, Any]) -> str:
         return f"Unexplained: {found['reason']}."
     if found["outside"] is not None:
         better, kind = found["outside"]["hypothesis"], found["outside"]["kind"]
+        others = found["outside"].get("others", {})
+        also = f" ({', '.join(others)} would do so too)" if others else ""
         return (
-            f"Unexplained: {better} predicts the trials significantly better than {best}; add "
-            f"{kind} to --kinds."
+            f"Unexplained: {better} predicts the trials significantly better than {best}{also}; "
+            f"add {kind} to --kinds."
         )
     return (
         f"Unexplained: even {best} predicts the trials significantly worse than the self-model "

@@ -17,6 +17,9 @@ OPENING = 1 / 3
 
 The first part discriminates best: later, contact has made any two simulations differ."""
 
+LEVELS, MANY_TRIALS = 2, 3
+"""Surrogates, each of the one before, and trials from which on the last one is used."""
+
 MIN_OPENING = 100
 """Control steps of the shortest opening; a shorter trial is simulated whole."""
 
@@ -42,29 +45,38 @@ class Surrogate:
         return self.evidence.distances(hypotheses, self.trials)
 
 
-def own_surrogate(comparator: Comparator, simulator: Simulator) -> Evidence | None:
-    """Returns the evidence of the comparator's own surrogate; None if it has none."""
-    if isinstance(comparator, ComparatorWithSurrogate):
-        return Evidence(simulator, comparator.surrogate)
-    return None
+def own_surrogates(comparator: Comparator, simulator: Simulator) -> tuple[Evidence, ...]:
+    """Returns the evidence of the comparator's own surrogate and of that one's, as far as they are.
+
+    Args:
+        comparator: The comparator.
+        simulator: The self-model.
+    """
+    found: list[Evidence] = []
+    current = comparator
+    while len(found) < LEVELS and isinstance(current, ComparatorWithSurrogate):
+        current = current.surrogate
+        found.append(Evidence(simulator, current))
+    return tuple(found)
 
 
-def surrogate_of(evidence: Evidence, own: Evidence | None, trials: Sequence[Trial]) -> Surrogate:
+def surrogate_of(evidence: Evidence, own: Sequence[Evidence], trials: Sequence[Trial]) -> Surrogate:
     """Returns the surrogate of a comparator on trials.
 
     The surrogate of a comparator without losses is the comparator itself: its hypotheses are not
     refined, so its distances from the whole trials make the ranking. Otherwise it is the
-    comparator's own surrogate, or the comparator on the openings of the trials.
+    comparator's own surrogate, or the comparator on the openings of the trials. Of ``MANY_TRIALS``
+    or more, the surrogate of the surrogate is enough: together they have as many pieces as one.
 
     Args:
         evidence: Losses of the comparator.
-        own: Losses of the comparator's own surrogate, if it has one.
+        own: Losses of the comparator's own surrogates; see ``own_surrogates``.
         trials: Trials that the comparator can judge.
     """
     if not evidence.is_piecewise(trials):
         return Surrogate(evidence, trials)
-    if own is not None:
-        return Surrogate(own, trials)
+    if own:
+        return Surrogate(own[-1] if len(trials) >= MANY_TRIALS else own[0], trials)
     return Surrogate(evidence, [_opening(evidence, trial) for trial in trials])
 
 

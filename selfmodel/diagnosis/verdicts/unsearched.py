@@ -30,8 +30,8 @@ def best_unsearched_fault(
         losses: Loss functions of the trials.
 
     Returns:
-        The hypothesis with the lowest total loss that passes; None if there is none, or if there
-        are no comparable healthy trials.
+        The hypothesis with the lowest total loss that passes, with the best hypothesis of each
+        other kind that passes; None if there is none, or if there are no comparable healthy trials.
     """
     if losses.healthy is None:
         return None
@@ -39,13 +39,20 @@ def best_unsearched_fault(
     if not np.isfinite(best_losses).all() or best_losses.mean() <= NEGLIGIBLE_LOSS:
         return None
     candidates = _candidates(best, space)
+    better: dict[str, Hypothesis] = {}
     for candidate in _shortlist(best, list(candidates), losses):
+        kind = candidates[candidate].kind.name
         alone = space.canonical([candidates[candidate]])
         healthy_without, healthy_with = losses.healthy([INTACT, alone])
         damaged_with = losses.damaged([candidate])[0]
-        if gain_exceeds_healthy_gain(damaged_with, best_losses, healthy_with, healthy_without):
-            return UnsearchedFault(candidate, candidates[candidate].kind.name)
-    return None
+        if kind not in better and gain_exceeds_healthy_gain(
+            damaged_with, best_losses, healthy_with, healthy_without
+        ):
+            better[kind] = candidate
+    if not better:
+        return None
+    (first, hypothesis), *others = better.items()
+    return UnsearchedFault(hypothesis, first, dict(others))
 
 
 def _candidates(best: Hypothesis, space: HypothesisSpace) -> dict[Hypothesis, Fault]:
@@ -56,7 +63,8 @@ def _candidates(best: Hypothesis, space: HypothesisSpace) -> dict[Hypothesis, Fa
     """
     unsearched = [kind for kind in ALL_KINDS if kind not in space.kinds and kind.edit_spec is None]
     found: dict[Hypothesis, Fault] = {}
-    for fault in HypothesisSpace(space.anatomy, tuple(unsearched)).coarse_candidates:
+    further = HypothesisSpace(space.anatomy, tuple(unsearched), space.observed)
+    for fault in further.coarse_candidates:
         others = [other for other in best.faults if other.part != fault.part]
         for faults in ((*best.faults, fault), (*others, fault)):
             found.setdefault(space.canonical(faults), fault)

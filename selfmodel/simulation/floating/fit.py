@@ -57,7 +57,7 @@ one-sided level of 5 %."""
 INDEPENDENT_ERRORS = 100
 """Independent errors of one unit that all errors together count as in the posterior deviations:
 fewer than in the fit, because no model has a factor for each limb and contact. With 100, the
-intervals of the robots with seeds 0 to 63 of ``benchmarks.calibration_robots`` contained the truth
+intervals of the robots with seeds 0 to 63 of ``benchmarks.calibration.robots`` contained the truth
 at about their rates; with 400, those of determined factors contained it too rarely."""
 
 

@@ -9,7 +9,7 @@ from selfmodel.diagnosis.loss_functions import Losses
 from selfmodel.diagnosis.search.refine import MIN_Z_OF_STEP
 from selfmodel.diagnosis.verdicts.significance import is_better
 from selfmodel.faults.hypothesis import Hypothesis, canonical
-from tests.diagnosis.test_refine import ANATOMY, FAULTS, PIECES, centred, find, said
+from tests.diagnosis.search.test_refine import ANATOMY, FAULTS, PIECES, centred, find, said
 
 FEW = FAULTS[-5:]
 """Sensors, whose faults do not absorb each other."""

@@ -14,7 +14,7 @@ from selfmodel.faults.hypothesis_space import COARSE_LEVELS, HypothesisSpace
 from selfmodel.faults.kind import ENVIRONMENT, Fault
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import KINDS, PAPER_KINDS
-from tests.diagnosis.test_refine import ANATOMY, FAULTS, PIECES, SPACE, find
+from tests.diagnosis.search.test_refine import ANATOMY, FAULTS, PIECES, SPACE, find
 
 WEAK_MOTOR = KINDS["motor"]
 

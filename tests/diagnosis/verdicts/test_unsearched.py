@@ -49,7 +49,8 @@ def test_what_explains_more_is_returned(quadruped: Robot):
         LossFunctions(after, after, of(quadruped, {})),
     )
 
-    assert found == UnsearchedFault(parse("wind=12", quadruped.anatomy), "wind")
+    wind, crosswind = (parse(text, quadruped.anatomy) for text in ("wind=12", "crosswind=12"))
+    assert found == UnsearchedFault(wind, "wind", {"crosswind": crosswind})
 
 
 def test_what_helped_before_as_well_mends_the_model_and_is_no_change(quadruped: Robot):
