@@ -114,8 +114,8 @@ def test_the_numbers_behind_a_verdict_are_a_sentence(fit: Fit | None, sentence: 
 def test_the_right_faults_at_another_severity_are_not_wrong(
     best: str,
     truth: str,
-    is_correct: bool,
-    judgement: str,  # noqa: FBT001  # a parameter of cases
+    is_correct: bool,  # noqa: FBT001  # a parameter of cases
+    judgement: str,
 ):
     found = {"correct": is_correct, "truth": truth, "diagnosis": [{"hypothesis": best}]}
 
