@@ -6,6 +6,7 @@ from typing import Any
 from rich.table import Table
 
 from selfmodel.cli.output.plain import plain
+from selfmodel.diagnosis.fit import FAULTY_RATIO
 
 
 def confidence_sentence(found: Mapping[str, Any]) -> str:
@@ -37,9 +38,10 @@ def fit_sentence(found: Mapping[str, Any]) -> str:
     if fit["healthy_loss"] is None and fit["excess"] is None:
         return f"{loss}; no trial of the healthy robot to compare with."
     excess = "infinitely many" if fit["excess"] is None else f"{fit['excess']:.3g}"
+    ratio = f" and {FAULTY_RATIO:g} times that loss" if fit["has_faults"] else ""
     return (
         f"{loss}, on healthy trials {_number(fit['healthy_loss'])}: an excess of {excess} standard "
-        f"errors, unexplained above {fit['threshold']:g}."
+        f"errors, unexplained above {fit['threshold']:g}{ratio}."
     )
 
 
@@ -57,6 +59,23 @@ def evidence_sentences(found: Mapping[str, Any]) -> list[str]:
         facts += [f"constant readings: {', '.join(constant)}"] if constant else []
         sentences += [f"In {one['trial']}, {'; '.join(facts)}."] if facts else []
     return sentences
+
+
+def right_or_wrong(found: Mapping[str, Any]) -> str:
+    """Returns the judgement of the best hypothesis, given the true one.
+
+    Args:
+        found: Values of ``--json`` output of a recovery.
+    """
+    if found["correct"]:
+        return "right"
+    best, truth = found["diagnosis"][0]["hypothesis"], found["truth"]
+    return "right except for severity" if _faults(best) == _faults(truth) else "wrong"
+
+
+def _faults(notation: str) -> set[str]:
+    """Returns the terms of a notation without severities."""
+    return {term.partition("=")[0] for term in notation.split("+")}
 
 
 def _number(value: float | None) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 
 from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_lines
-from selfmodel.cli.output.ranking import confidence_sentence, ranking_table
+from selfmodel.cli.output.ranking import confidence_sentence, ranking_table, right_or_wrong
 from selfmodel.cli.output.tables import folding, print_tables
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
 from selfmodel.experiments.experiment import Experiment, Outcome
@@ -35,9 +35,8 @@ def print_report(found: dict[str, Any], folder: Path) -> None:
     )
     print_tables(trials, ranking_table(found["diagnosis"], found["truth"]))
     evaluations, trials_since = found["evaluations"], found["physical_trials"]
-    verdict = "right" if found["correct"] else "wrong"
     print_lines(
-        f"truth: {found['truth']}{_reality(found)}; the diagnosis is {verdict}.",
+        f"truth: {found['truth']}{_reality(found)}; the diagnosis is {right_or_wrong(found)}.",
         confidence_sentence(found),
         f"{_sentence(found)} at best in {counted(trials_since, 'trial')} since.",
         f"{evaluations['repair']} controllers and {evaluations['distinct_hypotheses']} distinct "

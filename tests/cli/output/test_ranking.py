@@ -9,6 +9,7 @@ from selfmodel.cli.output.ranking import (
     detectable_sentences,
     evidence_sentences,
     fit_sentence,
+    right_or_wrong,
 )
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
@@ -68,20 +69,27 @@ def test_a_change_is_named_before_undetectable_faults():
             Fit(0.1234, float("inf"), 0.1, 2.5, 5.0, has_faults=True),
             (
                 "Mean loss 0.123, of intact infinite, on healthy trials 0.1: an excess of 2.5 "
-                "standard errors, unexplained above 5."
+                "standard errors, unexplained above 5 and 2.5 times that loss."
             ),
         ),
         (
             Fit(0.1234, 0.5, 0.0, float("inf"), 5.0, has_faults=True),
             (
                 "Mean loss 0.123, of intact 0.5, on healthy trials 0: an excess of infinitely many "
-                "standard errors, unexplained above 5."
+                "standard errors, unexplained above 5 and 2.5 times that loss."
             ),
         ),
         (
             Fit(0.1234, 0.5, float("inf"), 0.0, 5.0, has_faults=True),
             (
                 "Mean loss 0.123, of intact 0.5, on healthy trials infinite: an excess of 0 "
+                "standard errors, unexplained above 5 and 2.5 times that loss."
+            ),
+        ),
+        (
+            Fit(0.15, 0.15, 0.125, 1.0, 5.0, has_faults=False),
+            (
+                "Mean loss 0.15, of intact 0.15, on healthy trials 0.125: an excess of 1 "
                 "standard errors, unexplained above 5."
             ),
         ),
@@ -89,6 +97,29 @@ def test_a_change_is_named_before_undetectable_faults():
 )
 def test_the_numbers_behind_a_verdict_are_a_sentence(fit: Fit | None, sentence: str):
     assert fit_sentence(values_of(fit=fit)) == sentence
+
+
+@pytest.mark.parametrize(
+    ("best", "truth", "is_correct", "judgement"),
+    [
+        ("friction=0.4", "friction=0.4", True, "right"),
+        ("intact", "neuron:0", True, "right"),
+        ("friction=0.3895", "friction=0.4", False, "right except for severity"),
+        ("jam:a+wind=9", "wind=12+jam:a=0.3", False, "right except for severity"),
+        ("friction=0.4", "slope=0.4", False, "wrong"),
+        ("friction=0.4+motor:a=0.9", "friction=0.4", False, "wrong"),
+        ("intact", "friction=0.4", False, "wrong"),
+    ],
+)
+def test_the_right_faults_at_another_severity_are_not_wrong(
+    best: str,
+    truth: str,
+    is_correct: bool,  # noqa: FBT001  # a parameter of cases
+    judgement: str,
+):
+    found = {"correct": is_correct, "truth": truth, "diagnosis": [{"hypothesis": best}]}
+
+    assert right_or_wrong(found) == judgement
 
 
 def test_the_limits_of_a_kind_are_one_clause_and_equal_limits_are_named_together():
