@@ -10,6 +10,7 @@ from pathlib import Path
 from benchmarks.foreign.cases import CASES, GROUPS
 from benchmarks.foreign.generate import Plan, generate
 from benchmarks.foreign.robots import NAMES
+from benchmarks.foreign.scoring.csv_rows import write_csv
 from benchmarks.foreign.scoring.judge import summary
 from benchmarks.foreign.scoring.questions import QUESTIONS, Question
 from benchmarks.foreign.scoring.rates import table
@@ -53,6 +54,7 @@ def _add_score(parser: argparse.ArgumentParser) -> None:
 def _add_table(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("rows", type=Path, help="file of the rows")
     parser.add_argument("--by", choices=("group", "case"), default="group")
+    parser.add_argument("--csv", type=Path, help="file to write, a row per recording")
     parser.set_defaults(run=_table)
 
 
@@ -72,7 +74,10 @@ def _score(options: argparse.Namespace) -> None:
 
 
 def _table(options: argparse.Namespace) -> None:
-    print(table(read_rows(options.rows), options.by))
+    rows = read_rows(options.rows)
+    if options.csv:
+        write_csv(rows, options.csv)
+    print(table(rows, options.by))
 
 
 def _generate(options: argparse.Namespace) -> None:
