@@ -6,7 +6,7 @@ from typing import Any
 from rich.table import Table
 
 from selfmodel.cli.output.plain import plain
-from selfmodel.diagnosis.fit import FAULTY_RATIO
+from selfmodel.diagnosis.verdicts.fit import FAULTY_RATIO
 
 
 def confidence_sentence(found: Mapping[str, Any]) -> str:
