@@ -56,6 +56,9 @@ class LooseEncoders:
 def loose_encoders(behaviour: Behaviour, starts: IndexArray, horizon: int) -> LooseEncoders | None:
     """Returns the encoders of a trial that follow commands; None if there are none.
 
+    Encoders of intact joints may be among them: they are used only for hypotheses that detach the
+    joint.
+
     Args:
         behaviour: The logged behaviour.
         starts: Step at which each segment begins, ``(segments,)``.
@@ -159,12 +162,20 @@ def _low_pass(commands: FloatArray, constant: float) -> FloatArray:
 
     Row k contains the commands up to row k - 1: command k has its effect after row k.
     """
+    held = _held(commands)
     gain = 1 - np.exp(-1 / constant) if constant else 1.0
-    filtered = np.empty_like(commands)
-    filtered[0] = commands[0]
-    for k in range(1, len(commands)):
-        filtered[k] = filtered[k - 1] + gain * (commands[k - 1] - filtered[k - 1])
+    filtered = np.empty_like(held)
+    filtered[0] = held[0]
+    for k in range(1, len(held)):
+        filtered[k] = filtered[k - 1] + gain * (held[k - 1] - filtered[k - 1])
     return filtered
+
+
+def _held(commands: FloatArray) -> FloatArray:
+    """Returns commands in which an unknown one is the last known one; 0 before the first."""
+    known = np.where(np.isfinite(commands), np.arange(len(commands))[:, np.newaxis] + 1, 0)
+    before = np.vstack([np.zeros((1, commands.shape[1])), commands])
+    return np.asarray(np.take_along_axis(before, np.maximum.accumulate(known), axis=0))
 
 
 def _derived(readings: FloatArray, angles: FloatArray) -> tuple[float, float] | None:

@@ -81,7 +81,8 @@ def generate(out: Path, plan: Plan) -> Path:
         Its folder.
     """
     folder = out / plan.name
-    if (folder / "truth.json").exists():
+    made, asked = folder / "truth.json", dataclasses.asdict(plan)
+    if made.exists() and asked.items() <= json.loads(made.read_text()).items():
         return folder
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)

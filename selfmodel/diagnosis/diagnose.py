@@ -31,6 +31,10 @@ REFINEMENT_STARTS = 2
 """Hypotheses from the EA that the refinement starts from, best first."""
 
 
+MIN_SURROGATE_PIECES = 2
+"""Pieces of the surrogate comparator after a change that a search needs."""
+
+
 class DiagnosticSearch:
     """Evolves hypotheses against logged trials; every distance is cached.
 
@@ -91,10 +95,15 @@ class DiagnosticSearch:
         if change is None:
             return judged(best, compared, question)
         rest = partial(surrogate.evidence.losses, trials=change.since(surrogate.trials))
+        if rest([INTACT]).shape[1] < MIN_SURROGATE_PIECES:
+            return judged(best, compared, question)
         later = self._question(change.since(trials), rest, _until(change, trials))
-        best, compared = self._refined([change.after, *found[:REFINEMENT_STARTS]], later)
-        diagnosis = judged(best, compared, later)
-        return dataclasses.replace(diagnosis, change=self._dated(change, diagnosis.best, trials))
+        after, compared_later = self._refined([change.after, *found[:REFINEMENT_STARTS]], later)
+        if after == change.before:
+            return judged(best, compared, question)
+        diagnosis = judged(after, compared_later, later)
+        dated = self._dated(change, diagnosis.best, trials)
+        return dataclasses.replace(diagnosis, change=dated, trials=len(trials))
 
     def check(self, trials: Sequence[Trial]) -> None:
         """Checks that the comparator accepts all trials, before any search.
@@ -252,7 +261,8 @@ class DiagnosticSearch:
         split = best_split([change.before], [after], losses, losses)
         if split is None or timeline is None:
             return change
-        return change_at(split, losses, timeline, [trial.plan.name for trial in trials])
+        dated = change_at(split, losses, timeline, [trial.plan.name for trial in trials])
+        return dated if dated.index == change.index else change
 
 
 def _until(change: Change, trials: Sequence[Trial]) -> list[Trial | TrialPart]:

@@ -106,7 +106,9 @@ class Evidence:
         """
         total = np.zeros(len(hypotheses))
         for trial in trials:
-            total += np.array([row.mean() for row in self._part_rows(hypotheses, trial)])
+            # A change near the end of a trial leaves no piece of it.
+            rows = self._part_rows(hypotheses, trial)
+            total += np.array([row.mean() if len(row) else 0.0 for row in rows])
         return total
 
     def losses(

@@ -45,8 +45,8 @@ def diagnosis_from_dict(values: Mapping[str, Any], parse: Callable[[str], Hypoth
 
     Args:
         values: JSON values. ``outside`` and ``unseen`` are optional: earlier files lack them.
-            ``reason`` is there only for a diagnosis with a reason, ``detectable`` only for the
-            verdict ``intact``, ``change`` only for a change in time.
+            ``reason`` is there only for a diagnosis with a reason, ``detectable`` only if
+            the best hypothesis is the empty one, ``change`` only for a change in time.
         parse: Reads the notation of a hypothesis.
 
     Raises:

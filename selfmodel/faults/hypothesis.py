@@ -60,13 +60,13 @@ def canonical(faults: Iterable[Fault], anatomy: Anatomy) -> Hypothesis:
     given = filter(None, (fault.canonical for fault in faults))
     for fault in sorted(given, key=lambda one: (one.kind, one.part if one.kind.is_single else "")):
         distinct.setdefault((fault.kind, "" if fault.kind.is_single else fault.part), fault)
-    for fault in list(distinct.values()):
+    for key, fault in list(distinct.items()):
         simpler = fault.canonical_alone
         rest = [other for other in distinct.values() if other is not fault]
         if simpler is not fault and not any(
             simpler.kind.absorbs(simpler, other, anatomy) for other in rest
         ):
-            del distinct[fault.kind, fault.part]
+            del distinct[key]
             distinct[simpler.kind, simpler.part] = simpler
     kept = [
         fault

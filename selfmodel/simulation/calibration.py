@@ -120,7 +120,9 @@ class Calibration:
 
     @property
     def undetermined(self) -> tuple[str, ...]:
-        """Names of the fitted factors that the trials do not determine."""
+        """Names of the fitted factors that the trials do not determine; none without a fit."""
+        if not self.determined:
+            return ()
         return tuple(row["name"] for row in self.rows() if not row["determined"])
 
     def rows(self) -> list[dict[str, Any]]:

@@ -102,6 +102,8 @@ def _spread(behaviour: Behaviour) -> CalibrationSegments | None:
     if any(np.isnan(states[signal][known]).any() for signal in JOINTS):
         begins = np.arange(LEAD, last + 1, HORIZON)
         whole = _all_known(known, begins)
+        if not whole.any():
+            return None
     return _with_observed(behaviour, states, begins[whole])
 
 

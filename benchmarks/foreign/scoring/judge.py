@@ -13,6 +13,7 @@ JAM_TOLERANCE = 0.1
 MATTERS = 0.1
 """Smallest change of the displacement, relative to the healthy one, by which a fault matters."""
 
+_PREFIX = re.compile(r"[a-z]+")
 _NUMBER = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?")
 
 Terms = dict[tuple[str, str], float | None]
@@ -99,9 +100,9 @@ def terms(faults: Iterable[str]) -> Terms:
         keyword, _, part = head.partition(":")
         number = _NUMBER.search(value)
         if keyword != "intact":
-            found[keyword, "" if keyword == "payload" else part] = (
-                float(number[0]) if number else None
-            )
+            prefix = _PREFIX.match(value)  # the kind of sensor:NAME=gain0.5 is not sensor:NAME's
+            name = f"{keyword}-{prefix[0]}" if prefix else keyword
+            found[name, "" if keyword == "payload" else part] = float(number[0]) if number else None
     return found
 
 

@@ -103,12 +103,16 @@ def _selfmodel(
 ) -> subprocess.CompletedProcess[str]:
     """Runs the command line of the selfmodel that is importable here."""
     here = str(Path(__file__).resolve().parents[3])
-    return subprocess.run(
-        [sys.executable, "-m", "selfmodel", *first, *last],
-        cwd=cwd,
-        env={**os.environ, "PYTHONPATH": here, "OMP_NUM_THREADS": "1"},
-        capture_output=True,
-        text=True,
-        timeout=LIMIT,
-        check=False,
-    )
+    command = [sys.executable, "-m", "selfmodel", *first, *last]
+    try:
+        return subprocess.run(
+            command,
+            cwd=cwd,
+            env={**os.environ, "PYTHONPATH": here, "OMP_NUM_THREADS": "1"},
+            capture_output=True,
+            text=True,
+            timeout=LIMIT,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return subprocess.CompletedProcess(command, 1, "", f"more than {LIMIT} s")

@@ -7,6 +7,7 @@ from rich.table import Table
 
 from selfmodel.cli.output.plain import plain
 from selfmodel.diagnosis.verdicts.fit import FAULTY_RATIO
+from selfmodel.diagnosis.verdicts.significance import LOSS_RATIO
 
 
 def confidence_sentence(found: Mapping[str, Any]) -> str:
@@ -41,7 +42,8 @@ def fit_sentence(found: Mapping[str, Any]) -> str:
     ratio = f" and {FAULTY_RATIO:g} times that loss" if fit["has_faults"] else ""
     return (
         f"{loss}, on healthy trials {_number(fit['healthy_loss'])}: an excess of {excess} standard "
-        f"errors, unexplained above {fit['threshold']:g}{ratio}."
+        f"errors, unexplained above {fit['threshold']:g}{ratio}, or above {LOSS_RATIO:g} times "
+        f"that loss."
     )
 
 

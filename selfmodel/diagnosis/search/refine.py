@@ -22,9 +22,9 @@ where the trials require it. The whole algorithm:
    are fitted by the comparator itself, and it is pruned again.
 7. **Mean severities** (``severity.with_mean_severities``), unless they make a fault prunable.
 
-The surrogate comparator simulates a third of the segments, or the first third of each trial. The
-measurements behind the significance levels are in ``significance``, those behind the mean severity
-in ``severity``. No ablation of ``STARTS`` and ``SHORTLIST_SIZE`` is on record.
+The surrogate comparator simulates a third of the segments (a tenth from three trials on), or the
+first third of each trial. The measurements behind the significance levels are in ``significance``,
+those behind the mean severity in ``severity``. No ablation of ``STARTS`` and ``SHORTLIST_SIZE`` is on record.
 """
 
 from collections.abc import Iterable, Sequence

@@ -66,7 +66,8 @@ def surrogate_of(evidence: Evidence, own: Sequence[Evidence], trials: Sequence[T
     The surrogate of a comparator without losses is the comparator itself: its hypotheses are not
     refined, so its distances from the whole trials make the ranking. Otherwise it is the
     comparator's own surrogate, or the comparator on the openings of the trials. Of ``MANY_TRIALS``
-    or more, the surrogate of the surrogate is enough: together they have as many pieces as one.
+    or more, the surrogate of the surrogate is enough: together they have as many pieces as one. A
+    surrogate that cannot judge a trial, such as one with many late steps, is left out.
 
     Args:
         evidence: Losses of the comparator.
@@ -75,8 +76,14 @@ def surrogate_of(evidence: Evidence, own: Sequence[Evidence], trials: Sequence[T
     """
     if not evidence.is_piecewise(trials):
         return Surrogate(evidence, trials)
+    for cheaper in reversed(own if len(trials) >= MANY_TRIALS else own[:1]):
+        try:
+            cheaper.check(trials)
+        except InputError:
+            continue
+        return Surrogate(cheaper, trials)
     if own:
-        return Surrogate(own[-1] if len(trials) >= MANY_TRIALS else own[0], trials)
+        return Surrogate(evidence, trials)
     return Surrogate(evidence, [_opening(evidence, trial) for trial in trials])
 
 

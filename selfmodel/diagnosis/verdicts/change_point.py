@@ -82,7 +82,8 @@ class Change:
     def since(self, trials: Sequence[Trial]) -> list[Trial | TrialPart]:
         """Returns the trials from the change on.
 
-        The piece that contains the change is left out: neither hypothesis predicts it.
+        The first piece after the change is left out: the change may lie in it, and then neither
+        hypothesis predicts it.
 
         Args:
             trials: All trials of the diagnosis.
@@ -135,8 +136,10 @@ def best_split(
     Returns:
         None if the timeline is too short, or if every simulation diverged.
     """
-    shortlist = [split.after for split in _splits(before, after, coarse)[:SHORTLIST]]
-    found = _splits(before, shortlist, losses)
+    pieces, few = (each(before[:1]).shape[1] for each in (losses, coarse))
+    least = max(2, round(MIN_PIECES * few / pieces))
+    ranked = dict.fromkeys(split.after for split in _splits(before, after, coarse, least))
+    found = _splits(before, list(ranked)[:SHORTLIST], losses, MIN_PIECES)
     return found[0] if found else None
 
 
@@ -195,14 +198,21 @@ def change_at(split: Split, losses: Losses, timeline: Timeline, names: Sequence[
 
 
 def _splits(
-    before: Sequence[Hypothesis], after: Sequence[Hypothesis], losses: Losses
+    before: Sequence[Hypothesis], after: Sequence[Hypothesis], losses: Losses, least: int
 ) -> list[Split]:
-    """Returns the best change from any hypothesis before to each one after, best first."""
+    """Returns the best change from any hypothesis before to each one after, best first.
+
+    Args:
+        before: Hypotheses about the time before the change.
+        after: Hypotheses about the time after it.
+        losses: Losses on the timeline, ``(n, pieces)``.
+        least: Pieces before and after the change, at least.
+    """
     if not after:
         return []
     rows = losses([*before, *after])
     firsts, seconds = rows[: len(before)], rows[len(before) :]
-    if rows.shape[1] < 2 * MIN_PIECES:
+    if rows.shape[1] < 2 * least:
         return []
     found: list[tuple[float, int, Split]] = []
     for second, row in zip(after, seconds, strict=True):
@@ -210,8 +220,8 @@ def _splits(
             if first == second or not (np.isfinite(own).all() and np.isfinite(row).all()):
                 continue
             totals = _totals(own, row[np.newaxis])[0]
-            inner = totals[MIN_PIECES : len(row) - MIN_PIECES + 1]
-            piece = MIN_PIECES + int(np.argmin(inner))
+            inner = totals[least : len(row) - least + 1]
+            piece = least + int(np.argmin(inner))
             found.append((float(totals[piece]), len(found), Split(first, second, piece)))
     return [split for _, _, split in sorted(found, key=lambda one: one[:2])]
 

@@ -130,9 +130,12 @@ def excess_over_healthy(losses: FloatArray, healthy: FloatArray) -> float:
 
     Args:
         losses: Losses of the best hypothesis, ``(pieces,)``.
-        healthy: Losses of the empty hypothesis on healthy trials, ``(healthy_pieces,)``. The
-            test is unpaired (Welch). With a single piece, or with infinite losses, the result is
-            infinite if the ratio of the means is significant, else 0.
+        healthy: Losses of the empty hypothesis on healthy trials, ``(healthy_pieces,)``.
+
+    Returns:
+        Welch's statistic; 0 if the means differ by at most ``LOSS_FLOOR``, and infinite without
+        variance. With a single piece, or with infinite losses: infinite if the ratio of the means
+        is significant, else 0.
     """
     larger = bool(losses.mean() > LOSS_RATIO * healthy.mean() + LOSS_FLOOR)
     if min(len(losses), len(healthy)) < 2 or not np.isfinite([losses.mean(), healthy.mean()]).all():

@@ -1,9 +1,10 @@
 """Grown delay: commands take effect some control steps later than in the self-model.
 
 The severity is a number of control steps from 0 to 3, in addition to the control delay of the
-robot; 0 is nominal. It is rounded to whole control steps, and the delay of the robot and of the
-fault together is at most ``MAX_CONTROL_DELAY``: segments contain that many commands before their
-start. The fault has no part, because all motors share the delay. No fault absorbs it.
+robot; 0 is nominal. Its effect is that of the nearest whole number of control steps, also of a
+fitted severity between two. The delay of the robot and of the fault together is at most
+``MAX_CONTROL_DELAY``: segments contain that many commands before their start. The fault has no
+part, because all motors share the delay. No fault absorbs it.
 """
 
 from typing import TYPE_CHECKING

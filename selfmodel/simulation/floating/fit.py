@@ -252,7 +252,7 @@ class _Slopes:
 
     def _step(self, used: BoolArray) -> FloatArray:
         slopes, residuals = (self.ahead + self.behind)[used] / 2, self.residuals[used]
-        weight = 1 / (len(residuals) * PRIOR_WEIGHT**2)
+        weight = 1 / (max(len(residuals), 1) * PRIOR_WEIGHT**2)
         prior = prior_deviations(len(self.x)) ** -2
         gradient = slopes.T @ residuals * weight + prior * self.x
         return np.asarray(-np.linalg.solve(slopes.T @ slopes * weight + np.diag(prior), gradient))

@@ -90,7 +90,7 @@ def suspicion(
         return Suspicion(
             hinges[leaning], f"its mean error is {biases[leaning]:.2f} rad: an offset?"
         )
-    if parameters.delay >= MAX_CONTROL_DELAY:
+    if parameters.delay >= MAX_CONTROL_DELAY > predictions.robot.control_delay:
         limit = f"the control delay is {parameters.delay} steps, the largest that is fitted"
         return Suspicion(None, limit)
     return None

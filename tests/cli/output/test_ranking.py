@@ -69,28 +69,31 @@ def test_a_change_is_named_before_undetectable_faults():
             Fit(0.1234, float("inf"), 0.1, 2.5, 5.0, has_faults=True),
             (
                 "Mean loss 0.123, of intact infinite, on healthy trials 0.1: an excess of 2.5 "
-                "standard errors, unexplained above 5 and 2.5 times that loss."
+                "standard errors, unexplained above 5 and 2.5 times that loss, or above 3 "
+                "times that loss."
             ),
         ),
         (
             Fit(0.1234, 0.5, 0.0, float("inf"), 5.0, has_faults=True),
             (
                 "Mean loss 0.123, of intact 0.5, on healthy trials 0: an excess of infinitely many "
-                "standard errors, unexplained above 5 and 2.5 times that loss."
+                "standard errors, unexplained above 5 and 2.5 times that loss, or above 3 "
+                "times that loss."
             ),
         ),
         (
             Fit(0.1234, 0.5, float("inf"), 0.0, 5.0, has_faults=True),
             (
                 "Mean loss 0.123, of intact 0.5, on healthy trials infinite: an excess of 0 "
-                "standard errors, unexplained above 5 and 2.5 times that loss."
+                "standard errors, unexplained above 5 and 2.5 times that loss, or above 3 "
+                "times that loss."
             ),
         ),
         (
             Fit(0.15, 0.15, 0.125, 1.0, 5.0, has_faults=False),
             (
                 "Mean loss 0.15, of intact 0.15, on healthy trials 0.125: an excess of 1 "
-                "standard errors, unexplained above 5."
+                "standard errors, unexplained above 5, or above 3 times that loss."
             ),
         ),
     ],
