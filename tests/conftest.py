@@ -46,7 +46,9 @@ def recovered(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
     """A folder in which a small recovery ran, and the JSON that the command printed."""
     folder = tmp_path_factory.mktemp("recovered")
     done = selfmodel(
-        "recover", "quadruped", "--case", "4", *SMALL, "--out", "run", "--json", cwd=folder
+        *("recover", "quadruped", "--case", "4", *SMALL, "--kinds", "paper", "--out", "run"),
+        "--json",
+        cwd=folder,
     )
     assert done.returncode == 0, done.stderr
     return folder, json.loads(done.stdout)

@@ -132,7 +132,7 @@ def test_the_same_seed_gives_the_same_in_another_process(recovered: tuple[Path, 
     folder, told = recovered
     again = selfmodel_process(
         *("recover", "quadruped", "--case", "4", *SMALL, "--out", "again", "--json"),
-        *("--threads", "1"),
+        *("--threads", "1", "--kinds", "paper"),
         cwd=folder,
     )
 
@@ -201,7 +201,7 @@ def test_bad_input_is_one_sentence_and_status_2(tmp_path: Path, arguments: list[
 def test_progress_goes_to_standard_error_in_plain_lines_when_piped(
     run: Callable[..., Done], steps: int, tmp_path: Path
 ):
-    few = (*SMALL, "--trials", "1", "--steps", str(steps))
+    few = (*SMALL, "--kinds", "paper", "--trials", "1", "--steps", str(steps))
     done = run("recover", "quadruped", "--case", "9", *few, cwd=tmp_path)
 
     assert done.returncode == 0
@@ -280,7 +280,7 @@ def test_an_interrupted_recovery_keeps_its_finished_trials(tmp_path: Path):
     running = subprocess.Popen(
         [
             *(sys.executable, "-m", "selfmodel", "recover", "quadruped", "--case", "1"),
-            *(*SMALL, "--trials", "90", "--out", "run"),
+            *(*SMALL, "--kinds", "paper", "--trials", "90", "--out", "run"),
         ],
         cwd=tmp_path,
         stderr=subprocess.PIPE,

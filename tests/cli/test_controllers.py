@@ -8,7 +8,7 @@ import pytest
 from selfmodel.logs import read_log
 from tests.helpers.command import SMALL, selfmodel
 
-FEW = (*SMALL, "--trials", "1", "--out", "run", "--json")
+FEW = (*SMALL, "--kinds", "paper", "--trials", "1", "--out", "run", "--json")
 
 
 @pytest.fixture(scope="module")

@@ -24,7 +24,8 @@ where the trials require it. The whole algorithm:
 
 The surrogate comparator simulates a third of the segments (a tenth from three trials on), or the
 first third of each trial. The measurements behind the significance levels are in ``significance``,
-those behind the mean severity in ``severity``. No ablation of ``STARTS`` and ``SHORTLIST_SIZE`` is on record.
+those behind the mean severity in ``severity``. No ablation of ``STARTS`` and ``SHORTLIST_SIZE`` is
+on record.
 """
 
 from collections.abc import Iterable, Sequence
