@@ -17,6 +17,7 @@ from selfmodel.diagnosis.search.refine import refined
 from selfmodel.diagnosis.search.search_cost import SearchSize
 from selfmodel.diagnosis.search.surrogate import Surrogate, own_surrogates, surrogate_of
 from selfmodel.diagnosis.verdicts.change_point import Change, best_split, change_at, is_change
+from selfmodel.diagnosis.verdicts.unsearched import unsearched_space
 from selfmodel.evolution import Evolution, GenerationCallback, evolve
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import GENE_VALUES, HypothesisSpace
@@ -126,6 +127,7 @@ class DiagnosticSearch:
         return SearchSize(
             settings=self._settings,
             candidates=len(self._space.coarse_candidates),
+            unsearched=len(unsearched_space(self._space).coarse_candidates),
             surrogate_steps=surrogate.evidence.steps_per_hypothesis(surrogate.trials),
             is_refined=self.evidence.is_piecewise(trials),
             uses_segments=self.evidence.uses_segments(trials),

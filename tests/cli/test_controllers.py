@@ -37,7 +37,7 @@ def test_a_recovery_evolves_oscillators_where_they_are_asked_for(rhythmic: tuple
 def test_the_logs_of_oscillators_give_the_ranking_of_their_run(rhythmic: tuple[Path, dict]):
     folder, told = rhythmic
     logs = [one["log"] for one in told["trials"]]
-    done = selfmodel("diagnose", *logs, "--json", cwd=folder)
+    done = selfmodel("diagnose", *logs, "--kinds", "paper", "--json", cwd=folder)
 
     assert json.loads(done.stdout)["diagnosis"] == told["diagnosis"]
 

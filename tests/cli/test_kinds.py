@@ -86,8 +86,11 @@ def test_a_trial_and_its_replay_name_a_kind_of_ones_own(tmp_path: Path):
 
 
 @pytest.mark.search
-def test_kinds_of_body_and_environment_are_the_default(recovered: tuple[Path, dict]):
-    _, told = recovered
+def test_kinds_of_body_and_environment_are_the_default(tmp_path: Path):
+    few = (*SMALL, "--steps", "200", "--trials", "1", "--out", "run", "--json")
+    done = selfmodel("recover", "quadruped", "--case", "1", *few, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
     default = [kind.name for kind in DEFAULT_KINDS]
 
     assert told["kinds"] == default

@@ -255,7 +255,7 @@ def recovered_as_the_paper_did(tmp_path_factory: pytest.TempPathFactory) -> tupl
     ("run", "options"),
     [
         pytest.param("short", (), id="short"),
-        pytest.param("recovered", (), marks=pytest.mark.search, id="default"),
+        pytest.param("recovered", ("--kinds", "paper"), marks=pytest.mark.search, id="segments"),
         pytest.param(
             "recovered_as_the_paper_did", PAPERS, marks=pytest.mark.search, id="displacement"
         ),

@@ -237,7 +237,10 @@ def test_a_diagnosis_simulates_nothing_twice_and_ranks_nothing_that_is_not_consi
 
     assert found.unsearched is not None
     assert found.unsearched.kind == "friction"
-    assert set(simulator.times.values()) == {1}
+    # The losses by signal of an unexplained best hypothesis are computed once more.
+    again = {hypothesis for (hypothesis, _), times in simulator.times.items() if times > 1}
+    assert again <= {found.best, INTACT}
+    assert max(simulator.times.values()) <= 2
     simulated = {hypothesis for hypothesis, _ in simulator.times}
     considered = {
         one for one in simulated if {fault.kind for fault in one.faults} <= {*PAPER_KINDS}

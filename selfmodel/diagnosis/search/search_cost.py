@@ -15,11 +15,11 @@ DISTINCT_SCALE, DISTINCT_EXPONENT = 2.2, 0.57
 """The EA simulates about ``scale * evaluations ** exponent`` distinct hypotheses: later generations
 repeat those of earlier ones."""
 
-REFINED_PER_CANDIDATE = 7.0
+REFINED_PER_CANDIDATE = 4.0
 """Hypotheses that the refinement simulates, per fault of the hypothesis space."""
 
-UNSEARCHED_PER_CANDIDATE = 3.7
-"""Hypotheses of unsearched kinds that are simulated, per fault of the hypothesis space."""
+UNSEARCHED_PER_CANDIDATE = 0.95
+"""Hypotheses of unsearched kinds that are simulated, per fault of these kinds."""
 
 SHARE_WITH_OWN_DYNAMICS = 0.46
 """Share of hypotheses that are simulated where sensor faults do not change the motion."""
@@ -44,6 +44,7 @@ class SearchSize:
     Attributes:
         settings: Parameters of the EA.
         candidates: Number of single faults in the hypothesis space.
+        unsearched: Number of single faults of unsearched kinds.
         surrogate_steps: Control steps per hypothesis on all trials with the surrogate comparator.
         is_refined: Whether the best hypotheses are refined.
         uses_segments: Whether short predictions are compared, open loop.
@@ -52,6 +53,7 @@ class SearchSize:
 
     settings: Settings
     candidates: int
+    unsearched: int
     surrogate_steps: int
     is_refined: bool
     uses_segments: bool
@@ -68,7 +70,7 @@ class SearchSize:
             hypotheses += REFINED_PER_CANDIDATE * self.candidates
         if self.uses_segments:
             if self.has_healthy:
-                hypotheses += UNSEARCHED_PER_CANDIDATE * self.candidates
+                hypotheses += UNSEARCHED_PER_CANDIDATE * self.unsearched
             hypotheses *= SHARE_WITH_OWN_DYNAMICS
         steps: int = round(hypotheses * self.surrogate_steps)
         return steps

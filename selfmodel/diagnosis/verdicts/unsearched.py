@@ -55,16 +55,23 @@ def best_unsearched_fault(
     return UnsearchedFault(hypothesis, first, dict(others))
 
 
-def _candidates(best: Hypothesis, space: HypothesisSpace) -> dict[Hypothesis, Fault]:
-    """Candidate hypotheses, each with its unsearched fault.
+def unsearched_space(space: HypothesisSpace) -> HypothesisSpace:
+    """Returns the hypotheses of the built-in kinds that are not searched.
 
     Kinds that edit the specification, such as rough terrain, are excluded: each hypothesis needs a
     compiled model.
+
+    Args:
+        space: The searched hypotheses.
     """
-    unsearched = [kind for kind in ALL_KINDS if kind not in space.kinds and kind.edit_spec is None]
+    kinds = [kind for kind in ALL_KINDS if kind not in space.kinds and kind.edit_spec is None]
+    return HypothesisSpace(space.anatomy, tuple(kinds), space.observed)
+
+
+def _candidates(best: Hypothesis, space: HypothesisSpace) -> dict[Hypothesis, Fault]:
+    """Candidate hypotheses, each with its unsearched fault."""
     found: dict[Hypothesis, Fault] = {}
-    further = HypothesisSpace(space.anatomy, tuple(unsearched), space.observed)
-    for fault in further.coarse_candidates:
+    for fault in unsearched_space(space).coarse_candidates:
         others = [other for other in best.faults if other.part != fault.part]
         for faults in ((*best.faults, fault), (*others, fault)):
             found.setdefault(space.canonical(faults), fault)

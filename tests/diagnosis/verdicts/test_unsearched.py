@@ -171,7 +171,7 @@ def test_a_weak_failure_of_another_kind_is_unexplained_and_named_across_a_gap(
         {"diagnosis": ranking_to_list(found.ranked), **confidence_to_dict(found)}
     )
     assert told.startswith(
-        f"Unexplained: {found.unsearched.hypothesis}" if found.unsearched else "Expl"
+        f"Unexplained: {found.unsearched.hypothesis}" if found.unsearched else "Intact"
     )
     assert (f"add {kind} to --kinds" in told) == (kind is not None)
     assert all(fault.kind in PAPER_KINDS for one in found.ranked for fault in one.hypothesis.faults)
