@@ -10,6 +10,8 @@ from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT, SEGMENT_PRE
 from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
+from selfmodel.diagnosis.evidence import Evidence
+from selfmodel.diagnosis.search.surrogate import own_surrogates, surrogate_of
 from selfmodel.errors import InputError
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log
@@ -104,7 +106,7 @@ def test_a_comparator_says_what_a_trial_lacks(name: str, quadruped: Robot, tmp_p
         COMPARATORS[name].prepare(unobserved(trial))
 
 
-def test_what_only_the_screen_cannot_judge_is_said_before_any_search(quadruped: Robot):
+def test_a_surrogate_that_cannot_judge_a_trial_is_replaced_by_the_comparator(quadruped: Robot):
     run = gait()
     # Seen at four of the moments that are looked at closely, none of which the screen looks at.
     seen = np.zeros(run.steps, dtype=bool)
@@ -112,8 +114,11 @@ def test_what_only_the_screen_cannot_judge_is_said_before_any_search(quadruped: 
     seen[starts[[1, 2, 4, 5]]] = True
     angles = np.where(seen[:, np.newaxis], run["joint_positions"], np.nan)
     trial = logged(changed(run, joint_positions=angles))
-    search = DiagnosticSearch(Simulator(quadruped, 1), SEGMENT_PREDICTION, SMALL)
-    search.evidence.check([trial])
+    simulator = Simulator(quadruped, 1)
+    evidence = Evidence(simulator, SEGMENT_PREDICTION)
+    own = own_surrogates(SEGMENT_PREDICTION, simulator)
 
     with pytest.raises(InputError, match="needs joint_positions at 4 or more of 26 moments"):
-        search.check([trial])
+        own[0].check([trial])
+    assert surrogate_of(evidence, own, [trial]).evidence is evidence
+    DiagnosticSearch(simulator, SEGMENT_PREDICTION, SMALL).check([trial])
