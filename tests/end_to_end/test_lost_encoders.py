@@ -38,7 +38,13 @@ def lost(robot: Robot, truth: str, hinges: tuple[str, ...], steps: slice) -> Tri
 
 def diagnosis(trial: Trial, robot: Robot, comparator: str = "segment-prediction") -> Diagnosis:
     return selfmodel.diagnose(
-        trial, robot=robot, settings=SETTINGS, comparator=comparator, seed=0, threads=1
+        trial,
+        robot=robot,
+        settings=SETTINGS,
+        comparator=comparator,
+        kinds="paper",
+        seed=0,
+        threads=1,
     )
 
 
