@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
@@ -20,6 +20,7 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
 from selfmodel.trials.command_likeness import have_one_gait
+from selfmodel.trials.observed_columns import observed_as
 from selfmodel.trials.trial import Trial
 from selfmodel.trials.trial_part import TrialPart, whole
 
@@ -54,8 +55,16 @@ class Question:
 
     @property
     def healthy_losses(self) -> FloatArray | None:
-        """Losses of the empty hypothesis on healthy trials, ``(pieces,)``; None without any."""
-        return self.evidence.losses([INTACT], self.intact)[0] if self.intact else None
+        """Losses of the empty hypothesis on healthy trials, ``(pieces,)``; None without any.
+
+        Encoders that are lost in the trials to explain are left out of the healthy ones.
+        """
+        if not self.intact:
+            return None
+        trials = [whole(trial).trial for trial in self.trials]
+        parts = [whole(trial) for trial in self.intact]
+        known = [replace(part, trial=observed_as(part.trial, trials)) for part in parts]
+        return self.evidence.losses([INTACT], known)[0]
 
 
 def judged(best: Hypothesis, compared: Iterable[Hypothesis], question: Question) -> Diagnosis:

@@ -1,0 +1,42 @@
+"""Columns of a trial that other trials observed too."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from selfmodel.trials.signals import Signal
+from selfmodel.trials.trial import Trial
+
+SIGNALS: tuple[Signal, ...] = ("joint_positions", "joint_velocities", "sensors")
+"""Signals whose columns may be lost with an encoder."""
+
+
+def observed_as(trial: Trial, others: Sequence[Trial]) -> Trial:
+    """Returns a trial without the columns that were never observed in one of the others.
+
+    An unknown joint makes the prediction of the others worse. So the loss of a healthy trial is a
+    reference for a trial with a lost encoder only without the same encoder.
+
+    Args:
+        trial: The trial.
+        others: Trials of the same robot.
+
+    Returns:
+        The trial itself if the others lack nothing; otherwise a trial with NaN in these columns.
+    """
+    signals, lost = dict(trial.behaviour.signals), []
+    for signal in SIGNALS:
+        known = [np.isfinite(other.behaviour[signal]).any(axis=0) for other in others]
+        columns = np.flatnonzero(~np.logical_and.reduce(known)) if known else []
+        here = [c for c in columns if np.isfinite(signals[signal][:, c]).any()]
+        if here:
+            signals[signal] = signals[signal].copy()
+            signals[signal][:, here] = np.nan
+            lost.append(f"{signal} {here}")
+    if not lost:
+        return trial
+    behaviour = dataclasses.replace(trial.behaviour, signals=signals)
+    # Losses are looked up by the path of a trial.
+    path = f"{trial.path} without {', '.join(lost)}"
+    return dataclasses.replace(trial, behaviour=behaviour, path=path)
