@@ -4,6 +4,8 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
 from selfmodel.diagnosis.evidence import Evidence
@@ -64,7 +66,7 @@ class Question:
         trials = [whole(trial).trial for trial in self.trials]
         parts = [whole(trial) for trial in self.intact]
         known = [replace(part, trial=observed_as(part.trial, trials)) for part in parts]
-        return self.evidence.losses([INTACT], known)[0]
+        return np.asarray(self.evidence.losses([INTACT], known)[0])
 
 
 def judged(best: Hypothesis, compared: Iterable[Hypothesis], question: Question) -> Diagnosis:

@@ -27,9 +27,10 @@ def observed_as(trial: Trial, others: Sequence[Trial]) -> Trial:
     """
     signals, lost = dict(trial.behaviour.signals), []
     for signal in SIGNALS:
-        known = [np.isfinite(other.behaviour[signal]).any(axis=0) for other in others]
-        columns = np.flatnonzero(~np.logical_and.reduce(known)) if known else []
-        here = [c for c in columns if np.isfinite(signals[signal][:, c]).any()]
+        missing = np.zeros(signals[signal].shape[1], dtype=bool)
+        for other in others:
+            missing |= ~np.isfinite(other.behaviour[signal]).any(axis=0)
+        here = np.flatnonzero(missing & np.isfinite(signals[signal]).any(axis=0)).tolist()
         if here:
             signals[signal] = signals[signal].copy()
             signals[signal][:, here] = np.nan
