@@ -36,11 +36,16 @@ def lost(robot: Robot, truth: str, hinges: tuple[str, ...], steps: slice) -> Tri
     )
 
 
-def diagnosis(trial: Trial, robot: Robot, comparator: str = "segment-prediction") -> Diagnosis:
+def diagnosis(
+    trial: Trial,
+    robot: Robot,
+    comparator: str = "segment-prediction",
+    settings: selfmodel.Settings = SETTINGS,
+) -> Diagnosis:
     return selfmodel.diagnose(
         trial,
         robot=robot,
-        settings=SETTINGS,
+        settings=settings,
         comparator=comparator,
         kinds="paper",
         seed=0,
@@ -72,6 +77,7 @@ def test_every_comparator_of_joints_judges_a_trial_without_an_encoder(
     comparator: str, quadruped: Robot
 ):
     trial = lost(quadruped, "break:front_left_knee", ("front_left_knee",), slice(None))
-    found = diagnosis(trial, quadruped, comparator)
+    few = selfmodel.Settings(generations=2).scaled(8)
+    found = diagnosis(trial, quadruped, comparator, few)
     assert np.isfinite(found.ranked[0].distance)
     assert found.ranked[0].distance < found.intact_distance

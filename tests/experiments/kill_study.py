@@ -27,7 +27,10 @@ import numpy as np
 
 ROOT = Path(__file__).parents[2]
 SMALL = ("--steps", "60", "--population", "6", "--generations", "2")
-_ABLATE = ("ablate", "--robots", "quadruped", "--seed", "5", *SMALL, "--comparator")
+_ABLATE = (
+    *("ablate", "--robots", "quadruped", "--seed", "5", *SMALL, "--kinds", "paper"),
+    "--comparator",
+)
 STUDIES = {
     "ablate": (
         *(*_ABLATE, "forward-displacement,gait-pattern", "--case", "1,9", "--trials", "2"),
