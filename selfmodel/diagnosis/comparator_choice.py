@@ -38,8 +38,8 @@ def best_comparator(
         trials: Logged trials of the robot.
 
     Raises:
-        InputError: No comparator can judge all trials; the message has the reason for each trial.
-            Or a compared number is absurdly large.
+        InputError: No comparator can judge all trials; the message has the reasons of the last one
+            for each trial. Or a compared number is absurdly large.
     """
     reasons: list[str] = []
     for comparator in preference:

@@ -187,7 +187,7 @@ class EnvironmentRobot:
     def _send_safe(self) -> None:
         try:
             self._halt()
-        except Exception as error:  # any of the driver becomes a TrialError
+        except Exception as error:  # a driver may raise any exception: raised as a TrialError
             raise TrialError(
                 f"the safe command could not be sent: {_type_and_message(error)}"
             ) from error
@@ -239,7 +239,7 @@ class EnvironmentRobot:
             return None
         except HangError:
             raise
-        except Exception as error:  # any of the environment becomes a TrialError
+        except Exception as error:  # an environment may raise any: raised as a TrialError
             raise TrialError(f"the environment failed: {_type_and_message(error)}") from error
 
     def _check(

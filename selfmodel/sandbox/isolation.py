@@ -69,7 +69,7 @@ def run_isolated(
     with _lock, TemporaryDirectory(prefix="selfmodel-") as scratch:
         try:
             answer, ended = _server().call(task, message, budget, Path(scratch))
-        except BaseException:  # raised again; also Ctrl-C
+        except BaseException:  # raised again below, for Ctrl-C too: only the server is stopped
             # The next call must not receive the answer of this one.
             _stop_server()
             raise

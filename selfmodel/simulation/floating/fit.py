@@ -91,7 +91,9 @@ def prior_deviations(factors: int) -> FloatArray:
 
 
 def simulated_models(factors: int) -> int:
-    """Returns the number of models that a calibration simulates at most.
+    """Returns the number of models that a fit simulates at most.
+
+    The check of a suspicious log is not included: see ``log_check``.
 
     Args:
         factors: Number of factors.
