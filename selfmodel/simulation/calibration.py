@@ -203,7 +203,8 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
 def simulated_steps(robot: Robot, trials: Sequence[Trial]) -> int:
     """Returns the number of control steps that ``calibrate`` simulates at most, but for retries.
 
-    A suspicious log takes up to as many again, to find its probable error. A model that predicts the trials exactly takes one prediction of each.
+    A suspicious log takes up to as many again, to find its probable error. A model that predicts
+    the trials exactly takes one prediction of each.
 
     Args:
         robot: The robot as its model describes it.
