@@ -10,7 +10,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.diagnosis.evidence import Evidence
-from selfmodel.diagnosis.judgement import Question, judged, ranked_by_distance
+from selfmodel.diagnosis.judgement import Question, by_distance, judged, ranked_by_distance
 from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
 from selfmodel.diagnosis.search.observed_jams import observed_jams
 from selfmodel.diagnosis.search.refine import refined
@@ -166,7 +166,7 @@ class DiagnosticSearch:
         evolve(search, fitness, on_generation)
         self.evaluations += search.evaluations
         self._proposed |= totals.keys()
-        return _ranked(totals)
+        return by_distance(totals)
 
     def _question(
         self,
@@ -283,7 +283,3 @@ def _recorded(losses: Losses, into: set[Hypothesis]) -> Losses:
         return losses(hypotheses)
 
     return recorded
-
-
-def _ranked(totals: dict[Hypothesis, float]) -> list[Hypothesis]:
-    return sorted(totals, key=lambda one: (totals[one], len(one), one))

@@ -79,10 +79,10 @@ def judged(best: Hypothesis, compared: Iterable[Hypothesis], question: Question)
     """
     totals = _totals(compared, question)
     if not math.isfinite(totals[best]):
-        best = _ranked(totals)[0]
+        best = by_distance(totals)[0]
     if not math.isfinite(totals[best]):
-        return all_diverged(_ranked(totals)[: question.kept], question.logs)
-    others = [one for one in _ranked(totals) if one != best]
+        return all_diverged(by_distance(totals)[: question.kept], question.logs)
+    others = [one for one in by_distance(totals) if one != best]
     space, losses, kept = question.space, question.losses, question.kept
     indistinguishable = _indistinguishable(best, others, question)
     unsearched = best_unsearched_fault(best, space, losses)
@@ -138,7 +138,7 @@ def ranked_by_distance(found: Iterable[Hypothesis], question: Question) -> Diagn
         question: The trials and their losses.
     """
     totals = _totals({*found, INTACT}, question)
-    ranked, kept = _ranked(totals), question.kept
+    ranked, kept = by_distance(totals), question.kept
     best = ranked[0]
     if not math.isfinite(totals[best]):
         return all_diverged(ranked[:kept], question.logs)
@@ -167,7 +167,8 @@ def _totals(hypotheses: Iterable[Hypothesis], question: Question) -> dict[Hypoth
     return dict(zip(listed, map(float, distances), strict=True))
 
 
-def _ranked(totals: Mapping[Hypothesis, float]) -> list[Hypothesis]:
+def by_distance(totals: Mapping[Hypothesis, float]) -> list[Hypothesis]:
+    """Returns hypotheses by their distance; at equal distances, by their number of faults."""
     return sorted(totals, key=lambda one: (totals[one], len(one), one))
 
 
