@@ -16,12 +16,13 @@ NOTATION = {
     "joint-friction": "joint-friction:{part}={value:.3f}",
     "delay": "delay={value:.2f}",
     "encoder-offset": "encoder-offset:{part}={value:.3f}",
-    "encoder-slip": "encoder-offset:{part}={value:.3f}",
+    "encoder-slip": "encoder-offset:{part}=slip{value:.3f}",
     "grip": "grip:{part}={value:.3f}",
     "backlash": "backlash:{part}={value:.3f}",
 }
 """Notation of each kind of fault that selfmodel has, or is to have. With ``encoder-slip``, the
-servo uses the encoder with the offset; with ``encoder-offset``, it has another one."""
+servo uses the encoder with the offset; with ``encoder-offset``, it has another one. The notations
+differ in the prefix of the number."""
 
 UNKNOWN = ("crossed", "tether", "heavy-limb", "soft-ground", "side-slope", "short-range")
 """Kinds of faults that no kind of selfmodel expresses."""

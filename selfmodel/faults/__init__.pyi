@@ -11,7 +11,7 @@ from .kind import (
 from .kinds.broken import BROKEN as BROKEN
 from .kinds.damping import DAMPED_JOINT as DAMPED_JOINT
 from .kinds.delay import GROWN_DELAY as GROWN_DELAY
-from .kinds.encoder import ENCODER_OFFSET as ENCODER_OFFSET
+from .kinds.encoder import ENCODER_OFFSET as ENCODER_OFFSET, ENCODER_SLIP as ENCODER_SLIP
 from .kinds.grip import LOST_GRIP as LOST_GRIP
 from .kinds.ground import FRICTION as FRICTION, SLOPE as SLOPE
 from .kinds.jammed import JAMMED as JAMMED, JAMMED_AT_ANGLE as JAMMED_AT_ANGLE

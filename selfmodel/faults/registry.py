@@ -6,7 +6,7 @@ from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.kinds.broken import BROKEN
 from selfmodel.faults.kinds.damping import DAMPED_JOINT
 from selfmodel.faults.kinds.delay import GROWN_DELAY
-from selfmodel.faults.kinds.encoder import ENCODER_OFFSET
+from selfmodel.faults.kinds.encoder import ENCODER_OFFSET, ENCODER_SLIP
 from selfmodel.faults.kinds.grip import LOST_GRIP
 from selfmodel.faults.kinds.ground import FRICTION, SLOPE
 from selfmodel.faults.kinds.jammed import JAMMED, JAMMED_AT_ANGLE
@@ -24,7 +24,8 @@ KINDS: Mapping[str, FaultKind] = {
         *(BROKEN, JAMMED, FAILED_SENSOR, SILENT_NEURON),
         *(JAMMED_AT_ANGLE, WEAK_MOTOR, SENSOR_GAIN, SENSOR_BIAS, SENSOR_NOISE),
         *(FRICTION, SLOPE, ROUGHNESS, WIND, CROSSWIND),
-        *(PAYLOAD, DAMPED_JOINT, JOINT_FRICTION, LOST_GRIP, GROWN_DELAY, ENCODER_OFFSET),
+        *(PAYLOAD, DAMPED_JOINT, JOINT_FRICTION, LOST_GRIP, GROWN_DELAY),
+        *(ENCODER_OFFSET, ENCODER_SLIP),
     )
 }
 """All built-in kinds by name."""

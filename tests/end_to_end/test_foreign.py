@@ -13,10 +13,14 @@ from benchmarks.foreign.cases import CASES, faults_of
 from benchmarks.foreign.faults import NOTATION, UNKNOWN, Fault
 from benchmarks.foreign.generate import Plan, generate
 from benchmarks.foreign.robots import NAMES, Robot, robot
-from benchmarks.foreign.scoring.judge import judged, terms
+from benchmarks.foreign.scoring.judge import is_expressible, judged, terms
 from benchmarks.foreign.seeds import stream
 from benchmarks.foreign.world.body import compiled
 from benchmarks.foreign.world.gap import draw_gap
+from selfmodel.faults.kind import FaultKind
+from selfmodel.faults.notation import parse
+from selfmodel.faults.registry import ALL_KINDS
+from selfmodel.robot.robot import Robot as Body
 from tests.helpers.command import selfmodel
 
 FOLDER = Path(__file__).parents[2] / "benchmarks" / "foreign"
@@ -209,6 +213,31 @@ def test_a_row_tells_false_alarms_missed_faults_and_inventions_apart():
         pytest.approx(0.25)
     )
     assert judged({**row(["break:a"], "", ""), "answer": None}).verdict_right is False
+
+
+@pytest.mark.parametrize("kind", ALL_KINDS, ids=lambda kind: kind.name)
+def test_a_fault_is_expressible_if_its_own_kind_is_considered(kind: FaultKind, quadruped: Body):
+    read = terms([str(kind.candidates(quadruped.anatomy)[0])])
+    others = [other.name for other in ALL_KINDS if other != kind]
+
+    assert is_expressible(read, [kind.name])
+    assert not is_expressible(read, others)
+
+
+def test_an_encoder_slip_is_a_fault_of_its_own_with_an_error_in_rad(quadruped: Body):
+    (part, other) = quadruped.anatomy.hinges[:2]
+    slip = [Fault("encoder-slip", part, -0.15).notation]
+    offset = [Fault("encoder-offset", part, -0.15).notation]
+    kinds = {"kinds": ["encoder-offset", "encoder-slip"]}
+
+    found = judged(row(slip, f"encoder-offset:{part}=slip-0.1", "explained", **kinds))
+
+    assert found.verdict_right
+    assert found.severity_error == pytest.approx(0.05)
+    assert parse(slip[0], quadruped.anatomy).faults[0].severity == -0.15
+    for wrong in (offset[0], f"encoder-offset:{other}=slip-0.15"):
+        assert not judged(row(slip, wrong, "explained", **kinds)).right
+    assert judged(row(slip, "intact", "unexplained", kinds=["encoder-offset"])).right is None
 
 
 def test_terms_are_read_from_the_notation():

@@ -16,8 +16,15 @@ MATTERS = 0.1
 _PREFIX = re.compile(r"[a-z]+")
 _NUMBER = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?")
 
+_ANGLES = ("jam", "slope", "encoder-offset", "encoder-slip")
+"""Names in ``Terms`` of the kinds whose severities are angles."""
+
+_NAMES = {"encoder-offset-slip": "encoder-slip"}
+"""Names of kinds other than keyword and prefix, joined by a hyphen."""
+
 Terms = dict[tuple[str, str], float | None]
-"""Severity of each fault by keyword and part; None without a severity."""
+"""Severity of each fault by name and part; None without a severity. The name is that of the kind,
+and ``jam`` for a jam at any angle."""
 
 
 @dataclass(frozen=True)
@@ -102,6 +109,7 @@ def terms(faults: Iterable[str]) -> Terms:
         if keyword != "intact":
             prefix = _PREFIX.match(value)  # the kind of sensor:NAME=gain0.5 is not sensor:NAME's
             name = f"{keyword}-{prefix[0]}" if prefix else keyword
+            name = _NAMES.get(name, name)
             found[name, "" if keyword == "payload" else part] = float(number[0]) if number else None
     return found
 
@@ -119,10 +127,10 @@ def is_expressible(real: Terms, kinds: Iterable[str]) -> bool:
     """Returns whether the considered kinds have the faults."""
     considered = set(kinds)
 
-    def kind(keyword: str, severity: float | None) -> str:
-        return "jam-angle" if keyword == "jam" and severity else keyword
+    def kind(name: str, severity: float | None) -> str:
+        return "jam-angle" if name == "jam" and severity else name
 
-    return all(kind(keyword, severity) in considered for (keyword, _), severity in real.items())
+    return all(kind(name, severity) in considered for (name, _), severity in real.items())
 
 
 def matters(truth: dict[str, Any]) -> bool:
@@ -138,7 +146,7 @@ def _severity_error(best: Terms, real: Terms) -> float | None:
     for key, severity in real.items():
         guess = best[key]
         if severity is not None and guess is not None:
-            scale = 1.0 if key[0] in ("jam", "slope", "encoder-offset") else abs(severity)
+            scale = 1.0 if key[0] in _ANGLES else abs(severity)
             errors.append(abs(guess - severity) / scale)
     return max(errors) if errors else None
 

@@ -23,6 +23,28 @@ def motor_joints(model: mujoco.MjModel, motor: int) -> frozenset[int]:
     return tendon_joints(model, target) if kind == _TENDON else frozenset()
 
 
+def length_per_angle(model: mujoco.MjModel, motor: int, hinge: int) -> float:
+    """Returns the change of a motor's length per angle of a hinge, in the motor's unit per rad.
+
+    It is constant for motors that act on the hinge, or on a fixed tendon. It is 0 for all others:
+    the length of a spatial tendon is no function of the measured angle of a single hinge.
+
+    Args:
+        model: A compiled model.
+        motor: Id of the motor.
+        hinge: Id of the hinge.
+    """
+    kind, target = int(model.actuator_trntype[motor]), int(model.actuator_trnid[motor, 0])
+    gear = float(model.actuator_gear[motor, 0])
+    if kind in _JOINT:
+        return gear if target == hinge else 0.0
+    if kind != _TENDON:
+        return 0.0
+    path = slice(first := int(model.tendon_adr[target]), first + int(model.tendon_num[target]))
+    own = (model.wrap_type[path] == _WRAPPED_JOINT) & (model.wrap_objid[path] == hinge)
+    return gear * float(model.wrap_prm[path][own].sum())
+
+
 def motor_bodies(model: mujoco.MjModel, motor: int) -> frozenset[int]:
     """Returns the ids of the bodies that a motor requires to have an effect."""
     kind, target = int(model.actuator_trntype[motor]), int(model.actuator_trnid[motor, 0])

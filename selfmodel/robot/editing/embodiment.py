@@ -14,7 +14,7 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.robot.anatomy.anatomy import Anatomy
 from selfmodel.robot.anatomy.transmission import motor_bodies, motor_joints
-from selfmodel.robot.editing import couplings, grip, resistance
+from selfmodel.robot.editing import couplings, feedback, grip, resistance
 from selfmodel.robot.editing.frames import turn_about_origin, turned_by_hinge
 from selfmodel.robot.editing.point_mass import add_point_mass, inertia_box_reach
 
@@ -151,6 +151,10 @@ class Embodiment:
         # A joint that several of the motors drive is scaled once.
         joints = {joint for motor in motors for joint in motor_joints(self.model, motor)}
         self.model.jnt_actfrcrange[sorted(joints)] *= factor
+
+    def shift_feedback(self, hinge: str, offset: float) -> None:
+        """Adds an offset, rad, to the angle that servos measure; see ``feedback``."""
+        feedback.shift_feedback(self.model, hinge, offset)
 
     def scale_damping(self, hinge: str, factor: float) -> None:
         """Scales the viscous damping of a hinge; see ``resistance.scale_damping``."""

@@ -1,10 +1,13 @@
-"""Tests of encoders with an offset."""
+"""Tests of encoders with an offset: beside the servo's measurement, and in its place."""
 
+import mujoco
 import numpy as np
 import pytest
 
 from selfmodel.controllers.playback import Playback
-from selfmodel.faults.hypothesis import INTACT
+from selfmodel.faults.build import build
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.kinds.encoder import ENCODER_SLIP
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot
@@ -12,6 +15,7 @@ from selfmodel.simulation.requests import cut_segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour, collect
 from selfmodel.trials.signals import SIGNALS
+from tests.helpers.arms import quadruped_on_a_stand
 from tests.helpers.drivers import random_motion
 
 STEPS = 60
@@ -48,8 +52,9 @@ def test_an_offset_shifts_the_encoder_and_its_sensor_and_nothing_else(quadruped:
         np.testing.assert_array_equal(run[signal][1], run[signal][0])
 
 
-def test_a_prediction_begins_at_the_true_angle(quadruped: Robot):
-    text = f"encoder-offset:{JOINT}={OFFSET}"
+@pytest.mark.parametrize("prefix", ["", "slip"])
+def test_a_prediction_begins_at_the_true_angle(quadruped: Robot, prefix: str):
+    text = f"encoder-offset:{JOINT}={prefix}{OFFSET}"
     run = simulated(quadruped, [text])
     logged = Behaviour(run.names, run.time, {signal: run[signal][0] for signal in SIGNALS})
     starts = np.array([0, 20, 40])
@@ -64,9 +69,10 @@ def test_a_prediction_begins_at_the_true_angle(quadruped: Robot):
     assert np.abs(wrong).max() > 1e-4
 
 
+@pytest.mark.parametrize("prefix", ["", "slip"])
 @pytest.mark.parametrize("other", ["", f"+jam:{JOINT}=0.2", "+sensor:front_left_angle"])
-def test_a_physical_robot_logs_what_a_simulation_logs(quadruped: Robot, other: str):
-    text = f"encoder-offset:{JOINT}={OFFSET}{other}"
+def test_a_physical_robot_logs_what_a_simulation_logs(quadruped: Robot, other: str, prefix: str):
+    text = f"encoder-offset:{JOINT}={prefix}{OFFSET}{other}"
     run = simulated(quadruped, [text])
     driver = Playback(quadruped.anatomy.motors, random_motion(quadruped, STEPS))
     physical = SimulatedRobot(quadruped, parse(text, quadruped.anatomy)).run(driver, STEPS)
@@ -84,7 +90,116 @@ def test_the_sensor_of_a_jammed_joint_measures_the_angle_with_the_offset(quadrup
     assert run["sensors"][0, :, column] == pytest.approx(sensor.reading(0.2 + OFFSET))
 
 
-def test_a_broken_joint_has_no_encoder(quadruped: Robot):
-    both = parse(f"break:{JOINT}+encoder-offset:front_left_knee=0.1", quadruped.anatomy)
+@pytest.mark.parametrize("prefix", ["", "slip"])
+def test_a_broken_joint_has_no_encoder(quadruped: Robot, prefix: str):
+    text = f"break:{JOINT}+encoder-offset:front_left_knee={prefix}0.1"
+    both = parse(text, quadruped.anatomy)
 
     assert str(both) == f"break:{JOINT}"
+
+
+def motion(robot: Robot, model: mujoco.MjModel, targets: np.ndarray) -> np.ndarray:
+    """The generalized positions under motor targets, by MuJoCo alone, ``(steps + 1, nq)``."""
+    data = mujoco.MjData(model)
+    rows = [data.qpos.copy()]
+    for target in targets:
+        data.ctrl[:] = target
+        mujoco.mj_step(model, data, round(robot.control_timestep / model.opt.timestep))
+        rows.append(data.qpos.copy())
+    return np.array(rows)
+
+
+def lowered(robot: Robot, targets: np.ndarray) -> np.ndarray:
+    """Motor targets of which that of the joint is lower by the offset."""
+    (motor,) = robot.anatomy.joint(JOINT).motors
+    return targets - OFFSET * (np.array(robot.anatomy.motors) == motor)
+
+
+def test_a_robot_with_a_slip_moves_as_under_commands_that_are_lower_by_it(quadruped: Robot):
+    slip = build(quadruped, parse(f"encoder-offset:{JOINT}=slip{OFFSET}", quadruped.anatomy))
+    targets = random_motion(quadruped, STEPS)
+
+    moved = motion(quadruped, slip.model, targets)
+
+    expected = motion(quadruped, quadruped.model, lowered(quadruped, targets))
+    np.testing.assert_allclose(moved, expected, atol=1e-9, rtol=0)
+    assert np.abs(expected - motion(quadruped, quadruped.model, targets)).max() > 0.05
+
+
+def test_a_robot_with_a_slip_rests_at_the_commanded_angle_by_its_encoder_alone():
+    robot = quadruped_on_a_stand()
+    targets = np.full((200, len(robot.anatomy.motors)), 0.05)
+    address = int(robot.model.joint(JOINT).qposadr[0])
+    true = motion(robot, robot.model, lowered(robot, targets))[-1, address]
+    logged = {}
+    for text in ("intact", f"encoder-offset:{JOINT}=slip{OFFSET}"):
+        physical = SimulatedRobot(robot, parse(text, robot.anatomy))
+        samples = physical.run(Playback(robot.anatomy.motors, targets), len(targets))
+        behaviour = collect(robot.anatomy.names, samples)
+        logged[text] = behaviour["joint_positions"][-1, robot.anatomy.hinges.index(JOINT)]
+    intact, slipped = logged.values()
+
+    assert slipped == pytest.approx(intact, abs=0.01)
+    assert slipped - true == pytest.approx(OFFSET, abs=1e-6)
+    assert intact - true == pytest.approx(OFFSET, abs=0.01)
+
+
+def test_offset_and_slip_of_one_joint_add_up(quadruped: Robot):
+    text = f"encoder-offset:{JOINT}=slip0.2+encoder-offset:{JOINT}=-0.3"
+    both = parse(text, quadruped.anatomy)
+    own, slip = build(quadruped, both), parse(f"encoder-offset:{JOINT}=slip0.2", quadruped.anatomy)
+
+    assert str(both) == f"encoder-offset:{JOINT}=-0.3+encoder-offset:{JOINT}=slip0.2"
+    np.testing.assert_allclose(own.encoder_offset, -shift(quadruped), atol=1e-12)
+    np.testing.assert_array_equal(
+        own.model.actuator_biasprm, build(quadruped, slip).model.actuator_biasprm
+    )
+    column = quadruped.anatomy.sensors.index(quadruped.anatomy.sensor("front_left_angle"))
+    half_range = quadruped.anatomy.sensors[column].half_range
+    assert own.offset[column] == pytest.approx(-OFFSET / half_range)
+
+
+@pytest.mark.parametrize("other", [f"motor:{JOINT}=0.4", f"motor:{JOINT}=0", f"jam:{JOINT}=0.2"])
+def test_a_weak_or_jammed_motor_and_a_slip_have_one_model_in_both_orders(
+    quadruped: Robot, other: str
+):
+    slip, fault = (
+        parse(text, quadruped.anatomy).faults[0]
+        for text in (f"encoder-offset:{JOINT}=slip{OFFSET}", other)
+    )
+
+    built = [
+        build(quadruped, Hypothesis(faults)).model for faults in ((slip, fault), (fault, slip))
+    ]
+
+    first, second = (model.actuator_biasprm for model in built)
+    np.testing.assert_allclose(first, second, atol=1e-12)
+    (motor,) = quadruped.anatomy.joint(JOINT).motors
+    share = 0.4 if "0.4" in other else 0.0
+    constant = first[quadruped.anatomy.motors.index(motor), 0]
+    nominal = quadruped.model.actuator(motor).biasprm[1]
+    assert constant == pytest.approx(share * nominal * OFFSET)
+
+
+TORQUE = """
+<mujoco><option timestep="0.005"/><worldbody>
+  <geom type="plane" size="0 0 1"/>
+  <body name="trunk" pos="0 0 0.5"><freejoint/><geom type="box" size="0.1 0.1 0.1"/>
+    <body name="leg"><joint name="hip" axis="0 1 0" range="-60 60"/>
+      <geom type="capsule" fromto="0 0 0 0 0 -0.3" size="0.02"/></body></body>
+</worldbody>
+<actuator><motor name="hip" joint="hip" ctrlrange="-1 1"/></actuator></mujoco>
+"""
+
+
+def test_without_position_feedback_a_slip_is_an_offset():
+    robot = Robot("torque", TORQUE, 0.02)
+    offset, slip = (
+        build(robot, parse(f"encoder-offset:hip={prefix}0.1", robot.anatomy))
+        for prefix in ("", "slip")
+    )
+
+    np.testing.assert_array_equal(slip.encoder_offset, offset.encoder_offset)
+    np.testing.assert_array_equal(slip.model.actuator_biasprm, offset.model.actuator_biasprm)
+    assert slip.encoder_offset.any()
+    assert ENCODER_SLIP.parts(robot.anatomy) == ("hip",)
