@@ -13,6 +13,7 @@ from selfmodel.comparators.encoder_motion import (
     encoder_motion_loss,
     logged_motion,
 )
+from selfmodel.comparators.hinge_errors import hinge_losses
 from selfmodel.comparators.loose_encoders import (
     LooseEncoders,
     detached_hinges,
@@ -205,6 +206,16 @@ class PreparedSegments:
     def losses_by_signal(self, simulated: Behaviour) -> dict[str, FloatArray]:
         """Returns the part of each signal in the losses, ``(n, segments)`` each."""
         return {signal: term[:, self.steady] for signal, term in self._terms(simulated).items()}
+
+    def losses_by_hinge(self, simulated: Behaviour) -> FloatArray:
+        """Returns the loss of each hinge on its own, ``(n, segments, hinges)``; NaN if unknown.
+
+        See ``hinge_errors``. These losses are no part of ``losses``.
+        """
+        if self.motion is None:
+            return np.full((*self.losses(simulated).shape, len(simulated.names.hinges)), np.nan)
+        losses = hinge_losses(simulated.signals, self.states, self.compared, self.motion.resting)
+        return losses[:, self.steady]
 
     def _terms(self, simulated: Behaviour) -> dict[str, FloatArray]:
         """Returns the loss of each signal in each segment, ``(n, segments)`` each."""

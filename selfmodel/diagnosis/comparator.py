@@ -99,6 +99,22 @@ class LocatedTrial(PiecewiseTrial, Protocol):
 
 
 @runtime_checkable
+class HingewiseTrial(PiecewiseTrial, Protocol):
+    """A prepared trial that predicts the motion of single hinges."""
+
+    def losses_by_hinge(self, simulated: Behaviour) -> FloatArray:
+        """Returns the loss of each hinge on its own, ``(n, pieces, hinges)``.
+
+        These losses are used for faults of single joints, in addition to ``losses``. A loss is NaN
+        where the log, or a hypothesis, contains no evidence on the hinge.
+
+        Args:
+            simulated: As for ``distances``.
+        """
+        ...
+
+
+@runtime_checkable
 class Comparator(Protocol):
     """A distance between simulated behaviour and a logged trial.
 

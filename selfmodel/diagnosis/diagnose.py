@@ -10,8 +10,10 @@ from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.diagnosis.evidence import Evidence
+from selfmodel.diagnosis.joint_losses import JointLosses
 from selfmodel.diagnosis.judgement import Question, by_distance, judged, ranked_by_distance
 from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
+from selfmodel.diagnosis.search.joint_faults import with_joint_faults
 from selfmodel.diagnosis.search.observed_jams import observed_jams
 from selfmodel.diagnosis.search.refine import refined
 from selfmodel.diagnosis.search.search_cost import SearchSize
@@ -202,6 +204,13 @@ class DiagnosticSearch:
                 if comparable and intact
                 else None,
             ),
+            joints=JointLosses(
+                self._space.anatomy,
+                damaged=partial(self.evidence.losses_by_hinge, trials=trials),
+                healthy=partial(self.evidence.losses_by_hinge, trials=intact) if intact else None,
+            )
+            if self.evidence.predicts_hinges(known)
+            else None,
         )
 
     def _space_of(self, trials: Sequence[Trial | TrialPart]) -> HypothesisSpace:
@@ -228,6 +237,14 @@ class DiagnosticSearch:
                 healthy=question.losses.healthy,
             ),
         )
+        if question.joints is not None:
+            best = with_joint_faults(
+                best,
+                question.space,
+                self._settings.genes,
+                _recorded(question.losses.damaged, compared),
+                question.joints,
+            )
         compared |= {best, INTACT}
         self._proposed |= compared
         return best, compared

@@ -9,6 +9,7 @@ import numpy as np
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.diagnosis.comparator import (
     Comparator,
+    HingewiseTrial,
     LocatedTrial,
     PiecewiseTrial,
     PreparedTrial,
@@ -71,6 +72,14 @@ class Evidence:
             InputError: The comparator cannot judge one of the trials.
         """
         return all(isinstance(self._prepare(trial).request, Segments) for trial in trials)
+
+    def predicts_hinges(self, trials: Sequence[Trial]) -> bool:
+        """Returns whether the comparator predicts the motion of single hinges in all trials.
+
+        Raises:
+            InputError: The comparator cannot judge one of the trials.
+        """
+        return all(isinstance(self._prepare(trial), HingewiseTrial) for trial in trials)
 
     def check(self, trials: Sequence[Trial]) -> None:
         """Checks that the comparator can judge all trials, before any search.
@@ -160,6 +169,31 @@ class Evidence:
                 found.setdefault(signal, []).append(losses[0, kept])
         return {signal: float(np.concatenate(each).mean()) for signal, each in found.items()}
 
+    def losses_by_hinge(
+        self, hypotheses: Sequence[Hypothesis], trials: Sequence[Trial | TrialPart]
+    ) -> FloatArray:
+        """Returns the losses of each hinge on its own, ``(n, pieces, hinges)``.
+
+        They are infinite where a simulation diverges, and not cached.
+
+        Raises:
+            InputError: The comparator cannot judge a trial, or does not predict single hinges; see
+                ``predicts_hinges``.
+        """
+        found = []
+        for part in map(whole, trials):
+            prepared = self._prepare(part.trial)
+            if not isinstance(prepared, HingewiseTrial):
+                raise contract_error(self._comparator, "does not predict single hinges")
+            rows = []
+            for batch in self._batches(prepared, part.trial, hypotheses):
+                result = simulate(self._simulator, prepared.request, part.trial, batch)
+                losses = prepared.losses_by_hinge(result.behaviour)
+                diverged = result.diverged[:, np.newaxis, np.newaxis]
+                rows.append(np.where(diverged, np.inf, losses)[:, self._pieces(part)])
+            found.append(np.concatenate(rows))
+        return np.concatenate(found, axis=1)
+
     def _prepare(self, trial: Trial) -> PreparedTrial:
         key = _key(trial)
         if key not in self._prepared:
@@ -189,12 +223,20 @@ class Evidence:
         return cache.get_or_compute(hypotheses, partial(self._compute, trial))
 
     def _compute(self, trial: Trial, hypotheses: list[Hypothesis]) -> FloatArray:
-        prepared, simulator = self._prepare(trial), self._simulator
+        prepared = self._prepare(trial)
+        batches = self._batches(prepared, trial, hypotheses)
+        return np.concatenate([self._batch_losses(prepared, trial, batch) for batch in batches])
+
+    def _batches(
+        self, prepared: PreparedTrial, trial: Trial, hypotheses: Sequence[Hypothesis]
+    ) -> list[list[Hypothesis]]:
+        """Returns the hypotheses in batches that the memory of the budget allows."""
+        simulator = self._simulator
         size = largest_batch(
             simulator.robot, prepared.request, trial.behaviour.steps, simulator.budget
         )
-        batches = [hypotheses[first : first + size] for first in range(0, len(hypotheses), size)]
-        return np.concatenate([self._batch_losses(prepared, trial, batch) for batch in batches])
+        listed = list(hypotheses)
+        return [listed[first : first + size] for first in range(0, len(listed), size)]
 
     def _batch_losses(
         self, prepared: PreparedTrial, trial: Trial, hypotheses: list[Hypothesis]

@@ -9,6 +9,7 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
 from selfmodel.diagnosis.evidence import Evidence
+from selfmodel.diagnosis.joint_losses import JointLosses
 from selfmodel.diagnosis.loss_functions import LossFunctions
 from selfmodel.diagnosis.verdicts.detectable import detectable_severities
 from selfmodel.diagnosis.verdicts.fit import Fit
@@ -41,6 +42,7 @@ class Question:
         intact: Trials of the healthy robot, or parts of them.
         kept: Number of hypotheses in a ranking.
         losses: Loss functions of the trials.
+        joints: Losses of single joints; None if the comparator has none.
     """
 
     evidence: Evidence
@@ -49,6 +51,7 @@ class Question:
     intact: Sequence[Trial | TrialPart]
     kept: int
     losses: LossFunctions
+    joints: JointLosses | None = None
 
     @property
     def logs(self) -> list[str]:
@@ -115,6 +118,7 @@ def _fit(best: Hypothesis, question: Question) -> Fit:
         intact_losses,
         question.healthy_losses,
         is_one_gait=have_one_gait(trials, healthy),
+        joints=question.joints.excess(best) if question.joints else {},
     )
 
 
@@ -179,12 +183,16 @@ def _indistinguishable(
     parts, losses = _without_severities(best), question.losses
     candidates = [other for other in others if not parts <= _without_severities(other)]
     best_losses, *rows = losses.damaged([best, *candidates])
-    return tuple(
+    close = [
         one
         for one, row in zip(candidates, rows, strict=True)
         if not is_better(best_losses, row)
         and not any_fault_is_model_error(one, losses, question.space)
-    )
+    ]
+    if question.joints is None:
+        return tuple(close)
+    worse = question.joints.distinguishes(best, close)
+    return tuple(one for one, is_worse in zip(close, worse, strict=True) if not is_worse)
 
 
 def _without_severities(hypothesis: Hypothesis) -> set[tuple[FaultKind, str]]:

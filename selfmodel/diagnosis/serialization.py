@@ -103,6 +103,7 @@ def _fit(values: Mapping[str, Any]) -> Fit:
         excess=_from_json(excess) if is_compared else None,
         threshold=_from_json(values["threshold"]),
         has_faults=bool(values["has_faults"]),
+        joints={str(name): _from_json(z) for name, z in values.get("joints", {}).items()},
     )
 
 

@@ -28,6 +28,17 @@ PREDICTION_ERROR_SCALES: Mapping[Signal, float] = MappingProxyType(
 The scale of commands is for the paper's command range, and is multiplied by a motor's own range
 over the paper's."""
 
+# Those of the angles and velocities of calibration or smaller: losses are compared between
+# hypotheses about one joint, and with the losses of the same joint in healthy trials, so the error
+# of the model is on both sides.
+HINGE_ERROR_SCALES: Mapping[Signal, float] = MappingProxyType(
+    {
+        "joint_positions": 0.03,
+        "joint_velocities": 0.5,
+    }
+)
+"""Error of a short prediction of one hinge that counts as large (``hinge_errors``)."""
+
 # Smaller than the scales of diagnosis: a healthy robot differs from its model by parameters only,
 # and the fit is to find small differences.
 CALIBRATION_ERROR_SCALES: Mapping[Signal, float] = MappingProxyType(

@@ -146,7 +146,7 @@ def _verdict(found: Mapping[str, Any]) -> str:
     return (
         f"Unexplained: even {best} predicts the trials significantly worse than the self-model "
         f"predicts the healthy robot; there is another fault, or one of a kind that was not "
-        f"searched (--kinds).{_residual(found)}"
+        f"searched (--kinds).{_residual(found)}{_joints(found)}"
     )
 
 
@@ -160,6 +160,20 @@ def _residual(found: Mapping[str, Any]) -> str:
     return (
         f" {amount} is left: in {', '.join(left['signals'])}, most of it at t = "
         f"{left['begin']:.1f} to {left['end']:.1f} s of {left['trial']}."
+    )
+
+
+def _joints(found: Mapping[str, Any]) -> str:
+    """Returns the joints that move otherwise than in healthy trials, as a sentence."""
+    joints = (found.get("fit") or {}).get("joints")
+    if not joints:
+        return ""
+    listed = ", ".join(
+        name if excess is None else f"{name} ({excess:.1f})" for name, excess in joints.items()
+    )
+    return (
+        f" Joints whose motion is predicted worse than in the healthy trials, by standard errors: "
+        f"{listed}."
     )
 
 

@@ -36,10 +36,41 @@ def with_fitted_severities(
         before = current
         for index in range(len(current)):
             if index < len(current):  # a fault with a nominal severity was dropped
-                current = _fitted(current, index, losses, space, zooms)
+                current = with_fitted_severity(current, index, losses, space, zooms)
         if current == before:
             break
     return current
+
+
+def with_fitted_severity(
+    hypothesis: Hypothesis,
+    index: int,
+    losses: Losses,
+    space: HypothesisSpace,
+    zooms: int = ZOOMS,
+) -> Hypothesis:
+    """Returns the hypothesis with the severity of one fault of the lowest total loss.
+
+    Args:
+        hypothesis: In canonical form.
+        index: Index of the fault in the hypothesis.
+        losses: As for ``with_fitted_severities``.
+        space: The hypotheses about the robot.
+        zooms: As for ``with_fitted_severities``.
+    """
+    fault = hypothesis.faults[index]
+    bounds = space.severity_bounds(fault)
+    if bounds is None:
+        return hypothesis
+    severities = [fault.severity, *space.levels(fault)]
+    # A kind that edits the specification has no severities between its levels: each severity
+    # needs a compiled model.
+    for _ in range(1 if fault.kind.edit_spec else 1 + zooms):
+        tried = [space.with_severity(hypothesis, index, severity) for severity in severities]
+        chosen = int(np.argmin(losses(tried).sum(axis=1)))
+        severity, best = severities[chosen], tried[chosen]
+        severities = [severity, *_around(severity, severities, bounds)]
+    return best
 
 
 def with_mean_severities(
@@ -95,24 +126,6 @@ def _weights(rows: FloatArray) -> FloatArray:
     weights: FloatArray = np.exp(-np.square(z) / 2)
     weights[: low + 1] = weights[high:] = 0.0
     return weights
-
-
-def _fitted(
-    hypothesis: Hypothesis, index: int, losses: Losses, space: HypothesisSpace, zooms: int
-) -> Hypothesis:
-    fault = hypothesis.faults[index]
-    bounds = space.severity_bounds(fault)
-    if bounds is None:
-        return hypothesis
-    severities = [fault.severity, *space.levels(fault)]
-    # A kind that edits the specification has no severities between its levels: each severity
-    # needs a compiled model.
-    for _ in range(1 if fault.kind.edit_spec else 1 + zooms):
-        tried = [space.with_severity(hypothesis, index, severity) for severity in severities]
-        chosen = int(np.argmin(losses(tried).sum(axis=1)))
-        severity, best = severities[chosen], tried[chosen]
-        severities = [severity, *_around(severity, severities, bounds)]
-    return best
 
 
 def _around(severity: float, known: Sequence[float], bounds: tuple[float, float]) -> list[float]:

@@ -1,7 +1,8 @@
 """Fit of the best hypothesis: the numbers behind a verdict."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from selfmodel.diagnosis.verdicts.significance import LOSS_FLOOR, LOSS_RATIO
@@ -23,6 +24,9 @@ class Fit:
             trials.
         threshold: Excess above which the verdict is ``unexplained``, standard errors.
         has_faults: Whether the best hypothesis has faults.
+        joints: Excess of the loss of single joints over that on healthy trials, standard errors, by
+            the joint's name, largest first; joints beyond the threshold only, and
+            none if the best hypothesis has faults.
     """
 
     loss: float
@@ -31,6 +35,7 @@ class Fit:
     excess: float | None
     threshold: float
     has_faults: bool
+    joints: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def left(self) -> float | None:
@@ -46,6 +51,7 @@ class Fit:
 
         Faults make a motion harder to predict: a slipping foot, a body on the ground. So the loss
         of a hypothesis with faults has to exceed the reference by the factor ``FAULTY_RATIO`` too.
+        A robot with a joint that does not move as in healthy trials is not intact.
         """
         if self.healthy_loss is None or self.excess is None:
             return False
@@ -53,7 +59,7 @@ class Fit:
         if self.has_faults:
             by_much = self.loss > FAULTY_RATIO * self.healthy_loss + LOSS_FLOOR
             return ratio or (by_much and self.excess > self.threshold)
-        return ratio or self.excess > self.threshold
+        return ratio or self.excess > self.threshold or bool(self.joints)
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the JSON values; an infinite number is None."""
@@ -65,6 +71,7 @@ class Fit:
             "threshold": self.threshold,
             "has_faults": self.has_faults,
             "left": _finite(self.left),
+            "joints": {name: _finite(excess) for name, excess in self.joints.items()},
         }
 
 

@@ -1,12 +1,13 @@
 """The verdict of a diagnosis: ``intact``, ``explained``, ``ambiguous`` or ``unexplained``."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, UnsearchedFault, Verdict
 from selfmodel.diagnosis.verdicts.fit import Fit
 from selfmodel.diagnosis.verdicts.significance import (
+    MIN_Z_OF_JOINT,
     MIN_Z_OF_ONE_GAIT,
     MIN_Z_OF_OTHER_GAITS,
     excess_over_healthy,
@@ -24,6 +25,7 @@ def fit_of(
     healthy: FloatArray | None,
     *,
     is_one_gait: bool,
+    joints: Mapping[str, float],
 ) -> Fit:
     """Returns how well the best hypothesis predicts the trials.
 
@@ -34,14 +36,18 @@ def fit_of(
         healthy: Losses of the empty hypothesis on healthy trials, ``(healthy_pieces,)``; None
             without healthy trials.
         is_one_gait: Whether the healthy trials have the gaits of the trials to explain.
+        joints: Excess of the loss of each joint; see ``JointLosses.excess``.
     """
+    threshold = MIN_Z_OF_ONE_GAIT if is_one_gait else MIN_Z_OF_OTHER_GAITS
+    least = max(threshold, MIN_Z_OF_JOINT)
     return Fit(
         loss=float(losses.mean()),
         intact_loss=float(intact.mean()),
         healthy_loss=None if healthy is None else float(healthy.mean()),
         excess=None if healthy is None else excess_over_healthy(losses, healthy),
-        threshold=MIN_Z_OF_ONE_GAIT if is_one_gait else MIN_Z_OF_OTHER_GAITS,
+        threshold=threshold,
         has_faults=bool(best),
+        joints={} if best else {name: z for name, z in joints.items() if z >= least},
     )
 
 

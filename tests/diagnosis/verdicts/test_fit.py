@@ -55,6 +55,14 @@ def test_without_healthy_trials_nothing_is_unexplained():
     assert not Fit(9.0, 9.0, None, None, 5.0, has_faults=False).is_unexplained
 
 
+@pytest.mark.parametrize("joints", [{}, {"front_left_knee": 4.1}])
+def test_a_robot_with_a_joint_that_moves_otherwise_is_not_intact(joints: dict[str, float]):
+    fit = Fit(1.0, 1.0, 1.0, 0.0, 3.5, has_faults=False, joints=joints)
+
+    assert fit.is_unexplained == bool(joints)
+    assert fit.to_dict()["joints"] == joints
+
+
 @given(NUMBERS, NUMBERS, st.none() | NUMBERS, st.none() | NUMBERS)
 def test_the_json_has_no_infinite_number(
     loss: float, intact: float, healthy: float | None, excess: float | None
@@ -65,4 +73,5 @@ def test_the_json_has_no_infinite_number(
     assert values["loss"] == (None if math.isinf(loss) else loss)
     assert set(values) == {
         *("loss", "intact_loss", "healthy_loss", "excess", "threshold", "has_faults", "left"),
+        "joints",
     }
