@@ -38,6 +38,7 @@ class Question:
         evidence: Distances of hypotheses from trials.
         space: The hypotheses about the robot.
         trials: Trials to explain, or parts of them.
+        names: Names of the trials of the whole diagnosis, by path.
         intact: Trials of the healthy robot, or parts of them.
         kept: Number of hypotheses in a ranking.
         losses: Loss functions of the trials.
@@ -46,6 +47,7 @@ class Question:
     evidence: Evidence
     space: HypothesisSpace
     trials: Sequence[Trial | TrialPart]
+    names: Mapping[str, str]
     intact: Sequence[Trial | TrialPart]
     kept: int
     losses: LossFunctions
@@ -124,7 +126,7 @@ def _residual(best: Hypothesis, question: Question) -> Residual | None:
     if timeline is None:
         return None
     healthy = evidence.losses_by_signal(INTACT, question.intact) if question.intact else {}
-    names = [whole(trial).trial.plan.name for trial in question.trials]
+    names = [question.names[path] for path in question.logs]
     signals = evidence.losses_by_signal(best, question.trials)
     losses = question.losses.damaged([best])[0]
     return residual_of(signals, healthy, losses, timeline, names)
