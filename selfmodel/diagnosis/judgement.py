@@ -83,15 +83,17 @@ def judged(best: Hypothesis, compared: Iterable[Hypothesis], question: Question)
     if not math.isfinite(totals[best]):
         best = by_distance(totals)[0]
     if not math.isfinite(totals[best]):
-        return all_diverged(by_distance(totals)[: question.kept], question.logs)
+        ranked = _best_severities(by_distance(totals))
+        return all_diverged(ranked[: question.kept], question.logs)
     others = [one for one in by_distance(totals) if one != best]
+    ranked = _best_severities([best, *others])
     space, losses, kept = question.space, question.losses, question.kept
     indistinguishable = _indistinguishable(best, others, question)
     unsearched = best_unsearched_fault(best, space, losses)
     fit = _fit(best, question)
     verdict = verdict_of(best, fit, indistinguishable, unsearched)
     return Diagnosis(
-        ranked=tuple(Candidate(one, totals[one]) for one in [best, *others][:kept]),
+        ranked=tuple(Candidate(one, totals[one]) for one in ranked[:kept]),
         trials=len(question.trials),
         intact_distance=totals[INTACT],
         indistinguishable=indistinguishable[:kept],
@@ -143,16 +145,16 @@ def ranked_by_distance(found: Iterable[Hypothesis], question: Question) -> Diagn
     ranked, kept = by_distance(totals), question.kept
     best = ranked[0]
     if not math.isfinite(totals[best]):
-        return all_diverged(ranked[:kept], question.logs)
+        return all_diverged(_best_severities(ranked)[:kept], question.logs)
     parts = _without_severities(best)
-    equal = tuple(
+    equal = _best_severities(
         one
         for one in ranked[1:]
         if totals[one] == totals[best] and not parts <= _without_severities(one)
     )
     fit = _fit(best, question)
     return Diagnosis(
-        ranked=tuple(Candidate(one, totals[one]) for one in ranked[:kept]),
+        ranked=tuple(Candidate(one, totals[one]) for one in _best_severities(ranked)[:kept]),
         trials=len(question.trials),
         intact_distance=totals[INTACT],
         indistinguishable=equal[:kept],
@@ -177,11 +179,14 @@ def by_distance(totals: Mapping[Hypothesis, float]) -> list[Hypothesis]:
 def _indistinguishable(
     best: Hypothesis, others: Sequence[Hypothesis], question: Question
 ) -> tuple[Hypothesis, ...]:
-    """Hypotheses not significantly worse than the best, without supersets of its faults."""
+    """Hypotheses not significantly worse than the best, without supersets of its faults.
+
+    Of hypotheses that differ in severities alone, the one with the smallest distance.
+    """
     parts, losses = _without_severities(best), question.losses
     candidates = [other for other in others if not parts <= _without_severities(other)]
     best_losses, *rows = losses.damaged([best, *candidates])
-    return tuple(
+    return _best_severities(
         one
         for one, row in zip(candidates, rows, strict=True)
         if not is_better(best_losses, row)
@@ -189,5 +194,13 @@ def _indistinguishable(
     )
 
 
-def _without_severities(hypothesis: Hypothesis) -> set[tuple[FaultKind, str]]:
-    return {(fault.kind.without_severity, fault.part) for fault in hypothesis.faults}
+def _best_severities(hypotheses: Iterable[Hypothesis]) -> tuple[Hypothesis, ...]:
+    """Returns the first of the hypotheses that differ in severities alone, in the same order."""
+    first: dict[frozenset[tuple[FaultKind, str]], Hypothesis] = {}
+    for one in hypotheses:
+        first.setdefault(_without_severities(one), one)
+    return tuple(first.values())
+
+
+def _without_severities(hypothesis: Hypothesis) -> frozenset[tuple[FaultKind, str]]:
+    return frozenset((fault.kind.without_severity, fault.part) for fault in hypothesis.faults)
