@@ -10,6 +10,8 @@ from benchmarks.foreign.robots import Robot
 from benchmarks.foreign.seeds import stream
 
 Draw = Callable[[Robot, np.random.Generator], tuple[Fault, ...]]
+PartDraw = Callable[[Robot, np.random.Generator], str]
+SeverityDraw = Callable[[np.random.Generator], float]
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,15 @@ def onset_of(case: Case, robot: Robot, seed: int) -> float | None:
     return round(round(drawn / robot.control_timestep) * robot.control_timestep, 6)
 
 
+def _single(kind: str, part: PartDraw, severity: SeverityDraw) -> Draw:
+    """Returns a draw of one fault: its part, and then its severity."""
+
+    def draw(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+        return (Fault(kind, part(robot, rng), severity(rng)),)
+
+    return draw
+
+
 def _lost(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
     return _limb(robot, rng, ("freezes", "follows"))
 
@@ -62,8 +73,22 @@ def _hinge_part(robot: Robot, rng: np.random.Generator) -> str:
     return single[rng.integers(len(single))]
 
 
+def _environment(robot: Robot, rng: np.random.Generator) -> str:
+    """Returns the part of a fault of the environment, or of the whole robot."""
+    del robot, rng
+    return ""
+
+
 def _signed(rng: np.random.Generator, low: float, high: float) -> float:
     return float(rng.choice((-1, 1)) * rng.uniform(low, high))
+
+
+def _between(low: float, high: float, digits: int = 3) -> SeverityDraw:
+    return lambda rng: round(rng.uniform(low, high), digits)
+
+
+def _either_sign(low: float, high: float, digits: int = 3) -> SeverityDraw:
+    return lambda rng: round(_signed(rng, low, high), digits)
 
 
 def _jam(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
@@ -100,25 +125,6 @@ def _lost_and_jam(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
             return limb, jam
 
 
-def _motor(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
-    return (Fault("motor", _part(robot, rng), round(rng.uniform(0.05, 0.5), 3)),)
-
-
-def _friction(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
-    del robot
-    return (Fault("friction", value=round(rng.uniform(0.35, 0.6), 3)),)
-
-
-def _slope(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
-    del robot
-    return (Fault("slope", value=round(_signed(rng, 0.1, 0.2), 3)),)
-
-
-def _wind(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
-    del robot
-    return (Fault("wind", value=round(_signed(rng, 12, 25), 2)),)
-
-
 def _payload(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
     """A payload above the middle of the root body, or near its front or back end."""
     end = ("back", "", "front")[rng.integers(3)]
@@ -135,27 +141,6 @@ def _heavier(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
     model = robot.spec().compile()
     part = 0.3 * model.body(robot.root).mass[0] / model.body_mass.sum()
     return (Fault("payload", value=round(float(part), 3)),)
-
-
-def _damping(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
-    return (Fault("damping", _hinge_part(robot, rng), 8.0),)
-
-
-def _joint_friction(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
-    return (Fault("joint-friction", _hinge_part(robot, rng), round(rng.uniform(0.15, 0.4), 3)),)
-
-
-def _delay(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
-    del robot
-    return (Fault("delay", value=round(rng.uniform(2, 3), 2)),)
-
-
-def _encoder_offset(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
-    return (Fault("encoder-offset", _hinge_part(robot, rng), round(_signed(rng, 0.1, 0.25), 3)),)
-
-
-def _encoder_slip(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
-    return (Fault("encoder-slip", _hinge_part(robot, rng), round(_signed(rng, 0.1, 0.25), 3)),)
 
 
 def _grip(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
@@ -224,14 +209,15 @@ def _lost_none(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
     return _limb(robot, rng, ("none",))
 
 
-def _dead_motor(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
-    return (Fault("motor", _part(robot, rng), round(rng.uniform(0.01, 0.3), 3)),)
-
-
 def _jam_there(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
     """A jam at the angle at which the joint is at the onset."""
     return (Fault("jam", _hinge_part(robot, rng), float("nan")),)
 
+
+_FRICTION = _single("friction", _environment, _between(0.35, 0.6))
+_MOTOR = _single("motor", _part, _between(0.05, 0.5))
+_SLOPE = _single("slope", _environment, _either_sign(0.1, 0.2))
+_WIND = _single("wind", _environment, _either_sign(12, 25, digits=2))
 
 CASES = {
     case.name: case
@@ -243,25 +229,29 @@ CASES = {
         Case("break+jam", "paper", _lost_and_jam),
         Case("healthy", "healthy", _nothing),
         Case("jam-angle", "wide", _jam_angle),
-        Case("motor", "wide", _motor),
+        Case("motor", "wide", _MOTOR),
         Case("heavier", "wide", _heavier),
-        Case("damping", "wide", _damping),
-        Case("joint-friction", "wide", _joint_friction),
-        Case("delay", "wide", _delay),
-        Case("encoder-offset", "wide", _encoder_offset),
-        Case("encoder-slip", "wide", _encoder_slip),
+        Case("damping", "wide", _single("damping", _hinge_part, lambda _: 8.0)),
+        Case("joint-friction", "wide", _single("joint-friction", _hinge_part, _between(0.15, 0.4))),
+        Case("delay", "wide", _single("delay", _environment, _between(2, 3, digits=2))),
+        Case(
+            "encoder-offset",
+            "wide",
+            _single("encoder-offset", _hinge_part, _either_sign(0.1, 0.25)),
+        ),
+        Case("encoder-slip", "wide", _single("encoder-slip", _hinge_part, _either_sign(0.1, 0.25))),
         Case("grip", "wide", _grip),
         Case("backlash", "wide", _backlash),
-        Case("friction", "default", _friction),
-        Case("slope", "default", _slope),
-        Case("wind", "default", _wind),
+        Case("friction", "default", _FRICTION),
+        Case("slope", "default", _SLOPE),
+        Case("wind", "default", _WIND),
         Case("payload", "default", _payload),
-        Case("break+friction", "default", _with(_lost, _friction)),
-        Case("jam+slope", "default", _with(_jam, _slope)),
-        Case("motor+wind", "default", _with(_motor, _wind)),
+        Case("break+friction", "default", _with(_lost, _FRICTION)),
+        Case("jam+slope", "default", _with(_jam, _SLOPE)),
+        Case("motor+wind", "default", _with(_MOTOR, _WIND)),
         Case("break+payload", "default", _with(_lost, _payload)),
         Case("onset-jam", "onset", _jam_there, onset=True),
-        Case("onset-motor", "onset", _dead_motor, onset=True),
+        Case("onset-motor", "onset", _single("motor", _part, _between(0.01, 0.3)), onset=True),
         Case("onset-break", "onset", _lost, onset=True),
         Case("break-nan", "lost-encoder", _lost_nan),
         Case("break-none", "lost-encoder", _lost_none),

@@ -45,6 +45,7 @@ from selfmodel.logs import TrialLog
 from selfmodel.recovery.sequential_diagnosis import diagnose_trials
 from selfmodel.sandbox.budget import Budget
 from selfmodel.settings import Settings
+from selfmodel.trials.trial_names import trial_names
 
 
 def diagnose(
@@ -114,7 +115,9 @@ def diagnose(
         **confidence_to_dict(diagnosis),
         "evidence": [
             one.to_dict()
-            for one in direct_evidence(diagnosis.explained(found.damaged), model.anatomy)
+            for one in direct_evidence(
+                diagnosis.explained(found.damaged), model.anatomy, trial_names(found.damaged)
+            )
         ],
         "evaluations": found.search.evaluations,
         "distinct_hypotheses": found.search.distinct_hypotheses,

@@ -1,7 +1,7 @@
 """The diagnostic search: an EA over hypotheses, local refinement, and the verdict."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -28,6 +28,7 @@ from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Trial
+from selfmodel.trials.trial_names import trial_names
 from selfmodel.trials.trial_part import TrialPart, whole
 
 REFINEMENT_STARTS = 2
@@ -90,7 +91,8 @@ class DiagnosticSearch:
         """
         surrogate = surrogate_of(self.evidence, self._own_surrogates, trials)
         found = self._evolved(surrogate, seeds, rng, on_generation)
-        question = self._question(trials, surrogate.losses)
+        names = trial_names(trials)
+        question = self._question(trials, names, surrogate.losses)
         if not self.evidence.is_piecewise(trials):
             return ranked_by_distance(found, question)
         best, compared = self._refined(found[:REFINEMENT_STARTS], question)
@@ -100,7 +102,7 @@ class DiagnosticSearch:
         rest = partial(surrogate.evidence.losses, trials=change.since(surrogate.trials))
         if rest([INTACT]).shape[1] < MIN_SURROGATE_PIECES:
             return judged(best, compared, question)
-        later = self._question(change.since(trials), rest, _until(change, trials))
+        later = self._question(change.since(trials), names, rest, _until(change, trials))
         after, compared_later = self._refined([change.after, *found[:REFINEMENT_STARTS]], later)
         if after == change.before:
             return judged(best, compared, question)
@@ -173,6 +175,7 @@ class DiagnosticSearch:
     def _question(
         self,
         trials: Sequence[Trial | TrialPart],
+        names: Mapping[str, str],
         surrogate: Losses,
         earlier: Sequence[Trial | TrialPart] = (),
     ) -> Question:
@@ -183,6 +186,7 @@ class DiagnosticSearch:
 
         Args:
             trials: Trials to explain, or parts of them.
+            names: Names of the trials of the whole diagnosis, by path.
             surrogate: Losses of the surrogate comparator on these.
             earlier: Trials, or parts of them, of the robot before it changed: the healthy reference
                 if there are no trials of the healthy robot.
@@ -195,6 +199,7 @@ class DiagnosticSearch:
             evidence=self.evidence,
             space=self._space_of(trials),
             trials=trials,
+            names=names,
             intact=intact,
             kept=self._settings.kept,
             losses=LossFunctions(
@@ -269,7 +274,7 @@ class DiagnosticSearch:
         split = best_split([INTACT, best], list(after), losses.surrogate, losses.damaged)
         if split is None or not is_change(split, best, losses.damaged):
             return None
-        return change_at(split, losses.damaged, timeline, [trial.plan.name for trial in trials])
+        return change_at(split, losses.damaged, timeline, _names_of(trials))
 
     def _dated(self, change: Change, after: Hypothesis, trials: Sequence[Trial]) -> Change:
         """Returns a change with the time that the final hypothesis gives it."""
@@ -280,8 +285,14 @@ class DiagnosticSearch:
         split = best_split([change.before], [after], losses, losses)
         if split is None or timeline is None:
             return change
-        dated = change_at(split, losses, timeline, [trial.plan.name for trial in trials])
+        dated = change_at(split, losses, timeline, _names_of(trials))
         return dated if dated.index == change.index else change
+
+
+def _names_of(trials: Sequence[Trial]) -> list[str]:
+    """Returns the name of each of all trials."""
+    names = trial_names(trials)
+    return [names[trial.path] for trial in trials]
 
 
 def _until(change: Change, trials: Sequence[Trial]) -> list[Trial | TrialPart]:

@@ -76,11 +76,12 @@ class Diagnosis:
         ranked: Candidates, at least one. The first is the best: the hypothesis with the fewest
             faults, each of which makes the prediction significantly better; for a comparator
             without a significance test, the one with the smallest distance. The others follow by
-            distance, at equal distances by number of faults.
+            distance, at equal distances by number of faults. Of hypotheses that differ in
+            severities alone, only the first is ranked.
         trials: Number of trials.
         intact_distance: Distance of the empty hypothesis.
         indistinguishable: Hypotheses not significantly worse than the best, smallest distance
-            first.
+            first; of those that differ in severities alone, only the first.
         verdict: ``intact``, ``explained``, ``ambiguous`` or ``unexplained``; see ``Verdict``.
         test: Name of the test behind ``indistinguishable``.
         unsearched: The best hypothesis with a fault of an unsearched kind, if it predicts the

@@ -39,6 +39,7 @@ class Question:
         evidence: Distances of hypotheses from trials.
         space: The hypotheses about the robot.
         trials: Trials to explain, or parts of them.
+        names: Names of the trials of the whole diagnosis, by path.
         intact: Trials of the healthy robot, or parts of them.
         kept: Number of hypotheses in a ranking.
         losses: Loss functions of the trials.
@@ -48,6 +49,7 @@ class Question:
     evidence: Evidence
     space: HypothesisSpace
     trials: Sequence[Trial | TrialPart]
+    names: Mapping[str, str]
     intact: Sequence[Trial | TrialPart]
     kept: int
     losses: LossFunctions
@@ -84,15 +86,17 @@ def judged(best: Hypothesis, compared: Iterable[Hypothesis], question: Question)
     if not math.isfinite(totals[best]):
         best = by_distance(totals)[0]
     if not math.isfinite(totals[best]):
-        return all_diverged(by_distance(totals)[: question.kept], question.logs)
+        ranked = _best_severities(by_distance(totals))
+        return all_diverged(ranked[: question.kept], question.logs)
     others = [one for one in by_distance(totals) if one != best]
+    ranked = _best_severities([best, *others])
     space, losses, kept = question.space, question.losses, question.kept
     indistinguishable = _indistinguishable(best, others, question)
     unsearched = best_unsearched_fault(best, space, losses)
     fit = _fit(best, question)
     verdict = verdict_of(best, fit, indistinguishable, unsearched)
     return Diagnosis(
-        ranked=tuple(Candidate(one, totals[one]) for one in [best, *others][:kept]),
+        ranked=tuple(Candidate(one, totals[one]) for one in ranked[:kept]),
         trials=len(question.trials),
         intact_distance=totals[INTACT],
         indistinguishable=indistinguishable[:kept],
@@ -128,7 +132,7 @@ def _residual(best: Hypothesis, question: Question) -> Residual | None:
     if timeline is None:
         return None
     healthy = evidence.losses_by_signal(INTACT, question.intact) if question.intact else {}
-    names = [whole(trial).trial.plan.name for trial in question.trials]
+    names = [question.names[path] for path in question.logs]
     signals = evidence.losses_by_signal(best, question.trials)
     losses = question.losses.damaged([best])[0]
     return residual_of(signals, healthy, losses, timeline, names)
@@ -145,16 +149,16 @@ def ranked_by_distance(found: Iterable[Hypothesis], question: Question) -> Diagn
     ranked, kept = by_distance(totals), question.kept
     best = ranked[0]
     if not math.isfinite(totals[best]):
-        return all_diverged(ranked[:kept], question.logs)
+        return all_diverged(_best_severities(ranked)[:kept], question.logs)
     parts = _without_severities(best)
-    equal = tuple(
+    equal = _best_severities(
         one
         for one in ranked[1:]
         if totals[one] == totals[best] and not parts <= _without_severities(one)
     )
     fit = _fit(best, question)
     return Diagnosis(
-        ranked=tuple(Candidate(one, totals[one]) for one in ranked[:kept]),
+        ranked=tuple(Candidate(one, totals[one]) for one in _best_severities(ranked)[:kept]),
         trials=len(question.trials),
         intact_distance=totals[INTACT],
         indistinguishable=equal[:kept],
@@ -179,7 +183,10 @@ def by_distance(totals: Mapping[Hypothesis, float]) -> list[Hypothesis]:
 def _indistinguishable(
     best: Hypothesis, others: Sequence[Hypothesis], question: Question
 ) -> tuple[Hypothesis, ...]:
-    """Hypotheses not significantly worse than the best, without supersets of its faults."""
+    """Hypotheses not significantly worse than the best, without supersets of its faults.
+
+    Of hypotheses that differ in severities alone, the one with the smallest distance.
+    """
     parts, losses = _without_severities(best), question.losses
     candidates = [other for other in others if not parts <= _without_severities(other)]
     best_losses, *rows = losses.damaged([best, *candidates])
@@ -189,11 +196,19 @@ def _indistinguishable(
         if not is_better(best_losses, row)
         and not any_fault_is_model_error(one, losses, question.space)
     ]
-    if question.joints is None:
-        return tuple(close)
-    worse = question.joints.distinguishes(best, close)
-    return tuple(one for one, is_worse in zip(close, worse, strict=True) if not is_worse)
+    if question.joints is not None:
+        worse = question.joints.distinguishes(best, close)
+        close = [one for one, is_worse in zip(close, worse, strict=True) if not is_worse]
+    return _best_severities(close)
 
 
-def _without_severities(hypothesis: Hypothesis) -> set[tuple[FaultKind, str]]:
-    return {(fault.kind.without_severity, fault.part) for fault in hypothesis.faults}
+def _best_severities(hypotheses: Iterable[Hypothesis]) -> tuple[Hypothesis, ...]:
+    """Returns the first of the hypotheses that differ in severities alone, in the same order."""
+    first: dict[frozenset[tuple[FaultKind, str]], Hypothesis] = {}
+    for one in hypotheses:
+        first.setdefault(_without_severities(one), one)
+    return tuple(first.values())
+
+
+def _without_severities(hypothesis: Hypothesis) -> frozenset[tuple[FaultKind, str]]:
+    return frozenset((fault.kind.without_severity, fault.part) for fault in hypothesis.faults)

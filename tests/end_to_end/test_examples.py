@@ -67,7 +67,8 @@ def test_a_comparator_of_ones_own_keeps_the_contract():
 def test_a_comparator_of_ones_own_plugs_in_from_the_folder_that_the_command_runs_in(tmp_path: Path):
     command = [
         *(Path(sys.executable).with_name("selfmodel"), "recover", "quadruped", "--case", "2"),
-        *(*SMALL, "--trials", "1", "--comparator", "heading_comparator:HEADING"),
+        *(*SMALL, "--trials", "1", "--steps", "200", "--kinds", "paper"),
+        *("--comparator", "heading_comparator:HEADING"),
         *("--out", tmp_path / "run", "--json"),
     ]
 

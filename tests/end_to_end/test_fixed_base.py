@@ -39,7 +39,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_faults_are_found_in_the_logs_of_a_robot_with_a_fixed_base(
     folder: Path, robot: str, fault: str
 ):
-    drive = (f"{robot}.xml", "--steps", "200", "--controller", "cpg", "--gap", "0.02")
+    drive = (f"{robot}.xml", "--steps", "100", "--controller", "cpg", "--gap", "0.02")
     before, after = f"{robot}-before.mcap", f"{robot}-after.mcap"
     run(folder, "trial", *drive, "--stage", "before", "-o", before)
     run(folder, "trial", *drive, "--stage", "after", "--damage", fault, "-o", after)

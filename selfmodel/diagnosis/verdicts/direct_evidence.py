@@ -4,7 +4,7 @@ It is a report beside a diagnosis: ``segment-prediction`` uses the motion of the
 of its loss, and the readings and commands as before.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -106,21 +106,24 @@ class DirectEvidence:
         }
 
 
-def direct_evidence(trials: Sequence[Trial], anatomy: Anatomy) -> tuple[DirectEvidence, ...]:
+def direct_evidence(
+    trials: Sequence[Trial], anatomy: Anatomy, names: Mapping[str, str]
+) -> tuple[DirectEvidence, ...]:
     """Returns the evidence of each trial that needs no simulation.
 
     Args:
         trials: Trials of the robot; unknown values (NaN) are no evidence.
         anatomy: The robot's parts.
+        names: Names of the trials, by path; see ``trial_names``.
     """
-    return tuple(_evidence_of(trial, anatomy) for trial in trials)
+    return tuple(_evidence_of(trial, anatomy, names[trial.path]) for trial in trials)
 
 
-def _evidence_of(trial: Trial, anatomy: Anatomy) -> DirectEvidence:
+def _evidence_of(trial: Trial, anatomy: Anatomy, name: str) -> DirectEvidence:
     commanded = _commanded(trial)
     joints = tuple(_joints(trial, anatomy, commanded))
     return DirectEvidence(
-        trial=trial.plan.name,
+        trial=name,
         joints=joints,
         constant_sensors=tuple(_constant_sensors(trial)),
         commands_without_effect=tuple(_without_effect(joints, anatomy, commanded)),

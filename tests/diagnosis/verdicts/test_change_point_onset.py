@@ -48,8 +48,7 @@ def glued(first: Trial, second: Trial, step: int) -> Trial:
         for name, values in first.behaviour.signals.items()
     }
     behaviour = Behaviour(first.behaviour.names, first.behaviour.time, signals)
-    plan = dataclasses.replace(second.plan, name=f"glued-{step}")
-    return dataclasses.replace(second, plan=plan, behaviour=behaviour, path=f"glued-{step}.mcap")
+    return dataclasses.replace(second, behaviour=behaviour, path=f"glued-{step}.mcap")
 
 
 def diagnosed(robot: Robot, *trials: Trial, intact: tuple[Trial, ...] = ()) -> Diagnosis:

@@ -26,7 +26,7 @@ def evidence(robot: Robot, knee: np.ndarray | float, commanded: float = 1.0) -> 
     sensors = np.sign(swing) * np.ones(len(names))
     sensors[:, names.index(SENSOR)] = 0
     trial = Trial.from_arrays(robot, positions, commands, sensors=sensors)
-    (found,) = direct_evidence([trial], robot.anatomy)
+    (found,) = direct_evidence([trial], robot.anatomy, {trial.path: "walk"})
     return found
 
 
@@ -35,6 +35,7 @@ def test_a_joint_that_stands_within_its_noise_while_commanded_is_named(quadruped
     found = evidence(quadruped, 0.3 + noise)
     knee = {one.joint: one for one in found.joints}[KNEE]
 
+    assert found.trial == "walk"
     assert knee.motion == "stands"
     np.testing.assert_allclose([knee.angle, knee.deviation], [0.3, 0.007], atol=1e-3)
     assert knee.commanded > 1.9

@@ -20,14 +20,15 @@ def ant(tmp_path: Path) -> Path:
 @pytest.mark.search
 def test_a_users_robot_is_recovered_and_diagnosed_from_its_logs(ant: Path, tmp_path: Path):
     before = ant.read_bytes()
-    damage = ("--damage", "break:ankle_1", "--trials", "1", *SMALL)
-    done = selfmodel("recover", "ant.xml", *damage, "--out", "run", "--json", cwd=tmp_path)
+    damage = ("--damage", "break:ankle_1", "--trials", "1", "--steps", "300", *SMALL)
+    kinds = ("--kinds", "paper", "--json")
+    done = selfmodel("recover", "ant.xml", *damage, "--out", "run", *kinds, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
 
     logs = sorted(str(path) for path in (tmp_path / "run" / "trials").glob("*.mcap"))
-    alone = selfmodel("diagnose", *logs, "--json", cwd=tmp_path)
-    with_file = selfmodel("diagnose", *logs, "--robot", "ant.xml", "--json", cwd=tmp_path)
+    alone = selfmodel("diagnose", *logs, *kinds, cwd=tmp_path)
+    with_file = selfmodel("diagnose", *logs, "--robot", "ant.xml", *kinds, cwd=tmp_path)
 
     assert (told["robot"], told["truth"]) == ("ant", "break:ankle_1")
     assert alone.returncode == with_file.returncode == 0, alone.stderr + with_file.stderr

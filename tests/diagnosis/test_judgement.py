@@ -1,0 +1,113 @@
+"""Promises of the judgement: what it ranks, and how it names trials."""
+
+import dataclasses
+from collections.abc import Callable, Iterable
+from functools import partial
+
+import numpy as np
+import pytest
+
+from selfmodel.comparators import SEGMENT_PREDICTION
+from selfmodel.diagnosis.diagnose import DiagnosticSearch
+from selfmodel.diagnosis.diagnosis import Diagnosis
+from selfmodel.diagnosis.judgement import Question, judged, ranked_by_distance
+from selfmodel.diagnosis.loss_functions import LossFunctions
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.notation import parse
+from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.trial import Trial, TrialPlan
+from selfmodel.trials.trial_names import trial_names
+from tests.helpers.drivers import random_controllers
+from tests.helpers.memory import in_memory
+
+KNEE, SHOULDER = "front_left_knee", "back_right_shoulder"
+LAME = f"motor:{KNEE}=0.2"
+OF_ONE_SET = (
+    (LAME, f"motor:{KNEE}=0.21", f"motor:{KNEE}=0.9"),
+    (f"motor:{SHOULDER}=0.5", f"motor:{SHOULDER}=0.6", f"motor:{SHOULDER}=0.0"),
+    (f"jam:{SHOULDER}", f"jam:{SHOULDER}=0.4"),
+    (f"break:{SHOULDER}+{LAME}", f"break:{SHOULDER}+motor:{KNEE}=0.3"),
+    ("intact",),
+)
+"""Hypotheses that differ in severities alone, or not at all; the first set is the truth's."""
+
+
+def trial(robot: Robot, truth: str, path: str) -> Trial:
+    """A trial of a damaged robot with the plan of an import, and a log of its own."""
+    (gait,) = random_controllers(robot, 1)
+    physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
+    run = in_memory(robot)(physical, TrialPlan("imported", "after", gait, 200, 0))
+    return dataclasses.replace(run, path=path)
+
+
+def question_of(robot: Robot, *trials: Trial) -> Question:
+    """The question of some trials, with a trial of the healthy robot."""
+    healthy = trial(robot, "intact", "healthy.mcap")
+    simulator = Simulator(robot, 1)
+    search = DiagnosticSearch(simulator, SEGMENT_PREDICTION, Settings(), intact=[healthy])
+    return search._question(
+        trials, trial_names(trials), partial(search.evidence.losses, trials=trials)
+    )
+
+
+def parsed(robot: Robot) -> list[list[Hypothesis]]:
+    return [[parse(one, robot.anatomy) for one in some] for some in OF_ONE_SET]
+
+
+def nearest(sets: Iterable[list[Hypothesis]], question: Question) -> set[Hypothesis]:
+    """The hypothesis of each set with the smallest distance."""
+    distances = partial(question.evidence.distances, trials=question.trials)
+    return {some[int(np.argmin(distances(some)))] for some in sets}
+
+
+def judged_truth(found: Iterable[Hypothesis], question: Question) -> Diagnosis:
+    """The judgement of a search that ended at the truth."""
+    return judged(parse(LAME, question.space.anatomy), found, question)
+
+
+@pytest.mark.parametrize("judge", [judged_truth, ranked_by_distance])
+def test_the_ranking_has_each_set_of_faults_once_with_its_best_severities(
+    quadruped: Robot, judge: Callable[[Iterable[Hypothesis], Question], Diagnosis]
+):
+    question = question_of(quadruped, trial(quadruped, LAME, "lame.mcap"))
+    sets = parsed(quadruped)
+    found = judge([one for some in sets for one in some], question)
+    ranked = [candidate.hypothesis for candidate in found.ranked]
+
+    assert str(found.best) == LAME
+    assert len(ranked) == len(sets)
+    assert set(ranked) == nearest(sets, question)
+    distances = [candidate.distance for candidate in found.ranked]
+    assert distances == sorted(distances)
+
+
+def test_the_indistinguishable_hypotheses_have_each_set_of_faults_once(quadruped: Robot):
+    question = question_of(quadruped, trial(quadruped, LAME, "lame.mcap"))
+    alike = LossFunctions(
+        damaged=lambda some: np.ones((len(some), 20)),
+        surrogate=lambda some: np.ones((len(some), 20)),
+        healthy=None,
+    )
+    sets = parsed(quadruped)
+    found = judged_truth(
+        [one for some in sets for one in some], dataclasses.replace(question, losses=alike)
+    )
+
+    others = [some for some in sets if "+" not in str(some[0]) and str(some[0]) != LAME]
+    assert len(found.indistinguishable) == len(others)
+    assert set(found.indistinguishable) == nearest(others, question)
+
+
+def test_the_worst_time_of_an_unexplained_diagnosis_names_the_file_of_its_trial(
+    quadruped: Robot,
+):
+    names = {"monday.mcap": "intact", "tuesday.mcap": LAME}
+    trials = [trial(quadruped, truth, path) for path, truth in names.items()]
+    found = judged(INTACT, [INTACT], question_of(quadruped, *trials))
+
+    assert found.verdict == "unexplained"
+    assert found.residual is not None
+    assert found.residual.trial == "tuesday"
