@@ -188,7 +188,8 @@ class Evidence:
             rows = []
             for batch in self._batches(prepared, part.trial, hypotheses):
                 result = simulate(self._simulator, prepared.request, part.trial, batch)
-                losses = prepared.losses_by_hinge(result.behaviour)
+                with _diverging(result.diverged):
+                    losses = prepared.losses_by_hinge(result.behaviour)
                 diverged = result.diverged[:, np.newaxis, np.newaxis]
                 rows.append(np.where(diverged, np.inf, losses)[:, self._pieces(part)])
             found.append(np.concatenate(rows))
@@ -243,9 +244,7 @@ class Evidence:
     ) -> FloatArray:
         result = simulate(self._simulator, prepared.request, trial, hypotheses)
         diverged = result.diverged[:, np.newaxis]
-        # The losses of diverged simulations are replaced below.
-        warnings: Literal["ignore"] | None = "ignore" if diverged.any() else None
-        with np.errstate(over=warnings, invalid=warnings, divide=warnings):
+        with _diverging(result.diverged):
             losses = self._compare(prepared, result.behaviour, len(hypotheses))
         wrong = losses[~((losses >= 0) | diverged)]
         if len(wrong):
@@ -269,6 +268,15 @@ class Evidence:
                 self._comparator, f"returned {distances.shape} distances for {count} simulations"
             )
         return np.asarray(distances[:, np.newaxis])
+
+
+def _diverging(diverged: BoolArray) -> np.errstate:
+    """Returns a context without warnings of the losses of diverged simulations.
+
+    These losses are replaced afterwards.
+    """
+    warnings: Literal["ignore"] | None = "ignore" if diverged.any() else None
+    return np.errstate(over=warnings, invalid=warnings, divide=warnings)
 
 
 def simulate(

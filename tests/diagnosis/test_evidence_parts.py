@@ -11,6 +11,7 @@ from selfmodel.comparators import (
 )
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.evidence import Evidence
+from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated_robot import SimulatedRobot
@@ -150,3 +151,53 @@ def test_a_hypothesis_that_diverged_has_no_losses_by_signal(quadruped: Robot, tr
     bad = exploding(simulator, "jam:front_left_knee")
 
     assert Evidence(simulator, SEGMENT_PREDICTION).losses_by_signal(bad, trials) == {}
+
+
+def test_the_losses_of_hinges_have_the_pieces_of_the_losses(
+    evidence: Evidence, trials: list[Trial], two: list[Hypothesis], quadruped: Robot
+):
+    parts = [trials[0], TrialPart(trials[1], begin=0.5)]
+    losses, hinges = evidence.losses(two, parts), evidence.losses_by_hinge(two, parts)
+
+    assert evidence.predicts_hinges(trials)
+    assert hinges.shape == (*losses.shape, len(quadruped.anatomy.hinges))
+    first = evidence.losses_by_hinge(two, trials[:1])
+    np.testing.assert_array_equal(hinges[:, : first.shape[1]], first)
+
+
+def test_a_jam_shows_in_the_loss_of_its_hinge(evidence: Evidence, trials: list[Trial]):
+    names = trials[0].behaviour.names.hinges
+    mean = evidence.losses_by_hinge([INTACT], trials)[0].mean(axis=0)
+
+    assert names[int(np.argmax(mean))] == "front_left_knee"
+
+
+def test_a_detached_hinge_has_no_losses_and_the_others_have(
+    evidence: Evidence, trials: list[Trial], two: list[Hypothesis]
+):
+    unknown = np.isnan(evidence.losses_by_hinge(two, trials)).all(axis=1)
+    names = trials[0].behaviour.names.hinges
+
+    assert not unknown[0].any()
+    assert [name for name, is_unknown in zip(names, unknown[1], strict=True) if is_unknown] == [
+        "back_left_knee"
+    ]
+
+
+def test_the_losses_of_hinges_are_infinite_where_a_hypothesis_diverges(
+    quadruped: Robot, trials: list[Trial]
+):
+    simulator = Simulator(quadruped, 1)
+    bad = exploding(simulator, "jam:front_left_knee")
+    losses = Evidence(simulator, SEGMENT_PREDICTION).losses_by_hinge([bad, INTACT], trials)
+
+    assert np.isinf(losses[0]).all()
+    assert np.isfinite(losses[1]).all()
+
+
+def test_a_comparator_of_displacements_predicts_no_hinges(quadruped: Robot, trials: list[Trial]):
+    evidence = Evidence(Simulator(quadruped, 1), FORWARD_DISPLACEMENT)
+
+    assert not evidence.predicts_hinges(trials)
+    with pytest.raises(InputError, match="does not predict single hinges"):
+        evidence.losses_by_hinge([INTACT], trials)
