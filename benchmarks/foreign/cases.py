@@ -1,7 +1,7 @@
 """The cases: each draws its faults for a robot and a seed."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -57,6 +57,11 @@ def _single(kind: str, part: PartDraw, severity: SeverityDraw) -> Draw:
 
 def _lost(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
     return _limb(robot, rng, ("freezes", "follows"))
+
+
+def _lost_with_debris(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+    (fault,) = _lost(robot, rng)
+    return (replace(fault, debris=True),)
 
 
 def _limb(robot: Robot, rng: np.random.Generator, modes: tuple[str, ...]) -> tuple[Fault, ...]:
@@ -225,6 +230,7 @@ CASES = {
         Case("break", "paper", _lost),
         Case("jam", "paper", _jam),
         Case("sensor", "paper", _sensor, network=True),
+        Case("break-debris", "paper", _lost_with_debris),
         Case("break+sensor", "paper", _lost_and_sensor, network=True),
         Case("break+jam", "paper", _lost_and_jam),
         Case("healthy", "healthy", _nothing),

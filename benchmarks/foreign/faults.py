@@ -45,6 +45,7 @@ class Fault:
         value: Severity in the unit of its notation; for the kinds of ``UNKNOWN`` as in ``damage``.
         encoders: With ``lost`` and ``encoder``, the behaviour of the encoders; of ``ENCODERS``.
         place: With ``payload``, position on the root body, m.
+        debris: With ``lost``, whether the limb stays on the ground.
     """
 
     kind: str
@@ -52,6 +53,7 @@ class Fault:
     value: float = 0.0
     encoders: str = "freezes"
     place: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    debris: bool = False
 
     @property
     def notation(self) -> str:

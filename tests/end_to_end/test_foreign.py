@@ -67,6 +67,22 @@ def test_a_lost_limb_is_deleted_with_its_mass_hinges_and_motors(machine: Robot):
     assert left.body_mass.sum() < whole.body_mass.sum() - 0.01
 
 
+def test_debris_is_the_lost_limb_as_a_free_body_in_its_place(machine: Robot):
+    part = machine.parts[0]
+    fault = Fault("lost", part.name, debris=True)
+    whole, left = model_of(machine), model_of(machine, fault)
+    data, fallen = mujoco.MjData(whole), mujoco.MjData(left)
+    mujoco.mj_forward(whole, data)
+    mujoco.mj_forward(left, fallen)
+
+    debris, limb = left.body("debris").id, whole.body(part.body).id
+    assert left.body_mass.sum() == pytest.approx(whole.body_mass.sum())
+    assert left.body_mass[debris] == pytest.approx(whole.body_subtreemass[limb])
+    assert fallen.subtree_com[debris] == pytest.approx(data.subtree_com[limb], abs=1e-9)
+    assert left.jnt_type[left.body_jntadr[debris]] == mujoco.mjtJoint.mjJNT_FREE
+    assert left.jnt_qposadr[left.body_jntadr[debris]] == left.nq - 7
+
+
 def test_a_jam_fixes_the_body_at_the_angle_of_its_hinge(machine: Robot):
     part = next(part for part in machine.parts if len(part.hinges) == 1)
     whole, jammed = model_of(machine), model_of(machine, Fault("jam", part.name, 0.3))

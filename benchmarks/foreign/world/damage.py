@@ -7,6 +7,7 @@ import numpy as np
 
 from benchmarks.foreign.faults import Fault
 from benchmarks.foreign.robots import Part, Robot
+from benchmarks.foreign.world.debris import leave
 
 AIR = (1.2, 1.8e-5)
 """Density, kg/m^3, and viscosity, Pa s, of air at 20 degrees Celsius."""
@@ -25,7 +26,7 @@ def damaged(robot: Robot, faults: tuple[Fault, ...], angles: dict[str, float]) -
     for fault in faults:
         match fault.kind:
             case "lost":
-                spec.delete(spec.body(robot.part(fault.part).body))
+                _detach(spec, robot.part(fault.part).body, debris=fault.debris)
             case "jam":
                 _jam(spec, robot.part(fault.part), fault.value, angles)
             case "payload":
@@ -42,6 +43,13 @@ def damaged(robot: Robot, faults: tuple[Fault, ...], angles: dict[str, float]) -
                 spec.option.density, spec.option.viscosity = AIR
                 spec.option.wind[0 if fault.kind == "wind" else 1] = fault.value
     return spec
+
+
+def _detach(spec: mujoco.MjSpec, body: str, *, debris: bool) -> None:
+    """Deletes a body with all beyond it; debris stays where it was."""
+    if debris:
+        leave(spec, body)
+    spec.delete(spec.body(body))
 
 
 def _jam(spec: mujoco.MjSpec, part: Part, value: float, angles: dict[str, float]) -> None:
