@@ -27,6 +27,11 @@ from selfmodel.diagnosis.verdicts.significance import (
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 
+MIN_EXCESS = 2.0
+"""Standard errors by which the loss of a joint has to exceed that in healthy trials for a fault of
+the joint to be searched. It is lower than ``MIN_Z_OF_JOINT``, because the gain of a fault is paired
+over the pieces and so tested more sharply than the excess."""
+
 KINDS_FITTED = 3
 """Kinds whose severities are fitted between their levels, best first."""
 
@@ -78,7 +83,7 @@ class _JointSearch:
         """The joint with the largest excess, if it is large and the joint has no fault."""
         joint, excess = next(iter(self._joints.excess(hypothesis).items()), ("", 0.0))
         is_new = joint not in self.joints_with_faults(hypothesis)
-        return joint if excess >= MIN_Z_OF_JOINT and is_new else None
+        return joint if excess >= MIN_EXCESS and is_new else None
 
     def replaced(self, current: Hypothesis, joint: str) -> Hypothesis:
         """The hypothesis with the best fault of a joint in the place of its present ones."""
