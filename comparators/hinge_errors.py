@@ -9,7 +9,6 @@ from collections.abc import Mapping
 import numpy as np
 
 from selfmodel.arrays import FloatArray, IndexArray
-from selfmodel.comparators.loose_encoders import detached_hinges
 from selfmodel.trials.signal_scales import HINGE_ERROR_SCALES
 from selfmodel.trials.signals import Signal
 
@@ -18,19 +17,16 @@ def hinge_losses(
     predicted: Mapping[Signal, FloatArray],
     logged: Mapping[Signal, FloatArray],
     compared: IndexArray,
-    resting: FloatArray,
 ) -> FloatArray:
     """Returns the loss of each hinge in each segment, ``(n, segments, hinges)``.
 
     The loss is the mean of ``log(1 + (e / s)^2)`` over the compared steps, of the angle plus of the
-    velocity. It is NaN where the angle is unknown, and for a hinge that a hypothesis detaches: its
-    encoder is no evidence.
+    velocity. It is NaN where the angle is unknown.
 
     Args:
         predicted: Predicted signals of ``n`` hypotheses, ``(n, segments, horizon + 1, width)``.
         logged: Logged state at the compared steps, ``(segments, comparisons, width)`` per signal.
         compared: Steps within a segment at which the state is compared, ``(comparisons,)``.
-        resting: Angle at which a detached hinge is predicted, ``(hinges,)`` rad.
     """
     positions = predicted["joint_positions"]
     total = np.zeros((*positions.shape[:2], positions.shape[-1]))
@@ -39,8 +35,7 @@ def hinge_losses(
             errors = (predicted[signal][:, :, compared] - logged[signal]) / scale
             unknown = np.nan if signal == "joint_positions" else 0.0
             total += _mean_over_known(np.log1p(np.square(errors)), unknown)
-    detached = detached_hinges(positions, resting)
-    return np.where(detached[:, np.newaxis], np.nan, total)
+    return total
 
 
 def _mean_over_known(losses: FloatArray, unknown: float) -> FloatArray:

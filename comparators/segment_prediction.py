@@ -212,9 +212,9 @@ class PreparedSegments:
 
         See ``hinge_errors``. These losses are no part of ``losses``.
         """
-        if self.motion is None:
+        if "joint_positions" not in self.states:
             return np.full((*self.losses(simulated).shape, len(simulated.names.hinges)), np.nan)
-        losses = hinge_losses(simulated.signals, self.states, self.compared, self.motion.resting)
+        losses = hinge_losses(simulated.signals, self.states, self.compared)
         return losses[:, self.steady]
 
     def _terms(self, simulated: Behaviour) -> dict[str, FloatArray]:

@@ -105,8 +105,9 @@ class HingewiseTrial(PiecewiseTrial, Protocol):
     def losses_by_hinge(self, simulated: Behaviour) -> FloatArray:
         """Returns the loss of each hinge on its own, ``(n, pieces, hinges)``.
 
-        These losses are used for faults of single joints, in addition to ``losses``. A loss is NaN
-        where the log, or a hypothesis, contains no evidence on the hinge.
+        These losses are used for faults of single joints, in addition to ``losses``. The hinges are
+        in the order of the log's joint positions. A loss is NaN where the log contains no evidence
+        on the hinge; all others are at least 0, and finite.
 
         Args:
             simulated: As for ``distances``.

@@ -5,7 +5,12 @@ from collections.abc import Callable
 import numpy as np
 
 from selfmodel.arrays import FloatArray, IndexArray
-from selfmodel.diagnosis.comparator import Comparator, PiecewiseTrial, PreparedTrial
+from selfmodel.diagnosis.comparator import (
+    Comparator,
+    HingewiseTrial,
+    PiecewiseTrial,
+    PreparedTrial,
+)
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments, recordable
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.state_estimation import JOINTS
@@ -67,10 +72,24 @@ def check_comparator(comparator: Comparator, trial: Trial, simulated: Behaviour)
     )
     if isinstance(prepared, PiecewiseTrial):
         _check_pieces(prepared, again, requested, distances)
+    if isinstance(prepared, HingewiseTrial):
+        _check_hinges(prepared, requested)
     if not _is_same(before, requested):
         raise ValueError("a comparator must not change its arguments")
     if not _is_same(logged, trial.behaviour):
         raise ValueError("a comparator must not change the trial")
+
+
+def _check_hinges(prepared: HingewiseTrial, simulated: Behaviour) -> None:
+    losses = np.asarray(prepared.losses_by_hinge(simulated))
+    expected = (*np.shape(prepared.losses(simulated)), len(simulated.names.hinges))
+    if losses.shape != expected:
+        raise ValueError(
+            f"the losses of hinges must have shape (n, pieces, hinges) = {expected}, got "
+            f"{losses.shape}"
+        )
+    if np.isinf(losses).any() or (losses < 0).any():
+        raise ValueError("the losses of hinges must be finite and at least 0, or NaN if unknown")
 
 
 def shown(request: Request, trial: Trial) -> Behaviour:

@@ -10,15 +10,15 @@ from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.diagnosis.evidence import Evidence
-from selfmodel.diagnosis.joint_losses import JointLosses
-from selfmodel.diagnosis.judgement import Question, by_distance, judged, ranked_by_distance
+from selfmodel.diagnosis.judgement import by_distance, judged, ranked_by_distance
 from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
+from selfmodel.diagnosis.question import Question, question_of
 from selfmodel.diagnosis.search.joint_faults import with_joint_faults
-from selfmodel.diagnosis.search.observed_jams import observed_jams
 from selfmodel.diagnosis.search.refine import refined
 from selfmodel.diagnosis.search.search_cost import SearchSize
 from selfmodel.diagnosis.search.surrogate import Surrogate, own_surrogates, surrogate_of
 from selfmodel.diagnosis.verdicts.change_point import Change, best_split, change_at, is_change
+from selfmodel.diagnosis.verdicts.significance import MIN_Z, excess_over_healthy
 from selfmodel.diagnosis.verdicts.unsearched import unsearched_space
 from selfmodel.evolution import Evolution, GenerationCallback, evolve
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
@@ -29,7 +29,7 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Trial
 from selfmodel.trials.trial_names import trial_names
-from selfmodel.trials.trial_part import TrialPart, whole
+from selfmodel.trials.trial_part import TrialPart
 
 REFINEMENT_STARTS = 2
 """Hypotheses from the EA that the refinement starts from, best first."""
@@ -102,7 +102,9 @@ class DiagnosticSearch:
         rest = partial(surrogate.evidence.losses, trials=change.since(surrogate.trials))
         if rest([INTACT]).shape[1] < MIN_SURROGATE_PIECES:
             return judged(best, compared, question)
-        later = self._question(change.since(trials), names, rest, _until(change, trials))
+        change = self._with_refined_before(change, found, trials, surrogate)
+        healthy = change.until(trials) if change.before == INTACT else []
+        later = self._question(change.since(trials), names, rest, healthy)
         after, compared_later = self._refined([change.after, *found[:REFINEMENT_STARTS]], later)
         if after == change.before:
             return judged(best, compared, question)
@@ -181,9 +183,6 @@ class DiagnosticSearch:
     ) -> Question:
         """Returns the question of the hypothesis that explains some trials, or parts of them.
 
-        Closed-loop windows are correlated, so gains on them are not compared with gains on healthy
-        trials.
-
         Args:
             trials: Trials to explain, or parts of them.
             names: Names of the trials of the whole diagnosis, by path.
@@ -191,38 +190,15 @@ class DiagnosticSearch:
             earlier: Trials, or parts of them, of the robot before it changed: the healthy reference
                 if there are no trials of the healthy robot.
         """
-        intact = self._intact or earlier
-        known = [whole(trial).trial for trial in (*intact, *trials)]
-        is_piecewise = self.evidence.is_piecewise(known)
-        comparable = is_piecewise and self.evidence.uses_segments(known)
-        return Question(
-            evidence=self.evidence,
-            space=self._space_of(trials),
-            trials=trials,
+        return question_of(
+            self.evidence,
+            self._space,
+            trials,
             names=names,
-            intact=intact,
+            intact=self._intact or earlier,
+            surrogate=surrogate,
             kept=self._settings.kept,
-            losses=LossFunctions(
-                damaged=partial(self.evidence.losses, trials=trials),
-                surrogate=surrogate,
-                healthy=partial(self.evidence.losses, trials=intact)
-                if comparable and intact
-                else None,
-            ),
-            joints=JointLosses(
-                self._space.anatomy,
-                damaged=partial(self.evidence.losses_by_hinge, trials=trials),
-                healthy=partial(self.evidence.losses_by_hinge, trials=intact) if intact else None,
-            )
-            if self.evidence.predicts_hinges(known)
-            else None,
         )
-
-    def _space_of(self, trials: Sequence[Trial | TrialPart]) -> HypothesisSpace:
-        """Returns the hypotheses, with jams at the angles at which the encoders end."""
-        anatomy = self._space.anatomy
-        jams = observed_jams([whole(trial).rows for trial in trials], anatomy)
-        return dataclasses.replace(self._space, observed=jams)
 
     def _refined(
         self, known: Sequence[Hypothesis], question: Question
@@ -270,11 +246,37 @@ class DiagnosticSearch:
             return None
         losses = question.losses
         singles = question.space.with_one_more(INTACT)
+        before = dict.fromkeys([INTACT, best, *question.space.with_one_less(best)])
         after = dict.fromkeys([best, *found[:REFINEMENT_STARTS], *singles])
-        split = best_split([INTACT, best], list(after), losses.surrogate, losses.damaged)
+        split = best_split(list(before), list(after), losses.surrogate, losses.damaged)
         if split is None or not is_change(split, best, losses.damaged):
             return None
         return change_at(split, losses.damaged, timeline, _names_of(trials))
+
+    def _with_refined_before(
+        self,
+        change: Change,
+        found: Sequence[Hypothesis],
+        trials: Sequence[Trial],
+        surrogate: Surrogate,
+    ) -> Change:
+        """Returns a change with the refined hypothesis about the time before it.
+
+        If the empty hypothesis predicts this time as well as the healthy trials, or if there are
+        none, it stays: the search would only find model error.
+        """
+        earlier = change.until(trials)
+        coarse = partial(surrogate.evidence.losses, trials=change.until(surrogate.trials))
+        if coarse([INTACT]).shape[1] < MIN_SURROGATE_PIECES:
+            return change
+        question = self._question(earlier, trial_names(trials), coarse)
+        if change.before == INTACT:
+            healthy = question.healthy_losses
+            losses = question.losses.damaged([INTACT])[0]
+            if healthy is None or excess_over_healthy(losses, healthy) < MIN_Z:
+                return change
+        before, _ = self._refined([change.before, *found[:REFINEMENT_STARTS]], question)
+        return dataclasses.replace(change, before=before)
 
     def _dated(self, change: Change, after: Hypothesis, trials: Sequence[Trial]) -> Change:
         """Returns a change with the time that the final hypothesis gives it."""
@@ -293,14 +295,6 @@ def _names_of(trials: Sequence[Trial]) -> list[str]:
     """Returns the name of each of all trials."""
     names = trial_names(trials)
     return [names[trial.path] for trial in trials]
-
-
-def _until(change: Change, trials: Sequence[Trial]) -> list[Trial | TrialPart]:
-    """Returns the trials up to a change, if the robot was healthy before it."""
-    if change.before != INTACT:
-        return []
-    *earlier, last = trials[: change.index + 1]
-    return [*earlier, TrialPart(last, end=change.time)]
 
 
 def _recorded(losses: Losses, into: set[Hypothesis]) -> Losses:

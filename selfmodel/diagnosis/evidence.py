@@ -56,6 +56,7 @@ class Evidence:
         self._comparator = as_comparator(comparator, getattr(comparator, "name", repr(comparator)))
         self._prepared: dict[TrialKey, PreparedTrial] = {}
         self._losses: dict[TrialKey, Cache[Hypothesis]] = {}
+        self._hinge_losses: dict[TrialKey, Cache[Hypothesis]] = {}
 
     def is_piecewise(self, trials: Sequence[Trial]) -> bool:
         """Returns whether the distances are means of losses, so that paired tests are possible.
@@ -174,7 +175,8 @@ class Evidence:
     ) -> FloatArray:
         """Returns the losses of each hinge on its own, ``(n, pieces, hinges)``.
 
-        They are infinite where a simulation diverges, and not cached.
+        They are infinite where a simulation diverges, and NaN where the log contains no evidence on
+        a hinge, or the hypothesis detaches it.
 
         Raises:
             InputError: The comparator cannot judge a trial, or does not predict single hinges; see
@@ -182,17 +184,10 @@ class Evidence:
         """
         found = []
         for part in map(whole, trials):
-            prepared = self._prepare(part.trial)
-            if not isinstance(prepared, HingewiseTrial):
-                raise contract_error(self._comparator, "does not predict single hinges")
-            rows = []
-            for batch in self._batches(prepared, part.trial, hypotheses):
-                result = simulate(self._simulator, prepared.request, part.trial, batch)
-                with _diverging(result.diverged):
-                    losses = prepared.losses_by_hinge(result.behaviour)
-                diverged = result.diverged[:, np.newaxis, np.newaxis]
-                rows.append(np.where(diverged, np.inf, losses)[:, self._pieces(part)])
-            found.append(np.concatenate(rows))
+            cache = self._hinge_losses.setdefault(_key(part.trial), Cache())
+            compute = partial(self._compute_by_hinge, part.trial)
+            rows = np.array(cache.get_or_compute(hypotheses, compute))
+            found.append(rows[:, self._pieces(part)])
         return np.concatenate(found, axis=1)
 
     def _prepare(self, trial: Trial) -> PreparedTrial:
@@ -227,6 +222,31 @@ class Evidence:
         prepared = self._prepare(trial)
         batches = self._batches(prepared, trial, hypotheses)
         return np.concatenate([self._batch_losses(prepared, trial, batch) for batch in batches])
+
+    def _compute_by_hinge(self, trial: Trial, hypotheses: list[Hypothesis]) -> FloatArray:
+        prepared = self._prepare(trial)
+        if not isinstance(prepared, HingewiseTrial):
+            raise contract_error(self._comparator, "does not predict single hinges")
+        batches = self._batches(prepared, trial, hypotheses)
+        return np.concatenate([self._batch_by_hinge(prepared, trial, batch) for batch in batches])
+
+    def _batch_by_hinge(
+        self, prepared: HingewiseTrial, trial: Trial, hypotheses: list[Hypothesis]
+    ) -> FloatArray:
+        result = simulate(self._simulator, prepared.request, trial, hypotheses)
+        with _diverging(result.diverged):
+            losses = np.asarray(prepared.losses_by_hinge(result.behaviour))
+        hinges = trial.behaviour.names.hinges
+        if losses.ndim != 3 or losses.shape[::2] != (len(hypotheses), len(hinges)):
+            raise contract_error(
+                self._comparator,
+                f"returned losses {losses.shape} of {len(hinges)} hinges for {len(hypotheses)} "
+                f"simulations",
+            )
+        detached = [self._simulator.detached_hinges(hypothesis) for hypothesis in hypotheses]
+        unknown = np.array([[hinge in one for hinge in hinges] for one in detached])
+        diverged = result.diverged[:, np.newaxis, np.newaxis]
+        return np.where(diverged, np.inf, np.where(unknown[:, np.newaxis], np.nan, losses))
 
     def _batches(
         self, prepared: PreparedTrial, trial: Trial, hypotheses: Sequence[Hypothesis]

@@ -88,13 +88,18 @@ class JointLosses:
 
     def _different(self, one: Hypothesis, other: Hypothesis) -> list[str]:
         """Returns the joints at which exactly one of two hypotheses has a fault."""
-        parts = {fault.part for fault in set(one.faults) ^ set(other.faults)}
+        different = set(one.faults) ^ set(other.faults)
+        parts = {fault.part for fault in different if fault.kind.is_of_joint}
         return [joint.name for joint in self.anatomy.joints if joint.name in parts]
 
     def _of_joint(self, joint: str, losses: FloatArray) -> FloatArray:
-        """Returns the mean over a joint's hinges, ``(n, pieces)``."""
+        """Returns the mean over a joint's known hinges, ``(n, pieces)``; NaN without any."""
         columns = [self.anatomy.hinges.index(hinge) for hinge in self.anatomy.joint(joint).hinges]
-        return np.asarray(losses[:, :, columns].mean(axis=2))
+        some = losses[:, :, columns]
+        is_known = ~np.isnan(some)
+        count = is_known.sum(axis=2)
+        total = np.where(is_known, some, 0.0).sum(axis=2)
+        return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
 def known(rows: FloatArray) -> FloatArray:

@@ -2,15 +2,9 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
 
-import numpy as np
-
-from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
-from selfmodel.diagnosis.evidence import Evidence
-from selfmodel.diagnosis.joint_losses import JointLosses
-from selfmodel.diagnosis.loss_functions import LossFunctions
+from selfmodel.diagnosis.question import Question
 from selfmodel.diagnosis.verdicts.detectable import detectable_severities
 from selfmodel.diagnosis.verdicts.fit import Fit
 from selfmodel.diagnosis.verdicts.model_error import any_fault_is_model_error
@@ -20,58 +14,12 @@ from selfmodel.diagnosis.verdicts.undetectable import undetectable_faults
 from selfmodel.diagnosis.verdicts.unsearched import best_unsearched_fault
 from selfmodel.diagnosis.verdicts.verdict import all_diverged, fit_of, verdict_of
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
-from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
 from selfmodel.trials.command_likeness import have_one_gait
-from selfmodel.trials.observed_columns import observed_as
-from selfmodel.trials.trial import Trial
-from selfmodel.trials.trial_part import TrialPart, whole
+from selfmodel.trials.trial_part import whole
 
 EQUAL_DISTANCES = "equal distances"
 """Name of the test for a comparator with one distance per trial."""
-
-
-@dataclass(frozen=True, eq=False)
-class Question:
-    """Trials to explain, and the losses of hypotheses about them.
-
-    Attributes:
-        evidence: Distances of hypotheses from trials.
-        space: The hypotheses about the robot.
-        trials: Trials to explain, or parts of them.
-        names: Names of the trials of the whole diagnosis, by path.
-        intact: Trials of the healthy robot, or parts of them.
-        kept: Number of hypotheses in a ranking.
-        losses: Loss functions of the trials.
-        joints: Losses of single joints; None if the comparator has none.
-    """
-
-    evidence: Evidence
-    space: HypothesisSpace
-    trials: Sequence[Trial | TrialPart]
-    names: Mapping[str, str]
-    intact: Sequence[Trial | TrialPart]
-    kept: int
-    losses: LossFunctions
-    joints: JointLosses | None = None
-
-    @property
-    def logs(self) -> list[str]:
-        """Paths of the trials' logs."""
-        return [whole(trial).trial.path for trial in self.trials]
-
-    @property
-    def healthy_losses(self) -> FloatArray | None:
-        """Losses of the empty hypothesis on healthy trials, ``(pieces,)``; None without any.
-
-        Encoders that are lost in the trials to explain are left out of the healthy ones.
-        """
-        if not self.intact:
-            return None
-        trials = [whole(trial).trial for trial in self.trials]
-        parts = [whole(trial) for trial in self.intact]
-        known = [replace(part, trial=observed_as(part.trial, trials)) for part in parts]
-        return np.asarray(self.evidence.losses([INTACT], known)[0])
 
 
 def judged(best: Hypothesis, compared: Iterable[Hypothesis], question: Question) -> Diagnosis:
@@ -116,13 +64,15 @@ def _fit(best: Hypothesis, question: Question) -> Fit:
     trials, healthy = (
         [whole(one).rows for one in some] for some in (question.trials, question.intact)
     )
+    is_one_gait = have_one_gait(trials, healthy)
     return fit_of(
         best,
         losses,
         intact_losses,
         question.healthy_losses,
-        is_one_gait=have_one_gait(trials, healthy),
-        joints=question.joints.excess(best) if question.joints else {},
+        is_one_gait=is_one_gait,
+        # Another gait loads the joints otherwise: 16 of 24 healthy robots would be suspected.
+        joints=question.joints.excess(best) if question.joints and is_one_gait else {},
     )
 
 

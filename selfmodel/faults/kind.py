@@ -29,6 +29,11 @@ def joints_with_motors(anatomy: Anatomy) -> tuple[str, ...]:
     return tuple(joint.name for joint in anatomy.joints if joint.motors)
 
 
+def joints_with_servos(anatomy: Anatomy) -> tuple[str, ...]:
+    """Returns the joints with motors with position feedback."""
+    return tuple(joint.name for joint in anatomy.joints if joint.servos)
+
+
 def environment_part(_anatomy: Anatomy) -> tuple[str, ...]:
     """Returns the only part of an environment kind."""
     return (ENVIRONMENT,)
@@ -87,6 +92,8 @@ class FaultKind:
         unit: Unit of the severity.
         affects_dynamics: Whether the fault changes the robot's motion under given commands. If
             not, it changes readings only and shares the simulation of the same commands.
+        is_of_joint: Whether the parts are joints, and the fault shows in the motion of the joint
+            that it names, as its encoder measures it. Losses of single joints then decide on it.
         is_single: Whether a hypothesis has at most one fault of the kind, at one part.
         searchable: Whether a diagnosis may propose the kind; otherwise only a simulated physical
             robot has it.
@@ -122,6 +129,7 @@ class FaultKind:
     prefix: str = field(default="", compare=False, repr=False)
     unit: str = field(default="", compare=False, repr=False)
     affects_dynamics: bool = field(default=True, compare=False, repr=False)
+    is_of_joint: bool = field(default=False, compare=False, repr=False)
     is_single: bool = field(default=False, compare=False, repr=False)
     searchable: bool = field(default=True, compare=False, repr=False)
 

@@ -10,7 +10,6 @@ from selfmodel.trials.signals import Signal
 
 SEGMENTS, HORIZON, HINGES = 3, 12, 4
 COMPARED = np.array([3, 6, 9, 12])
-RESTING = np.full(HINGES, 9.0)
 MOTION = np.linspace(0, 1, SEGMENTS * (HORIZON + 1) * HINGES).reshape(1, SEGMENTS, -1, HINGES)
 
 
@@ -29,7 +28,7 @@ def losses(
         "joint_positions": positions[0][:, COMPARED],
         "joint_velocities": velocities[0][:, COMPARED],
     }
-    return hinge_losses(prediction, logged, COMPARED, RESTING)
+    return hinge_losses(prediction, logged, COMPARED)
 
 
 def with_hinge(values: np.ndarray, hinge: int, change: float) -> np.ndarray:
@@ -75,13 +74,3 @@ def test_a_few_lost_measurements_do_not_change_the_loss_of_a_constant_error():
 
     whole = losses(predicted(), positions=with_hinge(MOTION, 0, 0.1))
     assert losses(predicted(), positions=gaps) == pytest.approx(whole)
-
-
-def test_a_hinge_that_a_hypothesis_detaches_has_no_evidence():
-    detached = MOTION.copy()
-    detached[..., 3] = RESTING[3]
-
-    found = losses(predicted(detached))
-
-    assert np.isnan(found[..., 3]).all()
-    assert not found[..., :3].any()

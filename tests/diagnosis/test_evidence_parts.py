@@ -184,6 +184,17 @@ def test_a_detached_hinge_has_no_losses_and_the_others_have(
     ]
 
 
+def test_a_jam_at_the_angle_of_an_exact_encoder_has_losses(
+    evidence: Evidence, trials: list[Trial], quadruped: Robot
+):
+    """A detached hinge is predicted at that angle too, and has none."""
+    jam = parse("jam:front_left_knee", quadruped.anatomy)
+    losses = evidence.losses_by_hinge([jam], trials)
+
+    assert np.isfinite(losses).all()
+    assert losses.max() < 1e-6
+
+
 def test_the_losses_of_hinges_are_infinite_where_a_hypothesis_diverges(
     quadruped: Robot, trials: list[Trial]
 ):

@@ -10,8 +10,9 @@ import pytest
 from selfmodel.comparators import SEGMENT_PREDICTION
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
-from selfmodel.diagnosis.judgement import Question, judged, ranked_by_distance
+from selfmodel.diagnosis.judgement import judged, ranked_by_distance
 from selfmodel.diagnosis.loss_functions import LossFunctions
+from selfmodel.diagnosis.question import Question
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated_robot import SimulatedRobot

@@ -1,5 +1,6 @@
 """A diagnosis as sentences and as a table, from its JSON values."""
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -7,7 +8,9 @@ from rich.table import Table
 
 from selfmodel.cli.output.plain import plain
 from selfmodel.diagnosis.verdicts.fit import FAULTY_RATIO
-from selfmodel.diagnosis.verdicts.significance import LOSS_RATIO
+from selfmodel.diagnosis.verdicts.significance import LOSS_FLOOR, LOSS_RATIO
+
+_SEVERITY = re.compile(r"=([a-z]*)[^=]*$")  # the prefix belongs to the kind, the number does not
 
 
 def confidence_sentence(found: Mapping[str, Any]) -> str:
@@ -76,8 +79,8 @@ def right_or_wrong(found: Mapping[str, Any]) -> str:
 
 
 def _faults(notation: str) -> set[str]:
-    """Returns the terms of a notation without severities."""
-    return {term.partition("=")[0] for term in notation.split("+")}
+    """Returns the terms of a notation without the numbers of severities, with their prefixes."""
+    return {_SEVERITY.sub(r"=\1", term).rstrip("=") for term in notation.split("+")}
 
 
 def _number(value: float | None) -> str:
@@ -133,6 +136,11 @@ def _verdict(found: Mapping[str, Any]) -> str:
             return (
                 f"Ambiguous: the trials do not distinguish {best} from {others} ({found['test']})."
             )
+    return _unexplained(found)
+
+
+def _unexplained(found: Mapping[str, Any]) -> str:
+    best = found["diagnosis"][0]["hypothesis"]
     if found["reason"] is not None:
         return f"Unexplained: {found['reason']}."
     if found["outside"] is not None:
@@ -143,10 +151,17 @@ def _verdict(found: Mapping[str, Any]) -> str:
             f"Unexplained: {better} predicts the trials significantly better than {best}{also}; "
             f"add {kind} to --kinds."
         )
+    joints = _joints(found)
+    if joints and not _exceeds(found["fit"]):
+        return (
+            f"Unexplained: {best} predicts the trials as a whole, and not all joints.{joints} "
+            f"There is a fault of a kind that was not searched (--kinds), or a combination of "
+            f"faults."
+        )
     return (
         f"Unexplained: even {best} predicts the trials significantly worse than the self-model "
         f"predicts the healthy robot; there is another fault, or one of a kind that was not "
-        f"searched (--kinds).{_residual(found)}{_joints(found)}"
+        f"searched (--kinds).{_residual(found)}{joints}"
     )
 
 
@@ -161,6 +176,14 @@ def _residual(found: Mapping[str, Any]) -> str:
         f" {amount} is left: in {', '.join(left['signals'])}, most of it at t = "
         f"{left['begin']:.1f} to {left['end']:.1f} s of {left['trial']}."
     )
+
+
+def _exceeds(fit: Mapping[str, Any]) -> bool:
+    """Returns whether the loss is unexplained without the excess of joints."""
+    if fit["loss"] is None or fit["healthy_loss"] is None or fit["excess"] is None:
+        return True
+    is_large = fit["loss"] > LOSS_RATIO * fit["healthy_loss"] + LOSS_FLOOR
+    return bool(is_large or fit["excess"] > fit["threshold"])
 
 
 def _joints(found: Mapping[str, Any]) -> str:

@@ -4,11 +4,16 @@ The search before this one compares losses over all signals. A small fault of a 
 them, and so is the difference between kinds with similar effects: dry friction, damping, a weak
 motor, a jam. The joint's own motion contains both. On 120 recordings of another generator with one
 such fault, the loss of the joint was 4 to 50 standard errors above that in the healthy trial; in 24
-recordings of healthy robots, no joint's was above 2.1.
+recordings of healthy robots with the same gait, no joint's was above 2.1.
 
-The joints with a fault in the hypothesis are visited first, then, as long as a fault is added, the
-joint with the largest excess over the healthy trials. At each, the best fault by the sum of the
-total loss and the joint's loss is chosen.
+1. **Replacement**: at each joint with a fault, the best fault of the joint takes the place of the
+   present one if the motion of the joint is predicted significantly better.
+2. **Addition**: of the joints with an excess over the healthy trials, largest first, the first
+   whose best fault explains it gets this fault, until none does.
+3. **Pruning**, after a replacement or addition: a fault that is no longer required is removed.
+
+No step accepts a hypothesis that predicts the trials significantly worse. The best fault of a joint
+has the smallest sum of the total loss and the joint's loss.
 """
 
 from collections.abc import Sequence
@@ -26,14 +31,19 @@ from selfmodel.diagnosis.verdicts.significance import (
 )
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
+from selfmodel.faults.kind import Fault
 
 MIN_EXCESS = 2.0
 """Standard errors by which the loss of a joint has to exceed that in healthy trials for a fault of
 the joint to be searched. It is lower than ``MIN_Z_OF_JOINT``, because the gain of a fault is paired
 over the pieces and so tested more sharply than the excess."""
 
-KINDS_FITTED = 3
-"""Kinds whose severities are fitted between their levels, best first."""
+MAX_LEFT = 0.5
+"""Largest share of a joint's excess that an added fault may leave; one that leaves more is not the
+cause."""
+
+JOINTS_TRIED, KINDS_FITTED = 3, 3
+"""Joints that are tried for an addition, and kinds whose severities are fitted, best first."""
 
 
 def with_joint_faults(
@@ -45,9 +55,7 @@ def with_joint_faults(
 ) -> Hypothesis:
     """Returns a hypothesis with its faults of single joints decided by the joints' own motion.
 
-    A fault replaces those of the same joint if the motion of the joint is predicted significantly
-    better, and the trials not significantly worse. A fault of a further joint is added if, besides,
-    the gain exceeds that on healthy trials, and the excess of the joint is gone.
+    An added fault has to gain significantly more than on healthy trials, and to explain the joint.
 
     Args:
         best: The best hypothesis by the total loss.
@@ -56,60 +64,92 @@ def with_joint_faults(
         losses: Losses of hypotheses on the trials to explain, ``(n, pieces)``.
         joints: Losses of the joints.
     """
-    search = _JointSearch(space, losses, joints)
+    search = _JointSearch(best, space, losses, joints)
     current = best
-    for joint in search.joints_with_faults(best):
+    for joint in search.joints_of(best):
         current = search.replaced(current, joint)
     while len(current) < max_faults:
-        worst = search.worst_joint(current)
-        added = current if worst is None else search.added(current, worst)
+        added = search.with_one_more(current)
         if added == current:
             break
         current = added
-    return current
+    return best if current == best else search.pruned(current)
 
 
 class _JointSearch:
-    """Choice of the fault of one joint."""
+    """Choice of the faults of joints, beginning with a hypothesis."""
 
-    def __init__(self, space: HypothesisSpace, losses: Losses, joints: JointLosses) -> None:
-        self._space, self._losses, self._joints = space, losses, joints
+    def __init__(
+        self, start: Hypothesis, space: HypothesisSpace, losses: Losses, joints: JointLosses
+    ) -> None:
+        self._start, self._space, self._losses, self._joints = start, space, losses, joints
 
-    def joints_with_faults(self, hypothesis: Hypothesis) -> list[str]:
-        parts = {fault.part for fault in hypothesis.faults}
+    def joints_of(self, hypothesis: Hypothesis) -> list[str]:
+        """The joints with a fault of their motion, in the order of the anatomy."""
+        parts = {fault.part for fault in hypothesis.faults if fault.kind.is_of_joint}
         return [joint.name for joint in self._space.anatomy.joints if joint.name in parts]
-
-    def worst_joint(self, hypothesis: Hypothesis) -> str | None:
-        """The joint with the largest excess, if it is large and the joint has no fault."""
-        joint, excess = next(iter(self._joints.excess(hypothesis).items()), ("", 0.0))
-        is_new = joint not in self.joints_with_faults(hypothesis)
-        return joint if excess >= MIN_EXCESS and is_new else None
 
     def replaced(self, current: Hypothesis, joint: str) -> Hypothesis:
         """The hypothesis with the best fault of a joint in the place of its present ones."""
         candidate = self._best_at(current, joint)
         return candidate if self._is_better_at(joint, candidate, current) else current
 
-    def added(self, current: Hypothesis, joint: str) -> Hypothesis:
-        """The hypothesis with the best fault of a joint, if it explains the joint."""
-        candidate = self._best_at(current, joint)
-        faults = [fault for fault in candidate.faults if fault.part == joint]
-        if not faults or not self._is_better_at(joint, candidate, current):
-            return current
-        damaged = self._joints.of(joint, [candidate, current])
-        healthy = self._joints.healthy_of(joint, [self._space.canonical(faults), INTACT])
-        is_gain = gain_exceeds_healthy_gain(*known(damaged), *known(healthy))
-        left = self._joints.excess(candidate).get(joint, 0.0)
-        return candidate if is_gain and left < MIN_Z_OF_JOINT else current
+    def with_one_more(self, current: Hypothesis) -> Hypothesis:
+        """The hypothesis with a fault of a further joint; the same if none explains its joint."""
+        taken = self.joints_of(current)
+        excess = self._joints.excess(current)
+        suspects = [name for name, z in excess.items() if z >= MIN_EXCESS and name not in taken]
+        for joint in suspects[:JOINTS_TRIED]:
+            candidate = self._best_at(current, joint)
+            if self._explains(joint, candidate, current, excess[joint]):
+                return candidate
+        return current
+
+    def pruned(self, hypothesis: Hypothesis) -> Hypothesis:
+        """The hypothesis without the faults that neither the trials nor their joints require."""
+        current = hypothesis
+        while True:
+            fewer = next(
+                (one for one in self._space.with_one_less(current) if self._suffices(one, current)),
+                None,
+            )
+            if fewer is None:
+                return current
+            current = fewer
+
+    def _suffices(self, fewer: Hypothesis, current: Hypothesis) -> bool:
+        if is_better(*self._losses([current, fewer])):
+            return False
+        removed = set(current.faults) - set(fewer.faults)
+        joints = [fault.part for fault in removed if fault.kind.is_of_joint]
+        return not any(
+            joint_is_better(*self._joints.of(joint, [current, fewer])) for joint in joints
+        )
+
+    def _explains(
+        self, joint: str, candidate: Hypothesis, current: Hypothesis, excess: float
+    ) -> bool:
+        """Returns whether a fault of a joint is the cause of its excess, and no model error."""
+        if not self._is_better_at(joint, candidate, current):
+            return False
+        alone = self._space.canonical(_faults_of(candidate, joint))
+        damaged = known(self._joints.of(joint, [candidate, current]))
+        healthy = known(self._joints.healthy_of(joint, [alone, INTACT]))
+        left = self._joints.excess(candidate).get(joint, np.inf)
+        is_cause = left < min(MIN_Z_OF_JOINT, MAX_LEFT * excess)
+        return is_cause and gain_exceeds_healthy_gain(*damaged, *healthy)
 
     def _best_at(self, current: Hypothesis, joint: str) -> Hypothesis:
-        """The hypothesis with the best fault of a joint; ``current`` if no fault is comparable."""
-        others = [fault for fault in current.faults if fault.part != joint]
+        """The hypothesis with the best fault of a joint; ``current`` if there is no evidence."""
+        if np.isnan(self._joints.of(joint, [current])).all():
+            return current
+        others = [fault for fault in current.faults if fault not in _faults_of(current, joint)]
         by_kind: dict[str, list[Hypothesis]] = {}
         for fault in self._space.coarse_candidates:
-            hypothesis = self._space.canonical([*others, fault])
-            if fault.part == joint and len(hypothesis) > len(others):
-                by_kind.setdefault(fault.kind.name, []).append(hypothesis)
+            if fault.kind.is_of_joint and fault.part == joint:
+                hypothesis = self._space.canonical([*others, fault])
+                if len(hypothesis) > len(others):
+                    by_kind.setdefault(fault.kind.name, []).append(hypothesis)
         coarse = [self._smallest(levels, joint) for levels in by_kind.values()]
         few = sorted(coarse, key=lambda one: self._focused([one], joint)[0].sum())[:KINDS_FITTED]
         fitted = [self._fitted(one, joint) for one in few]
@@ -117,12 +157,14 @@ class _JointSearch:
 
     def _fitted(self, hypothesis: Hypothesis, joint: str) -> Hypothesis:
         """The hypothesis with the severity of the joint's fault fitted."""
-        index = next(i for i, fault in enumerate(hypothesis.faults) if fault.part == joint)
+        (fault,) = _faults_of(hypothesis, joint)
 
         def focused(hypotheses: Sequence[Hypothesis]) -> FloatArray:
             return self._focused(hypotheses, joint)
 
-        return with_fitted_severity(hypothesis, index, focused, self._space)
+        return with_fitted_severity(
+            hypothesis, hypothesis.faults.index(fault), focused, self._space
+        )
 
     def _smallest(self, hypotheses: Sequence[Hypothesis], joint: str) -> Hypothesis:
         return hypotheses[int(np.argmin(self._focused(hypotheses, joint).sum(axis=1)))]
@@ -136,6 +178,14 @@ class _JointSearch:
 
     def _is_better_at(self, joint: str, one: Hypothesis, other: Hypothesis) -> bool:
         """Returns whether one predicts the joint better, and the trials not worse."""
-        if one == other or is_better(*self._losses([other, one])):
+        if one == other:
+            return False
+        start, before, after = self._losses([self._start, other, one])
+        if is_better(start, after) or is_better(before, after):
             return False
         return joint_is_better(*self._joints.of(joint, [one, other]))
+
+
+def _faults_of(hypothesis: Hypothesis, joint: str) -> list[Fault]:
+    """Returns the faults of the motion of a joint."""
+    return [fault for fault in hypothesis.faults if fault.kind.is_of_joint and fault.part == joint]

@@ -91,6 +91,15 @@ class Change:
         first, *rest = trials[self.index :]
         return [TrialPart(first, begin=math.nextafter(self.time, math.inf)), *rest]
 
+    def until(self, trials: Sequence[Trial]) -> list[Trial | TrialPart]:
+        """Returns the trials up to the change.
+
+        Args:
+            trials: All trials of the diagnosis.
+        """
+        *earlier, last = trials[: self.index + 1]
+        return [*earlier, TrialPart(last, end=self.time)]
+
     def to_dict(self) -> dict[str, Any]:
         """Returns the JSON values."""
         return {

@@ -24,9 +24,9 @@ class Fit:
             trials.
         threshold: Excess above which the verdict is ``unexplained``, standard errors.
         has_faults: Whether the best hypothesis has faults.
-        joints: Excess of the loss of single joints over that on healthy trials, standard errors, by
-            the joint's name, largest first; joints beyond the threshold only, and
-            none if the best hypothesis has faults.
+        joints: Excess of the loss of single joints over that on healthy trials with the same gait,
+            standard errors, by the joint's name, largest first: those of at least
+            ``MIN_Z_OF_JOINT``, and none if the best hypothesis has faults.
     """
 
     loss: float

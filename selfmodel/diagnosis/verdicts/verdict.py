@@ -36,18 +36,18 @@ def fit_of(
         healthy: Losses of the empty hypothesis on healthy trials, ``(healthy_pieces,)``; None
             without healthy trials.
         is_one_gait: Whether the healthy trials have the gaits of the trials to explain.
-        joints: Excess of the loss of each joint; see ``JointLosses.excess``.
+        joints: Excess of the loss of each joint, see ``JointLosses.excess``; none if it is no
+            evidence.
     """
-    threshold = MIN_Z_OF_ONE_GAIT if is_one_gait else MIN_Z_OF_OTHER_GAITS
-    least = max(threshold, MIN_Z_OF_JOINT)
+    suspected = {name: z for name, z in joints.items() if z >= MIN_Z_OF_JOINT}
     return Fit(
         loss=float(losses.mean()),
         intact_loss=float(intact.mean()),
         healthy_loss=None if healthy is None else float(healthy.mean()),
         excess=None if healthy is None else excess_over_healthy(losses, healthy),
-        threshold=threshold,
+        threshold=MIN_Z_OF_ONE_GAIT if is_one_gait else MIN_Z_OF_OTHER_GAITS,
         has_faults=bool(best),
-        joints={} if best else {name: z for name, z in joints.items() if z >= least},
+        joints={} if best else suspected,
     )
 
 

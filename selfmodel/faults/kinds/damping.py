@@ -30,4 +30,5 @@ DAMPED_JOINT = FaultKind(
     levels=uniform_levels(3.0, 10.0, 30.0),
     degenerates_to={1.0: None},
     unit="times",
+    is_of_joint=True,
 )

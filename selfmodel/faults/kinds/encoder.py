@@ -6,8 +6,8 @@ the true angle, which is the logged angle minus the offset.
 
 The two kinds differ in the servos. With ``encoder-offset``, the servo has a measurement of its own
 and is not affected. With ``encoder-slip``, the servo uses the encoder: under the same commands, the
-true angle is lower by the offset. Without position feedback, as of a torque motor, both kinds are
-equal. Faults of both kinds at one joint add up.
+true angle is lower by the offset. A joint without a servo, such as one with a torque motor, has the
+first kind only. Faults of both kinds at one joint add up.
 
 A broken joint at or before the joint absorbs the fault; a jammed joint does not, because its
 constant angle is measured with the offset. Motors that move the jammed joint only have no force, so
@@ -20,7 +20,7 @@ from selfmodel.faults.kind import (
     Fault,
     FaultKind,
     joints,
-    joints_with_motors,
+    joints_with_servos,
     uniform_bounds,
     uniform_levels,
 )
@@ -57,16 +57,18 @@ ENCODER_OFFSET = FaultKind(
     levels=_LEVELS,
     degenerates_to={0.0: None},
     unit="rad",
+    is_of_joint=True,
 )
 
 ENCODER_SLIP = FaultKind(
     name="encoder-slip",
     keyword="encoder-offset",
     prefix="slip",
-    parts=joints_with_motors,
+    parts=joints_with_servos,
     apply=_slip,
     severity_bounds=_BOUNDS,
     levels=_LEVELS,
     degenerates_to={0.0: None},
     unit="rad",
+    is_of_joint=True,
 )

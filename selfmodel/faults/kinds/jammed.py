@@ -94,7 +94,12 @@ def _levels(anatomy: Anatomy, part: str) -> tuple[float, ...]:
 
 
 JAMMED = FaultKind(
-    name="jam", keyword="jam", parts=joints, apply=_apply_at_zero, absorbs=_absorbs_at_zero
+    name="jam",
+    keyword="jam",
+    parts=joints,
+    apply=_apply_at_zero,
+    absorbs=_absorbs_at_zero,
+    is_of_joint=True,
 )
 
 JAMMED_AT_ANGLE = FaultKind(
@@ -107,4 +112,5 @@ JAMMED_AT_ANGLE = FaultKind(
     levels=_levels,
     degenerates_to={0.0: JAMMED},
     unit="rad",
+    is_of_joint=True,
 )

@@ -34,4 +34,5 @@ JOINT_FRICTION = FaultKind(
     levels=uniform_levels(0.1, 0.2, 0.4),
     degenerates_to={0.0: None},
     unit="of the motors' largest torque",
+    is_of_joint=True,
 )

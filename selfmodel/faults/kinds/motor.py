@@ -29,4 +29,5 @@ WEAK_MOTOR = FaultKind(
     levels=uniform_levels(0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9),
     degenerates_to={1.0: None},
     unit="of its torque",
+    is_of_joint=True,
 )

@@ -15,6 +15,7 @@ class Joint:
         hinges: Hinge joints of the model that form the joint.
         motors: Actuators that drive the joint; an actuator that moves several joints through a
             tendon belongs to the first of them.
+        servos: Those of the motors with position feedback.
         bodies: Bodies that are detached when the joint breaks: the body that the joint moves, and
             all its descendants.
         descendants: Joints and sensors on ``bodies``, without the joint itself.
@@ -26,6 +27,7 @@ class Joint:
     name: str
     hinges: tuple[str, ...]
     motors: tuple[str, ...]
+    servos: tuple[str, ...]
     bodies: frozenset[str]
     descendants: frozenset[str]
     limits: tuple[tuple[float, float], ...]

@@ -5,7 +5,12 @@ import math
 import mujoco
 
 from selfmodel.robot.anatomy.anatomy import Anatomy, Joint, Sensor
-from selfmodel.robot.anatomy.transmission import descends, motor_bodies, motor_joints
+from selfmodel.robot.anatomy.transmission import (
+    descends,
+    has_feedback,
+    motor_bodies,
+    motor_joints,
+)
 from selfmodel.robot.base.root_body import joints_of_body
 
 _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
@@ -62,12 +67,12 @@ def _joint(
     subtree = frozenset(b for b in range(body, model.nbody) if descends(model, b, body))
     bodies = frozenset(model.body(b).name for b in subtree)
     moved = {m: motor_joints(model, m) for m in range(model.nu)}
+    motors = [m for j in group for m in moved if j == min(moved[m], default=-1)]
     return Joint(
         name=names[body],
         hinges=tuple(model.joint(j).name for j in group),
-        motors=tuple(
-            model.actuator(m).name for j in group for m in moved if j == min(moved[m], default=-1)
-        ),
+        motors=tuple(model.actuator(m).name for m in motors),
+        servos=tuple(model.actuator(m).name for m in motors if has_feedback(model, m)),
         bodies=bodies,
         descendants=frozenset(
             [names[b] for b in groups if b != body and b in subtree]

@@ -45,6 +45,12 @@ def length_per_angle(model: mujoco.MjModel, motor: int, hinge: int) -> float:
     return gear * float(model.wrap_prm[path][own].sum())
 
 
+def has_feedback(model: mujoco.MjModel, motor: int) -> bool:
+    """Returns whether the force of a motor depends on its position, as that of a servo does."""
+    is_affine = model.actuator_biastype[motor] == mujoco.mjtBias.mjBIAS_AFFINE
+    return bool(is_affine and model.actuator_biasprm[motor, 1] != 0)
+
+
 def motor_bodies(model: mujoco.MjModel, motor: int) -> frozenset[int]:
     """Returns the ids of the bodies that a motor requires to have an effect."""
     kind, target = int(model.actuator_trntype[motor]), int(model.actuator_trnid[motor, 0])

@@ -2,9 +2,7 @@
 
 import mujoco
 
-from selfmodel.robot.anatomy.transmission import length_per_angle
-
-_AFFINE = int(mujoco.mjtBias.mjBIAS_AFFINE)
+from selfmodel.robot.anatomy.transmission import has_feedback, length_per_angle
 
 
 def shift_feedback(model: mujoco.MjModel, name: str, offset: float) -> None:
@@ -21,6 +19,6 @@ def shift_feedback(model: mujoco.MjModel, name: str, offset: float) -> None:
     """
     hinge = int(model.joint(name).id)
     for motor in range(model.nu):
-        if model.actuator_biastype[motor] == _AFFINE:
+        if has_feedback(model, motor):
             bias = model.actuator_biasprm[motor]
             bias[0] += bias[1] * length_per_angle(model, motor, hinge) * offset

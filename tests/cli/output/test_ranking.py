@@ -102,6 +102,15 @@ def test_the_numbers_behind_a_verdict_are_a_sentence(fit: Fit | None, sentence: 
     assert fit_sentence(values_of(fit=fit)) == sentence
 
 
+def test_a_joint_that_moves_otherwise_is_named_though_the_loss_is_explained():
+    fit = Fit(0.1, 0.1, 0.1, 0.5, 3.5, has_faults=False, joints={"knee": 4.25, "hip": 4.0})
+    sentence = confidence_sentence(values_of(best=INTACT, fit=fit, verdict="unexplained"))
+
+    assert "not all joints. Joints whose motion is predicted worse" in sentence
+    assert "knee (4.2), hip (4.0)" in sentence
+    assert "significantly worse than the self-model" not in sentence
+
+
 @pytest.mark.parametrize(
     ("best", "truth", "is_correct", "judgement"),
     [
@@ -112,6 +121,9 @@ def test_the_numbers_behind_a_verdict_are_a_sentence(fit: Fit | None, sentence: 
         ("friction=0.4", "slope=0.4", False, "wrong"),
         ("friction=0.4+motor:a=0.9", "friction=0.4", False, "wrong"),
         ("intact", "friction=0.4", False, "wrong"),
+        ("encoder-offset:a=0.1", "encoder-offset:a=slip0.1", False, "wrong"),
+        ("sensor:a1=gain0.2", "sensor:a1=gain0.3", False, "right except for severity"),
+        ("motor:leg1=0.2", "motor:leg2=0.2", False, "wrong"),
     ],
 )
 def test_the_right_faults_at_another_severity_are_not_wrong(

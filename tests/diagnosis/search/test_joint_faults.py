@@ -50,7 +50,11 @@ def bowl(truth: Hypothesis, seed: int = 0, steepness: float = 1.0) -> HingeLosse
 def distance(hypothesis: Hypothesis, truth: Hypothesis, joint: str) -> float:
     """How wrong a hypothesis is about a joint; NaN if it breaks the joint."""
     faults, real = (
-        {fault.kind.name: fault.severity for fault in one.faults if fault.part == joint}
+        {
+            fault.kind.name: fault.severity
+            for fault in one.faults
+            if fault.part == joint and fault.kind.name in KINDS_OF_A_JOINT
+        }
         for one in (hypothesis, truth)
     )
     if "break" in faults:
@@ -60,14 +64,21 @@ def distance(hypothesis: Hypothesis, truth: Hypothesis, joint: str) -> float:
     return sum(abs(faults[kind] - real[kind]) / (1 + real[kind]) for kind in real)
 
 
-def total(of_faults: float = 0.0) -> Losses:
-    """Total losses that vary at random with the hypothesis, and are larger with faults."""
+def total(of_faults: float = 0.0, required: str = "intact") -> Losses:
+    """Total losses that vary at random with the hypothesis.
+
+    Args:
+        of_faults: Further loss of every hypothesis with faults.
+        required: Faults without which the loss is larger.
+    """
+    needed = set(said(required).faults)
 
     def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
         rows = []
         for hypothesis in hypotheses:
             rng = np.random.default_rng(list(str(hypothesis).encode()))
-            rows.append(rng.normal(1.0, 0.02, PIECES) + of_faults * bool(hypothesis))
+            more = of_faults * bool(hypothesis) + len(needed - set(hypothesis.faults))
+            rows.append(rng.normal(1.0, 0.02, PIECES) + more)
         return np.array(rows)
 
     return losses
@@ -126,11 +137,44 @@ def test_a_hypothesis_has_at_most_the_given_number_of_faults():
     assert len(searched("intact", truth, most=1)) == 1
 
 
-def test_faults_of_other_parts_are_kept():
-    found = searched("break:back_left_knee", f"break:back_left_knee+damping:{KNEE}=8.0")
+def test_a_fault_of_another_part_that_the_trials_require_is_kept():
+    lost = "break:back_left_knee"
+    found = searched(lost, f"{lost}+damping:{KNEE}=8.0", losses=total(required=lost))
 
-    assert said("break:back_left_knee").faults[0] in found.faults
+    assert said(lost).faults[0] in found.faults
+    assert terms(found) == pytest.approx(terms(said(f"{lost}+damping:{KNEE}=8.0")), rel=0.05)
+
+
+def test_a_fault_that_imitated_that_of_a_joint_is_removed():
+    assert terms(searched("break:back_left_knee", f"damping:{KNEE}=8.0")) == pytest.approx(
+        {f"damping {KNEE}": 8.0}, rel=0.05
+    )
+
+
+def test_a_fault_of_the_same_part_that_is_not_about_its_motion_is_kept():
+    grip = f"grip:{KNEE}=0.2"
+    found = searched(grip, f"motor:{KNEE}=0.5", losses=total(required=grip))
+
+    assert said(grip).faults[0] in found.faults
     assert len(found) == 2
+
+
+def test_the_second_joint_is_searched_where_no_fault_explains_the_first():
+    """The largest excess is that of a joint that no searched fault explains."""
+    steep = bowl(said(f"jam:{SHOULDER}+encoder-offset:{SHOULDER}=0.7"), steepness=4.0)
+    shallow = bowl(said(f"damping:{KNEE}=8.0"))
+    column = ANATOMY.hinges.index(ANATOMY.joint(SHOULDER).hinges[0])
+
+    def damaged(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        rows = shallow(hypotheses)
+        rows[:, :, column] = steep(hypotheses)[:, :, column]
+        return rows
+
+    joints = JointLosses(ANATOMY, damaged, bowl(INTACT, seed=1))
+    found = with_joint_faults(INTACT, SPACE, 4, total(), joints)
+
+    assert next(iter(joints.excess(INTACT))) == SHOULDER
+    assert terms(found) == pytest.approx({f"damping {KNEE}": 8.0}, rel=0.05)
 
 
 def test_a_broken_joint_has_no_evidence_and_stays_broken():

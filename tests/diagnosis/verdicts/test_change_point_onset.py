@@ -98,6 +98,20 @@ def test_a_jam_in_the_second_of_three_trials_is_dated_in_that_trial(
     assert found.trials == 3
 
 
+def test_a_jam_of_a_robot_that_has_lost_a_limb_before_is_found_with_both_hypotheses(
+    quadruped: Robot, gait: Controller
+):
+    lost = "break:back_right_knee"
+    healthy = trial(quadruped, gait, "intact")
+    before, after = (trial(quadruped, gait, truth) for truth in (lost, f"{lost}+{JAM}"))
+    found = diagnosed(quadruped, glued(before, after, 150), intact=(healthy,))
+
+    assert str(found.best) == f"{lost}+{JAM}"
+    assert found.change is not None
+    assert str(found.change.before) == lost
+    assert abs(found.change.time - 1.5) <= 0.2
+
+
 @pytest.mark.parametrize("truth", ["intact", JAM])
 def test_a_robot_that_does_not_change_has_no_change(quadruped: Robot, gait: Controller, truth: str):
     found = diagnosed(quadruped, trial(quadruped, gait, truth))

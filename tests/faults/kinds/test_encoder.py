@@ -7,7 +7,7 @@ import pytest
 from selfmodel.controllers.playback import Playback
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
-from selfmodel.faults.kinds.encoder import ENCODER_SLIP
+from selfmodel.faults.kinds.encoder import ENCODER_OFFSET, ENCODER_SLIP
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot
@@ -192,14 +192,8 @@ TORQUE = """
 """
 
 
-def test_without_position_feedback_a_slip_is_an_offset():
+def test_a_joint_without_position_feedback_has_an_offset_only():
     robot = Robot("torque", TORQUE, 0.02)
-    offset, slip = (
-        build(robot, parse(f"encoder-offset:hip={prefix}0.1", robot.anatomy))
-        for prefix in ("", "slip")
-    )
 
-    np.testing.assert_array_equal(slip.encoder_offset, offset.encoder_offset)
-    np.testing.assert_array_equal(slip.model.actuator_biasprm, offset.model.actuator_biasprm)
-    assert slip.encoder_offset.any()
-    assert ENCODER_SLIP.parts(robot.anatomy) == ("hip",)
+    assert ENCODER_OFFSET.parts(robot.anatomy) == ("hip",)
+    assert ENCODER_SLIP.parts(robot.anatomy) == ()
