@@ -7,7 +7,8 @@ such fault, the loss of the joint was 4 to 50 standard errors above that in the 
 recordings of healthy robots with the same gait, no joint's was above 2.1.
 
 1. **Replacement**: at each joint with a fault, the best fault of the joint takes the place of the
-   present one if the motion of the joint is predicted significantly better.
+   present one if the motion of the joint is predicted significantly better; in the place of
+   several, if it is not predicted significantly worse.
 2. **Addition**: of the joints with an excess over the healthy trials, largest first, the first
    whose best fault explains it gets this fault, until none does.
 3. **Pruning**, after a replacement or addition: a fault that is no longer required is removed.
@@ -92,7 +93,11 @@ class _JointSearch:
     def replaced(self, current: Hypothesis, joint: str) -> Hypothesis:
         """The hypothesis with the best fault of a joint in the place of its present ones."""
         candidate = self._best_at(current, joint)
-        return candidate if self._is_better_at(joint, candidate, current) else current
+        is_simpler = len(candidate) < len(current) and not self._is_worse_at(
+            joint, candidate, current
+        )
+        is_chosen = is_simpler or self._is_better_at(joint, candidate, current)
+        return candidate if is_chosen else current
 
     def with_one_more(self, current: Hypothesis) -> Hypothesis:
         """The hypothesis with a fault of a further joint; the same if none explains its joint."""
@@ -153,7 +158,7 @@ class _JointSearch:
         coarse = [self._smallest(levels, joint) for levels in by_kind.values()]
         few = sorted(coarse, key=lambda one: self._focused([one], joint)[0].sum())[:KINDS_FITTED]
         fitted = [self._fitted(one, joint) for one in few]
-        return self._smallest([*fitted, current], joint) if fitted else current
+        return self._smallest(fitted, joint) if fitted else current
 
     def _fitted(self, hypothesis: Hypothesis, joint: str) -> Hypothesis:
         """The hypothesis with the severity of the joint's fault fitted."""
@@ -175,6 +180,15 @@ class _JointSearch:
         unknown = np.isnan(own)
         own = np.where(unknown.all(axis=1, keepdims=True), np.inf, np.where(unknown, 0.0, own))
         return self._losses(hypotheses) + own
+
+    def _is_worse_at(self, joint: str, one: Hypothesis, other: Hypothesis) -> bool:
+        """Returns whether one predicts the trials or the joint significantly worse."""
+        start, before, after = self._losses([self._start, other, one])
+        return (
+            is_better(start, after)
+            or is_better(before, after)
+            or joint_is_better(*self._joints.of(joint, [other, one]))
+        )
 
     def _is_better_at(self, joint: str, one: Hypothesis, other: Hypothesis) -> bool:
         """Returns whether one predicts the joint better, and the trials not worse."""

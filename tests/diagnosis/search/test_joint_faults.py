@@ -125,6 +125,20 @@ def test_a_fault_of_the_wrong_kind_is_replaced():
     assert terms(found) == pytest.approx({f"joint-friction {KNEE}": 0.23}, rel=0.05)
 
 
+def test_one_fault_takes_the_place_of_two_that_imitate_it():
+    truth = f"motor:{KNEE}=0.3"
+    two = said(f"damping:{KNEE}=3.0+joint-friction:{KNEE}=0.1")
+    of_one = bowl(said(truth))
+
+    def damaged(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        return of_one([said(truth) if one == two else one for one in hypotheses])
+
+    joints = JointLosses(ANATOMY, damaged, bowl(INTACT, seed=1))
+    found = with_joint_faults(two, SPACE, 4, total(), joints)
+
+    assert terms(found) == pytest.approx(terms(said(truth)), rel=0.05)
+
+
 def test_faults_of_two_joints_are_found():
     truth = f"damping:{KNEE}=8.0+motor:{SHOULDER}=0.2"
 
