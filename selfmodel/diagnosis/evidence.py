@@ -175,8 +175,8 @@ class Evidence:
     ) -> FloatArray:
         """Returns the losses of each hinge on its own, ``(n, pieces, hinges)``.
 
-        They are infinite where a simulation diverges, and NaN where the log contains no evidence on
-        a hinge, or the hypothesis detaches it.
+        The simulations are those of ``losses``. A loss is infinite where one diverges, and NaN
+        where the log contains no evidence on a hinge, or the hypothesis detaches it.
 
         Raises:
             InputError: The comparator cannot judge a trial, or does not predict single hinges; see
@@ -220,20 +220,33 @@ class Evidence:
 
     def _compute(self, trial: Trial, hypotheses: list[Hypothesis]) -> FloatArray:
         prepared = self._prepare(trial)
-        batches = self._batches(prepared, trial, hypotheses)
-        return np.concatenate([self._batch_losses(prepared, trial, batch) for batch in batches])
+        rows = []
+        for batch in self._batches(prepared, trial, hypotheses):
+            result = simulate(self._simulator, prepared.request, trial, batch)
+            rows.append(self._losses_of(prepared, result))
+        return np.concatenate(rows)
 
     def _compute_by_hinge(self, trial: Trial, hypotheses: list[Hypothesis]) -> FloatArray:
         prepared = self._prepare(trial)
         if not isinstance(prepared, HingewiseTrial):
             raise contract_error(self._comparator, "does not predict single hinges")
-        batches = self._batches(prepared, trial, hypotheses)
-        return np.concatenate([self._batch_by_hinge(prepared, trial, batch) for batch in batches])
+        rows = []
+        for batch in self._batches(prepared, trial, hypotheses):
+            result = simulate(self._simulator, prepared.request, trial, batch)
+            rows.append(self._hinge_losses_of(prepared, trial, batch, result))
+            # The same simulations have the losses that are asked for next.
+            total = dict(zip(batch, self._losses_of(prepared, result), strict=True))
+            cache = self._losses.setdefault(_key(trial), Cache())
+            cache.get_or_compute(batch, partial(_rows_of, total))
+        return np.concatenate(rows)
 
-    def _batch_by_hinge(
-        self, prepared: HingewiseTrial, trial: Trial, hypotheses: list[Hypothesis]
+    def _hinge_losses_of(
+        self,
+        prepared: HingewiseTrial,
+        trial: Trial,
+        hypotheses: list[Hypothesis],
+        result: SimulationResult,
     ) -> FloatArray:
-        result = simulate(self._simulator, prepared.request, trial, hypotheses)
         with _diverging(result.diverged):
             losses = np.asarray(prepared.losses_by_hinge(result.behaviour))
         hinges = trial.behaviour.names.hinges
@@ -259,13 +272,10 @@ class Evidence:
         listed = list(hypotheses)
         return [listed[first : first + size] for first in range(0, len(listed), size)]
 
-    def _batch_losses(
-        self, prepared: PreparedTrial, trial: Trial, hypotheses: list[Hypothesis]
-    ) -> FloatArray:
-        result = simulate(self._simulator, prepared.request, trial, hypotheses)
+    def _losses_of(self, prepared: PreparedTrial, result: SimulationResult) -> FloatArray:
         diverged = result.diverged[:, np.newaxis]
         with _diverging(result.diverged):
-            losses = self._compare(prepared, result.behaviour, len(hypotheses))
+            losses = self._compare(prepared, result.behaviour, len(diverged))
         wrong = losses[~((losses >= 0) | diverged)]
         if len(wrong):
             raise contract_error(
@@ -288,6 +298,10 @@ class Evidence:
                 self._comparator, f"returned {distances.shape} distances for {count} simulations"
             )
         return np.asarray(distances[:, np.newaxis])
+
+
+def _rows_of(rows: Mapping[Hypothesis, FloatArray], hypotheses: list[Hypothesis]) -> FloatArray:
+    return np.array([rows[hypothesis] for hypothesis in hypotheses])
 
 
 def _diverging(diverged: BoolArray) -> np.errstate:

@@ -165,6 +165,19 @@ def test_the_losses_of_hinges_have_the_pieces_of_the_losses(
     np.testing.assert_array_equal(hinges[:, : first.shape[1]], first)
 
 
+def test_losses_and_those_of_hinges_need_one_simulation(
+    quadruped: Robot, trials: list[Trial], two: list[Hypothesis], evidence: Evidence
+):
+    simulator = Simulator(quadruped, 1)
+    once = Evidence(simulator, SEGMENT_PREDICTION)
+    hinges = once.losses_by_hinge(two, trials)
+    steps = simulator.stats.steps
+
+    np.testing.assert_array_equal(once.losses(two, trials), evidence.losses(two, trials))
+    np.testing.assert_array_equal(once.losses_by_hinge(two, trials), hinges)
+    assert simulator.stats.steps == steps
+
+
 def test_a_jam_shows_in_the_loss_of_its_hinge(evidence: Evidence, trials: list[Trial]):
     names = trials[0].behaviour.names.hinges
     mean = evidence.losses_by_hinge([INTACT], trials)[0].mean(axis=0)
