@@ -19,6 +19,7 @@ from selfmodel.diagnosis.comparator import (
 from selfmodel.diagnosis.preparation import contract_error, prepared_trial
 from selfmodel.diagnosis.search.search_cost import steps_of
 from selfmodel.diagnosis.verdicts.change_point import Timeline
+from selfmodel.diagnosis.verdicts.contradiction import contradiction_losses
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.simulation.batch_memory import largest_batch
@@ -223,7 +224,7 @@ class Evidence:
         rows = []
         for batch in self._batches(prepared, trial, hypotheses):
             result = simulate(self._simulator, prepared.request, trial, batch)
-            rows.append(self._losses_of(prepared, result))
+            rows.append(self._losses_of(prepared, trial, batch, result))
         return np.concatenate(rows)
 
     def _compute_by_hinge(self, trial: Trial, hypotheses: list[Hypothesis]) -> FloatArray:
@@ -235,7 +236,8 @@ class Evidence:
             result = simulate(self._simulator, prepared.request, trial, batch)
             rows.append(self._hinge_losses_of(prepared, trial, batch, result))
             # The same simulations have the losses that are asked for next.
-            total = dict(zip(batch, self._losses_of(prepared, result), strict=True))
+            losses = self._losses_of(prepared, trial, batch, result)
+            total = dict(zip(batch, losses, strict=True))
             cache = self._losses.setdefault(_key(trial), Cache())
             cache.get_or_compute(batch, partial(_rows_of, total))
         return np.concatenate(rows)
@@ -272,7 +274,13 @@ class Evidence:
         listed = list(hypotheses)
         return [listed[first : first + size] for first in range(0, len(listed), size)]
 
-    def _losses_of(self, prepared: PreparedTrial, result: SimulationResult) -> FloatArray:
+    def _losses_of(
+        self,
+        prepared: PreparedTrial,
+        trial: Trial,
+        hypotheses: list[Hypothesis],
+        result: SimulationResult,
+    ) -> FloatArray:
         diverged = result.diverged[:, np.newaxis]
         with _diverging(result.diverged):
             losses = self._compare(prepared, result.behaviour, len(diverged))
@@ -281,6 +289,10 @@ class Evidence:
             raise contract_error(
                 self._comparator,
                 f"returned a distance that is not a number of at least 0: {wrong[0]}",
+            )
+        if isinstance(prepared, TimedTrial):
+            losses = losses + contradiction_losses(
+                hypotheses, trial.behaviour, prepared.piece_steps
             )
         return np.where(diverged, np.inf, losses)
 

@@ -5,8 +5,9 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
-from selfmodel.arrays import FloatArray
+from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.trials.behaviour import Behaviour
 
 if TYPE_CHECKING:
     from mujoco import MjSpec
@@ -77,6 +78,8 @@ class FaultKind:
             of MjData stay.
         adapt_to_contacts: Optional hook: adapts an embodiment to the contact points observed in a
             trial, ``(n, 3)``, world frame, m, before segments of that trial are predicted.
+        contradicted: Optional hook: returns a mask of the steps of a log that the fault excludes,
+            ``(steps,)``, such as those in which a failed sensor reads something.
         parts: Names of the parts that the kind applies to, in the order of a gene's third value;
             ``ENVIRONMENT`` alone for an environment.
         absorbs: Returns whether the first fault, of this kind, removes any effect of the second.
@@ -106,6 +109,9 @@ class FaultKind:
         default=None, compare=False, repr=False
     )
     adapt_to_contacts: Callable[["Embodiment", "Fault", FloatArray], None] | None = field(
+        default=None, compare=False, repr=False
+    )
+    contradicted: Callable[["Fault", Behaviour], BoolArray] | None = field(
         default=None, compare=False, repr=False
     )
     parts: Callable[[Anatomy], tuple[str, ...]] = field(

@@ -7,6 +7,7 @@ from selfmodel.diagnosis.loss_functions import SHORTLIST_SIZE, LossFunctions, by
 from selfmodel.diagnosis.verdicts.significance import (
     NEGLIGIBLE_LOSS,
     gain_exceeds_healthy_gain,
+    is_better,
     paired_z,
 )
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
@@ -45,6 +46,10 @@ def best_unsearched_fault(
         alone = space.canonical([candidates[candidate]])
         healthy_without, healthy_with = losses.healthy([INTACT, alone])
         damaged_with = losses.damaged([candidate])[0]
+        # A reading that healthy trials predict better with the fault is predicted badly as such.
+        changes_readings = not candidates[candidate].kind.affects_dynamics
+        if changes_readings and is_better(healthy_with, healthy_without):
+            continue
         if kind not in better and gain_exceeds_healthy_gain(
             damaged_with, best_losses, healthy_with, healthy_without
         ):

@@ -6,8 +6,12 @@ touch is 0 or 1, and an angle is 1 at the end of its joint's range.
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
 from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.trials.behaviour import Behaviour
 
 if TYPE_CHECKING:
     from selfmodel.robot.editing.embodiment import Embodiment
@@ -28,6 +32,28 @@ def _column(anatomy: Anatomy, fault: Fault) -> int:
 
 def _fail(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
     embodiment.fix_reading(_column(anatomy, fault), 0.0)
+
+
+def _readings(fault: Fault, behaviour: Behaviour) -> FloatArray:
+    return behaviour["sensors"][:, behaviour.names.sensors.index(fault.part)]
+
+
+def _reads_something(fault: Fault, behaviour: Behaviour) -> BoolArray:
+    """Returns a mask of the steps with a known reading other than 0, ``(steps,)``."""
+    readings = _readings(fault, behaviour)
+    return np.asarray(np.isfinite(readings) & (readings != 0))
+
+
+def _reads_0_or_1(fault: Fault, behaviour: Behaviour) -> BoolArray:
+    """Returns a mask of the steps that exclude a gain or a bias of a binary sensor, ``(steps,)``.
+
+    A sensor with a gain reads the gain in place of 1, one with a bias never 0.
+    """
+    readings = _readings(fault, behaviour)
+    is_known = np.isfinite(readings)
+    if not np.isin(readings[is_known], (0.0, 1.0)).all():
+        return np.zeros(len(readings), dtype=np.bool_)
+    return np.asarray(is_known & (readings == (1.0 if fault.kind == SENSOR_GAIN else 0.0)))
 
 
 def _scale(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
@@ -52,6 +78,7 @@ FAILED_SENSOR = FaultKind(
     keyword="sensor",
     parts=_sensors,
     apply=_fail,
+    contradicted=_reads_something,
     absorbs=_absorbs,
     affects_dynamics=False,
 )
@@ -62,6 +89,7 @@ SENSOR_GAIN = FaultKind(
     prefix="gain",
     parts=_sensors,
     apply=_scale,
+    contradicted=_reads_0_or_1,
     affects_dynamics=False,
     severity_bounds=uniform_bounds(0.0, 2.0),
     levels=uniform_levels(0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.2, 1.4, 1.6, 1.8, 2.0),
@@ -77,6 +105,7 @@ SENSOR_BIAS = FaultKind(
     prefix="bias",
     parts=_sensors,
     apply=_shift,
+    contradicted=_reads_0_or_1,
     affects_dynamics=False,
     severity_bounds=uniform_bounds(-1.0, 1.0),
     levels=uniform_levels(-0.9, -0.7, -0.5, -0.35, -0.2, -0.1, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9),
