@@ -13,6 +13,7 @@ from selfmodel.robot.designs import network_for
 from selfmodel.robot.editing.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import SIGNALS
 
 STEPS = 20
@@ -58,6 +59,8 @@ def check_fault_kind(kind: FaultKind, robot: Robot) -> None:
     _check_batch(kind, robot)
     if kind.adapt_to_contacts is not None:
         _check_contacts(kind, candidates, robot)
+    _check_parts(kind, candidates, robot)
+    _check_contradictions(kind, candidates, robot)
 
 
 def _check_severity(fault: Fault, robot: Robot) -> None:
@@ -128,6 +131,32 @@ def _check_contacts(kind: FaultKind, candidates: tuple[Fault, ...], robot: Robot
                 kind.adapt_to_contacts(own, fault, points)
             if mujoco.mj_sizeModel(own.model) != size or not np.array_equal(points, before):
                 raise ValueError(f"{kind.name} changes the contact points, or a model's layout")
+
+
+def _check_parts(kind: FaultKind, candidates: tuple[Fault, ...], robot: Robot) -> None:
+    joints = {joint.name for joint in robot.anatomy.joints}
+    others = sorted({fault.part for fault in candidates} - joints)
+    if kind.is_of_joint and others:
+        raise ValueError(f"{kind.name} is of joints, and {', '.join(others)} is no joint")
+
+
+def _check_contradictions(kind: FaultKind, candidates: tuple[Fault, ...], robot: Robot) -> None:
+    """Checks that the log of a robot with a fault does not contradict the fault."""
+    if kind.contradicted is None:
+        return
+    network = network_for(robot)
+    controller = Controller(network, np.linspace(-1, 1, network.weights))
+    hypotheses = [Hypothesis((fault,)) for fault in candidates]
+    runs = [(hypothesis, controller) for hypothesis in hypotheses]
+    simulated = Simulator(robot, 1).run(runs, STEPS, SIGNALS).behaviour
+    for row, fault in enumerate(candidates):
+        signals = {signal: values[row] for signal, values in simulated.signals.items()}
+        log = Behaviour(simulated.names, simulated.time, signals)
+        mask = kind.contradicted(fault, log)
+        if np.shape(mask) != (STEPS,) or np.asarray(mask).dtype != np.bool_:
+            raise ValueError(f"{kind.name} must return a mask of the {STEPS} steps of a log")
+        if np.any(mask):
+            raise ValueError(f"the log of a robot with {fault} contradicts the fault")
 
 
 def _contents(embodiment: Embodiment) -> tuple[bytes, ...]:

@@ -133,6 +133,11 @@ GRADED = FaultKind(
             {"adapt_to_contacts": lambda _own, _fault, points: points.fill(0)},
             "changes the contact points",
         ),
+        (
+            {"contradicted": lambda _fault, log: log["sensors"][:, 0] == log["sensors"][:, 0]},
+            "the log of a robot with .* contradicts the fault",
+        ),
+        ({"contradicted": lambda _fault, _log: np.zeros(3)}, "a mask of the 20 steps"),
     ],
 )
 def test_the_contract_kit_sees_each_way_to_break_it(change: dict, said: str, quadruped: Robot):
@@ -140,6 +145,13 @@ def test_the_contract_kit_sees_each_way_to_break_it(change: dict, said: str, qua
 
     with pytest.raises((ValueError, InputError), match=said):
         check_fault_kind(dataclasses.replace(GRADED, **change), quadruped)
+
+
+def test_the_contract_kit_sees_a_kind_of_joints_with_other_parts(quadruped: Robot):
+    kind = dataclasses.replace(KINDS["sensor"], is_of_joint=True)
+
+    with pytest.raises(ValueError, match=r"front_left_touch.* is no joint"):
+        check_fault_kind(kind, quadruped)
 
 
 def test_the_contract_kit_sees_a_kind_that_edits_the_robot_itself():
