@@ -12,6 +12,11 @@ SERVO_GAINS = (150.0, 15.0)
 """Stiffness, N m/rad, and damping, N m s/rad, of the position servos of the ant."""
 
 
+TOUCH_REACH = 0.02
+"""Distance by which the touch sites of the ant extend beyond its feet, m: a contact at rest lies up
+to the margin of a geom beyond it, 0.01 m."""
+
+
 @dataclass(frozen=True)
 class Part:
     """A joint in the sense of a diagnosis: all hinges of one body.
@@ -152,7 +157,7 @@ def _ant(spec: mujoco.MjSpec) -> mujoco.MjSpec:
                 name=f"{joint.name}_site",
                 type=mujoco.mjtGeom.mjGEOM_CAPSULE,
                 fromto=geom.fromto,
-                size=[geom.size[0] * 1.1, 0, 0],
+                size=[geom.size[0] + TOUCH_REACH, 0, 0],
             )
             spec.add_sensor(
                 name=f"{body.name}_touch",

@@ -67,6 +67,14 @@ def test_a_lost_limb_is_deleted_with_its_mass_hinges_and_motors(machine: Robot):
     assert left.body_mass.sum() < whole.body_mass.sum() - 0.01
 
 
+def test_feet_at_rest_are_felt():
+    model = model_of(robot("ant"))
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, 300)
+
+    assert (data.sensordata > 0).sum() >= 3
+
+
 def test_debris_is_the_lost_limb_as_a_free_body_in_its_place(machine: Robot):
     part = machine.parts[0]
     fault = Fault("lost", part.name, debris=True)
