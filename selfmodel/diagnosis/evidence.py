@@ -1,4 +1,4 @@
-"""Losses of hypotheses on logged trials, each simulated once."""
+"""Losses of hypotheses on logged trials, each simulated once, and once more for those of hinges."""
 
 from collections.abc import Mapping, Sequence
 from functools import partial

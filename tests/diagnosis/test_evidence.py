@@ -237,10 +237,12 @@ def test_a_diagnosis_simulates_nothing_twice_and_ranks_nothing_that_is_not_consi
 
     assert found.unsearched is not None
     assert found.unsearched.kind == "friction"
-    # The losses by signal of an unexplained best hypothesis are computed once more.
+    # The losses of hinges are computed for a few hypotheses, and those by signal of an unexplained
+    # best hypothesis.
     again = {hypothesis for (hypothesis, _), times in simulator.times.items() if times > 1}
-    assert again <= {found.best, INTACT}
-    assert max(simulator.times.values()) <= 2
+    assert {found.best, INTACT} & again
+    assert len(again) <= 3
+    assert max(simulator.times.values()) <= 3
     simulated = {hypothesis for hypothesis, _ in simulator.times}
     considered = {
         one for one in simulated if {fault.kind for fault in one.faults} <= {*PAPER_KINDS}
