@@ -105,6 +105,10 @@ class _JointSearch:
         excess = self._joints.excess(current)
         suspects = [name for name, z in excess.items() if z >= MIN_EXCESS and name not in taken]
         for joint in suspects[:JOINTS_TRIED]:
+            levels = self._best_levels(current, joint)
+            # A level near the true severity is much better already: fits cost most of this search.
+            if not levels or not self._is_better_at(joint, levels[0], current):
+                continue
             candidate = self._best_at(current, joint)
             if self._explains(joint, candidate, current, excess[joint]):
                 return candidate
@@ -146,8 +150,14 @@ class _JointSearch:
 
     def _best_at(self, current: Hypothesis, joint: str) -> Hypothesis:
         """The hypothesis with the best fault of a joint; ``current`` if there is no evidence."""
+        levels = self._best_levels(current, joint)[:KINDS_FITTED]
+        fitted = [self._fitted(one, joint) for one in levels]
+        return self._smallest(fitted, joint) if fitted else current
+
+    def _best_levels(self, current: Hypothesis, joint: str) -> list[Hypothesis]:
+        """The hypothesis with each kind of fault of a joint at its best level, best first."""
         if np.isnan(self._joints.of(joint, [current])).all():
-            return current
+            return []
         others = [fault for fault in current.faults if fault not in _faults_of(current, joint)]
         by_kind: dict[str, list[Hypothesis]] = {}
         for fault in self._space.coarse_candidates:
@@ -155,10 +165,8 @@ class _JointSearch:
                 hypothesis = self._space.canonical([*others, fault])
                 if len(hypothesis) > len(others):
                     by_kind.setdefault(fault.kind.name, []).append(hypothesis)
-        coarse = [self._smallest(levels, joint) for levels in by_kind.values()]
-        few = sorted(coarse, key=lambda one: self._focused([one], joint)[0].sum())[:KINDS_FITTED]
-        fitted = [self._fitted(one, joint) for one in few]
-        return self._smallest(fitted, joint) if fitted else current
+        best = [self._smallest(levels, joint) for levels in by_kind.values()]
+        return sorted(best, key=lambda one: float(self._focused([one], joint)[0].sum()))
 
     def _fitted(self, hypothesis: Hypothesis, joint: str) -> Hypothesis:
         """The hypothesis with the severity of the joint's fault fitted."""
