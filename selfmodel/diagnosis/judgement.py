@@ -9,7 +9,7 @@ from selfmodel.diagnosis.verdicts.detectable import detectable_severities
 from selfmodel.diagnosis.verdicts.fit import Fit
 from selfmodel.diagnosis.verdicts.model_error import any_fault_is_model_error
 from selfmodel.diagnosis.verdicts.residual import Residual, residual_of
-from selfmodel.diagnosis.verdicts.significance import TEST, is_better
+from selfmodel.diagnosis.verdicts.significance import MIN_Z_OF_JOINT, TEST, is_better
 from selfmodel.diagnosis.verdicts.undetectable import undetectable_faults
 from selfmodel.diagnosis.verdicts.unsearched import best_unsearched_fault
 from selfmodel.diagnosis.verdicts.verdict import all_diverged, fit_of, verdict_of
@@ -71,9 +71,18 @@ def _fit(best: Hypothesis, question: Question) -> Fit:
         intact_losses,
         question.healthy_losses,
         is_one_gait=is_one_gait,
-        # Another gait loads the joints otherwise: 16 of 24 healthy robots would be suspected.
-        joints=question.joints.excess(best) if question.joints and is_one_gait else {},
+        joints=_suspected_joints(question) if is_one_gait and not best else {},
     )
+
+
+def _suspected_joints(question: Question) -> dict[str, float]:
+    """Returns the joints that the empty hypothesis predicts worse than in healthy trials.
+
+    The trials have the gait of the healthy ones: another one loads the joints otherwise, and 16 of
+    24 healthy robots would be suspected.
+    """
+    excess = question.joints.excess(INTACT) if question.joints else {}
+    return {joint: z for joint, z in excess.items() if z >= MIN_Z_OF_JOINT}
 
 
 def _residual(best: Hypothesis, question: Question) -> Residual | None:

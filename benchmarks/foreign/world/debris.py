@@ -13,21 +13,15 @@ def leave(spec: mujoco.MjSpec, body: str) -> None:
         spec: Specification of the robot, before the limb is deleted from it.
         body: Name of the limb's first body.
     """
-    model = spec.copy().compile()
+    whole = spec.copy()
+    model = whole.compile()
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     root = model.body(body).id
     debris = spec.worldbody.add_body(name="debris", pos=data.xpos[root], quat=data.xquat[root])
     debris.add_freejoint()
-    for geom in range(model.ngeom):
-        if _is_beyond(model, int(model.geom_bodyid[geom]), root):
-            _add(debris, model, data, geom, root)
-
-
-def _is_beyond(model: mujoco.MjModel, body: int, root: int) -> bool:
-    while body > root:
-        body = int(model.body_parentid[body])
-    return body == root
+    for geom in whole.body(body).find_all(mujoco.mjtObj.mjOBJ_GEOM):
+        _add(debris, model, data, geom.id, root)
 
 
 def _add(

@@ -30,7 +30,8 @@ the largest excess was 5.0."""
 MIN_Z_OF_JOINT = 6.0
 """Standard errors by which the loss of a single joint has to exceed that in healthy trials for the
 robot not to be intact. In 24 healthy recordings of another generator, the largest of all joints was
-2.1, and faults of a joint caused 4 to 50; with our own gap of 0.1, one healthy joint had 5.0."""
+2.1, and in 24 with a fault of a joint, that joint had 4 to 53; with our own gap of 0.1, one healthy
+joint had 5.0."""
 
 LOSS_RATIO = 3.0
 """Ratio of mean losses that is significant whatever the standard error: a few segments are enough

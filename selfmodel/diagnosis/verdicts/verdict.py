@@ -7,7 +7,6 @@ from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, UnsearchedFault, Verdict
 from selfmodel.diagnosis.verdicts.fit import Fit
 from selfmodel.diagnosis.verdicts.significance import (
-    MIN_Z_OF_JOINT,
     MIN_Z_OF_ONE_GAIT,
     MIN_Z_OF_OTHER_GAITS,
     excess_over_healthy,
@@ -36,10 +35,8 @@ def fit_of(
         healthy: Losses of the empty hypothesis on healthy trials, ``(healthy_pieces,)``; None
             without healthy trials.
         is_one_gait: Whether the healthy trials have the gaits of the trials to explain.
-        joints: Excess of the loss of each joint, see ``JointLosses.excess``; none if it is no
-            evidence.
+        joints: Excess of the losses of suspected joints; see ``Fit.joints``.
     """
-    suspected = {name: z for name, z in joints.items() if z >= MIN_Z_OF_JOINT}
     return Fit(
         loss=float(losses.mean()),
         intact_loss=float(intact.mean()),
@@ -47,7 +44,7 @@ def fit_of(
         excess=None if healthy is None else excess_over_healthy(losses, healthy),
         threshold=MIN_Z_OF_ONE_GAIT if is_one_gait else MIN_Z_OF_OTHER_GAITS,
         has_faults=bool(best),
-        joints={} if best else suspected,
+        joints=joints,
     )
 
 

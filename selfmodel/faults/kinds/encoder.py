@@ -14,6 +14,7 @@ constant angle is measured with the offset. Motors that move the jammed joint on
 both kinds are equal there. A weak motor scales the force that the slip adds, as all of its force.
 """
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from selfmodel.faults.kind import (
@@ -28,9 +29,6 @@ from selfmodel.robot.anatomy.anatomy import Anatomy
 
 if TYPE_CHECKING:
     from selfmodel.robot.editing.embodiment import Embodiment
-
-_BOUNDS = uniform_bounds(-1.0, 1.0)
-_LEVELS = uniform_levels(-0.3, -0.1, 0.1, 0.3)
 
 
 def _offset(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
@@ -53,22 +51,13 @@ ENCODER_OFFSET = FaultKind(
     keyword="encoder-offset",
     parts=joints,
     apply=_offset,
-    severity_bounds=_BOUNDS,
-    levels=_LEVELS,
+    severity_bounds=uniform_bounds(-1.0, 1.0),
+    levels=uniform_levels(-0.3, -0.1, 0.1, 0.3),
     degenerates_to={0.0: None},
     unit="rad",
     is_of_joint=True,
 )
 
-ENCODER_SLIP = FaultKind(
-    name="encoder-slip",
-    keyword="encoder-offset",
-    prefix="slip",
-    parts=joints_with_servos,
-    apply=_slip,
-    severity_bounds=_BOUNDS,
-    levels=_LEVELS,
-    degenerates_to={0.0: None},
-    unit="rad",
-    is_of_joint=True,
+ENCODER_SLIP = replace(
+    ENCODER_OFFSET, name="encoder-slip", prefix="slip", parts=joints_with_servos, apply=_slip
 )

@@ -15,6 +15,7 @@ from selfmodel.simulation.requests import cut_segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour, collect
 from selfmodel.trials.signals import SIGNALS
+from tests.faults.test_registry import BARE
 from tests.helpers.arms import quadruped_on_a_stand
 from tests.helpers.drivers import random_motion
 
@@ -181,19 +182,8 @@ def test_a_weak_or_jammed_motor_and_a_slip_have_one_model_in_both_orders(
     assert constant == pytest.approx(share * nominal * OFFSET)
 
 
-TORQUE = """
-<mujoco><option timestep="0.005"/><worldbody>
-  <geom type="plane" size="0 0 1"/>
-  <body name="trunk" pos="0 0 0.5"><freejoint/><geom type="box" size="0.1 0.1 0.1"/>
-    <body name="leg"><joint name="hip" axis="0 1 0" range="-60 60"/>
-      <geom type="capsule" fromto="0 0 0 0 0 -0.3" size="0.02"/></body></body>
-</worldbody>
-<actuator><motor name="hip" joint="hip" ctrlrange="-1 1"/></actuator></mujoco>
-"""
-
-
 def test_a_joint_without_position_feedback_has_an_offset_only():
-    robot = Robot("torque", TORQUE, 0.02)
+    robot = Robot("torque", BARE.replace("<position", "<motor").replace(' kp="50"', ""), 0.02)
 
     assert ENCODER_OFFSET.parts(robot.anatomy) == ("hip",)
     assert ENCODER_SLIP.parts(robot.anatomy) == ()
