@@ -103,6 +103,10 @@ class Evolution:
             return {"generations": self.generations}
         return {}
 
+    def candidates(self, count: int) -> FloatArray:
+        """Returns the best genomes, best first, ``(count or fewer, length)``."""
+        return self._genomes[:count]
+
     def _children(self) -> FloatArray:
         settings, rng = self._settings, self._rng
         count = settings.population - settings.survivors

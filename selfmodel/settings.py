@@ -83,6 +83,11 @@ class Settings:
                 f"got {self.crossovers}"
             )
 
+    @property
+    def evaluations(self) -> int:
+        """Genomes that one EA evaluates: a population, then its children."""
+        return self.population + (self.generations - 1) * (self.population - self.survivors)
+
     def scaled(self, population: int) -> "Settings":
         """Returns these settings for another population size, in the paper's proportions.
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.physical.initial_pose import randomize_joint_angles
+from selfmodel.physical.initial_pose import randomize_joint_angles, start_spread
 from selfmodel.robot.anatomy.anatomy import Anatomy
 from selfmodel.robot.editing.embodiment import Embodiment
 from selfmodel.tasks.randomness import next_seed
@@ -66,7 +66,8 @@ class DamagedTask:
         model, data = physics.model.ptr, physics.data.ptr
         if self._start > 0:
             rng = np.random.default_rng(next_seed(self._task.random))
-            randomize_joint_angles(self._anatomy, model, data, self._start, rng)
+            spread = start_spread(self._start)
+            randomize_joint_angles(self._anatomy, model, data, spread.angles, rng)
         for position, velocity, angle in self._embodiment.welded:
             data.qpos[position], data.qvel[velocity] = angle, 0.0
         self._delayed = deque(np.zeros((self._delay, model.nu)))

@@ -15,7 +15,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.physical.debris import detached_limbs, place_debris
-from selfmodel.physical.initial_pose import randomize_initial_pose
+from selfmodel.physical.initial_pose import randomize_initial_pose, start_spread
 from selfmodel.physical.measurement_noise import ExactMeasurement, Measurement, NoisyMeasurement
 from selfmodel.physical.reality_gap import RealityGap, draw_gap
 from selfmodel.physical.simulated_robot import physical_embodiment
@@ -167,7 +167,8 @@ class Walk(base.Task):
         self._begin(rng)
         model, data = physics.model.ptr, physics.data.ptr
         if self._start_level > 0:
-            randomize_initial_pose(self._robot, model, data, self._start_level, rng)
+            spread = start_spread(self._start_level)
+            randomize_initial_pose(self._robot, model, data, spread, rng)
         place_debris(model, data, self._limbs)
         super().initialize_episode(physics)
         self._start = self._end = self._forward(physics)

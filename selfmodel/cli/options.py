@@ -238,6 +238,24 @@ NamedKinds = Annotated[
     ),
 ]
 
+RepairName = Annotated[
+    str,
+    typer.Option(
+        metavar="robust|paper",
+        help="Evolve controllers on rollouts with noise and with the uncertainty of the self-model;"
+        " or as the paper does, in one exact simulation.",
+        rich_help_panel=SEARCH,
+    ),
+]
+SearchName = Annotated[
+    str | None,
+    typer.Option(
+        metavar="cma-es|ea",
+        help="Search of the robust repair: CMA-ES with raced starts, or the paper's EA.",
+        show_default="cma-es; ea with --repair paper",
+        rich_help_panel=SEARCH,
+    ),
+]
 ScoreName = Annotated[
     str,
     typer.Option(

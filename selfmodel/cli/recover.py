@@ -26,8 +26,10 @@ from selfmodel.cli.options import (
     NextTrialName,
     Population,
     Reference,
+    RepairName,
     RobotName,
     ScoreName,
+    SearchName,
     Seed,
     Steps,
     Structural,
@@ -68,6 +70,8 @@ def recover(
     next_trial: NextTrialName = "repair",
     controller: ControllerKind = "network",
     neurons: Neurons = None,
+    repair: RepairName = plugins.ROBUST,
+    search: SearchName = None,
     score: ScoreName = "displacement",
     reference: Reference = None,
     seed: Seed = 0,
@@ -101,6 +105,7 @@ def recover(
     design = plugins.design(controller, made, neurons)
     truth = HypothesisSpace(made.anatomy, considered).parse(damaged)
     check_silent_neurons(design, silent_neurons(truth))
+    plugins.repair(repair, search)  # an unknown name is refused before any work
     settings = Settings(steps=steps, trials=trials, generations=generations).scaled(population)
     chosen = choose_score(
         score, entry, design, steps=steps, seed=seed, reference=reference, budget=limits
@@ -129,6 +134,8 @@ def recover(
         gait=chosen.gait,
         score=chosen.score,
         physical=entry.physical,
+        repair=repair,
+        search=search,
     )
     try:
         with display(partial(_described, made, chosen.score)) as on_event:

@@ -100,7 +100,9 @@ def evolve_controller(
     check_motion(score.name, robot)
     chosen = _design(design, robot)
     search = RepairSearch(Simulator(robot, threads), settings or Settings(), chosen, score=score)
-    return search(hypothesis_of(hypothesis, robot), seeds, repair_stream(seed, 0), on_event)
+    hypotheses = (hypothesis_of(hypothesis, robot),)
+    (best,) = search(hypotheses, seeds, repair_stream(seed, 0), on_event)
+    return best.controller
 
 
 def run_trial(
@@ -320,6 +322,8 @@ def recover(
     calibrate: bool = True,
     next_trial: NextTrial = by_repair,
     score: Score = DISPLACEMENT,
+    repair: str = plugins.ROBUST,
+    search: str | None = None,
     seed: int = 0,
     threads: int = 0,
     on_event: Callable[[Event], None] = _ignore,
@@ -351,7 +355,10 @@ def recover(
         design: Name of a controller design, such as ``network`` or ``cpg``, or a design.
         calibrate: Whether the self-model is fitted to the trial before the failure.
         next_trial: Chooses the controller of each trial after the failing one.
-        score: Fitness of the repair EA; the forward displacement by default.
+        score: Fitness of the repair; the forward displacement by default.
+        repair: ``robust``, on rollouts under random conditions; or ``paper``, in one exact
+            simulation.
+        search: ``cma-es`` or ``ea``; None for that of the repair, CMA-ES or the paper's EA.
         seed: Seed of all random numbers.
         threads: Threads of the physics; 0 for all processors.
         on_event: Called with the progress of the recovery.
@@ -381,4 +388,5 @@ def recover(
         calibrate=partial(fitted, robot, threads=count) if calibrate else None,
         next_trial=next_trial,
         score=score,
+        make_repair=plugins.repair(repair, search),
     )

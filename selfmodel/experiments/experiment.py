@@ -9,7 +9,7 @@ from time import perf_counter
 from selfmodel.controllers.controller import Controller, Design
 from selfmodel.diagnosis.comparator_choice import ComparatorChoice
 from selfmodel.experiments.fitting import fitted
-from selfmodel.experiments.plugins import NEXT_TRIAL
+from selfmodel.experiments.plugins import NEXT_TRIAL, PAPER, repair
 from selfmodel.experiments.reality import draw_reality
 from selfmodel.experiments.scoring import is_correct
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
@@ -47,7 +47,9 @@ class Experiment:
         calibrated: Whether the self-model is fitted to the trials before the failure.
         next_trial: Choice of each trial after the failing one, one of ``NEXT_TRIAL``.
         design: Controller design; None for the robot's network.
-        score: Fitness of the repair EA.
+        score: Fitness of the repair.
+        repair: Name of the repair, ``robust`` or ``paper``.
+        search: Name of the search of the repair; None for its own.
         physical: Returns the physical robot with a hypothesis, for robots beyond a simulation of
             the model; unused with a reality gap or structural mismatches.
     """
@@ -69,6 +71,8 @@ class Experiment:
     design: Design | None = None
     score: Score = DISPLACEMENT
     physical: Callable[[Robot, Hypothesis], PhysicalRobot] | None = None
+    repair: str = PAPER
+    search: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +127,7 @@ def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
         else None,
         next_trial=NEXT_TRIAL[experiment.next_trial],
         score=experiment.score,
+        make_repair=repair(experiment.repair, experiment.search),
     )
     return Outcome(
         recovery=recovery,

@@ -66,8 +66,8 @@ def evolve_gait(
         Number of evaluations, as JSON, and the file.
     """
     repair = RepairSearch(Simulator(robot, threads=1), settings, design, score=score)
-    gait = repair(INTACT, (), repair_stream(seed, 0), lambda _generation: None)
-    return write_gait(path, gait, repair.evaluations)
+    (gait,) = repair((INTACT,), (), repair_stream(seed, 0), lambda _generation: None)
+    return write_gait(path, gait.controller, repair.evaluations)
 
 
 def write_gait(path: Path, gait: Controller, evaluations: int) -> PartResult:

@@ -6,6 +6,7 @@ A plug-in is an entry point of an installed package, or ``package.module:object`
 import importlib
 import sys
 from collections.abc import Iterable, Mapping
+from functools import partial
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import MappingProxyType
@@ -14,10 +15,15 @@ from selfmodel.comparators import COMPARATORS
 from selfmodel.controllers.controller import Design
 from selfmodel.diagnosis.comparator import Comparator, as_comparator
 from selfmodel.errors import InputError, unknown_name
+from selfmodel.evolution import Evolution
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import ALL_KINDS, KIND_SETS, KINDS, kind_names
+from selfmodel.recovery.candidate import MakeRepair
+from selfmodel.recovery.cma_es import CmaEs
 from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.next_trial import NextTrial, by_disagreement, by_repair
+from selfmodel.recovery.repair import paper_repair
+from selfmodel.recovery.robust_repair import MakeSearch, RobustRepair
 from selfmodel.recovery.tracking import TRACKING
 from selfmodel.recovery.upright import UPRIGHT
 from selfmodel.robot.designs import DESIGNS
@@ -28,6 +34,12 @@ NEXT_TRIAL: Mapping[str, NextTrial] = MappingProxyType(
     {"repair": by_repair, "disagreement": by_disagreement}
 )
 """Choices of the next trial of a recovery, by name."""
+
+ROBUST, PAPER = "robust", "paper"
+"""Names of the repairs: on rollouts under random conditions, and in one exact simulation."""
+
+SEARCHES: Mapping[str, MakeSearch] = MappingProxyType({"cma-es": CmaEs, "ea": Evolution})
+"""Searches of the robust repair, by name."""
 
 RETURN = "return"
 """Name of the score that is the sum of a task's rewards."""
@@ -61,6 +73,30 @@ def next_trial(name: str) -> str:
     if name not in NEXT_TRIAL:
         raise unknown_name("choice of the next trial", name, NEXT_TRIAL)
     return name
+
+
+def repair(name: str = ROBUST, search: str | None = None) -> MakeRepair:
+    """Returns a function that makes a repair.
+
+    Args:
+        name: ``robust`` or ``paper``.
+        search: Name of one of ``SEARCHES``; None for the repair's own, CMA-ES or the paper's EA.
+
+    Raises:
+        InputError: A name is unknown, or the paper's repair is to have another search.
+    """
+    if name not in (ROBUST, PAPER):
+        raise unknown_name("repair", name, (ROBUST, PAPER))
+    if search is not None and search not in SEARCHES:
+        raise unknown_name("search", search, SEARCHES)
+    if name == ROBUST:
+        return partial(RobustRepair, make_search=SEARCHES[search or "cma-es"])
+    if search not in (None, "ea"):
+        raise InputError(
+            f"the paper's repair has its own EA, got the search {search}: leave --search out, or "
+            f"give --repair {ROBUST}"
+        )
+    return paper_repair
 
 
 def kinds(names: str) -> tuple[FaultKind, ...]:

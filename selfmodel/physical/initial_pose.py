@@ -1,5 +1,7 @@
 """Random initial pose of a physical robot, near the reference pose of its model."""
 
+from dataclasses import dataclass
+
 import mujoco
 import numpy as np
 
@@ -16,8 +18,30 @@ TILT_DEVIATION = 0.1
 """Standard deviation of the initial roll and pitch of the base, rad, at a gap level of 1."""
 
 
+@dataclass(frozen=True)
+class StartSpread:
+    """Random deviation of initial poses from the reference pose of a model.
+
+    Attributes:
+        angles: Standard deviation of the joint angles, rad.
+        tilt: Standard deviation of the roll and of the pitch of the base, rad.
+    """
+
+    angles: float
+    tilt: float
+
+
+def start_spread(level: float) -> StartSpread:
+    """Returns the spread of the initial poses of a physical robot at a level of the gap."""
+    return StartSpread(level * ANGLE_DEVIATION, level * TILT_DEVIATION)
+
+
 def randomize_initial_pose(
-    robot: Robot, model: mujoco.MjModel, data: mujoco.MjData, level: float, rng: np.random.Generator
+    robot: Robot,
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    spread: StartSpread,
+    rng: np.random.Generator,
 ) -> None:
     """Moves a robot from its reference pose to a random pose nearby, above the ground.
 
@@ -26,15 +50,15 @@ def randomize_initial_pose(
 
     Args:
         robot: The robot as its model describes it.
-        model: Compiled model of the physical robot.
+        model: Compiled model of the robot, with its faults.
         data: State of the model in the reference pose; it is changed.
-        level: Level of the reality gap.
+        spread: Standard deviations of the pose.
         rng: Random numbers of the pose.
     """
     fields, write = signal_fields(robot, model), state_writer(robot, bind_data(data), model)
     reference_depth = _penetration_depth(robot, model, data)
-    randomize_joint_angles(robot.anatomy, model, data, level, rng)
-    tilt = np.append(level * TILT_DEVIATION * rng.standard_normal(2), 0.0)
+    randomize_joint_angles(robot.anatomy, model, data, spread.angles, rng)
+    tilt = np.append(spread.tilt * rng.standard_normal(2), 0.0)
     base = rotated_by_vector(current_value(fields["base_orientation"], data), tilt)
     write({"base_orientation": base[np.newaxis]})
     # Penetration no deeper than in the reference pose: deeper contacts would throw the robot up.
@@ -47,19 +71,19 @@ def randomize_joint_angles(
     anatomy: Anatomy,
     model: mujoco.MjModel,
     data: mujoco.MjData,
-    level: float,
+    deviation: float,
     rng: np.random.Generator,
 ) -> None:
     """Adds normal noise to the joint angles of a robot, within their limits.
 
     Args:
         anatomy: Parts of the robot.
-        model: Compiled model of the physical robot; its welded joints keep their angles.
+        model: Compiled model of the robot; its welded joints keep their angles.
         data: State of the model; it is changed.
-        level: Level of the reality gap.
+        deviation: Standard deviation of the angles, rad.
         rng: Random numbers of the angles.
     """
-    angles = level * ANGLE_DEVIATION * rng.standard_normal(len(anatomy.hinges))
+    angles = deviation * rng.standard_normal(len(anatomy.hinges))
     for name, angle in zip(anatomy.hinges, angles, strict=True):
         hinge = model.joint(name)
         if model.dof_armature[hinge.dofadr[0]] == WELD_ARMATURE:

@@ -13,7 +13,7 @@ from selfmodel.errors import TrialError
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.physical.debris import add_debris, detached_limbs, place_debris
-from selfmodel.physical.initial_pose import randomize_initial_pose
+from selfmodel.physical.initial_pose import randomize_initial_pose, start_spread
 from selfmodel.physical.measurement_noise import ExactMeasurement, Measurement, NoisyMeasurement
 from selfmodel.physical.reality_gap import RealityGap, perturbed_model
 from selfmodel.physical.structural_mismatch import StructuralMismatch, add_structural_mismatch
@@ -95,7 +95,7 @@ class SimulatedRobot:
         if self._gap is not None:
             measurement = NoisyMeasurement(self._gap.level, robot.anatomy, embodiment, rng)
             delay += self._gap.delay
-            randomize_initial_pose(robot, model, data, self._gap.level, rng)
+            randomize_initial_pose(robot, model, data, start_spread(self._gap.level), rng)
             place_debris(model, data, self._limbs)
         with mujoco_errors_as_input_errors("simulate the physical robot"):
             mujoco.mj_forward(model, data)

@@ -10,6 +10,7 @@ from selfmodel.controllers.controller import Controller, draw_genomes
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.evolution import reproduce
 from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.recovery.candidate import Candidate, unpredicted
 from selfmodel.recovery.database import Database
 from selfmodel.recovery.disagreement import Disagreement
 from selfmodel.recovery.events import DiscriminatingTrial, Event
@@ -34,7 +35,7 @@ class Situation:
         simulator: Self-model.
         settings: The paper's numbers.
         rng: Random number generator of all random choices.
-        repaired: Evolves a controller that compensates for the last diagnosis.
+        repaired: Evolves candidates that compensate for the last diagnosis, best first.
         on_event: Callback, called with each event as it happens.
     """
 
@@ -43,20 +44,26 @@ class Situation:
     simulator: Simulator
     settings: Settings
     rng: np.random.Generator
-    repaired: Callable[[], Controller]
+    repaired: Callable[[], Sequence[Candidate]]
     on_event: Callable[[Event], None]
 
 
-NextTrial = Callable[[Situation], Controller]
+NextTrial = Callable[[Situation], Candidate]
 """Chooses the controller of the next physical trial."""
 
 
-def by_repair(situation: Situation) -> Controller:
-    """Returns a controller that compensates for the best hypothesis, as in the paper."""
-    return situation.repaired()
+def by_repair(situation: Situation) -> Candidate:
+    """Returns the best candidate of the repair that was not tried yet.
+
+    If all candidates were tried, as may happen with the paper's repair, the best one is returned.
+    """
+    candidates = situation.repaired()
+    tried = situation.known.controllers
+    untried = [candidate for candidate in candidates if candidate.controller not in tried]
+    return (untried or candidates)[0]
 
 
-def by_disagreement(situation: Situation) -> Controller:
+def by_disagreement(situation: Situation) -> Candidate:
     """Returns the controller with the largest disagreement of the hypotheses, or a repair.
 
     A repair is returned once the diagnosis is ``explained`` or ``intact`` and either has no
@@ -69,15 +76,16 @@ def by_disagreement(situation: Situation) -> Controller:
     is_certain = diagnosis.verdict in ("intact", "explained")
     certain = is_certain and (unresolved or not diagnosis.undetectable)
     if certain or situation.trials_left == 1:
-        return situation.repaired()
+        return by_repair(situation)
     situation.on_event(DiscriminatingTrial(candidates_to_separate(diagnosis)))
-    return discriminating_controller(
+    controller = discriminating_controller(
         diagnosis,
         situation.known.controllers,
         situation.simulator,
         situation.settings,
         situation.rng,
     )
+    return unpredicted(controller)
 
 
 def discriminating_controller(

@@ -15,12 +15,14 @@ from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.physical.interface import PhysicalRobot
+from selfmodel.recovery.candidate import Candidate, MakeRepair, unpredicted
 from selfmodel.recovery.database import Database, Journal, RunTrial
 from selfmodel.recovery.events import Event, SearchBegins
 from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.next_trial import NextTrial, Situation, by_repair
 from selfmodel.recovery.random_streams import choice_stream, diagnosis_stream, repair_stream
-from selfmodel.recovery.repair import RepairSearch
+from selfmodel.recovery.robust_repair import RobustRepair
+from selfmodel.recovery.uncertainty import assumed_uncertainty, estimated_uncertainty
 from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import Calibration
@@ -37,12 +39,14 @@ class Recovery:
         trials: Physical trials, in order: ``before``, ``after``, then those of stage ``recovery``.
         tried: Best hypothesis at the time when the controller was chosen, one per trial.
         diagnosis: Last diagnosis, which explains all trials.
-        repair_evaluations: Number of controllers that the repair EA evaluated.
+        repair_evaluations: Number of controllers that the repair evaluated.
         diagnostic_evaluations: Number of hypotheses that the diagnostic EA evaluated.
         distinct_hypotheses: Number of distinct hypotheses among them.
         comparator: Comparator of the diagnoses, and the reason for its choice.
         calibration: Fit of the self-model to the trials before the failure; None without one.
-        score: Score of the repair EA.
+        score: Fitness of the repair.
+        predicted: Score that the self-model predicted of each trial's controller when it was chosen;
+            NaN if none was predicted, as for the first trial after the failure.
         scores: Score of each trial; those after the failure under the last diagnosis, which matters
             for a score that depends on the ground or on detached limbs.
     """
@@ -56,6 +60,7 @@ class Recovery:
     comparator: ChosenComparator
     calibration: Calibration | None = None
     score: Score = DISPLACEMENT
+    predicted: tuple[float, ...] = ()
     scores: tuple[float, ...] = ()
 
     @property
@@ -121,9 +126,13 @@ class Recovery:
                 "stage": trial.plan.stage,
                 "hypothesis": str(tried),
                 "displacement": _observed(trial.displacement),
+                "score": _observed(score),
+                "predicted_score": _observed(predicted),
                 "log": trial.path,
             }
-            for trial, tried in zip(self.trials, self.tried, strict=True)
+            for trial, tried, score, predicted in zip(
+                self.trials, self.tried, self.scores, self.predicted, strict=True
+            )
         ]
 
 
@@ -153,6 +162,7 @@ def recover(
     calibrate: Callable[[Sequence[Trial]], Calibration] | None = None,
     next_trial: NextTrial = by_repair,
     score: Score = DISPLACEMENT,
+    make_repair: MakeRepair = RobustRepair,
 ) -> Recovery:
     """Runs the recovery of a robot: a healthy trial, a failing one, then diagnosis and repair.
 
@@ -174,21 +184,25 @@ def recover(
         kinds: Fault kinds that a diagnosis searches.
         calibrate: Fits the self-model to the trials before the failure; no fit if not given.
         next_trial: Chooses the controller of each trial after the failing one.
-        score: Fitness of the repair EA.
+        score: Fitness of the repair.
+        make_repair: Makes the repair, which evolves the controllers.
 
     Returns:
         The trials, the last diagnosis and the number of evaluations.
     """
     # From the nominal robot: the numbers of the calibrated model are rounded.
     design = network_for(simulator.robot) if design is None else design
-    repair = RepairSearch(simulator, settings, design, score=score)
+    uncertainty = assumed_uncertainty(simulator.robot.anatomy)
+    repair = make_repair(simulator, settings, design, score, uncertainty)
+    earlier_evaluations = 0
     tried: list[Hypothesis] = []
+    predicted: list[float] = []
     database = Database()
 
-    def evolve_controller(hypothesis: Hypothesis) -> Controller:
-        on_event(SearchBegins("repair", hypothesis))
+    def evolve_candidates(hypotheses: Sequence[Hypothesis]) -> tuple[Candidate, ...]:
+        on_event(SearchBegins("repair", hypotheses[0]))
         rng = repair_stream(seed, len(database.diagnoses))
-        return repair(hypothesis, database.controllers, rng, on_event)
+        return repair(hypotheses, database.controllers, rng, on_event)
 
     def diagnose() -> Diagnosis:
         nonlocal database
@@ -200,18 +214,19 @@ def recover(
         on_event(diagnosis)
         return diagnosis
 
-    def act(robot: PhysicalRobot, stage: Stage, best: Hypothesis, controller: Controller) -> None:
+    def act(robot: PhysicalRobot, stage: Stage, best: Hypothesis, candidate: Candidate) -> None:
         nonlocal database
-        plan = TrialPlan(f"{len(tried):02d}-{stage}", stage, controller, settings.steps, seed)
+        name = f"{len(tried):02d}-{stage}"
+        plan = TrialPlan(name, stage, candidate.controller, settings.steps, seed)
         tried.append(best)
+        predicted.append(candidate.predicted)
         trial = run_trial(robot, plan)
         database = database.with_trial(trial)
         on_event(trial)
 
     HypothesisSpace.of(kinds, simulator.robot.anatomy)  # before any physical trial
-    if gait is None:
-        gait = evolve_controller(INTACT)
-    act(healthy, "before", INTACT, gait)
+    first = unpredicted(gait) if gait is not None else evolve_candidates((INTACT,))[0]
+    act(healthy, "before", INTACT, first)
     healthy_trials = database.trials
     choose_comparator(simulator.robot, healthy_trials)  # before the calibration and the failure
     calibration = calibrate(healthy_trials) if calibrate else None
@@ -221,35 +236,39 @@ def recover(
             simulator = Simulator(
                 calibration.robot, simulator.threads, simulator.stats, simulator.budget
             )
-            repair = RepairSearch(simulator, settings, design, repair.evaluations, score)
-    act(damaged, "after", INTACT, gait)
+    uncertainty = estimated_uncertainty(simulator, healthy_trials, calibration)
+    earlier_evaluations = repair.evaluations
+    repair = make_repair(simulator, settings, design, score, uncertainty)
+    act(damaged, "after", INTACT, unpredicted(first.controller))
     chosen = choose_comparator(simulator.robot, database.trials)
     on_event(chosen)
     search = DiagnosticSearch(simulator, chosen.comparator, settings, kinds, intact=healthy_trials)
     for trials_left in range(settings.trials, 0, -1):
-        best = diagnose().best
+        diagnosis = diagnose()
+        hypotheses = (diagnosis.best, *diagnosis.indistinguishable)
         situation = Situation(
             known=database,
             trials_left=trials_left,
             simulator=simulator,
             settings=settings,
             rng=choice_stream(seed, len(database.diagnoses)),
-            repaired=partial(evolve_controller, best),
+            repaired=partial(evolve_candidates, hypotheses),
             on_event=on_event,
         )
-        act(damaged, "recovery", best, next_trial(situation))
+        act(damaged, "recovery", diagnosis.best, next_trial(situation))
     diagnosis = diagnose()
 
     return Recovery(
         trials=database.trials,
         tried=tuple(tried),
         diagnosis=diagnosis,
-        repair_evaluations=repair.evaluations,
+        repair_evaluations=earlier_evaluations + repair.evaluations,
         diagnostic_evaluations=search.evaluations,
         distinct_hypotheses=search.distinct_hypotheses,
         comparator=chosen,
         calibration=calibration,
         score=score,
+        predicted=tuple(predicted),
         scores=tuple(
             score.of_trial(simulator.robot, diagnosis.best if number else INTACT, trial)
             for number, trial in enumerate(database.trials)

@@ -1,4 +1,4 @@
-"""Repair EA: evolves a controller for a robot with the faults of a hypothesis."""
+"""The paper's repair EA: evolves a controller in one exact simulation of a hypothesis."""
 
 from collections.abc import Sequence
 
@@ -9,23 +9,37 @@ from selfmodel.controllers.controller import Controller, Design, draw_genomes
 from selfmodel.errors import WorkError
 from selfmodel.evolution import Evolution, GenerationCallback, evolve
 from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.recovery.candidate import Candidate, Repair
 from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
 from selfmodel.simulation.cache import Cache
+from selfmodel.simulation.conditions import Uncertainty
 from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.trials.behaviour import Behaviour
 
 
+def paper_repair(
+    simulator: Simulator,
+    settings: Settings,
+    design: Design,
+    score: Score,
+    _uncertainty: Uncertainty,
+) -> Repair:
+    """Returns the paper's repair EA, which ignores the uncertainty of the self-model."""
+    return RepairSearch(simulator, settings, design, score)
+
+
 class RepairSearch:
-    """Repair EA, with a cache of the fitness of all rollouts. Source: the paper, section III.
+    """Repair EA, a ``Repair``, with a cache of the fitness of all rollouts.
+
+    Source: the paper, section III.
 
     Args:
         simulator: Self-model.
         settings: The paper's numbers.
         design: Design of the controllers to evolve; the paper's network for the simulator's robot
             if not given.
-        evaluations: Number of controllers evaluated by an earlier search, to continue its count.
         score: Fitness; the forward displacement in metres if not given.
 
     Attributes:
@@ -37,7 +51,6 @@ class RepairSearch:
         simulator: Simulator,
         settings: Settings,
         design: Design | None = None,
-        evaluations: int = 0,
         score: Score = DISPLACEMENT,
     ) -> None:
         self._simulator = simulator
@@ -45,19 +58,19 @@ class RepairSearch:
         self._design = network_for(simulator.robot) if design is None else design
         self._fitness: Cache[Run] = Cache()
         self._score = score
-        self.evaluations = evaluations
+        self.evaluations = 0
 
     def __call__(
         self,
-        hypothesis: Hypothesis,
+        hypotheses: Sequence[Hypothesis],
         seeds: Sequence[Controller],
         rng: np.random.Generator,
         on_generation: GenerationCallback,
-    ) -> Controller:
-        """Returns the best controller found.
+    ) -> tuple[Candidate, ...]:
+        """Returns the best controller found; see ``Repair``.
 
         Args:
-            hypothesis: Faults of the simulated robot.
+            hypotheses: Hypotheses, of which the first one is simulated.
             seeds: Initial controllers in addition to random ones; controllers of another design
                 are ignored.
             rng: Random number generator of all random choices.
@@ -66,7 +79,7 @@ class RepairSearch:
         Raises:
             WorkError: The simulation diverged with every controller.
         """
-        design = self._design
+        design, hypothesis = self._design, hypotheses[0]
 
         def fitness(genomes: FloatArray) -> FloatArray:
             runs: list[Run] = [(hypothesis, Controller(design, genome)) for genome in genomes]
@@ -87,7 +100,8 @@ class RepairSearch:
                 f"with {search.evaluations} controllers: check the model, such as its physics time "
                 f"step, masses and motors"
             )
-        return Controller(design, search.best)
+        best = Controller(design, search.best)
+        return (Candidate(best, np.array([search.best_fitness])),)
 
     def _simulate(self, runs: list[Run]) -> FloatArray:
         """Fitness of rollouts with one hypothesis; negative infinity for a diverged rollout."""

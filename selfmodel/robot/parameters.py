@@ -61,11 +61,22 @@ def from_factors(factors: FloatArray, delay: float) -> Parameters:
     return Parameters(root, limbs, friction, damping, tuple(motors), delay)
 
 
-def model_with_parameters(robot: Robot, parameters: Parameters) -> mujoco.MjModel:
-    """Returns a copy of a robot's model with scaled parameters; the control delay is unchanged."""
-    masses = _mass_factors(robot, parameters)
+def model_with_parameters(
+    robot: Robot, parameters: Parameters, model: mujoco.MjModel | None = None
+) -> mujoco.MjModel:
+    """Returns a copy of a model with scaled parameters; the control delay is unchanged.
+
+    Args:
+        robot: The robot.
+        parameters: The parameters.
+        model: Model of the robot with edits of its specification; the robot's own by default.
+    """
+    model = robot.model if model is None else model
+    masses = np.full(model.nbody, parameters.limb_mass)
+    masses[0] = 1.0
+    masses[model.body(robot.root).id] = parameters.root_mass
     return scale_model(
-        robot.model,
+        model,
         mass=masses,
         inertia=masses,
         friction=parameters.friction,
@@ -123,10 +134,3 @@ def with_model(robot: Robot, model: mujoco.MjModel, delay: float) -> Robot:
 
 
 _EXPLICIT_OR_FROM_GEOMS = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
-
-
-def _mass_factors(robot: Robot, parameters: Parameters) -> FloatArray:
-    factors = np.full(robot.model.nbody, parameters.limb_mass)
-    factors[0] = 1.0
-    factors[robot.model.body(robot.root).id] = parameters.root_mass
-    return factors

@@ -12,6 +12,7 @@ from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.controllers.command_source import CommandSource, make_batch
 from selfmodel.faults.build import apply_faults, build
 from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.physical.measurement_noise import dead_sensors
 from selfmodel.physical.reality_gap import perturbed_models
 from selfmodel.robot.control_delay import added_steps, split_delay
 from selfmodel.robot.editing.embodiment import Embodiment
@@ -19,6 +20,13 @@ from selfmodel.robot.robot import Robot
 from selfmodel.robot.state.sensing import SensorReader
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.simulation.batch import LiveBatch, live_signals, new_batch
+from selfmodel.simulation.conditions import (
+    Condition,
+    ReadingNoise,
+    Uncertainty,
+    embodiment_under,
+    initial_positions,
+)
 from selfmodel.simulation.ground_contacts import ground_contact_points
 from selfmodel.simulation.outcome import SimulationResult, SimulationStats
 from selfmodel.simulation.prediction import predict
@@ -177,12 +185,49 @@ class Simulator:
         grouped = flat.grouped(len(hypotheses), ensemble.members)
         return SimulationResult(grouped.behaviour, np.asarray(grouped.diverged.any(axis=1)))
 
+    def run_under(
+        self,
+        conditions: Sequence[Condition],
+        uncertainty: Uncertainty,
+        drivers: Sequence[CommandSource],
+        steps: int,
+        record: Sequence[Signal],
+    ) -> SimulationResult:
+        """Simulates each driver under each condition.
+
+        Args:
+            conditions: At least one condition.
+            uncertainty: Distribution of the conditions.
+            drivers: Sources of the commands, at least one.
+            steps: Control steps, and rows of every signal.
+            record: Signals to record.
+
+        Returns:
+            Signals of ``(drivers, conditions, steps, width)``, and a mask of
+            ``(drivers, conditions)``.
+        """
+        robot, count = self.robot, len(drivers)
+        embodiments = [embodiment_under(robot, own) for own in conditions]
+        silent = np.array([dead_sensors(robot.anatomy, own) for own in embodiments])
+        start = initial_positions(robot, embodiments, conditions, uncertainty.start)
+        flat = self._run(
+            [*embodiments] * count,
+            [driver for driver in drivers for _ in conditions],
+            steps,
+            record,
+            start=np.tile(start, (count, 1)),
+            noise=ReadingNoise(conditions, uncertainty, silent),
+        )
+        return flat.grouped(count, len(conditions))
+
     def _run(
         self,
         embodiments: Sequence[Embodiment],
         drivers: Sequence[CommandSource],
         steps: int,
         record: Sequence[Signal],
+        start: FloatArray | None = None,
+        noise: ReadingNoise | None = None,
     ) -> SimulationResult:
         robot, n = self.robot, len(embodiments)
         batch = new_batch(robot.model, embodiments, self.threads)
@@ -208,19 +253,24 @@ class Simulator:
         # After all bindings: a field that is bound later remains zero until the next step.
         alive = LiveBatch(batch)
         alive.reset(mujoco.mjtStage.mjSTAGE_ACC)
+        if start is not None:
+            qpos[:] = start
+            alive.forward()
         for k in range(steps):
             reader.read(sensordata, qpos, controllers.readings)
+            if noise is not None:
+                noise.add(controllers.readings)
             controllers.step(motors.inlet)
             motors.advance()
             for signal, rows in kept.items():
                 rows[k] = live[signal]()
             if k + 1 < steps:
-                start = perf_counter()
+                clock = perf_counter()
                 if part:
                     alive.step(part)
                     motors.release()
                 alive.step(robot.substeps - part)
-                self.stats.physics_seconds += perf_counter() - start
+                self.stats.physics_seconds += perf_counter() - clock
         diverged = alive.diverged()
         self.stats.runs += n
         self.stats.steps += n * steps

@@ -8,7 +8,12 @@ from scipy.spatial.transform import Rotation
 
 from selfmodel.faults.build import build
 from selfmodel.faults.notation import parse
-from selfmodel.physical.initial_pose import ANGLE_DEVIATION, TILT_DEVIATION, randomize_initial_pose
+from selfmodel.physical.initial_pose import (
+    ANGLE_DEVIATION,
+    TILT_DEVIATION,
+    randomize_initial_pose,
+    start_spread,
+)
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state.access import signal_fields
 from selfmodel.tasks import ROBOTS
@@ -21,7 +26,7 @@ def started(
 ) -> tuple[mujoco.MjModel, mujoco.MjData]:
     model = build(robot, parse(text, robot.anatomy)).model
     data = mujoco.MjData(model)
-    randomize_initial_pose(robot, model, data, level, np.random.default_rng(seed))
+    randomize_initial_pose(robot, model, data, start_spread(level), np.random.default_rng(seed))
     mujoco.mj_forward(model, data)
     return model, data
 

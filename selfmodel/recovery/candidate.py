@@ -1,0 +1,75 @@
+"""Candidates of a repair, and the interface of repairs."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from selfmodel.arrays import FloatArray
+from selfmodel.controllers.controller import Controller, Design
+from selfmodel.evolution import GenerationCallback
+from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.recovery.fitness import Score
+from selfmodel.settings import Settings
+from selfmodel.simulation.conditions import Uncertainty
+from selfmodel.simulation.simulator import Simulator
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A controller for the next trial, with its predicted scores.
+
+    Attributes:
+        controller: The controller.
+        scores: Score in simulation under each condition, ``(conditions,)``; a single one for
+            a repair that simulates the self-model alone.
+    """
+
+    controller: Controller
+    scores: FloatArray
+
+    @property
+    def predicted(self) -> float:
+        """Mean predicted score."""
+        return float(np.mean(self.scores))
+
+
+def unpredicted(controller: Controller) -> Candidate:
+    """Returns a candidate without a prediction."""
+    return Candidate(controller, np.array([np.nan]))
+
+
+class Repair(Protocol):
+    """Search for controllers that compensate for the faults of a hypothesis.
+
+    Attributes:
+        evaluations: Number of controllers evaluated so far.
+    """
+
+    evaluations: int
+
+    def __call__(
+        self,
+        hypotheses: Sequence[Hypothesis],
+        seeds: Sequence[Controller],
+        rng: np.random.Generator,
+        on_generation: GenerationCallback,
+    ) -> tuple[Candidate, ...]:
+        """Returns candidates for the next trial, best first, at least one.
+
+        Args:
+            hypotheses: The best hypothesis, then those that cannot be told apart from it.
+            seeds: Known controllers; those of another design are ignored.
+            rng: Random number generator of all random choices.
+            on_generation: Callback, called after each generation.
+
+        Raises:
+            WorkError: The simulation diverged with every controller.
+        """
+        ...
+
+
+MakeRepair = Callable[[Simulator, Settings, Design, Score, Uncertainty], Repair]
+"""Function that makes a repair from the self-model, the settings, the design of the controllers,
+the score, and the uncertainty of the self-model."""

@@ -1,0 +1,167 @@
+"""CMA-ES with raced starts, with the interface ``ask``, ``tell``, ``stop``.
+
+Source: Hansen, *The CMA evolution strategy: a tutorial* (arXiv:1604.00772); the implementation is
+that of the library ``cma``.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import cma
+import numpy as np
+
+from selfmodel.arrays import FloatArray
+from selfmodel.evolution import Draw
+from selfmodel.settings import Settings
+
+DEVIATION = 0.4
+"""Standard deviation of the first generation of a run; genomes are in [-1, 1]."""
+
+SHARE = 0.24
+"""Genomes of a generation of a run, relative to the population of the paper's EA."""
+
+RANDOM_SHARE = 2.0
+"""Random genomes from which the runs start, relative to that population."""
+
+MIN_POPULATION = 4
+"""Smallest generation of a run, of which the better half is recombined."""
+
+STARTS = 4
+"""Number of runs that start. One run in three converges to a poor gait."""
+
+ROUND = 12
+"""Generations after which the better half of the runs continues."""
+
+RECENT = 5
+"""Generations whose fitness counts in that choice, and whose genomes are ``candidates``."""
+
+
+class CmaEs:
+    """Raced runs of CMA-ES; fitness is maximised.
+
+    The first generation contains random genomes. The best of them are the initial means of the
+    runs, of which the better half continues after each round, until one is left (successive
+    halving). The covariance is diagonal (sep-CMA-ES; Ros and Hansen, PPSN 2008): it adapts within
+    the evaluations that a repair affords.
+
+    Args:
+        length: Number of values of a genome.
+        draw: Draws random genomes.
+        settings: The paper's numbers, which set the size of a generation.
+        rng: Source of all random numbers.
+        seeds: Further genomes of the first generation.
+    """
+
+    def __init__(
+        self,
+        length: int,
+        draw: Draw,
+        settings: Settings,
+        rng: np.random.Generator,
+        seeds: Sequence[FloatArray] = (),
+    ) -> None:
+        self._rng = rng
+        self._population = max(MIN_POPULATION, round(SHARE * settings.population))
+        random = max(STARTS, round(RANDOM_SHARE * settings.population) - len(seeds))
+        fresh = draw(rng, (random, length))
+        self._asked = np.concatenate([np.array(list(seeds)).reshape(-1, length), fresh])
+        self._runs: list[_Run] = []
+        self.generation = 0
+        self.evaluations = 0
+
+    def ask(self) -> FloatArray:
+        """Returns the genomes to evaluate, ``(n, length)``: random ones, then those of the runs."""
+        return self._asked
+
+    def tell(self, fitness: FloatArray) -> None:
+        """Sets the fitness of the genomes that ``ask`` returned, ``(n,)``.
+
+        Raises:
+            ValueError: ``fitness`` has another shape, or a NaN.
+        """
+        if fitness.shape != (len(self._asked),) or np.isnan(fitness).any():
+            raise ValueError(
+                f"expected a fitness other than NaN for each of the {len(self._asked)} genomes "
+                f"asked for, got shape {fitness.shape}"
+            )
+        if not self._runs:
+            best = np.argsort(-fitness, kind="stable")[:STARTS]
+            self._runs = [_Run(self._asked[i], self._population, self._rng) for i in best]
+        else:
+            for run, own in zip(self._runs, np.split(fitness, len(self._runs)), strict=True):
+                run.tell(own)
+            if self.generation % ROUND == 0 and len(self._runs) > 1:
+                order = sorted(self._runs, key=lambda run: -run.recent_fitness)
+                self._runs = order[: len(order) // 2]
+        self.generation += 1
+        self.evaluations += len(fitness)
+        self._asked = np.concatenate([run.ask() for run in self._runs])
+
+    def stop(self) -> dict[str, int]:
+        """Returns no reason: the caller's budget ends the search."""
+        return {}
+
+    def candidates(self, count: int) -> FloatArray:
+        """Returns genomes that may be the best, ``(count or fewer, length)``.
+
+        They are the means of the runs and the best genomes of recent generations: with a noisy
+        fitness the highest value seen is an overestimate, and the mean of a run is often better
+        than any genome evaluated.
+        """
+        means = [run.mean for run in self._runs]
+        recent = sorted((own for run in self._runs for own in run.recent), key=lambda own: -own[0])
+        return np.array([*means, *(genome for _, genome in recent)][:count])
+
+
+class _Run:
+    """One run of CMA-ES.
+
+    Args:
+        start: Initial mean, ``(length,)``.
+        population: Genomes of a generation.
+        rng: Source of all random numbers.
+    """
+
+    def __init__(self, start: FloatArray, population: int, rng: np.random.Generator) -> None:
+        options: dict[str, Any] = {
+            "bounds": [-1, 1],
+            "popsize": population,
+            "CMA_diagonal": True,
+            "randn": lambda *shape: rng.standard_normal(shape),
+            "seed": np.nan,  # the library's own generator is not used
+            "verbose": -9,
+        }
+        # The bounds' transformation is not invertible at the bounds.
+        self._search = cma.CMAEvolutionStrategy(np.clip(start, -0.99, 0.99), DEVIATION, options)
+        self.recent: list[tuple[float, FloatArray]] = []
+        self._best_halves: list[float] = []
+
+    @property
+    def mean(self) -> FloatArray:
+        """Mean of the distribution, ``(length,)``."""
+        return _bounded(self._search.result.xfavorite)
+
+    @property
+    def recent_fitness(self) -> float:
+        """Mean fitness of the better half of recent generations."""
+        return float(np.mean(self._best_halves[-RECENT:]))
+
+    def ask(self) -> FloatArray:
+        self._genomes = _bounded(np.array(self._search.ask()))
+        return self._genomes
+
+    def tell(self, fitness: FloatArray) -> None:
+        # A diverged simulation is worse than all others by a finite number.
+        finite = fitness[np.isfinite(fitness)]
+        worst = finite.min() - 1.0 if len(finite) else 0.0
+        fitness = np.where(np.isfinite(fitness), fitness, worst)
+        self._search.tell(list(self._genomes), list(-fitness))
+        order = np.argsort(-fitness, kind="stable")
+        self._best_halves.append(float(fitness[order[: len(order) // 2]].mean()))
+        best = (float(fitness[order[0]]), self._genomes[order[0]])
+        self.recent = [*self.recent, best][-RECENT:]
+
+
+def _bounded(genomes: FloatArray) -> FloatArray:
+    """Returns genomes without a rounding error beyond the bounds."""
+    return np.clip(genomes, -1.0, 1.0)

@@ -1,0 +1,144 @@
+"""Uncertainty of a self-model: assumed before the first trial, estimated from healthy trials."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from selfmodel.arrays import BoolArray, FloatArray
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.physical.initial_pose import StartSpread
+from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.simulation.calibration import EXACT_ERROR, Calibration
+from selfmodel.simulation.conditions import Uncertainty
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.encoder_noise import encoder_noise
+from selfmodel.trials.rotation import directions
+from selfmodel.trials.signals import Signal
+from selfmodel.trials.trial import Trial
+
+ASSUMED_NOISE = 0.05
+"""Standard deviation of a reading, as a fraction of half its range, before the first trial."""
+
+ASSUMED_WRONG_TOUCHES = 0.025
+"""Probability of a wrong touch reading before the first trial."""
+
+ASSUMED_START = StartSpread(0.01, 0.005)
+"""Spread of the initial poses before the first trial, rad."""
+
+ASSUMED_FACTORS = 0.1
+"""Standard deviation of the logarithm of the factor of a mass or a motor before the first trial;
+that of friction and of damping, which models often contain guesses of, is twice as large."""
+
+ASSUMED_DELAYS = (0, 1, 2)
+"""Control delays in addition to the model's before the first trial, control steps."""
+
+MIN_SHARE = 0.5
+"""Smallest deviation of the initial pose, as a fraction of the noise with which it was measured: a
+pose within the noise cannot be told from the reference pose."""
+
+
+def assumed_uncertainty(anatomy: Anatomy) -> Uncertainty:
+    """Returns the uncertainty of a robot before its first trial."""
+    touch = _touch(anatomy)
+    return Uncertainty(
+        factors=np.array([1.0, 1.0, 2.0, 2.0] + [1.0] * len(anatomy.motors)) * ASSUMED_FACTORS,
+        reading_noise=np.where(touch, 0.0, ASSUMED_NOISE),
+        wrong_touches=np.where(touch, ASSUMED_WRONG_TOUCHES, 0.0),
+        start=ASSUMED_START,
+        delays=ASSUMED_DELAYS,
+    )
+
+
+def estimated_uncertainty(
+    simulator: Simulator, trials: Sequence[Trial], calibration: Calibration | None
+) -> Uncertainty:
+    """Returns the uncertainty of a robot after its healthy trials.
+
+    The noise is that of the trials in excess of the same estimate in noise-free simulations of
+    them: a contact changes a reading within a step, too. Without a calibration, the parameters of
+    the model count as known.
+
+    Args:
+        simulator: The self-model, calibrated if there is a calibration.
+        trials: Trials of the healthy robot, at least one.
+        calibration: Fit of the self-model to the trials; None without one.
+    """
+    anatomy = simulator.robot.anatomy
+    touch, factors = _touch(anatomy), np.zeros(4 + len(anatomy.motors))
+    if calibration is not None and calibration.error_before >= EXACT_ERROR:
+        factors = calibration.deviations
+    pairs = [(trial.behaviour, _simulated(simulator, trial)) for trial in trials]
+    noise = [_excess(_variance, *_signals(pair, _readings)) for pair in pairs]
+    wrong = [_excess(_flips, *_signals(pair, _readings)) for pair in pairs]
+    angles = [_start_variance(*_signals(pair, _angles)) for pair in pairs]
+    tilts = [_start_variance(*_signals(pair, _tilts)) for pair in pairs]
+    angle = _deviation(angles)
+    return Uncertainty(
+        factors=factors,
+        reading_noise=np.where(touch, 0.0, np.sqrt(np.mean(noise, axis=0))),
+        wrong_touches=np.where(touch, np.mean(wrong, axis=0), 0.0),
+        # A base that was not observed is assumed to tilt by half of the joints' deviation.
+        start=StartSpread(angle, angle / 2 if np.isnan(tilts).all() else _deviation(tilts)),
+    )
+
+
+def _touch(anatomy: Anatomy) -> BoolArray:
+    return np.array([sensor.kind == "touch" for sensor in anatomy.sensors], dtype=bool)
+
+
+def _simulated(simulator: Simulator, trial: Trial) -> Behaviour:
+    record: tuple[Signal, ...] = ("sensors", "joint_positions", "base_orientation")
+    outcome = simulator.run([(INTACT, trial.plan.controller)], trial.behaviour.steps, record)
+    signals = {signal: values[0] for signal, values in outcome.behaviour.signals.items()}
+    return Behaviour(outcome.behaviour.names, outcome.behaviour.time, signals)
+
+
+def _signals(
+    pair: tuple[Behaviour, Behaviour], columns: Callable[[Behaviour], FloatArray]
+) -> tuple[FloatArray, FloatArray]:
+    return columns(pair[0]), columns(pair[1])
+
+
+def _readings(behaviour: Behaviour) -> FloatArray:
+    return behaviour["sensors"]
+
+
+def _angles(behaviour: Behaviour) -> FloatArray:
+    return behaviour["joint_positions"]
+
+
+def _tilts(behaviour: Behaviour) -> FloatArray:
+    """Returns roll and pitch as direction cosines, ``(steps, 2)``."""
+    return directions(behaviour["base_orientation"])[:, 2:4]
+
+
+def _excess(
+    estimate: Callable[[FloatArray], FloatArray], logged: FloatArray, simulated: FloatArray
+) -> FloatArray:
+    return np.maximum(estimate(logged) - estimate(simulated), 0.0)
+
+
+def _variance(series: FloatArray) -> FloatArray:
+    return np.square(encoder_noise(series))
+
+
+def _flips(series: FloatArray) -> FloatArray:
+    """Returns the fraction of the steps at which a reading differs from both of its neighbours."""
+    before, own, after = series[:-2], series[1:-1], series[2:]
+    return np.asarray(((before == after) & (own != before)).mean(axis=0))
+
+
+def _start_variance(logged: FloatArray, simulated: FloatArray) -> float:
+    """Returns the mean variance of the initial pose; NaN if it was not observed."""
+    noise = float(np.mean(_excess(_variance, logged, simulated)))
+    deviations = np.square(logged[0] - simulated[0])
+    known = deviations[np.isfinite(deviations)]
+    if not len(known):
+        return np.nan
+    return max(float(known.mean()) - noise, MIN_SHARE**2 * noise)
+
+
+def _deviation(variances: Sequence[float]) -> float:
+    known = [variance for variance in variances if np.isfinite(variance)]
+    return float(np.sqrt(np.mean(known))) if known else 0.0

@@ -1,0 +1,169 @@
+"""Conditions of a run: one draw of everything that trials leave open about a robot.
+
+A controller that is evolved in one exact simulation depends on its exactness. Rollouts under
+several conditions measure how a controller performs on a robot that is only known approximately.
+Source of the idea: Jakobi, Husbands and Harvey, "Noise and the reality gap" (ECAL 1995).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from selfmodel.arrays import BoolArray, FloatArray
+from selfmodel.faults.build import build
+from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.physical.initial_pose import StartSpread, randomize_initial_pose
+from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.robot.editing.embodiment import Embodiment
+from selfmodel.robot.parameters import from_factors, model_with_parameters
+from selfmodel.robot.robot import Robot
+
+_SEEDS = 2**63
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """Distribution of the runs of a robot around those of its self-model.
+
+    Attributes:
+        factors: Standard deviation of the logarithm of each factor of ``Parameters.factors``,
+            relative to the self-model, ``(4 + motors,)``.
+        reading_noise: Standard deviation of the noise of each reading, ``(sensors,)``; 0 for a
+            touch sensor.
+        wrong_touches: Probability that a reading of a touch sensor is wrong, ``(sensors,)``; 0 for
+            other sensors.
+        start: Spread of the initial poses.
+        delays: Control delays in addition to the self-model's, control steps, equally probable.
+    """
+
+    factors: FloatArray
+    reading_noise: FloatArray
+    wrong_touches: FloatArray
+    start: StartSpread
+    delays: tuple[int, ...] = (0,)
+
+    @property
+    def is_none(self) -> bool:
+        """Whether all runs equal those of the self-model."""
+        noise = (self.factors, self.reading_noise, self.wrong_touches)
+        exact = self.start == NO_SPREAD and self.delays == (0,)
+        return exact and not any(values.any() for values in noise)
+
+
+NO_SPREAD = StartSpread(0.0, 0.0)
+
+
+def no_uncertainty(anatomy: Anatomy) -> Uncertainty:
+    """Returns the uncertainty of a robot that equals its self-model."""
+    sensors = np.zeros(len(anatomy.sensors))
+    return Uncertainty(np.zeros(4 + len(anatomy.motors)), sensors, sensors, NO_SPREAD)
+
+
+@dataclass(frozen=True, eq=False)
+class Condition:
+    """One draw of an uncertainty.
+
+    Attributes:
+        hypothesis: Faults of the robot.
+        log_factors: Logarithms of the factors of ``Parameters.factors``, ``(4 + motors,)``.
+        delay: Control delay in addition to the self-model's, control steps.
+        seed: Seed of the initial pose and of the noise of the readings.
+    """
+
+    hypothesis: Hypothesis
+    log_factors: FloatArray
+    delay: int
+    seed: int
+
+
+def draw_conditions(
+    hypotheses: Sequence[Hypothesis],
+    uncertainty: Uncertainty,
+    count: int,
+    rng: np.random.Generator,
+) -> tuple[Condition, ...]:
+    """Returns random conditions, with the hypotheses in turn from a random one.
+
+    Args:
+        hypotheses: Hypotheses that cannot be told apart, at least one.
+        uncertainty: Distribution of the conditions.
+        count: Number of conditions.
+        rng: Random number generator of the draws.
+    """
+    first = int(rng.integers(len(hypotheses)))
+    return tuple(
+        Condition(
+            hypotheses[(first + number) % len(hypotheses)],
+            uncertainty.factors * rng.standard_normal(len(uncertainty.factors)),
+            int(rng.choice(uncertainty.delays)),
+            int(rng.integers(_SEEDS)),
+        )
+        for number in range(count)
+    )
+
+
+def embodiment_under(robot: Robot, condition: Condition) -> Embodiment:
+    """Returns the model and sensor parameters of a robot under a condition."""
+    parameters = from_factors(np.exp(condition.log_factors), robot.control_delay)
+    embodiment = build(
+        robot,
+        condition.hypothesis,
+        perturb=lambda model: model_with_parameters(robot, parameters, model),
+    )
+    embodiment.added_delay[0] += condition.delay
+    return embodiment
+
+
+def initial_positions(
+    robot: Robot,
+    embodiments: Sequence[Embodiment],
+    conditions: Sequence[Condition],
+    spread: StartSpread,
+) -> FloatArray:
+    """Returns the initial generalised positions of a robot, ``(conditions, nq)``.
+
+    Args:
+        robot: The robot as its model describes it.
+        embodiments: Model of the robot under each condition.
+        conditions: The conditions.
+        spread: Spread of the initial poses.
+    """
+    poses = []
+    for embodiment, condition in zip(embodiments, conditions, strict=True):
+        data = mujoco.MjData(embodiment.model)
+        if spread != NO_SPREAD:
+            rng = np.random.default_rng((condition.seed, 0))
+            randomize_initial_pose(robot, embodiment.model, data, spread, rng)
+        poses.append(data.qpos.copy())
+    return np.array(poses)
+
+
+class ReadingNoise:
+    """Adds noise to the readings of a batch of runs, by condition, step by step.
+
+    The noise of a condition is the same in all its runs (common random numbers).
+
+    Args:
+        conditions: The conditions, whose runs are in turn in each group of adjacent rows.
+        uncertainty: Distribution of the noise.
+        silent: Sensors without any signal, whose readings have no noise, ``(conditions, sensors)``.
+    """
+
+    def __init__(
+        self, conditions: Sequence[Condition], uncertainty: Uncertainty, silent: BoolArray
+    ) -> None:
+        self._generators = [np.random.default_rng((own.seed, 1)) for own in conditions]
+        self._deviations = np.where(silent, 0.0, uncertainty.reading_noise)
+        self._wrong = np.where(silent, 0.0, uncertainty.wrong_touches)
+
+    def add(self, readings: FloatArray) -> None:
+        """Adds the noise of the next step to the readings, ``(runs * conditions, sensors)``."""
+        count, sensors = self._deviations.shape
+        by_condition = readings.reshape(-1, count, sensors)
+        uniform = np.array([rng.random(sensors) for rng in self._generators])
+        normal = np.array([rng.standard_normal(sensors) for rng in self._generators])
+        by_condition += self._deviations * normal
+        wrong = uniform < self._wrong
+        by_condition[:, wrong] = 1 - by_condition[:, wrong]
