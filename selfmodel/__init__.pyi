@@ -20,7 +20,7 @@ from .faults.registry import ALL_KINDS as ALL_KINDS, PAPER_KINDS as PAPER_KINDS
 from .logs.reader import read_log as read_log
 from .physical.environment_robot import EnvironmentRobot as EnvironmentRobot
 from .physical.interface import PhysicalRobot as PhysicalRobot
-from .recovery.recover import Recovery as Recovery
+from .recovery.recovery import Recovery as Recovery
 from .robot.robot import Robot as Robot
 from .sandbox.budget import Budget as Budget
 from .settings import Settings as Settings

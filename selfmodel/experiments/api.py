@@ -37,9 +37,10 @@ from selfmodel.recovery.events import Event
 from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.next_trial import NextTrial, by_repair
 from selfmodel.recovery.random_streams import repair_stream
-from selfmodel.recovery.recover import Recovery
+from selfmodel.recovery.recovery import Recovery
 from selfmodel.recovery.repair import RepairSearch
 from selfmodel.recovery.sequential_diagnosis import diagnose_trials
+from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.settings import Settings
@@ -101,7 +102,8 @@ def evolve_controller(
     chosen = _design(design, robot)
     search = RepairSearch(Simulator(robot, threads), settings or Settings(), chosen, score=score)
     hypotheses = (hypothesis_of(hypothesis, robot),)
-    (best,) = search(hypotheses, seeds, repair_stream(seed, 0), on_event)
+    uncertainty = partial(assumed_uncertainty, robot)
+    (best,) = search(hypotheses, uncertainty, seeds, repair_stream(seed, 0), on_event)
     return best.controller
 
 

@@ -1,6 +1,7 @@
 """Gaits of healthy robots for studies, evolved once and kept in files."""
 
 import dataclasses
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from selfmodel.logs.files import replace_file
 from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.random_streams import repair_stream
 from selfmodel.recovery.repair import RepairSearch
+from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
@@ -66,7 +68,13 @@ def evolve_gait(
         Number of evaluations, as JSON, and the file.
     """
     repair = RepairSearch(Simulator(robot, threads=1), settings, design, score=score)
-    (gait,) = repair((INTACT,), (), repair_stream(seed, 0), lambda _generation: None)
+    (gait,) = repair(
+        (INTACT,),
+        partial(assumed_uncertainty, robot),
+        (),
+        repair_stream(seed, 0),
+        lambda _generation: None,
+    )
     return write_gait(path, gait.controller, repair.evaluations)
 
 

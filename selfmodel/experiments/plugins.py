@@ -22,7 +22,7 @@ from selfmodel.recovery.candidate import MakeRepair
 from selfmodel.recovery.cma_es import CmaEs
 from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.next_trial import NextTrial, by_disagreement, by_repair
-from selfmodel.recovery.repair import paper_repair
+from selfmodel.recovery.repair import RepairSearch
 from selfmodel.recovery.robust_repair import MakeSearch, RobustRepair
 from selfmodel.recovery.tracking import TRACKING
 from selfmodel.recovery.upright import UPRIGHT
@@ -96,7 +96,7 @@ def repair(name: str = ROBUST, search: str | None = None) -> MakeRepair:
             f"the paper's repair has its own EA, got the search {search}: leave --search out, or "
             f"give --repair {ROBUST}"
         )
-    return paper_repair
+    return RepairSearch
 
 
 def kinds(names: str) -> tuple[FaultKind, ...]:

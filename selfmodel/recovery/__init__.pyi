@@ -7,5 +7,5 @@ from .next_trial import (
     by_disagreement as by_disagreement,
     by_repair as by_repair,
 )
-from .recover import Recovery as Recovery
+from .recovery import Recovery as Recovery
 from .repair import RepairSearch as RepairSearch

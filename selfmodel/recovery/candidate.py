@@ -52,14 +52,18 @@ class Repair(Protocol):
     def __call__(
         self,
         hypotheses: Sequence[Hypothesis],
+        uncertainty: Callable[[], Uncertainty],
         seeds: Sequence[Controller],
         rng: np.random.Generator,
         on_generation: GenerationCallback,
+        /,
     ) -> tuple[Candidate, ...]:
         """Returns candidates for the next trial, best first, at least one.
 
         Args:
             hypotheses: The best hypothesis, then those that cannot be told apart from it.
+            uncertainty: Returns the uncertainty of the self-model; not called by a repair that
+                simulates the self-model alone.
             seeds: Known controllers; those of another design are ignored.
             rng: Random number generator of all random choices.
             on_generation: Callback, called after each generation.
@@ -70,6 +74,6 @@ class Repair(Protocol):
         ...
 
 
-MakeRepair = Callable[[Simulator, Settings, Design, Score, Uncertainty], Repair]
-"""Function that makes a repair from the self-model, the settings, the design of the controllers,
-the score, and the uncertainty of the self-model."""
+MakeRepair = Callable[[Simulator, Settings, Design, Score], Repair]
+"""Function that makes a repair from the self-model, the settings, the design of the controllers and
+the score."""

@@ -15,7 +15,11 @@ from selfmodel.evolution import Draw
 from selfmodel.settings import Settings
 
 DEVIATION = 0.4
-"""Standard deviation of the first generation of a run; genomes are in [-1, 1]."""
+"""Standard deviation of the first generation of a run from a random genome; genomes are in
+[-1, 1]."""
+
+SEED_DEVIATION = 0.15
+"""Standard deviation of the first generation of a run from a seed: a larger one forgets it."""
 
 SHARE = 0.24
 """Genomes of a generation of a run, relative to the population of the paper's EA."""
@@ -27,9 +31,10 @@ MIN_POPULATION = 4
 """Smallest generation of a run, of which the better half is recombined."""
 
 STARTS = 4
-"""Number of runs that start. One run in three converges to a poor gait."""
+"""Number of runs that start, at most half of them from seeds. One run in three converges to a poor
+gait."""
 
-ROUND = 12
+PRUNED_AFTER = (4, 12)
 """Generations after which the better half of the runs continues."""
 
 RECENT = 5
@@ -39,9 +44,9 @@ RECENT = 5
 class CmaEs:
     """Raced runs of CMA-ES; fitness is maximised.
 
-    The first generation contains random genomes. The best of them are the initial means of the
-    runs, of which the better half continues after each round, until one is left (successive
-    halving). The covariance is diagonal (sep-CMA-ES; Ros and Hansen, PPSN 2008): it adapts within
+    The first generation contains the seeds and random genomes. The best of them are the initial
+    means of the runs, of which the better half continues, until one is left (successive halving).
+    The covariance is diagonal (sep-CMA-ES; Ros and Hansen, PPSN 2008): it adapts within
     the evaluations that a repair affords.
 
     Args:
@@ -61,6 +66,7 @@ class CmaEs:
         seeds: Sequence[FloatArray] = (),
     ) -> None:
         self._rng = rng
+        self._seeds = len(seeds)
         self._population = max(MIN_POPULATION, round(SHARE * settings.population))
         random = max(STARTS, round(RANDOM_SHARE * settings.population) - len(seeds))
         fresh = draw(rng, (random, length))
@@ -85,12 +91,11 @@ class CmaEs:
                 f"asked for, got shape {fitness.shape}"
             )
         if not self._runs:
-            best = np.argsort(-fitness, kind="stable")[:STARTS]
-            self._runs = [_Run(self._asked[i], self._population, self._rng) for i in best]
+            self._runs = self._started(fitness)
         else:
             for run, own in zip(self._runs, np.split(fitness, len(self._runs)), strict=True):
                 run.tell(own)
-            if self.generation % ROUND == 0 and len(self._runs) > 1:
+            if self.generation in PRUNED_AFTER:
                 order = sorted(self._runs, key=lambda run: -run.recent_fitness)
                 self._runs = order[: len(order) // 2]
         self.generation += 1
@@ -100,6 +105,16 @@ class CmaEs:
     def stop(self) -> dict[str, int]:
         """Returns no reason: the caller's budget ends the search."""
         return {}
+
+    def _started(self, fitness: FloatArray) -> list["_Run"]:
+        """Returns the runs from the best seeds and the best random genomes."""
+        order = np.argsort(-fitness, kind="stable")
+        seeds = order[order < self._seeds][: STARTS // 2]
+        random = order[order >= self._seeds][: STARTS - len(seeds)]
+        starts = [(i, SEED_DEVIATION) for i in seeds] + [(i, DEVIATION) for i in random]
+        return [
+            _Run(self._asked[i], deviation, self._population, self._rng) for i, deviation in starts
+        ]
 
     def candidates(self, count: int) -> FloatArray:
         """Returns genomes that may be the best, ``(count or fewer, length)``.
@@ -118,11 +133,14 @@ class _Run:
 
     Args:
         start: Initial mean, ``(length,)``.
+        deviation: Standard deviation of the first generation.
         population: Genomes of a generation.
         rng: Source of all random numbers.
     """
 
-    def __init__(self, start: FloatArray, population: int, rng: np.random.Generator) -> None:
+    def __init__(
+        self, start: FloatArray, deviation: float, population: int, rng: np.random.Generator
+    ) -> None:
         options: dict[str, Any] = {
             "bounds": [-1, 1],
             "popsize": population,
@@ -132,7 +150,7 @@ class _Run:
             "verbose": -9,
         }
         # The bounds' transformation is not invertible at the bounds.
-        self._search = cma.CMAEvolutionStrategy(np.clip(start, -0.99, 0.99), DEVIATION, options)
+        self._search = cma.CMAEvolutionStrategy(np.clip(start, -0.99, 0.99), deviation, options)
         self.recent: list[tuple[float, FloatArray]] = []
         self._best_halves: list[float] = []
 

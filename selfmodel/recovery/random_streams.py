@@ -22,6 +22,11 @@ def choice_stream(seed: int, number: int) -> np.random.Generator:
     return _stream(seed, _CHOICES + number)
 
 
+def posterior_stream(seed: int) -> np.random.Generator:
+    """Returns the stream of the sample of models that trials weight."""
+    return _stream(seed, _PHYSICAL - 1)
+
+
 def gap_stream(seed: int) -> np.random.Generator:
     """Returns the stream of the reality gap of a simulated physical robot."""
     return _stream(seed, _PHYSICAL)

@@ -1,6 +1,6 @@
 """The paper's repair EA: evolves a controller in one exact simulation of a hypothesis."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from selfmodel.controllers.controller import Controller, Design, draw_genomes
 from selfmodel.errors import WorkError
 from selfmodel.evolution import Evolution, GenerationCallback, evolve
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.recovery.candidate import Candidate, Repair
+from selfmodel.recovery.candidate import Candidate
 from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
@@ -17,17 +17,6 @@ from selfmodel.simulation.cache import Cache
 from selfmodel.simulation.conditions import Uncertainty
 from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.trials.behaviour import Behaviour
-
-
-def paper_repair(
-    simulator: Simulator,
-    settings: Settings,
-    design: Design,
-    score: Score,
-    _uncertainty: Uncertainty,
-) -> Repair:
-    """Returns the paper's repair EA, which ignores the uncertainty of the self-model."""
-    return RepairSearch(simulator, settings, design, score)
 
 
 class RepairSearch:
@@ -63,6 +52,7 @@ class RepairSearch:
     def __call__(
         self,
         hypotheses: Sequence[Hypothesis],
+        _uncertainty: Callable[[], Uncertainty],
         seeds: Sequence[Controller],
         rng: np.random.Generator,
         on_generation: GenerationCallback,

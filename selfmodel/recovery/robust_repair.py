@@ -6,6 +6,7 @@ poses, parameters of the model and hypotheses that cannot be told apart. Source:
 and Harvey, "Noise and the reality gap" (ECAL 1995); the paper, section VI (noisy transfer).
 """
 
+import math
 from collections.abc import Callable, Sequence
 from time import perf_counter
 from typing import Protocol
@@ -20,19 +21,17 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.recovery.candidate import Candidate
 from selfmodel.recovery.cma_es import CmaEs
 from selfmodel.recovery.fitness import Score
+from selfmodel.recovery.robust_fitness import RobustFitness, robust
+from selfmodel.recovery.upright import UPRIGHT
 from selfmodel.settings import Settings
-from selfmodel.simulation.conditions import Condition, Uncertainty, draw_conditions
+from selfmodel.simulation.conditions import Uncertainty
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import Behaviour
 
 COST = 2.0
 """Simulated control steps of a repair, relative to those of the paper's repair EA."""
 
 FIRST_STEPS = 200
 """Control steps of the rollouts of the random first generation."""
-
-TAIL = 0.25
-"""Fraction of the conditions, those with the lowest scores, that count as the lower tail."""
 
 FINALISTS, FINAL_CONDITIONS = 12, 4
 """Candidates of a search, and conditions under which they are compared."""
@@ -78,7 +77,6 @@ class RobustRepair:
         settings: The paper's numbers; they set the cost of a repair.
         design: Design of the controllers to evolve.
         score: Fitness of a rollout.
-        uncertainty: Distribution of the rollouts.
         make_search: Makes the search.
 
     Attributes:
@@ -90,17 +88,17 @@ class RobustRepair:
         simulator: Simulator,
         settings: Settings,
         design: Design,
-        score: Score,
-        uncertainty: Uncertainty,
+        score: Score = UPRIGHT,
         make_search: MakeSearch = CmaEs,
     ) -> None:
         self._simulator, self._settings, self._design = simulator, settings, design
-        self._score, self._uncertainty, self._make_search = score, uncertainty, make_search
+        self._score, self._make_search = score, make_search
         self.evaluations = 0
 
     def __call__(
         self,
         hypotheses: Sequence[Hypothesis],
+        uncertainty: Callable[[], Uncertainty],
         seeds: Sequence[Controller],
         rng: np.random.Generator,
         on_generation: GenerationCallback,
@@ -110,84 +108,44 @@ class RobustRepair:
         Raises:
             WorkError: The simulation diverged with every controller.
         """
-        design, steps = self._design, self._settings.steps
+        design, settings, steps = self._design, self._settings, self._settings.steps
+        fitness = RobustFitness(self._simulator, self._score, hypotheses, uncertainty())
         own = [controller.genome for controller in seeds if controller.design == design]
-        search = self._make_search(design.weights, draw_genomes, self._settings, rng, own)
-        finalists = min(FINALISTS, self._settings.population)
+        search = self._make_search(design.weights, draw_genomes, settings, rng, own)
+        finalists = min(FINALISTS, settings.population)
         judging = finalists * FINAL_CONDITIONS + JUDGED * JUDGED_CONDITIONS
-        budget = (COST * self._settings.evaluations - judging) * steps
-        spent, number, best, start = 0, 0, -np.inf, perf_counter()
+        budget = (COST * settings.evaluations - judging) * steps
+        spent, number, start = 0, 0, perf_counter()
         while number == 0 or (spent < budget and not search.stop()):
             genomes = search.ask()
-            horizon = min(FIRST_STEPS, steps) if number == 0 else steps
-            conditions = draw_conditions(hypotheses, self._uncertainty, 1, rng)
-            fitness = robust(self._scores(self._controllers(genomes), conditions, horizon))
-            search.tell(fitness)
+            horizon = steps if number else min(FIRST_STEPS, steps)
+            scores = fitness(self._controllers(genomes), 1, horizon, rng)[:, 0]
+            search.tell(scores)
             spent += len(genomes) * horizon
             number += 1
-            best = float(fitness.max())
-            left = int(np.ceil(max(0.0, budget - spent) / (len(search.ask()) * steps)))
-            seconds = perf_counter() - start
-            on_generation(Generation(number, number + left, best, search.evaluations, seconds))
+            left = math.ceil(max(0, budget - spent) / (len(search.ask()) * steps))
+            on_generation(
+                Generation(
+                    number=number,
+                    total=number + left,
+                    best=float(scores.max()),
+                    evaluations=search.evaluations,
+                    seconds=perf_counter() - start,
+                )
+            )
         self.evaluations += search.evaluations
         found = self._controllers(search.candidates(finalists))
-        found, _ = self._best(found, JUDGED, FINAL_CONDITIONS, hypotheses, rng)
-        found, scores = self._best(found, JUDGED, JUDGED_CONDITIONS, hypotheses, rng)
-        if not np.isfinite(scores[0]).any():
+        for conditions in (FINAL_CONDITIONS, JUDGED_CONDITIONS):
+            judged = fitness(found, conditions, steps, rng)
+            best = np.argsort(-robust(judged), kind="stable")[:JUDGED]
+            found, judged = [found[i] for i in best], judged[best]
+        if np.isneginf(judged[0]).all():
             raise WorkError(
                 f"no simulation of {self._simulator.robot.name} as {hypotheses[0]} remained "
                 f"finite, with {search.evaluations} controllers: check the model, such as its "
                 f"physics time step, masses and motors"
             )
-        return tuple(map(Candidate, found, scores))
+        return tuple(map(Candidate, found, judged))
 
     def _controllers(self, genomes: FloatArray) -> list[Controller]:
         return [Controller(self._design, genome) for genome in genomes]
-
-    def _best(
-        self,
-        controllers: Sequence[Controller],
-        count: int,
-        conditions: int,
-        hypotheses: Sequence[Hypothesis],
-        rng: np.random.Generator,
-    ) -> tuple[list[Controller], FloatArray]:
-        """Returns the best controllers and their scores, ``(count, conditions)``, best first."""
-        drawn = draw_conditions(hypotheses, self._uncertainty, conditions, rng)
-        scores = self._scores(controllers, drawn, self._settings.steps)
-        order = np.argsort(-robust(scores), kind="stable")[:count]
-        return [controllers[i] for i in order], scores[order]
-
-    def _scores(
-        self, controllers: Sequence[Controller], conditions: Sequence[Condition], steps: int
-    ) -> FloatArray:
-        """Scores by condition, ``(controllers, conditions)``; -inf for a diverged rollout."""
-        outcome = self._simulator.run_under(
-            conditions, self._uncertainty, controllers, steps, self._score.record
-        )
-        scores = np.full(outcome.diverged.shape, -np.inf)
-        for column, condition in enumerate(conditions):
-            finite = ~outcome.diverged[:, column]
-            if finite.any():
-                simulated = outcome.behaviour
-                signals = {
-                    signal: values[finite, column] for signal, values in simulated.signals.items()
-                }
-                behaviour = Behaviour(simulated.names, simulated.time, signals)
-                scores[finite, column] = self._score.of(
-                    self._simulator.robot, condition.hypothesis, behaviour
-                )
-        return scores
-
-
-def robust(scores: FloatArray) -> FloatArray:
-    """Returns the mean of the mean score and of the mean of the lower tail.
-
-    Args:
-        scores: ``(controllers, conditions)``.
-
-    Returns:
-        ``(controllers,)``.
-    """
-    tail = np.sort(scores, axis=1)[:, : max(1, round(TAIL * scores.shape[1]))]
-    return np.asarray((scores.mean(axis=1) + tail.mean(axis=1)) / 2)

@@ -8,13 +8,14 @@ from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.physical.initial_pose import StartSpread
 from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import EXACT_ERROR, Calibration
 from selfmodel.simulation.conditions import Uncertainty
+from selfmodel.simulation.model_distribution import LogNormal, exact
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.encoder_noise import encoder_noise
 from selfmodel.trials.rotation import directions
-from selfmodel.trials.signals import Signal
 from selfmodel.trials.trial import Trial
 
 ASSUMED_NOISE = 0.05
@@ -30,6 +31,10 @@ ASSUMED_FACTORS = 0.1
 """Standard deviation of the logarithm of the factor of a mass or a motor before the first trial;
 that of friction and of damping, which models often contain guesses of, is twice as large."""
 
+BODIES = 0.1
+"""Standard deviation of the logarithm of the factor of a single body's mass, and of its inertia: a
+calibration fits only those that the bodies share, and a robot of unequal legs walks in curves."""
+
 ASSUMED_DELAYS = (0, 1, 2)
 """Control delays in addition to the model's before the first trial, control steps."""
 
@@ -38,11 +43,13 @@ MIN_SHARE = 0.5
 pose within the noise cannot be told from the reference pose."""
 
 
-def assumed_uncertainty(anatomy: Anatomy) -> Uncertainty:
+def assumed_uncertainty(robot: Robot) -> Uncertainty:
     """Returns the uncertainty of a robot before its first trial."""
-    touch = _touch(anatomy)
+    touch = _touch(robot.anatomy)
+    factors = np.full(4 + robot.model.nu, ASSUMED_FACTORS)
+    factors[2:4] *= 2  # friction and damping
     return Uncertainty(
-        factors=np.array([1.0, 1.0, 2.0, 2.0] + [1.0] * len(anatomy.motors)) * ASSUMED_FACTORS,
+        models=LogNormal(factors, np.full(robot.model.nbody, BODIES)),
         reading_noise=np.where(touch, 0.0, ASSUMED_NOISE),
         wrong_touches=np.where(touch, ASSUMED_WRONG_TOUCHES, 0.0),
         start=ASSUMED_START,
@@ -64,10 +71,10 @@ def estimated_uncertainty(
         trials: Trials of the healthy robot, at least one.
         calibration: Fit of the self-model to the trials; None without one.
     """
-    anatomy = simulator.robot.anatomy
-    touch, factors = _touch(anatomy), np.zeros(4 + len(anatomy.motors))
+    robot = simulator.robot
+    touch, models = _touch(robot.anatomy), exact(robot)
     if calibration is not None and calibration.error_before >= EXACT_ERROR:
-        factors = calibration.deviations
+        models = LogNormal(calibration.deviations, np.full(robot.model.nbody, BODIES))
     pairs = [(trial.behaviour, _simulated(simulator, trial)) for trial in trials]
     noise = [_excess(_variance, *_signals(pair, _readings)) for pair in pairs]
     wrong = [_excess(_flips, *_signals(pair, _readings)) for pair in pairs]
@@ -75,7 +82,7 @@ def estimated_uncertainty(
     tilts = [_start_variance(*_signals(pair, _tilts)) for pair in pairs]
     angle = _deviation(angles)
     return Uncertainty(
-        factors=factors,
+        models=models,
         reading_noise=np.where(touch, 0.0, np.sqrt(np.mean(noise, axis=0))),
         wrong_touches=np.where(touch, np.mean(wrong, axis=0), 0.0),
         # A base that was not observed is assumed to tilt by half of the joints' deviation.
@@ -88,8 +95,11 @@ def _touch(anatomy: Anatomy) -> BoolArray:
 
 
 def _simulated(simulator: Simulator, trial: Trial) -> Behaviour:
-    record: tuple[Signal, ...] = ("sensors", "joint_positions", "base_orientation")
-    outcome = simulator.run([(INTACT, trial.plan.controller)], trial.behaviour.steps, record)
+    outcome = simulator.run(
+        [(INTACT, trial.plan.controller)],
+        trial.behaviour.steps,
+        ("sensors", "joint_positions", "base_orientation"),
+    )
     signals = {signal: values[0] for signal, values in outcome.behaviour.signals.items()}
     return Behaviour(outcome.behaviour.names, outcome.behaviour.time, signals)
 

@@ -7,6 +7,7 @@ Source of the idea: Jakobi, Husbands and Harvey, "Noise and the reality gap" (EC
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import mujoco
 import numpy as np
@@ -15,10 +16,9 @@ from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.physical.initial_pose import StartSpread, randomize_initial_pose
-from selfmodel.robot.anatomy.anatomy import Anatomy
 from selfmodel.robot.editing.embodiment import Embodiment
-from selfmodel.robot.parameters import from_factors, model_with_parameters
 from selfmodel.robot.robot import Robot
+from selfmodel.simulation.model_distribution import ModelDistribution, ModelDraw
 
 _SEEDS = 2**63
 
@@ -28,8 +28,7 @@ class Uncertainty:
     """Distribution of the runs of a robot around those of its self-model.
 
     Attributes:
-        factors: Standard deviation of the logarithm of each factor of ``Parameters.factors``,
-            relative to the self-model, ``(4 + motors,)``.
+        models: Distribution of the parameters of the model.
         reading_noise: Standard deviation of the noise of each reading, ``(sensors,)``; 0 for a
             touch sensor.
         wrong_touches: Probability that a reading of a touch sensor is wrong, ``(sensors,)``; 0 for
@@ -38,27 +37,11 @@ class Uncertainty:
         delays: Control delays in addition to the self-model's, control steps, equally probable.
     """
 
-    factors: FloatArray
+    models: ModelDistribution
     reading_noise: FloatArray
     wrong_touches: FloatArray
     start: StartSpread
     delays: tuple[int, ...] = (0,)
-
-    @property
-    def is_none(self) -> bool:
-        """Whether all runs equal those of the self-model."""
-        noise = (self.factors, self.reading_noise, self.wrong_touches)
-        exact = self.start == NO_SPREAD and self.delays == (0,)
-        return exact and not any(values.any() for values in noise)
-
-
-NO_SPREAD = StartSpread(0.0, 0.0)
-
-
-def no_uncertainty(anatomy: Anatomy) -> Uncertainty:
-    """Returns the uncertainty of a robot that equals its self-model."""
-    sensors = np.zeros(len(anatomy.sensors))
-    return Uncertainty(np.zeros(4 + len(anatomy.motors)), sensors, sensors, NO_SPREAD)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,15 +50,22 @@ class Condition:
 
     Attributes:
         hypothesis: Faults of the robot.
-        log_factors: Logarithms of the factors of ``Parameters.factors``, ``(4 + motors,)``.
+        model: Parameters of the model.
         delay: Control delay in addition to the self-model's, control steps.
         seed: Seed of the initial pose and of the noise of the readings.
     """
 
     hypothesis: Hypothesis
-    log_factors: FloatArray
+    model: ModelDraw
     delay: int
     seed: int
+
+    def embodiment(self, robot: Robot) -> Embodiment:
+        """Returns the model and sensor parameters of a robot, given its self-model."""
+        perturb = partial(self.model.applied_to, robot)
+        embodiment = build(robot, self.hypothesis, perturb=perturb)
+        embodiment.added_delay[0] += self.delay
+        return embodiment
 
 
 def draw_conditions(
@@ -96,24 +86,12 @@ def draw_conditions(
     return tuple(
         Condition(
             hypotheses[(first + number) % len(hypotheses)],
-            uncertainty.factors * rng.standard_normal(len(uncertainty.factors)),
+            uncertainty.models.draw(rng),
             int(rng.choice(uncertainty.delays)),
             int(rng.integers(_SEEDS)),
         )
         for number in range(count)
     )
-
-
-def embodiment_under(robot: Robot, condition: Condition) -> Embodiment:
-    """Returns the model and sensor parameters of a robot under a condition."""
-    parameters = from_factors(np.exp(condition.log_factors), robot.control_delay)
-    embodiment = build(
-        robot,
-        condition.hypothesis,
-        perturb=lambda model: model_with_parameters(robot, parameters, model),
-    )
-    embodiment.added_delay[0] += condition.delay
-    return embodiment
 
 
 def initial_positions(
@@ -133,7 +111,7 @@ def initial_positions(
     poses = []
     for embodiment, condition in zip(embodiments, conditions, strict=True):
         data = mujoco.MjData(embodiment.model)
-        if spread != NO_SPREAD:
+        if spread != StartSpread(0.0, 0.0):
             rng = np.random.default_rng((condition.seed, 0))
             randomize_initial_pose(robot, embodiment.model, data, spread, rng)
         poses.append(data.qpos.copy())

@@ -24,7 +24,6 @@ from selfmodel.simulation.conditions import (
     Condition,
     ReadingNoise,
     Uncertainty,
-    embodiment_under,
     initial_positions,
 )
 from selfmodel.simulation.ground_contacts import ground_contact_points
@@ -207,7 +206,7 @@ class Simulator:
             ``(drivers, conditions)``.
         """
         robot, count = self.robot, len(drivers)
-        embodiments = [embodiment_under(robot, own) for own in conditions]
+        embodiments = [condition.embodiment(robot) for condition in conditions]
         silent = np.array([dead_sensors(robot.anatomy, own) for own in embodiments])
         start = initial_positions(robot, embodiments, conditions, uncertainty.start)
         flat = self._run(
@@ -226,6 +225,7 @@ class Simulator:
         drivers: Sequence[CommandSource],
         steps: int,
         record: Sequence[Signal],
+        *,
         start: FloatArray | None = None,
         noise: ReadingNoise | None = None,
     ) -> SimulationResult:

@@ -23,7 +23,8 @@ from selfmodel.physical.environment_robot import EnvironmentRobot
 from selfmodel.physical.interface import PhysicalRobot, TimedRobot
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.physical.step_timing import StepTimer
-from selfmodel.recovery.recover import Recovery, recover
+from selfmodel.recovery.recover import recover
+from selfmodel.recovery.recovery import Recovery
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator

@@ -26,7 +26,8 @@ from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.recovery.events import Event, SearchBegins
 from selfmodel.recovery.next_trial import NextTrial, Situation, by_repair, discriminating_controller
-from selfmodel.recovery.recover import Recovery, recover
+from selfmodel.recovery.recover import recover
+from selfmodel.recovery.recovery import Recovery
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import Budget
 from selfmodel.settings import Settings

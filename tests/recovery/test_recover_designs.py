@@ -12,7 +12,8 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.recovery.next_trial import candidates, discriminating_controller
-from selfmodel.recovery.recover import Recovery, recover
+from selfmodel.recovery.recover import recover
+from selfmodel.recovery.recovery import Recovery
 from selfmodel.recovery.repair import RepairSearch
 from selfmodel.robot.designs import DESIGNS, cpg_for
 from selfmodel.robot.parameters import nominal, with_parameters

@@ -1,0 +1,187 @@
+"""Posterior of the self-model after trials: models weighted by how well they predict the path.
+
+Calibration predicts a tenth of a second at a time; the small differences of single limbs that make
+a robot walk in a curve show only over a whole trial. Each trial that the recovery makes is compared
+with rollouts of its controller under a sample of models (importance sampling). Continuous
+self-modelling after Bongard, Zykov and Lipson, *Resilient machines through continuous
+self-modeling* (Science 2006).
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+
+from selfmodel.arrays import FloatArray
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.recovery.uncertainty import estimated_uncertainty
+from selfmodel.simulation.calibration import Calibration
+from selfmodel.simulation.conditions import Condition, Uncertainty, draw_conditions
+from selfmodel.simulation.model_distribution import Weighted
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.rotation import directions
+from selfmodel.trials.trial import Trial
+
+MODELS = 128
+"""Models of the sample. Each trial is simulated once per model."""
+
+REPEATS = 16
+"""Rollouts of one model, which measure how far noise alone moves the path."""
+
+MARKS = 5
+"""Times at which the path is compared, evenly spaced to the end of the trial."""
+
+INDEPENDENT = 3.0
+"""Independent differences that all differences of a trial count as: one for each of forward,
+sideways and heading, because those at successive times are strongly correlated."""
+
+MAX_DIFFERENCE = 6.0
+"""Bound on a difference, in standard deviations: after a fall, paths differ by any amount."""
+
+SHARE_OF_SPREAD = 0.15
+"""Error of every model's path, relative to the spread of the models' paths: no model is exact."""
+
+MIN_EFFECTIVE = 16.0
+"""Smallest effective size of the weighted sample; below it, the likelihood is flattened."""
+
+
+class Posterior:
+    """The uncertainty of a self-model, updated by trials. It simulates nothing until it is needed.
+
+    Args:
+        simulator: Self-model, calibrated if there is a calibration.
+        healthy: Trials of the healthy robot, at least one.
+        calibration: Fit of the self-model to the healthy trials; None without one.
+        rng: Random number generator of the sample.
+    """
+
+    def __init__(
+        self,
+        simulator: Simulator,
+        healthy: Sequence[Trial],
+        calibration: Calibration | None,
+        rng: np.random.Generator,
+    ) -> None:
+        self._simulator, self._healthy, self._calibration = simulator, healthy, calibration
+        self._rng = rng
+        self._likelihoods: dict[tuple[Hypothesis, str], FloatArray] = {}
+
+    @cached_property
+    def _uncertainty(self) -> Uncertainty:
+        return estimated_uncertainty(self._simulator, self._healthy, self._calibration)
+
+    @cached_property
+    def _conditions(self) -> tuple[Condition, ...]:
+        """``MODELS`` conditions, then ``REPEATS`` with the model of the first one."""
+        count = MODELS + REPEATS
+        drawn = draw_conditions((INTACT,), self._uncertainty, count, self._rng)
+        repeats = [dataclasses.replace(own, model=drawn[0].model) for own in drawn[MODELS:]]
+        return (*drawn[:MODELS], *repeats)
+
+    def after(self, trials: Sequence[Trial], hypothesis: Hypothesis) -> Uncertainty:
+        """Returns an uncertainty whose models are weighted by their predictions of trials.
+
+        Args:
+            trials: Trials of controllers; those of the stage ``before`` are of the intact robot.
+                Trials whose base was not observed are left out.
+            hypothesis: Faults of the robot in all other trials.
+        """
+        sample = [condition.model for condition in self._conditions[:MODELS]]
+        if not any(model.differs for model in sample):
+            return self._uncertainty
+        known = [trial for trial in trials if np.isfinite(_path(trial.behaviour)).all()]
+        likelihood = np.zeros(MODELS)
+        for trial in known:
+            likelihood += self._likelihood(
+                trial, INTACT if trial.plan.stage == "before" else hypothesis
+            )
+        models = Weighted(sample, flattened_weights(likelihood))
+        return dataclasses.replace(self._uncertainty, models=models)
+
+    def _likelihood(self, trial: Trial, hypothesis: Hypothesis) -> FloatArray:
+        key = (hypothesis, trial.path)
+        if key not in self._likelihoods:
+            conditions = [
+                dataclasses.replace(own, hypothesis=hypothesis) for own in self._conditions
+            ]
+            paths = _paths(self._simulator, self._uncertainty, trial, conditions)
+            self._likelihoods[key] = log_likelihood(
+                _path(trial.behaviour), paths[:MODELS], paths[MODELS:]
+            )
+        return self._likelihoods[key]
+
+
+def log_likelihood(observed: FloatArray, paths: FloatArray, repeats: FloatArray) -> FloatArray:
+    """Returns the logarithm of the likelihood of each model, ``(models,)``.
+
+    Args:
+        observed: Path of the trial, ``(values,)``.
+        paths: Path predicted by each model, ``(models, values)``; NaN if its simulation diverged.
+        repeats: Paths of one model with different noise, ``(repeats, values)``.
+    """
+    # The noise is that of the trial and that of the rollout.
+    noise = np.sqrt(2) * np.nanstd(repeats, axis=0)
+    scale = np.hypot(noise, SHARE_OF_SPREAD * np.nanstd(paths, axis=0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        differences = np.abs(paths - observed) / scale
+    differences = np.nan_to_num(differences, nan=MAX_DIFFERENCE, posinf=MAX_DIFFERENCE)
+    squares = np.square(np.minimum(differences, MAX_DIFFERENCE))
+    return np.asarray(-0.5 * INDEPENDENT * squares.mean(axis=1), dtype=np.float64)
+
+
+def flattened_weights(likelihood: FloatArray) -> FloatArray:
+    """Returns the weights of models, ``(models,)``.
+
+    The likelihood is flattened until the effective size of the sample is ``MIN_EFFECTIVE``.
+
+    Args:
+        likelihood: Logarithm of the likelihood of each model, ``(models,)``.
+    """
+    temperature = 1.0
+    while True:
+        weights = np.exp((likelihood - likelihood.max()) / temperature)
+        weights /= weights.sum()
+        if 1 / np.square(weights).sum() >= min(MIN_EFFECTIVE, len(weights)):
+            return np.asarray(weights)
+        temperature *= 1.5
+
+
+def _paths(
+    simulator: Simulator,
+    uncertainty: Uncertainty,
+    trial: Trial,
+    conditions: Sequence[Condition],
+) -> FloatArray:
+    """Returns the path of a trial's controller under each condition, ``(conditions, values)``.
+
+    The path of a simulation that diverged is NaN.
+    """
+    outcome = simulator.run_under(
+        conditions,
+        uncertainty,
+        [trial.plan.controller],
+        trial.behaviour.steps,
+        ("base_position", "base_orientation"),
+    )
+    paths: FloatArray = _path(outcome.behaviour)[0]
+    paths[outcome.diverged[0]] = np.nan
+    return paths
+
+
+def _path(behaviour: Behaviour) -> FloatArray:
+    """Returns forward and sideways position, m, and heading, rad, at the marks, ``(..., values)``.
+
+    They are relative to the first step.
+    """
+    marks = np.linspace(0, behaviour.steps - 1, MARKS + 1).round().astype(np.intp)[1:]
+    position = behaviour["base_position"][..., :2]
+    ahead = directions(behaviour["base_orientation"])
+    heading = np.unwrap(np.arctan2(ahead[..., 1], ahead[..., 0]), axis=-1)
+    moved = position - position[..., :1, :]
+    turned = heading - heading[..., :1]
+    path: FloatArray = np.concatenate(
+        [moved[..., marks, 0], moved[..., marks, 1], turned[..., marks]], axis=-1
+    )
+    return path

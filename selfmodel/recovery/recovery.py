@@ -1,0 +1,128 @@
+"""Result of a recovery."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from selfmodel.diagnosis.comparator_choice import ChosenComparator
+from selfmodel.diagnosis.diagnosis import Diagnosis
+from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.recovery.fitness import DISPLACEMENT, Score
+from selfmodel.simulation.calibration import Calibration
+from selfmodel.trials.data_frame import data_frame
+from selfmodel.trials.trial import Trial
+
+
+@dataclass(frozen=True)
+class Recovery:
+    """Result of a recovery.
+
+    Attributes:
+        trials: Physical trials, in order: ``before``, ``after``, then those of stage ``recovery``.
+        tried: Best hypothesis at the time when the controller was chosen, one per trial.
+        diagnosis: Last diagnosis, which explains all trials.
+        repair_evaluations: Number of controllers that the repair evaluated.
+        diagnostic_evaluations: Number of hypotheses that the diagnostic EA evaluated.
+        distinct_hypotheses: Number of distinct hypotheses among them.
+        comparator: Comparator of the diagnoses, and the reason for its choice.
+        calibration: Fit of the self-model to the trials before the failure; None without one.
+        score: Fitness of the repair.
+        predicted: Score that the self-model predicted of each trial's controller; NaN if none was
+            predicted, as for the first trial after the failure.
+        scores: Score of each trial; those after the failure under the last diagnosis, which matters
+            for a score that depends on the ground or on detached limbs.
+    """
+
+    trials: tuple[Trial, ...]
+    tried: tuple[Hypothesis, ...]
+    diagnosis: Diagnosis
+    repair_evaluations: int
+    diagnostic_evaluations: int
+    distinct_hypotheses: int
+    comparator: ChosenComparator
+    calibration: Calibration | None = None
+    score: Score = DISPLACEMENT
+    predicted: tuple[float, ...] = ()
+    scores: tuple[float, ...] = ()
+
+    @property
+    def best_score(self) -> float:
+        """Largest score of the recovery trials; NaN if unobserved in all."""
+        return _largest(self.scores[2:])
+
+    @property
+    def before(self) -> float:
+        """Forward displacement before the failure, m."""
+        return self.trials[0].displacement
+
+    @property
+    def after(self) -> float:
+        """Forward displacement of the same controller after the failure, m."""
+        return self.trials[1].displacement
+
+    @property
+    def recovered(self) -> float:
+        """Largest forward displacement of the recovery trials, m; NaN if unobserved in all."""
+        return _largest([trial.displacement for trial in self.trials[2:]])
+
+    def __repr__(self) -> str:
+        lines = [f"<Recovery: {self.diagnosis.best}, {self.diagnosis.verdict}"]
+        lines += [
+            f"  {trial.plan.name:14} {trial.displacement:8.3f} m  {tried}"
+            for trial, tried in zip(self.trials, self.tried, strict=True)
+        ]
+        return "\n".join(lines) + ">"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns the result as JSON values: trials, displacements in m, diagnosis, evaluations.
+
+        A displacement is None where the base was not observed.
+        """
+        return {
+            "trials": self._rows(),
+            "displacement": {
+                "before": _observed(self.before),
+                "after": _observed(self.after),
+                "recovered": _observed(self.recovered),
+            },
+            "diagnosis": self.diagnosis.to_dict(),
+            "evaluations": {
+                "repair": self.repair_evaluations,
+                "diagnostic": self.diagnostic_evaluations,
+                "distinct_hypotheses": self.distinct_hypotheses,
+            },
+        }
+
+    def to_pandas(self) -> Any:  # noqa: ANN401  # pandas is optional
+        """Returns the physical trials as a ``pandas.DataFrame``, one row per trial.
+
+        Raises:
+            InputError: pandas is not installed.
+        """
+        return data_frame(self._rows())
+
+    def _rows(self) -> list[dict[str, Any]]:
+        return [
+            {
+                "trial": trial.plan.name,
+                "stage": trial.plan.stage,
+                "hypothesis": str(tried),
+                "displacement": _observed(trial.displacement),
+                "score": _observed(score),
+                "predicted_score": _observed(predicted),
+                "log": trial.path,
+            }
+            for trial, tried, score, predicted in zip(
+                self.trials, self.tried, self.scores, self.predicted, strict=True
+            )
+        ]
+
+
+def _largest(values: Sequence[float]) -> float:
+    return max((value for value in values if not math.isnan(value)), default=math.nan)
+
+
+def _observed(displacement: float) -> float | None:
+    """JSON has no NaN, which is the displacement of an unobserved base."""
+    return None if math.isnan(displacement) else displacement
