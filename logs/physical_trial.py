@@ -4,13 +4,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from selfmodel.errors import TrialError
 from selfmodel.logs.reader import read_log
 from selfmodel.logs.records import TrialHeader, checked_name
 from selfmodel.logs.writing.writer import write_trial
 from selfmodel.physical.interface import PhysicalRobot, TimedRobot
+from selfmodel.physical.watchdog import HangError
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
+
+MIN_STEPS = 50
+"""Steps below which a trial that ended early is an error: it contains too few predictions."""
 
 
 def run_trial(
@@ -58,11 +63,27 @@ class TrialRunner:
     def __call__(self, physical: PhysicalRobot, plan: TrialPlan) -> Trial:
         """Runs a physical trial; see ``run_trial``.
 
+        A trial that the robot could not finish, such as after an emergency stop, is returned as far
+        as it went.
+
         Raises:
             InputError: The plan's name is no file name, or the name of an existing log.
-            LogError: The robot stopped early, or the log failed its verification.
+            LogError: The robot stopped early without an error, or the log failed its verification.
             LogWriteError: The disk is full, or failed.
+            TrialError: The trial ended before ``MIN_STEPS``, its driver hangs, or the robot could
+                not be stopped.
         """
         path = self.folder / f"{checked_name(plan.name)}.mcap"
         header = TrialHeader(self.settings, hidden=self.hidden.get(plan.stage), gap=self.gap)
-        return run_trial(physical, plan, path, self.robot, header)
+        try:
+            return run_trial(physical, plan, path, self.robot, header)
+        except HangError:
+            raise
+        except TrialError as error:
+            # A note reports a robot that could not be stopped.
+            if getattr(error, "__notes__", ()) or not path.exists():
+                raise
+            trial = read_log(path).trial
+            if trial.behaviour.steps < MIN_STEPS:
+                raise
+            return trial

@@ -9,7 +9,7 @@ from typing import Self
 
 from selfmodel.controllers.command_source import CommandSource
 from selfmodel.controllers.playback import Playback
-from selfmodel.errors import InputError, describe
+from selfmodel.errors import InputError, TrialError, describe
 from selfmodel.logs.atomic import partial_path
 from selfmodel.logs.errors import IncompleteError, salvage_it
 from selfmodel.logs.records import FINISHED, STOPPED, Result, TrialHeader, checked_name
@@ -80,9 +80,10 @@ class TrialWriter:
     """Writer of one trial's log, sample by sample; a context manager that finishes the file.
 
     A trial that ends early, by an exception or a kill, leaves a ``.part`` with all steps but at
-    most the last ``FLUSH_STEPS``. The trial of a robot with its own clock cannot be repeated:
-    there, an exception leaves a complete log with the status ``stopped``, or no file if there is no
-    step yet, so that the trial can be repeated under its name.
+    most the last ``FLUSH_STEPS``. A trial that its robot could not finish (``TrialError``) leaves a
+    complete log with the status ``stopped``, and so does any exception in the trial of a robot with
+    its own clock, which cannot be repeated. If there is no step yet, such a trial leaves no file,
+    so that it can be repeated under its name.
 
     Args:
         path: Name of the log.
@@ -171,7 +172,7 @@ class TrialWriter:
                 self._flush()
             if error is None and self.steps == self._plan.steps:
                 self._finish(FINISHED)
-            elif error is not None and self._header.timed and self._sound:
+            elif error is not None and self._is_stopped_trial(error):
                 if self.steps:
                     self._finish(STOPPED, _stop_reason(error))
                 else:
@@ -189,6 +190,10 @@ class TrialWriter:
                 good=f"{self.steps} steps are in that file",
                 advice=salvage_it(partial_path(self.path)),
             )
+
+    def _is_stopped_trial(self, error: BaseException) -> bool:
+        """Whether the log of a trial that ended by an error is finished as it is."""
+        return self._sound and (self._header.timed or isinstance(error, TrialError))
 
     def _flush(self) -> None:
         """Writes the buffered steps, and flushes them to the operating system."""

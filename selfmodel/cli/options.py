@@ -267,6 +267,18 @@ ScoreName = Annotated[
         rich_help_panel=CONTROLLER,
     ),
 ]
+RecoveryScore = Annotated[
+    str | None,
+    typer.Option(
+        "--score",
+        metavar="NAME",
+        help="Fitness of controllers: displacement; upright, the displacement until the first "
+        "fall; return, the sum of the task's rewards; or tracking, the error of the joints from a "
+        "trajectory.",
+        show_default="upright; displacement with --repair paper",
+        rich_help_panel=CONTROLLER,
+    ),
+]
 Reference = Annotated[
     Path | None,
     typer.Option(

@@ -25,10 +25,10 @@ from selfmodel.cli.options import (
     Neurons,
     NextTrialName,
     Population,
+    RecoveryScore,
     Reference,
     RepairName,
     RobotName,
-    ScoreName,
     SearchName,
     Seed,
     Steps,
@@ -72,7 +72,7 @@ def recover(
     neurons: Neurons = None,
     repair: RepairName = plugins.ROBUST,
     search: SearchName = None,
-    score: ScoreName = "displacement",
+    score: RecoveryScore = None,
     reference: Reference = None,
     seed: Seed = 0,
     steps: Steps = 1000,
@@ -108,7 +108,13 @@ def recover(
     plugins.repair(repair, search)  # an unknown name is refused before any work
     settings = Settings(steps=steps, trials=trials, generations=generations).scaled(population)
     chosen = choose_score(
-        score, entry, design, steps=steps, seed=seed, reference=reference, budget=limits
+        score or plugins.DEFAULT_SCORES[repair],
+        entry,
+        design,
+        steps=steps,
+        seed=seed,
+        reference=reference,
+        budget=limits,
     )
     if chosen.gait is not None:
         print_notes(

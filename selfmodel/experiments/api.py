@@ -41,6 +41,7 @@ from selfmodel.recovery.recovery import Recovery
 from selfmodel.recovery.repair import RepairSearch
 from selfmodel.recovery.sequential_diagnosis import diagnose_trials
 from selfmodel.recovery.uncertainty import assumed_uncertainty
+from selfmodel.recovery.upright import UPRIGHT
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.settings import Settings
@@ -323,7 +324,7 @@ def recover(
     design: str | Design = "network",
     calibrate: bool = True,
     next_trial: NextTrial = by_repair,
-    score: Score = DISPLACEMENT,
+    score: Score | None = None,
     repair: str = plugins.ROBUST,
     search: str | None = None,
     seed: int = 0,
@@ -357,7 +358,8 @@ def recover(
         design: Name of a controller design, such as ``network`` or ``cpg``, or a design.
         calibrate: Whether the self-model is fitted to the trial before the failure.
         next_trial: Chooses the controller of each trial after the failing one.
-        score: Fitness of the repair; the forward displacement by default.
+        score: Fitness of the repair; by default the forward displacement until the first fall, or
+            the whole displacement for the paper's repair.
         repair: ``robust``, on rollouts under random conditions; or ``paper``, in one exact
             simulation.
         search: ``cma-es`` or ``ea``; None for that of the repair, CMA-ES or the paper's EA.
@@ -372,6 +374,7 @@ def recover(
     """
     check_seed(seed)
     robot, count = robot_of(robot), thread_count(threads)
+    score = score or (UPRIGHT if repair == plugins.ROBUST else DISPLACEMENT)
     check_motion(score.name, robot)
     chosen, searched = settings or Settings(), kinds_of(kinds)
     journal = create_journal(Path(folder), robot.anatomy, searched)

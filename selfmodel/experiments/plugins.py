@@ -38,6 +38,11 @@ NEXT_TRIAL: Mapping[str, NextTrial] = MappingProxyType(
 ROBUST, PAPER = "robust", "paper"
 """Names of the repairs: on rollouts under random conditions, and in one exact simulation."""
 
+DEFAULT_SCORES: Mapping[str, str] = MappingProxyType(
+    {ROBUST: UPRIGHT.name, PAPER: DISPLACEMENT.name}
+)
+"""Name of the score of each repair, unless another is given."""
+
 SEARCHES: Mapping[str, MakeSearch] = MappingProxyType({"cma-es": CmaEs, "ea": Evolution})
 """Searches of the robust repair, by name."""
 

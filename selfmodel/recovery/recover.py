@@ -27,7 +27,9 @@ from selfmodel.recovery.random_streams import (
 from selfmodel.recovery.recovery import Recovery
 from selfmodel.recovery.robust_repair import RobustRepair
 from selfmodel.recovery.uncertainty import assumed_uncertainty
+from selfmodel.recovery.upright import fall_of
 from selfmodel.robot.designs import network_for
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.conditions import Uncertainty
@@ -83,8 +85,7 @@ def recover(
     # From the nominal robot: the numbers of the calibrated model are rounded.
     design = network_for(simulator.robot) if design is None else design
     repair, evaluations_before = make_repair(simulator, settings, design, score), 0
-    tried: list[Hypothesis] = []
-    predicted: list[float] = []
+    tried: list[tuple[Hypothesis, Candidate]] = []
     database = Database()
 
     def evolve_candidates(
@@ -108,8 +109,7 @@ def recover(
         nonlocal database
         name = f"{len(tried):02d}-{stage}"
         plan = TrialPlan(name, stage, candidate.controller, settings.steps, seed)
-        tried.append(best)
-        predicted.append(candidate.predicted)
+        tried.append((best, candidate))
         trial = run_trial(robot, plan)
         database = database.with_trial(trial)
         on_event(trial)
@@ -150,9 +150,10 @@ def recover(
         act(damaged, "recovery", diagnosis.best, next_trial(situation))
     diagnosis = diagnose()
 
+    scores, falls = _judged(simulator.robot, diagnosis.best, database.trials, score)
     return Recovery(
         trials=database.trials,
-        tried=tuple(tried),
+        tried=tuple(best for best, _ in tried),
         diagnosis=diagnosis,
         repair_evaluations=evaluations_before + repair.evaluations,
         diagnostic_evaluations=search.evaluations,
@@ -160,9 +161,19 @@ def recover(
         comparator=chosen,
         calibration=calibration,
         score=score,
-        predicted=tuple(predicted),
-        scores=tuple(
-            score.of_trial(simulator.robot, diagnosis.best if number else INTACT, trial)
-            for number, trial in enumerate(database.trials)
-        ),
+        predicted=tuple(candidate.predicted for _, candidate in tried),
+        scores=scores,
+        falls=falls,
+    )
+
+
+def _judged(
+    robot: Robot, hypothesis: Hypothesis, trials: Sequence[Trial], score: Score
+) -> tuple[tuple[float, ...], tuple[int | None, ...]]:
+    """Returns the score and the fall of each trial, of which the first is of the intact robot."""
+    faults = (INTACT, *[hypothesis] * (len(trials) - 1))
+    pairs = list(zip(faults, trials, strict=True))
+    return (
+        tuple(score.of_trial(robot, own, trial) for own, trial in pairs),
+        tuple(fall_of(robot, own, trial) for own, trial in pairs),
     )

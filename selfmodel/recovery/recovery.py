@@ -32,6 +32,7 @@ class Recovery:
             predicted, as for the first trial after the failure.
         scores: Score of each trial; those after the failure under the last diagnosis, which matters
             for a score that depends on the ground or on detached limbs.
+        falls: Step at which the robot fell in each trial; None if it did not.
     """
 
     trials: tuple[Trial, ...]
@@ -45,6 +46,13 @@ class Recovery:
     score: Score = DISPLACEMENT
     predicted: tuple[float, ...] = ()
     scores: tuple[float, ...] = ()
+    falls: tuple[int | None, ...] = ()
+
+    @property
+    def fell(self) -> bool:
+        """Whether the robot fell in the recovery trial with the largest score."""
+        scores = [-math.inf if math.isnan(score) else score for score in self.scores[2:]]
+        return bool(scores) and self.falls[2 + scores.index(max(scores))] is not None
 
     @property
     def best_score(self) -> float:

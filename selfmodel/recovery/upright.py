@@ -9,6 +9,7 @@ from selfmodel.recovery.falls import first_falls
 from selfmodel.recovery.fitness import Score
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.trial import Trial
 
 
 def falls_of(robot: Robot, hypothesis: Hypothesis, behaviour: Behaviour) -> IndexArray:
@@ -23,6 +24,22 @@ def falls_of(robot: Robot, hypothesis: Hypothesis, behaviour: Behaviour) -> Inde
         Step indices, ``(...)``.
     """
     return first_falls(behaviour, build(robot, hypothesis).normal, robot.standing_height)
+
+
+def fall_of(robot: Robot, hypothesis: Hypothesis, trial: Trial) -> int | None:
+    """Returns the step at which the robot fell in a trial; None if it did not, or cannot fall.
+
+    A fixed base cannot fall, and a base that was not observed is not known to have fallen.
+
+    Args:
+        robot: The healthy robot.
+        hypothesis: Faults of the physical robot.
+        trial: The trial.
+    """
+    if robot.has_fixed_base:
+        return None
+    fall = int(falls_of(robot, hypothesis, trial.behaviour))
+    return fall if fall < trial.behaviour.steps else None
 
 
 def _displacement_until_a_fall(

@@ -98,6 +98,7 @@ def recovery(
     trials: int = 3,
     gait: Controller | None = None,
     next_trial: NextTrial = by_repair,
+    make_repair: MakeRepair = RepairSearch,
 ) -> Recovery:
     """A small recovery from a failure."""
     physical = SimulatedRobot(robot), SimulatedRobot(robot, truth)
@@ -115,6 +116,7 @@ def recovery(
         kinds=PAPER_KINDS,
         gait=gait,
         next_trial=next_trial,
+        make_repair=make_repair,
     )
 
 

@@ -1,6 +1,7 @@
 """Outcome of ``selfmodel recover``, as text and as JSON."""
 
 import dataclasses
+import math
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -29,7 +30,7 @@ def print_report(found: dict[str, Any], folder: Path) -> None:
     column, key = _column(score)
     trials = folding(
         ("trial", "best hypothesis so far", column),
-        [(trial["stage"], trial["hypothesis"], f"{trial[key]:.3f}") for trial in found["trials"]],
+        [(trial["stage"], trial["hypothesis"], _result(trial, key)) for trial in found["trials"]],
         title="physical trials",
         texts=2,
     )
@@ -39,6 +40,7 @@ def print_report(found: dict[str, Any], folder: Path) -> None:
         f"truth: {found['truth']}{_reality(found)}; the diagnosis is {right_or_wrong(found)}.",
         confidence_sentence(found),
         f"{_sentence(found)} at best in {counted(trials_since, 'trial')} since.",
+        *_no_recovery(found),
         f"{evaluations['repair']} controllers and {evaluations['distinct_hypotheses']} distinct "
         f"hypotheses in {found['seconds']:.0f} s; diverged: {evaluations['diverged']}.",
         f"Logs: {folder}",
@@ -64,6 +66,17 @@ def _sentence(found: dict[str, Any]) -> str:
     return (
         f"The score {score['name']} was {before} before, {after} after the failure, and {recovered}"
     )
+
+
+def _result(trial: dict[str, Any], key: str) -> str:
+    """Returns the result of a trial, with its early end or its fall."""
+    fall = trial["fell_at_step"]
+    return f"{trial[key]:.3f}" + ("" if fall is None else f", fell at step {fall}")
+
+
+def _no_recovery(found: dict[str, Any]) -> list[str]:
+    """Returns a sentence if the robot fell in its best trial."""
+    return ["The robot fell in that trial, which is no recovery."] if found["fell"] else []
 
 
 def _reality(found: dict[str, Any]) -> str:
@@ -106,6 +119,7 @@ def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
         "gap": experiment.gap,
         "structure": experiment.structure,
         "next_trial": experiment.next_trial,
+        "repair": experiment.repair,
         "controller": design.name,
         "neurons": design.hidden,
         "seed": experiment.seed,
@@ -114,11 +128,19 @@ def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
                 "log": trial.path,
                 "stage": trial.plan.stage,
                 "displacement": trial.displacement,
+                "steps": trial.behaviour.steps,
                 "score": score,
+                "predicted_score": predicted if math.isfinite(predicted) else None,
+                "fell_at_step": fall,
                 "hypothesis": str(tried),
             }
-            for trial, tried, score in zip(
-                recovery.trials, recovery.tried, recovery.scores, strict=True
+            for trial, tried, score, predicted, fall in zip(
+                recovery.trials,
+                recovery.tried,
+                recovery.scores,
+                recovery.predicted,
+                recovery.falls,
+                strict=True,
             )
         ],
         "diagnosis": ranking_to_list(recovery.diagnosis.ranked),
@@ -137,6 +159,7 @@ def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
             "after": recovery.scores[1],
             "recovered": recovery.best_score,
         },
+        "fell": recovery.fell,
         "recovery": recovery.recovered / recovery.before if recovery.before > 0 else None,
         "physical_trials": len(recovery.trials) - 2,
         "evaluations": {
