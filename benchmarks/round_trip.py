@@ -41,7 +41,7 @@ def main() -> None:
     robot = ROBOTS["quadruped"].robot()
     simulator = Simulator(robot, os.cpu_count() or 1)
     rng = repair_stream(SEED, 0)
-    gait = RepairSearch(simulator, SETTINGS)(INTACT, (), rng, lambda _: None)
+    gait = RepairSearch(simulator, SETTINGS).best(INTACT, (), rng, lambda _: None)
     print("| fault | exact log | imported, with its controller | imported, commands played back |")
     print("|---|---|---|---|")
     for truth in single_faults(robot):

@@ -74,7 +74,7 @@ def evolve_gait(name: str, seed: int, out: Path) -> Facts:
         # The first of the streams that `recover` draws from: the same gait as its own.
         (stream,) = np.random.default_rng(seed).spawn(1)
         repair = RepairSearch(Simulator(robot, threads=1), settings)
-        gait = repair(INTACT, [], stream, lambda _: None)
+        gait = repair.best(INTACT, [], stream, lambda _: None)
         seconds = perf_counter() - start
         save_controller(folder / "gait.npz", gait)
         walked = walk(robot, gait, settings.steps)

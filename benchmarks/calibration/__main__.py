@@ -152,7 +152,7 @@ def _gait(robot: Robot, number: int, bank: Path | None) -> Controller:
     if bank is not None:
         return gait(bank, robot.name, number)
     repair = RepairSearch(Simulator(robot, threads=1), Settings())
-    return repair(INTACT, (), repair_stream(number, 0), lambda _generation: None)
+    return repair.best(INTACT, (), repair_stream(number, 0), lambda _generation: None)
 
 
 def table(rows: Sequence[Facts]) -> str:

@@ -40,7 +40,6 @@ from selfmodel.recovery.random_streams import repair_stream
 from selfmodel.recovery.recovery import Recovery
 from selfmodel.recovery.repair import RepairSearch
 from selfmodel.recovery.sequential_diagnosis import diagnose_trials
-from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.recovery.upright import UPRIGHT
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
@@ -102,10 +101,7 @@ def evolve_controller(
     check_motion(score.name, robot)
     chosen = _design(design, robot)
     search = RepairSearch(Simulator(robot, threads), settings or Settings(), chosen, score=score)
-    hypotheses = (hypothesis_of(hypothesis, robot),)
-    uncertainty = partial(assumed_uncertainty, robot)
-    (best,) = search(hypotheses, uncertainty, seeds, repair_stream(seed, 0), on_event)
-    return best.controller
+    return search.best(hypothesis_of(hypothesis, robot), seeds, repair_stream(seed, 0), on_event)
 
 
 def run_trial(

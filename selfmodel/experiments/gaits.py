@@ -1,7 +1,6 @@
 """Gaits of healthy robots for studies, evolved once and kept in files."""
 
 import dataclasses
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,6 @@ from selfmodel.logs.files import replace_file
 from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.random_streams import repair_stream
 from selfmodel.recovery.repair import RepairSearch
-from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
@@ -68,14 +66,8 @@ def evolve_gait(
         Number of evaluations, as JSON, and the file.
     """
     repair = RepairSearch(Simulator(robot, threads=1), settings, design, score=score)
-    (gait,) = repair(
-        (INTACT,),
-        partial(assumed_uncertainty, robot),
-        (),
-        repair_stream(seed, 0),
-        lambda _generation: None,
-    )
-    return write_gait(path, gait.controller, repair.evaluations)
+    gait = repair.best(INTACT, (), repair_stream(seed, 0), lambda _generation: None)
+    return write_gait(path, gait, repair.evaluations)
 
 
 def write_gait(path: Path, gait: Controller, evaluations: int) -> PartResult:

@@ -57,10 +57,21 @@ class RepairSearch:
         rng: np.random.Generator,
         on_generation: GenerationCallback,
     ) -> tuple[Candidate, ...]:
-        """Returns the best controller found; see ``Repair``.
+        """Returns the best controller for the first hypothesis; see ``Repair``."""
+        best, fitness = self._evolved(hypotheses[0], seeds, rng, on_generation)
+        return (Candidate(best, np.array([fitness])),)
+
+    def best(
+        self,
+        hypothesis: Hypothesis,
+        seeds: Sequence[Controller],
+        rng: np.random.Generator,
+        on_generation: GenerationCallback,
+    ) -> Controller:
+        """Returns the best controller found.
 
         Args:
-            hypotheses: Hypotheses, of which the first one is simulated.
+            hypothesis: Faults of the simulated robot.
             seeds: Initial controllers in addition to random ones; controllers of another design
                 are ignored.
             rng: Random number generator of all random choices.
@@ -69,7 +80,16 @@ class RepairSearch:
         Raises:
             WorkError: The simulation diverged with every controller.
         """
-        design, hypothesis = self._design, hypotheses[0]
+        return self._evolved(hypothesis, seeds, rng, on_generation)[0]
+
+    def _evolved(
+        self,
+        hypothesis: Hypothesis,
+        seeds: Sequence[Controller],
+        rng: np.random.Generator,
+        on_generation: GenerationCallback,
+    ) -> tuple[Controller, float]:
+        design = self._design
 
         def fitness(genomes: FloatArray) -> FloatArray:
             runs: list[Run] = [(hypothesis, Controller(design, genome)) for genome in genomes]
@@ -90,8 +110,7 @@ class RepairSearch:
                 f"with {search.evaluations} controllers: check the model, such as its physics time "
                 f"step, masses and motors"
             )
-        best = Controller(design, search.best)
-        return (Candidate(best, np.array([search.best_fitness])),)
+        return Controller(design, search.best), search.best_fitness
 
     def _simulate(self, runs: list[Run]) -> FloatArray:
         """Fitness of rollouts with one hypothesis; negative infinity for a diverged rollout."""

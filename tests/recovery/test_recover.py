@@ -24,10 +24,12 @@ from selfmodel.logs.journal import FolderJournal, create_journal
 from selfmodel.logs.mcap.contents import Contents
 from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.recovery.candidate import MakeRepair
 from selfmodel.recovery.events import Event, SearchBegins
 from selfmodel.recovery.next_trial import NextTrial, Situation, by_repair, discriminating_controller
 from selfmodel.recovery.recover import recover
 from selfmodel.recovery.recovery import Recovery
+from selfmodel.recovery.repair import RepairSearch
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import Budget
 from selfmodel.settings import Settings

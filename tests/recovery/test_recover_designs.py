@@ -86,7 +86,7 @@ def test_a_search_for_one_kind_does_not_start_from_controllers_of_the_other(quad
     for kind in ("network", "cpg"):
         design = DESIGNS[kind](quadruped, None)
         search = RepairSearch(Simulator(quadruped, 1), FEW, design)
-        found = search(INTACT, seeds, np.random.default_rng(0), lambda _generation: None)
+        found = search.best(INTACT, seeds, np.random.default_rng(0), lambda _generation: None)
         assert found.design == design
 
 

@@ -21,7 +21,9 @@ SMALL = dataclasses.replace(Settings().scaled(20), generations=1, steps=200)
 def test_a_repair_starts_from_the_controllers_it_is_given(quadruped: Robot):
     seeds = random_controllers(quadruped, 20, seed=3)
     simulator = Simulator(quadruped, 2)
-    best = RepairSearch(simulator, SMALL)(INTACT, seeds, np.random.default_rng(0), lambda _: None)
+    best = RepairSearch(simulator, SMALL).best(
+        INTACT, seeds, np.random.default_rng(0), lambda _: None
+    )
     runs = [(INTACT, seed) for seed in seeds]
     behaviour = simulator.run(runs, SMALL.steps, ["base_position"]).behaviour
 
@@ -32,4 +34,4 @@ def test_a_repair_that_no_simulation_survives_is_an_error(quadruped: Robot):
     few = dataclasses.replace(Settings().scaled(4), generations=1, steps=20)
     search = RepairSearch(Simulator(unstable(quadruped), 2), few)
     with pytest.raises(WorkError, match="no simulation of quadruped as intact remained finite, wi"):
-        search(INTACT, (), np.random.default_rng(0), lambda _: None)
+        search.best(INTACT, (), np.random.default_rng(0), lambda _: None)

@@ -97,7 +97,8 @@ def test_a_repair_for_the_return_finds_another_controller_than_one_for_the_way()
     stands = RepairSearch(simulator, settings, score=score)
     goes = RepairSearch(simulator, settings)
     found = [
-        repair(INTACT, (), np.random.default_rng(0), lambda _: None) for repair in (stands, goes)
+        repair.best(INTACT, (), np.random.default_rng(0), lambda _: None)
+        for repair in (stands, goes)
     ]
     shown = simulator.run([(INTACT, one) for one in found], STEPS, score.record).behaviour
     returns = score.of(robot, INTACT, shown)
