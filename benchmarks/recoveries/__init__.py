@@ -1,0 +1,1 @@
+"""Recoveries of simulated physical robots, measured against an oracle."""

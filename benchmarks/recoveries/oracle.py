@@ -1,0 +1,77 @@
+"""Oracle: the best controller for the physical robot's own hidden model with its noise.
+
+A recovery is compared with what the damaged body can do, because a ratio to a poor gait before the
+failure flatters.
+"""
+
+from dataclasses import asdict
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from benchmarks.recoveries.cells import HEALTHY, Cell
+from selfmodel.controllers.controller import Controller
+from selfmodel.physical.initial_pose import start_spread
+from selfmodel.physical.interface import PhysicalRobot
+from selfmodel.physical.reality_gap import perturbed_model
+from selfmodel.recovery.robust_fitness import robust
+from selfmodel.recovery.robust_repair import RobustRepair
+from selfmodel.recovery.upright import UPRIGHT
+from selfmodel.robot.designs import network_for
+from selfmodel.robot.parameters import with_model
+from selfmodel.settings import Settings
+from selfmodel.simulation.conditions import Uncertainty
+from selfmodel.simulation.model_distribution import exact
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.behaviour import collect
+from selfmodel.trials.trial import Trial, TrialPlan
+
+SEARCHES = 2
+"""Searches of an oracle, of which the best counts."""
+
+RUNS = 12
+"""Physical runs of the best controller, whose mean displacement is the oracle's."""
+
+
+def oracle(cell: Cell, *, settings: Settings) -> dict[str, Any]:
+    """Returns the row of an oracle: the mean upright displacement of its controller, m.
+
+    Args:
+        cell: The failure.
+        settings: The paper's numbers, which set the cost of a search.
+    """
+    start = perf_counter()
+    robot, gap = cell.nominal, cell.reality.gap
+    hidden = with_model(robot, perturbed_model(robot.model, gap), robot.control_delay + gap.delay)
+    touch = np.array([sensor.kind == "touch" for sensor in robot.anatomy.sensors])
+    noise = Uncertainty(
+        models=exact(hidden),
+        reading_noise=np.where(touch, 0.0, cell.gap),
+        wrong_touches=np.where(touch, cell.gap / 2, 0.0),
+        start=start_spread(cell.gap),
+    )
+    repair = RobustRepair(Simulator(hidden, 1), settings, network_for(robot), UPRIGHT)
+    found = []
+    for number in range(SEARCHES):
+        rng = np.random.default_rng((cell.seed, cell.case, number))
+        found += repair((cell.truth,), lambda: noise, (), rng, lambda _generation: None)[:1]
+    best = max(found, key=lambda candidate: float(robust(candidate.scores[np.newaxis])[0]))
+    physical = cell.reality.robot(robot, cell.truth, stream=0 if cell.case == HEALTHY else 1)
+    runs = [_run(cell, physical, best.controller, settings.steps) for _ in range(RUNS)]
+    return {
+        **asdict(cell),
+        "upright": round(float(np.mean(runs)), 4),
+        "lowest": round(min(runs), 4),
+        "predicted": round(best.predicted, 4),
+        "evaluations": repair.evaluations,
+        "seconds": round(perf_counter() - start, 1),
+    }
+
+
+def _run(cell: Cell, physical: PhysicalRobot, controller: Controller, steps: int) -> float:
+    """Returns the upright displacement of one physical run, m."""
+    names = cell.nominal.anatomy.names
+    plan = TrialPlan("oracle", "single", controller, steps, cell.seed)
+    trial = Trial(plan, cell.robot, collect(names, physical.run(controller, steps)), "oracle")
+    return UPRIGHT.of_trial(cell.nominal, cell.truth, trial)

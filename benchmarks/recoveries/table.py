@@ -1,0 +1,80 @@
+"""Tables of the study: medians and lowest tenths by case, with bootstrap intervals."""
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from benchmarks.recoveries.cells import HEALTHY
+from selfmodel.experiments.confidence_intervals import proportion
+
+RESAMPLES = 2000
+
+HEADER = """\
+| robot | case | gap | n | diagnosis right | before, m | ÷ oracle | first trial ÷ oracle | best ÷ \
+oracle | observed ÷ predicted | fell |
+|---|---|---|---:|---:|---:|---:|---:|---:|---:|---:|"""
+
+
+def table(rows: Sequence[dict[str, Any]], oracles: Sequence[dict[str, Any]]) -> str:
+    """Returns a Markdown table, a line per robot, case and gap, and one per robot and gap.
+
+    A ratio is a median, with its 95 % bootstrap interval and the lowest tenth.
+    """
+    best = {_cell(row): row["upright"] for row in oracles}
+    lines = [HEADER]
+    for robot, gap in sorted({(row["robot"], row["gap"]) for row in rows}):
+        own = [row for row in rows if (row["robot"], row["gap"]) == (robot, gap)]
+        lines += [
+            _line(robot, case, gap, [row for row in own if row["case"] == case], best)
+            for case in sorted({row["case"] for row in own})
+        ]
+        lines.append(_line(robot, "all", gap, own, best))
+    return "\n".join(lines)
+
+
+def _line(
+    robot: str, case: object, gap: float, rows: Sequence[dict[str, Any]], best: dict[Any, float]
+) -> str:
+    right = proportion(sum(row["correct"] for row in rows), len(rows))
+    healthy = [_ratio(row["upright"][0], best.get(_cell(row, HEALTHY))) for row in rows]
+    first = [_ratio(row["upright"][2], best.get(_cell(row))) for row in rows]
+    largest = [_ratio(max(row["upright"][2:]), best.get(_cell(row))) for row in rows]
+    transfer = [
+        _ratio(seen, told)
+        for row in rows
+        for seen, told in zip(row["upright"][2:], row["predicted"][2:], strict=True)
+    ]
+    before = np.mean([row["upright"][0] for row in rows])
+    falls = sum(row["falls"][2 + int(np.argmax(row["upright"][2:]))] is not None for row in rows)
+    cells = (
+        robot,
+        str(case),
+        f"{gap:g}",
+        str(len(rows)),
+        f"{100 * right.estimate:.0f} % ({100 * right.low:.0f} to {100 * right.high:.0f})",
+        f"{before:.1f}",
+        *(_median(values) for values in (healthy, first, largest, transfer)),
+        f"{falls} of {len(rows)}",
+    )
+    return f"| {' | '.join(cells)} |"
+
+
+def _cell(row: dict[str, Any], case: int | None = None) -> tuple[Any, ...]:
+    return (row["robot"], row["case"] if case is None else case, row["gap"], row["seed"])
+
+
+def _ratio(value: float, reference: float | None) -> float:
+    return value / reference if reference and reference > 0 else float("nan")
+
+
+def _median(values: Iterable[float]) -> str:
+    """Returns the median with its interval and the lowest tenth as text; "-" without values."""
+    known = np.array([value for value in values if np.isfinite(value)])
+    if not len(known):
+        return "-"
+    rng = np.random.default_rng(0)
+    medians = np.median(rng.choice(known, (RESAMPLES, len(known))), axis=1)
+    low, high = np.quantile(medians, [0.025, 0.975])
+    lowest = np.quantile(known, 0.1)
+    return f"{np.median(known):.2f} ({low:.2f} to {high:.2f}; {lowest:.2f})"
