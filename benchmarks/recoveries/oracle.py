@@ -52,10 +52,11 @@ def oracle(cell: Cell, *, settings: Settings) -> dict[str, Any]:
         start=start_spread(cell.gap),
     )
     repair = RobustRepair(Simulator(hidden, 1), settings, network_for(robot), UPRIGHT)
-    found = []
-    for number in range(SEARCHES):
-        rng = np.random.default_rng((cell.seed, cell.case, number))
-        found += repair((cell.truth,), lambda: noise, (), rng, lambda _generation: None)[:1]
+    generators = [np.random.default_rng((cell.seed, cell.case, i)) for i in range(SEARCHES)]
+    found = [
+        repair((cell.truth,), lambda: noise, (), rng, lambda _generation: None)[0]
+        for rng in generators
+    ]
     best = max(found, key=lambda candidate: float(robust(candidate.scores[np.newaxis])[0]))
     physical = cell.reality.robot(robot, cell.truth, stream=0 if cell.case == HEALTHY else 1)
     runs = [_run(cell, physical, best.controller, settings.steps) for _ in range(RUNS)]

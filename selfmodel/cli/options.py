@@ -262,8 +262,8 @@ ScoreName = Annotated[
         "--score",
         metavar="NAME",
         help="Fitness of controllers: displacement; upright, the displacement until the first "
-        "fall; return, the sum of the task's rewards; or tracking, the error of the joints from a "
-        "trajectory.",
+        "fall; energy, that less the work of the joints; return, the sum of the task's rewards; "
+        "tracking, the error of the joints from a trajectory; or package.module:object.",
         rich_help_panel=CONTROLLER,
     ),
 ]
@@ -273,8 +273,8 @@ RecoveryScore = Annotated[
         "--score",
         metavar="NAME",
         help="Fitness of controllers: displacement; upright, the displacement until the first "
-        "fall; return, the sum of the task's rewards; or tracking, the error of the joints from a "
-        "trajectory.",
+        "fall; energy, that less the work of the joints; return, the sum of the task's rewards; "
+        "tracking, the error of the joints from a trajectory; or package.module:object.",
         show_default="upright; displacement with --repair paper",
         rich_help_panel=CONTROLLER,
     ),

@@ -20,6 +20,7 @@ from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import ALL_KINDS, KIND_SETS, KINDS, kind_names
 from selfmodel.recovery.candidate import MakeRepair
 from selfmodel.recovery.cma_es import CmaEs
+from selfmodel.recovery.energy import ENERGY
 from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.next_trial import NextTrial, by_disagreement, by_repair
 from selfmodel.recovery.repair import RepairSearch
@@ -51,6 +52,7 @@ RETURN = "return"
 
 COMPARATOR_GROUP = "selfmodel.comparators"
 FAULT_KIND_GROUP = "selfmodel.fault_kinds"
+SCORE_GROUP = "selfmodel.scores"
 """Groups of the entry points of plug-ins."""
 
 
@@ -191,22 +193,29 @@ def design(name: str, robot: Robot, neurons: int | None = None) -> Design:
 
 
 def score(name: str, robot: str, entry: Entry) -> Score:
-    """Returns the fitness of the repair EA by name.
+    """Returns the fitness of a repair by name.
 
     Args:
-        name: ``displacement``; ``upright``, the displacement up to the first fall; or ``return``,
-            the sum of the rewards of the robot's task.
+        name: ``displacement``; ``upright``, the displacement up to the first fall; ``energy``, that
+            less the work of the joints; ``return``, the sum of the rewards of the robot's task; the
+            name of an entry point in the group ``selfmodel.scores``, or ``package.module:object``.
         robot: Name of the robot.
         entry: The robot's entry.
 
     Raises:
-        InputError: The name is unknown, or the robot has no task with rewards.
+        InputError: The name is unknown, the object is no score, or the robot has no task with
+            rewards.
     """
-    by_name = {DISPLACEMENT.name: DISPLACEMENT, UPRIGHT.name: UPRIGHT}
+    by_name = {score.name: score for score in (DISPLACEMENT, UPRIGHT, ENERGY)}
     if name in by_name:
         return by_name[name]
     if name != RETURN:
-        raise unknown_name("score", name, (*by_name, RETURN, TRACKING))
+        found = _plug_in("score", name, SCORE_GROUP, (*by_name, RETURN, TRACKING))
+        if not isinstance(found, Score):
+            raise InputError(
+                f"{name!r} is no score: expected a selfmodel.recovery.Score, got {found!r}"
+            )
+        return found
     if entry.episode_return is None:
         raise InputError(
             f"{robot} has no task of dm_control, so no rewards: give --score {DISPLACEMENT.name}"

@@ -1,4 +1,5 @@
 from .database import Database as Database, Journal as Journal
+from .energy import ENERGY as ENERGY
 from .events import Event as Event
 from .fitness import DISPLACEMENT as DISPLACEMENT, Score as Score
 from .next_trial import (

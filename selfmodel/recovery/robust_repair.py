@@ -119,11 +119,17 @@ class RobustRepair:
         while number == 0 or (spent < budget and not search.stop()):
             genomes = search.ask()
             horizon = steps if number else min(FIRST_STEPS, steps)
-            scores = fitness(self._controllers(genomes), 1, horizon, rng)[:, 0]
+            before = self._simulator.stats.steps
+            if number:
+                scores = fitness.race(self._controllers(genomes), steps, rng)
+            else:
+                scores = fitness(self._controllers(genomes), 1, horizon, rng)[:, 0]
             search.tell(scores)
-            spent += len(genomes) * horizon
+            cost = self._simulator.stats.steps - before
+            spent += cost
             number += 1
-            left = math.ceil(max(0, budget - spent) / (len(search.ask()) * steps))
+            ahead = cost * len(search.ask()) / len(genomes)
+            left = math.ceil(max(0, budget - spent) / ahead)
             on_generation(
                 Generation(
                     number=number,

@@ -1,7 +1,8 @@
 """Batches of MuJoCo simulations that continue when some of them diverge."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -14,6 +15,7 @@ from selfmodel.robot.mujoco_log import uncounted_warnings
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state.access import observed_fields
 from selfmodel.robot.state.fields import Reader
+from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import Signal
 
 
@@ -45,10 +47,25 @@ def live_signals(
     }
 
 
-class LiveBatch:
-    """Batch that steps only the simulations without a MuJoCo error, and records divergence.
+@dataclass(frozen=True)
+class EarlyStop:
+    """Runs that are stopped before their end, such as those that a search will reject.
 
-    MuJoCo's warnings are not counted: a simulation with a warning is recorded as diverged.
+    Attributes:
+        steps: Numbers of finished steps after which runs are chosen.
+        chosen: Function from the behaviour so far, ``(runs, steps, width)`` per signal, to a mask
+            of the runs to stop, ``(runs,)``.
+    """
+
+    steps: tuple[int, ...]
+    chosen: Callable[[Behaviour], BoolArray]
+
+
+class LiveBatch:
+    """Batch that steps only the simulations that were not stopped and have no MuJoCo error.
+
+    It records divergence. MuJoCo's warnings are not counted: a simulation with a warning is
+    recorded as diverged.
 
     MuJoCo resets a simulation with a warning, which continues to be stepped: its values are
     invalid, but the simulations of a batch are independent.
@@ -58,6 +75,21 @@ class LiveBatch:
         self._batch = batch
         self._ids: IndexArray | None = None
         self._failed = np.zeros(batch.nsim, dtype=bool)
+        self._stopped = np.zeros(batch.nsim, dtype=bool)
+
+    @property
+    def running(self) -> int:
+        """Number of simulations that are stepped."""
+        return self._batch.nsim if self._ids is None else len(self._ids)
+
+    def stop(self, chosen: BoolArray) -> None:
+        """Steps some simulations no longer; their state remains.
+
+        Args:
+            chosen: Mask of the simulations, ``(n,)``.
+        """
+        self._stopped |= chosen
+        self._ids = np.flatnonzero(~(self._failed | self._stopped))
 
     def reset(self, stage: mujoco.mjtStage) -> None:
         """Resets all simulations to the reference pose.
@@ -85,7 +117,7 @@ class LiveBatch:
                 yield
         except SimulationError as error:
             self._failed[error.ids] = True
-            self._ids = np.flatnonzero(~self._failed)
+            self._ids = np.flatnonzero(~(self._failed | self._stopped))
 
     def diverged(self) -> BoolArray:
         """Returns a mask of the simulations that diverged or had a warning, ``(n,)``."""

@@ -1,7 +1,7 @@
 """Simulator: batches of closed-loop rollouts, short predictions and ensembles of the self-model."""
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache, partial
 from time import perf_counter
 
@@ -19,7 +19,7 @@ from selfmodel.robot.editing.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state.sensing import SensorReader
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
-from selfmodel.simulation.batch import LiveBatch, live_signals, new_batch
+from selfmodel.simulation.batch import EarlyStop, LiveBatch, live_signals, new_batch
 from selfmodel.simulation.conditions import (
     Condition,
     ReadingNoise,
@@ -191,6 +191,8 @@ class Simulator:
         drivers: Sequence[CommandSource],
         steps: int,
         record: Sequence[Signal],
+        *,
+        early_stop: EarlyStop | None = None,
     ) -> SimulationResult:
         """Simulates each driver under each condition.
 
@@ -200,6 +202,8 @@ class Simulator:
             drivers: Sources of the commands, at least one.
             steps: Control steps, and rows of every signal.
             record: Signals to record.
+            early_stop: Runs to stop before the end, each of which then has its last row in all
+                later rows of its state; none by default.
 
         Returns:
             Signals of ``(drivers, conditions, steps, width)``, and a mask of
@@ -216,6 +220,7 @@ class Simulator:
             record,
             start=np.tile(start, (count, 1)),
             noise=ReadingNoise(conditions, uncertainty, silent),
+            early_stop=early_stop,
         )
         return flat.grouped(count, len(conditions))
 
@@ -228,6 +233,7 @@ class Simulator:
         *,
         start: FloatArray | None = None,
         noise: ReadingNoise | None = None,
+        early_stop: EarlyStop | None = None,
     ) -> SimulationResult:
         robot, n = self.robot, len(embodiments)
         batch = new_batch(robot.model, embodiments, self.threads)
@@ -264,6 +270,9 @@ class Simulator:
             motors.advance()
             for signal, rows in kept.items():
                 rows[k] = live[signal]()
+            if early_stop is not None and k + 1 in early_stop.steps:
+                alive.stop(early_stop.chosen(_behaviour(robot, kept, k + 1)))
+            self.stats.steps += alive.running
             if k + 1 < steps:
                 clock = perf_counter()
                 if part:
@@ -273,13 +282,17 @@ class Simulator:
                 self.stats.physics_seconds += perf_counter() - clock
         diverged = alive.diverged()
         self.stats.runs += n
-        self.stats.steps += n * steps
         self.stats.diverged += int(diverged.sum())
-        signals = {
-            signal: np.ascontiguousarray(rows.swapaxes(0, 1)) for signal, rows in kept.items()
-        }
-        time = np.arange(steps, dtype=np.float64) * robot.control_timestep
-        return SimulationResult(Behaviour(robot.anatomy.names, time, signals), diverged)
+        return SimulationResult(_behaviour(robot, kept, steps), diverged)
+
+
+def _behaviour(robot: Robot, kept: Mapping[Signal, FloatArray], steps: int) -> Behaviour:
+    """Returns the behaviour of the first steps from rows of ``(steps, n, width)`` per signal."""
+    signals = {
+        signal: np.ascontiguousarray(rows[:steps].swapaxes(0, 1)) for signal, rows in kept.items()
+    }
+    time = np.arange(steps, dtype=np.float64) * robot.control_timestep
+    return Behaviour(robot.anatomy.names, time, signals)
 
 
 class _DelayLine:

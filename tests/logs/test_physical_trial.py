@@ -6,10 +6,11 @@ from pathlib import Path
 import pytest
 
 from selfmodel.controllers.controller import Controller
-from selfmodel.errors import InputError
+from selfmodel.errors import InputError, TrialError
 from selfmodel.logs import IncompleteError, read_log
-from selfmodel.logs.physical_trial import TrialRunner, run_trial
+from selfmodel.logs.physical_trial import MIN_STEPS, TrialRunner, run_trial
 from selfmodel.logs.records import TrialHeader
+from selfmodel.physical.watchdog import HangError
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Sample
@@ -64,6 +65,44 @@ def test_a_robot_that_stops_early_leaves_an_unfinished_log(biped: Robot, tmp_pat
         run(Untimed(biped, 5), plan_of(biped, STEPS, "00-before"))
 
     assert [file.name for file in tmp_path.iterdir()] == ["00-before.mcap.part"]
+
+
+class Falling(Untimed):
+    """A physical robot that cannot finish its trial."""
+
+    def __init__(self, robot: Robot, stops_after: int, error: TrialError) -> None:
+        super().__init__(robot, stops_after)
+        self._error = error
+
+    def run(self, controller: Controller, steps: int) -> Iterator[Sample]:
+        """Yields some samples, then raises the error."""
+        yield from super().run(controller, steps)
+        raise self._error
+
+
+def test_a_trial_that_the_robot_cannot_finish_is_a_trial_as_far_as_it_goes(
+    biped: Robot, tmp_path: Path
+):
+    run = TrialRunner(tmp_path, biped, Settings())
+    robot = Falling(biped, MIN_STEPS, TrialError("a limit was exceeded"))
+    trial = run(robot, plan_of(biped, 2 * MIN_STEPS, "02-recovery"))
+    log = read_log(tmp_path / "02-recovery.mcap")
+
+    assert (trial.plan.steps, trial.behaviour.steps) == (2 * MIN_STEPS, MIN_STEPS)
+    assert (log.status, log.reason) == ("stopped", "TrialError: a limit was exceeded")
+
+
+@pytest.mark.parametrize("case", ["short", "hanging", "not stopped"])
+def test_a_trial_that_is_too_short_or_whose_robot_is_not_safe_is_an_error(
+    biped: Robot, tmp_path: Path, case: str
+):
+    error = HangError("step hangs") if case == "hanging" else TrialError("it fell")
+    if case == "not stopped":
+        error.add_note("the safe command could not be sent")
+    robot = Falling(biped, MIN_STEPS - (case == "short"), error)
+    run = TrialRunner(tmp_path, biped, Settings())
+    with pytest.raises(TrialError, match=str(error)):
+        run(robot, plan_of(biped, 2 * MIN_STEPS, "02-recovery"))
 
 
 def test_a_plan_names_the_log_and_a_name_that_is_none_is_refused(biped: Robot, tmp_path: Path):

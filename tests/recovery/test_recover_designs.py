@@ -11,7 +11,8 @@ from selfmodel.experiments.arguments import comparator_choice
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated_robot import SimulatedRobot
-from selfmodel.recovery.next_trial import candidates, discriminating_controller
+from selfmodel.recovery.candidate import unpredicted
+from selfmodel.recovery.next_trial import by_repair, candidates, discriminating_controller
 from selfmodel.recovery.recover import recover
 from selfmodel.recovery.recovery import Recovery
 from selfmodel.recovery.repair import RepairSearch
@@ -32,10 +33,10 @@ def evolved(robot: Robot, kind: str, next_trial: str = "repair") -> Recovery:
 
     def choose(situation):  # noqa: ANN001, ANN202  # as recover declares it
         if next_trial == "repair":
-            return situation.repaired()
+            return by_repair(situation)
         known = situation.known
         rest = (situation.simulator, situation.settings, situation.rng)
-        return discriminating_controller(known.diagnoses[-1], known.controllers, *rest)
+        return unpredicted(discriminating_controller(known.diagnoses[-1], known.controllers, *rest))
 
     return recover(
         healthy=SimulatedRobot(robot),

@@ -1,0 +1,83 @@
+"""Promises of CMA-ES: ask, tell, stop; raced starts; only the given random numbers."""
+
+import numpy as np
+import pytest
+
+from selfmodel.controllers.controller import draw_genomes
+from selfmodel.recovery.cma_es import MIN_POPULATION, PRUNED_AFTER, STARTS, CmaEs
+from selfmodel.settings import Settings
+
+LENGTH = 6
+GOAL = np.array([0.5, -0.5, 0.25, 0.0, 0.9, -0.9])
+
+
+def fitness(genomes: np.ndarray) -> np.ndarray:
+    return -np.square(genomes - GOAL).sum(axis=1)
+
+
+def run(generations: int, seeds: tuple[np.ndarray, ...] = (), seed: int = 0) -> CmaEs:
+    rng = np.random.default_rng(seed)
+    search = CmaEs(LENGTH, draw_genomes, Settings().scaled(40), rng, seeds)
+    for _ in range(generations):
+        assert not search.stop()
+        search.tell(fitness(search.ask()))
+    return search
+
+
+def test_it_finds_the_maximum():
+    best = run(80).candidates(5)
+    assert fitness(best).max() > -1e-3
+    assert np.all(np.abs(best) <= 1)
+
+
+def test_after_the_race_one_start_is_left():
+    sizes = [len(run(count).ask()) for count in (1, 1 + PRUNED_AFTER[0], 1 + PRUNED_AFTER[1])]
+    one = round(0.24 * 40)
+    assert sizes == [STARTS * one, STARTS * one, STARTS // 2 * one] or sizes[-1] == one
+    assert len(run(2 + PRUNED_AFTER[1]).ask()) == one
+
+
+def test_a_run_starts_from_a_good_seed_and_stays_near_it():
+    seed = GOAL + 0.02
+    search = run(1, (seed,))
+    population = search.ask()[: round(0.24 * 40)]
+    assert np.linalg.norm(population.mean(axis=0) - seed) < 0.4
+    assert fitness(run(25, (seed,)).candidates(1)).max() > fitness(run(25).candidates(1)).max()
+
+
+def test_the_same_generator_gives_the_same_genomes_and_no_other_generator_is_used():
+    np.random.seed(0)  # noqa: NPY002  # the library's default generator is numpy's global one
+    first = run(20).ask()
+    state = np.random.get_state()[1].copy()  # noqa: NPY002  # as above
+    np.random.seed(7)  # noqa: NPY002  # as above
+    np.testing.assert_array_equal(run(20).ask(), first)
+    np.random.seed(0)  # noqa: NPY002  # as above
+    np.testing.assert_array_equal(np.random.get_state()[1], state)  # noqa: NPY002  # as above
+    assert not np.array_equal(run(20, seed=1).ask(), first)
+
+
+def test_diverged_simulations_are_the_worst():
+    rng = np.random.default_rng(0)
+    search = CmaEs(LENGTH, draw_genomes, Settings().scaled(40), rng)
+    for _ in range(60):
+        genomes = search.ask()
+        values = fitness(genomes)
+        values[genomes[:, 0] < 0] = -np.inf
+        search.tell(values)
+    assert fitness(search.candidates(5)).max() > -0.01
+    search.tell(np.full(len(search.ask()), -np.inf))
+    assert np.isfinite(search.ask()).all()
+
+
+@pytest.mark.parametrize("values", [np.zeros(3), np.full(80, np.nan)])
+def test_a_fitness_of_another_shape_or_a_nan_is_refused(values: np.ndarray):
+    search = CmaEs(LENGTH, draw_genomes, Settings().scaled(40), np.random.default_rng(0))
+    with pytest.raises(ValueError, match="expected a fitness other than NaN"):
+        search.tell(values)
+
+
+def test_the_smallest_settings_still_search():
+    search = CmaEs(LENGTH, draw_genomes, Settings().scaled(2), np.random.default_rng(0))
+    assert len(search.ask()) == STARTS
+    search.tell(fitness(search.ask()))
+    assert len(search.ask()) == STARTS * MIN_POPULATION

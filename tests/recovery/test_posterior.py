@@ -1,0 +1,97 @@
+"""Promises of the posterior of a self-model: models that predict the trials weigh more."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import selfmodel
+from selfmodel.controllers.playback import Playback
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.recovery.posterior import (
+    MIN_EFFECTIVE,
+    MODELS,
+    Posterior,
+    flattened_weights,
+    log_likelihood,
+)
+from selfmodel.robot.robot import Robot
+from selfmodel.simulation.calibration import calibrate
+from selfmodel.simulation.model_distribution import Weighted
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.trial import Trial
+from tests.helpers.drivers import random_controllers
+
+
+def trials(robot: Robot, gap: float, folder: Path, count: int = 1) -> list[Trial]:
+    physical = selfmodel.simulated_robot(robot, gap=gap, seed=1)
+    return [
+        selfmodel.run_trial(
+            physical, walk, folder / f"{number}.mcap", robot=robot, steps=200, stage="before"
+        )
+        for number, walk in enumerate(random_controllers(robot, count, seed=3))
+    ]
+
+
+def posterior(robot: Robot, healthy: list[Trial], seed: int = 0) -> Posterior:
+    calibration = calibrate(robot, healthy, 1)
+    simulator = Simulator(calibration.robot, 1)
+    return Posterior(simulator, healthy, calibration, np.random.default_rng(seed))
+
+
+def test_models_that_predict_the_path_weigh_more():
+    repeats = np.random.default_rng(0).normal(0, 0.1, (16, 3))
+    paths = np.array([[1.0, 0, 0], [1.5, 0, 0], [3.0, 0, 0], [np.nan] * 3])
+    found = log_likelihood(np.array([1.0, 0, 0]), paths, repeats)
+
+    assert found[0] > found[1] > found[2] >= found[3]
+    assert np.isfinite(found).all()
+
+
+@pytest.mark.parametrize("spread", [0.0, 1.0, 1e6])
+def test_the_effective_size_of_the_sample_is_bounded_below(spread: float):
+    likelihood = -spread * np.random.default_rng(0).random(MODELS)
+    weights = flattened_weights(likelihood)
+
+    assert weights.sum() == pytest.approx(1)
+    assert 1 / np.square(weights).sum() >= MIN_EFFECTIVE - 1e-9
+    order = np.argsort(-likelihood)
+    assert np.all(np.diff(weights[order]) <= 1e-12)
+    if spread == 0:
+        np.testing.assert_allclose(weights, 1 / MODELS)
+
+
+def test_a_trial_changes_the_weights_once_and_other_random_numbers_the_sample(
+    quadruped: Robot, tmp_path: Path
+):
+    healthy = trials(quadruped, 0.1, tmp_path, count=2)
+    own = posterior(quadruped, healthy[:1])
+    first, again = (own.after(healthy[:1], INTACT) for _ in range(2))
+    both = own.after(healthy, INTACT)
+
+    assert isinstance(first.models, Weighted)
+    np.testing.assert_array_equal(first.models.weights, again.models.weights)
+    assert np.ptp(first.models.weights) > 0
+    assert not np.array_equal(first.models.weights, both.models.weights)
+    other = posterior(quadruped, healthy[:1], seed=1).after(healthy[:1], INTACT)
+    assert not np.array_equal(other.models.models[0].factors, first.models.models[0].factors)
+
+
+def test_a_model_that_is_exact_stays_so_without_a_simulation(quadruped: Robot, tmp_path: Path):
+    healthy = trials(quadruped, 0.0, tmp_path)
+    own = posterior(quadruped, healthy)
+    before = own._simulator.stats.runs
+    found = own.after(healthy, INTACT)
+
+    assert not found.models.draw(np.random.default_rng(0)).differs
+    assert own._simulator.stats.runs == before + 1  # the noise-free trial of the estimate
+
+
+def test_a_recording_of_other_software_is_a_trial_too(quadruped: Robot, tmp_path: Path):
+    (walked,) = trials(quadruped, 0.1, tmp_path)
+    played = Playback(walked.behaviour.names.motors, walked.behaviour["commands"])
+    plan = walked.plan.__class__("played", "before", played, walked.plan.steps, 0)
+    recording = Trial(plan, walked.robot, walked.behaviour, "played.mcap")
+    found = posterior(quadruped, [recording]).after([recording], INTACT)
+
+    assert isinstance(found.models, Weighted)

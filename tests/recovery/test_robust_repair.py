@@ -1,0 +1,106 @@
+"""Promises of the robust repair: its cost, its candidates, its errors."""
+
+import dataclasses
+from functools import partial
+
+import numpy as np
+import pytest
+
+from selfmodel.controllers.controller import draw_genomes
+from selfmodel.errors import WorkError
+from selfmodel.evolution import Evolution, Generation
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.faults.notation import parse
+from selfmodel.recovery.candidate import Candidate
+from selfmodel.recovery.fitness import DISPLACEMENT
+from selfmodel.recovery.robust_fitness import RobustFitness, robust
+from selfmodel.recovery.robust_repair import COST, RobustRepair
+from selfmodel.recovery.uncertainty import assumed_uncertainty
+from selfmodel.robot.designs import network_for
+from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.simulation.simulator import Simulator
+from tests.helpers.hostile import unstable
+
+SMALL = dataclasses.replace(Settings().scaled(20), generations=8, steps=100)
+
+
+def repaired(
+    robot: Robot, simulator: Simulator, seed: int = 0, **options: object
+) -> tuple[tuple[Candidate, ...], list[Generation]]:
+    repair = RobustRepair(simulator, SMALL, network_for(robot), DISPLACEMENT, **options)
+    generations: list[Generation] = []
+    found = repair(
+        (INTACT,),
+        partial(assumed_uncertainty, robot),
+        (),
+        np.random.default_rng(seed),
+        generations.append,
+    )
+    return found, generations
+
+
+def test_candidates_are_better_than_chance_under_new_conditions_and_best_first(quadruped: Robot):
+    simulator = Simulator(quadruped, 2)
+    found, _ = repaired(quadruped, simulator)
+    fitness = RobustFitness(simulator, DISPLACEMENT, (INTACT,), assumed_uncertainty(quadruped))
+    design, rng = network_for(quadruped), np.random.default_rng(9)
+    random = [type(found[0].controller)(design, genome) for genome in draw_genomes(rng, (40, 68))]
+    by_chance = robust(fitness(random, 8, SMALL.steps, np.random.default_rng(1)))
+    best = robust(fitness([found[0].controller], 8, SMALL.steps, np.random.default_rng(1)))
+
+    assert best[0] > np.quantile(by_chance, 0.9)
+    values = [float(robust(own.scores[None])[0]) for own in found]
+    assert values == sorted(values, reverse=True)
+    assert found[0].predicted == pytest.approx(found[0].scores.mean())
+
+
+def test_it_costs_twice_the_papers_search_and_reports_its_progress(quadruped: Robot):
+    # Of a budget that exceeds the last comparison of the candidates.
+    simulator = Simulator(quadruped, 2)
+    _, generations = repaired(quadruped, simulator)
+    largest = max(len(range(4)) * 5, 40)  # a generation more, at most
+
+    assert simulator.stats.steps <= (COST * SMALL.evaluations + largest + 150) * SMALL.steps
+    assert [own.number for own in generations] == list(range(1, len(generations) + 1))
+    assert generations[-1].number == generations[-1].total
+
+
+def test_the_number_of_threads_changes_nothing(quadruped: Robot):
+    found = [repaired(quadruped, Simulator(quadruped, threads))[0] for threads in (1, 2)]
+    assert [own.controller for own in found[0]] == [own.controller for own in found[1]]
+    np.testing.assert_array_equal(found[0][0].scores, found[1][0].scores)
+    assert repaired(quadruped, Simulator(quadruped, 1), seed=1)[0][0].controller not in [
+        own.controller for own in found[0]
+    ]
+
+
+def test_the_papers_ea_can_be_its_search(quadruped: Robot):
+    found, generations = repaired(quadruped, Simulator(quadruped, 2), make_search=Evolution)
+    assert np.isfinite(found[0].scores).all()
+    assert generations[0].evaluations == SMALL.population
+
+
+def test_only_the_hypotheses_that_are_given_are_simulated(quadruped: Robot):
+    weak = parse("motor:front_left_knee=0.5", quadruped.anatomy)
+    seen: set[object] = set()
+
+    class Watched(Simulator):
+        def run_under(self, conditions, *rest, **options):  # noqa: ANN001, ANN002, ANN003, ANN202
+            seen.update(condition.hypothesis for condition in conditions)
+            return super().run_under(conditions, *rest, **options)
+
+    repair = RobustRepair(Watched(quadruped, 2), SMALL, network_for(quadruped), DISPLACEMENT)
+    repair(
+        (weak, INTACT),
+        partial(assumed_uncertainty, quadruped),
+        (),
+        np.random.default_rng(0),
+        lambda _generation: None,
+    )
+    assert seen == {weak, INTACT}
+
+
+def test_a_repair_that_no_simulation_survives_is_an_error(quadruped: Robot):
+    with pytest.raises(WorkError, match="no simulation of quadruped as intact remained finite"):
+        repaired(quadruped, Simulator(unstable(quadruped), 2))

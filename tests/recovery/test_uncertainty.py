@@ -1,0 +1,83 @@
+"""Promises of the uncertainty of a self-model: what healthy trials tell about noise."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import selfmodel
+from selfmodel.recovery.uncertainty import BODIES, assumed_uncertainty, estimated_uncertainty
+from selfmodel.robot.robot import Robot
+from selfmodel.simulation.calibration import Calibration, calibrate
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.trial import Trial
+from tests.helpers.drivers import random_controllers
+
+
+def healthy_trial(robot: Robot, gap: float, folder: Path, steps: int = 600) -> Trial:
+    physical = selfmodel.simulated_robot(robot, gap=gap, seed=1)
+    (walk,) = random_controllers(robot, 1, seed=3)
+    return selfmodel.run_trial(
+        physical, walk, folder / "walk.mcap", robot=robot, steps=steps, stage="before"
+    )
+
+
+def fitted(robot: Robot, trial: Trial) -> tuple[Simulator, Calibration]:
+    calibration = calibrate(robot, [trial], 1)
+    return Simulator(calibration.robot, 1), calibration
+
+
+@pytest.mark.parametrize("level", [0.05, 0.1])
+def test_the_noise_of_the_readings_is_that_of_the_physical_robot(
+    quadruped: Robot, level: float, tmp_path: Path
+):
+    trial = healthy_trial(quadruped, level, tmp_path)
+    simulator, calibration = fitted(quadruped, trial)
+    found = estimated_uncertainty(simulator, [trial], calibration)
+    touch = np.array([sensor.kind == "touch" for sensor in quadruped.anatomy.sensors])
+
+    np.testing.assert_allclose(found.reading_noise[~touch], level, rtol=0.25)
+    assert found.wrong_touches[touch].mean() == pytest.approx(level / 2, rel=0.5)
+    assert not found.reading_noise[touch].any()
+    assert not found.wrong_touches[~touch].any()
+    assert 0.2 * level / 2 < found.start.angles < 0.2 * level * 3
+    assert found.models.bodies.max() == BODIES
+
+
+def test_a_robot_that_equals_its_model_has_no_uncertainty(quadruped: Robot, tmp_path: Path):
+    trial = healthy_trial(quadruped, 0.0, tmp_path)
+    simulator, calibration = fitted(quadruped, trial)
+    found = estimated_uncertainty(simulator, [trial], calibration)
+
+    assert not found.reading_noise.any()
+    assert not found.wrong_touches.any()
+    assert (found.start.angles, found.start.tilt) == (0.0, 0.0)
+    assert not found.models.draw(np.random.default_rng(0)).differs
+
+
+def test_a_base_that_was_not_observed_tilts_by_half_of_the_joints_deviation(
+    quadruped: Robot, tmp_path: Path
+):
+    trial = healthy_trial(quadruped, 0.1, tmp_path, steps=300)
+    signals = {
+        signal: np.full_like(values, np.nan) if signal.startswith("base") else values
+        for signal, values in trial.behaviour.signals.items()
+    }
+    blind = dataclasses.replace(
+        trial, behaviour=dataclasses.replace(trial.behaviour, signals=signals)
+    )
+    found = estimated_uncertainty(Simulator(quadruped, 1), [blind], None)
+
+    assert found.start.tilt == found.start.angles / 2 > 0
+    assert not found.models.draw(np.random.default_rng(0)).differs  # no calibration: as given
+
+
+def test_before_the_first_trial_everything_is_uncertain(robot: Robot):
+    found = assumed_uncertainty(robot)
+    touch = np.array([sensor.kind == "touch" for sensor in robot.anatomy.sensors])
+
+    assert (found.reading_noise[~touch] > 0).all()
+    assert (found.wrong_touches[touch] > 0).all()
+    assert len(found.delays) > 1
+    assert found.models.draw(np.random.default_rng(0)).differs
