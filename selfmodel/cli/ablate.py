@@ -21,7 +21,6 @@ from selfmodel.cli.options import (
     KindNames,
     Only,
     Population,
-    ScoreName,
     Seeds,
     Steps,
     Structural,
@@ -31,6 +30,7 @@ from selfmodel.cli.options import (
 from selfmodel.cli.output import grid_display
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.tables import show
+from selfmodel.cli.repair_options import ScoreName
 from selfmodel.comparators import COMPARATORS
 from selfmodel.experiments.ablation import Ablation, AblationResults, ablate as run, write_results
 from selfmodel.experiments.ablation.results import as_dict

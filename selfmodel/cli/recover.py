@@ -25,11 +25,7 @@ from selfmodel.cli.options import (
     Neurons,
     NextTrialName,
     Population,
-    RecoveryScore,
-    Reference,
-    RepairName,
     RobotName,
-    SearchName,
     Seed,
     Steps,
     Structural,
@@ -39,6 +35,7 @@ from selfmodel.cli.options import (
 from selfmodel.cli.output.display import displacement_text, display
 from selfmodel.cli.output.printing import print_json, print_notes
 from selfmodel.cli.output.report import facts, print_report, result_file
+from selfmodel.cli.repair_options import RecoveryScore, Reference, RepairName, SearchName
 from selfmodel.controllers.controller import check_silent_neurons
 from selfmodel.experiments import plugins, robots
 from selfmodel.experiments.arguments import AUTO, comparator_choice

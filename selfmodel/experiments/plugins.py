@@ -18,7 +18,7 @@ from selfmodel.errors import InputError, unknown_name
 from selfmodel.evolution import Evolution
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import ALL_KINDS, KIND_SETS, KINDS, kind_names
-from selfmodel.recovery.candidate import MakeRepair
+from selfmodel.recovery.candidate_controller import MakeRepair
 from selfmodel.recovery.cma_es import CmaEs
 from selfmodel.recovery.energy import ENERGY
 from selfmodel.recovery.fitness import DISPLACEMENT, Score

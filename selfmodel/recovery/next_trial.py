@@ -10,7 +10,7 @@ from selfmodel.controllers.controller import Controller, draw_genomes
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.evolution import reproduce
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.recovery.candidate import Candidate, unpredicted
+from selfmodel.recovery.candidate_controller import CandidateController
 from selfmodel.recovery.database import Database
 from selfmodel.recovery.disagreement import Disagreement
 from selfmodel.recovery.events import DiscriminatingTrial, Event
@@ -44,15 +44,15 @@ class Situation:
     simulator: Simulator
     settings: Settings
     rng: np.random.Generator
-    repaired: Callable[[], Sequence[Candidate]]
+    repaired: Callable[[], Sequence[CandidateController]]
     on_event: Callable[[Event], None]
 
 
-NextTrial = Callable[[Situation], Candidate]
+NextTrial = Callable[[Situation], Controller]
 """Chooses the controller of the next physical trial."""
 
 
-def by_repair(situation: Situation) -> Candidate:
+def by_repair(situation: Situation) -> Controller:
     """Returns the best candidate of the repair that was not tried yet.
 
     If all candidates were tried, as may happen with the paper's repair, the best one is returned.
@@ -60,10 +60,10 @@ def by_repair(situation: Situation) -> Candidate:
     candidates = situation.repaired()
     tried = situation.known.controllers
     untried = [candidate for candidate in candidates if candidate.controller not in tried]
-    return (untried or candidates)[0]
+    return (untried or candidates)[0].controller
 
 
-def by_disagreement(situation: Situation) -> Candidate:
+def by_disagreement(situation: Situation) -> Controller:
     """Returns the controller with the largest disagreement of the hypotheses, or a repair.
 
     A repair is returned once the diagnosis is ``explained`` or ``intact`` and either has no
@@ -78,14 +78,13 @@ def by_disagreement(situation: Situation) -> Candidate:
     if certain or situation.trials_left == 1:
         return by_repair(situation)
     situation.on_event(DiscriminatingTrial(candidates_to_separate(diagnosis)))
-    controller = discriminating_controller(
+    return discriminating_controller(
         diagnosis,
         situation.known.controllers,
         situation.simulator,
         situation.settings,
         situation.rng,
     )
-    return unpredicted(controller)
 
 
 def discriminating_controller(

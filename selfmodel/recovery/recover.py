@@ -1,6 +1,7 @@
 """The paper's algorithm: run and log a trial, diagnose, repair, with few physical trials."""
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 from selfmodel.controllers.controller import Controller, Design
@@ -12,7 +13,7 @@ from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.physical.interface import PhysicalRobot
-from selfmodel.recovery.candidate import Candidate, MakeRepair, unpredicted
+from selfmodel.recovery.candidate_controller import CandidateController, MakeRepair
 from selfmodel.recovery.database import Database, Journal, RunTrial
 from selfmodel.recovery.events import Event, SearchBegins
 from selfmodel.recovery.fitness import DISPLACEMENT, Score
@@ -85,15 +86,18 @@ def recover(
     # From the nominal robot: the numbers of the calibrated model are rounded.
     design = network_for(simulator.robot) if design is None else design
     repair, evaluations_before = make_repair(simulator, settings, design, score), 0
-    tried: list[tuple[Hypothesis, Candidate]] = []
+    tried: list[Hypothesis] = []
+    predicted: dict[object, float] = {}
     database = Database()
 
     def evolve_candidates(
         hypotheses: Sequence[Hypothesis], uncertainty: Callable[[], Uncertainty]
-    ) -> tuple[Candidate, ...]:
+    ) -> tuple[CandidateController, ...]:
         on_event(SearchBegins("repair", hypotheses[0]))
         rng = repair_stream(seed, len(database.diagnoses))
-        return repair(hypotheses, uncertainty, database.controllers, rng, on_event)
+        found = repair(hypotheses, uncertainty, database.controllers, rng, on_event)
+        predicted.update({candidate.controller: candidate.predicted for candidate in found})
+        return found
 
     def diagnose() -> Diagnosis:
         nonlocal database
@@ -105,32 +109,28 @@ def recover(
         on_event(diagnosis)
         return diagnosis
 
-    def act(robot: PhysicalRobot, stage: Stage, best: Hypothesis, candidate: Candidate) -> None:
+    def act(robot: PhysicalRobot, stage: Stage, best: Hypothesis, controller: Controller) -> None:
         nonlocal database
-        name = f"{len(tried):02d}-{stage}"
-        plan = TrialPlan(name, stage, candidate.controller, settings.steps, seed)
-        tried.append((best, candidate))
+        plan = TrialPlan(f"{len(tried):02d}-{stage}", stage, controller, settings.steps, seed)
+        tried.append(best)
         trial = run_trial(robot, plan)
         database = database.with_trial(trial)
         on_event(trial)
 
     HypothesisSpace.of(kinds, simulator.robot.anatomy)  # before any physical trial
-    assumed = partial(assumed_uncertainty, simulator.robot)
-    first = unpredicted(gait) if gait else evolve_candidates((INTACT,), assumed)[0]
-    act(healthy, "before", INTACT, first)
+    before = partial(assumed_uncertainty, simulator.robot)
+    gait = gait or evolve_candidates((INTACT,), before)[0].controller
+    act(healthy, "before", INTACT, gait)
     healthy_trials = database.trials
     choose_comparator(simulator.robot, healthy_trials)  # before the calibration and the failure
     calibration = calibrate(healthy_trials) if calibrate else None
     if calibration is not None:
         on_event(calibration)
         if calibration.robot is not simulator.robot:
-            simulator = Simulator(
-                calibration.robot, simulator.threads, simulator.stats, simulator.budget
-            )
-            evaluations_before = repair.evaluations
+            simulator, evaluations_before = _fitted(simulator, calibration), repair.evaluations
             repair = make_repair(simulator, settings, design, score)
     posterior = Posterior(simulator, healthy_trials, calibration, posterior_stream(seed))
-    act(damaged, "after", INTACT, unpredicted(first.controller))
+    act(damaged, "after", INTACT, gait)
     chosen = choose_comparator(simulator.robot, database.trials)
     on_event(chosen)
     search = DiagnosticSearch(simulator, chosen.comparator, settings, kinds, intact=healthy_trials)
@@ -153,7 +153,7 @@ def recover(
     scores, falls = _judged(simulator.robot, diagnosis.best, database.trials, score)
     return Recovery(
         trials=database.trials,
-        tried=tuple(best for best, _ in tried),
+        tried=tuple(tried),
         diagnosis=diagnosis,
         repair_evaluations=evaluations_before + repair.evaluations,
         diagnostic_evaluations=search.evaluations,
@@ -161,10 +161,15 @@ def recover(
         comparator=chosen,
         calibration=calibration,
         score=score,
-        predicted=tuple(candidate.predicted for _, candidate in tried),
+        predicted=_predictions(database.trials, predicted),
         scores=scores,
         falls=falls,
     )
+
+
+def _fitted(simulator: Simulator, calibration: Calibration) -> Simulator:
+    """Returns a simulator of the calibrated self-model, with the same statistics."""
+    return Simulator(calibration.robot, simulator.threads, simulator.stats, simulator.budget)
 
 
 def _judged(
@@ -177,3 +182,9 @@ def _judged(
         tuple(score.of_trial(robot, own, trial) for own, trial in pairs),
         tuple(fall_of(robot, own, trial) for own, trial in pairs),
     )
+
+
+def _predictions(trials: Sequence[Trial], predicted: Mapping[object, float]) -> tuple[float, ...]:
+    """Returns the predicted score of each trial, by controller; the failure was not predicted."""
+    known = (None if trial.plan.stage == "after" else trial.plan.controller for trial in trials)
+    return tuple(predicted.get(controller, math.nan) for controller in known)

@@ -9,7 +9,7 @@ from selfmodel.controllers.controller import Controller, Design, draw_genomes
 from selfmodel.errors import WorkError
 from selfmodel.evolution import Evolution, GenerationCallback, evolve
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.recovery.candidate import Candidate
+from selfmodel.recovery.candidate_controller import CandidateController
 from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
@@ -56,10 +56,10 @@ class RepairSearch:
         seeds: Sequence[Controller],
         rng: np.random.Generator,
         on_generation: GenerationCallback,
-    ) -> tuple[Candidate, ...]:
+    ) -> tuple[CandidateController, ...]:
         """Returns the best controller for the first hypothesis; see ``Repair``."""
         best, fitness = self._evolved(hypotheses[0], seeds, rng, on_generation)
-        return (Candidate(best, np.array([fitness])),)
+        return (CandidateController(best, np.array([fitness])),)
 
     def best(
         self,

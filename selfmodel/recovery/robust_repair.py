@@ -18,7 +18,7 @@ from selfmodel.controllers.controller import Controller, Design, draw_genomes
 from selfmodel.errors import WorkError
 from selfmodel.evolution import Draw, Generation, GenerationCallback
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.recovery.candidate import Candidate
+from selfmodel.recovery.candidate_controller import CandidateController
 from selfmodel.recovery.cma_es import CmaEs
 from selfmodel.recovery.fitness import Score
 from selfmodel.recovery.robust_fitness import RobustFitness, robust
@@ -102,7 +102,7 @@ class RobustRepair:
         seeds: Sequence[Controller],
         rng: np.random.Generator,
         on_generation: GenerationCallback,
-    ) -> tuple[Candidate, ...]:
+    ) -> tuple[CandidateController, ...]:
         """Returns candidates, best first; see ``Repair``.
 
         Raises:
@@ -151,7 +151,7 @@ class RobustRepair:
                 f"finite, with {search.evaluations} controllers: check the model, such as its "
                 f"physics time step, masses and motors"
             )
-        return tuple(map(Candidate, found, judged))
+        return tuple(map(CandidateController, found, judged))
 
     def _controllers(self, genomes: FloatArray) -> list[Controller]:
         return [Controller(self._design, genome) for genome in genomes]

@@ -12,7 +12,7 @@ from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, Verdict
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
-from selfmodel.recovery.candidate import unpredicted
+from selfmodel.recovery.candidate_controller import CandidateController
 from selfmodel.recovery.database import Database
 from selfmodel.recovery.disagreement import EARLY_STEPS, Disagreement
 from selfmodel.recovery.events import DiscriminatingTrial, Event
@@ -225,10 +225,10 @@ def test_hypotheses_are_told_apart_until_one_explains_all_or_asking_is_in_vain(
         simulator=Simulator(quadruped, 1),
         settings=SMALL,
         rng=np.random.default_rng(0),
-        repaired=lambda: (unpredicted(compensating),),
+        repaired=lambda: (CandidateController(compensating, np.zeros(1)),),
         on_event=events.append,
     )
 
-    assert by_repair(situation).controller == compensating
-    assert (by_disagreement(situation).controller != compensating) == asks
+    assert by_repair(situation) == compensating
+    assert (by_disagreement(situation) != compensating) == asks
     assert events == ([DiscriminatingTrial(candidates_to_separate(found))] if asks else [])

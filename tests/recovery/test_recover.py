@@ -24,7 +24,6 @@ from selfmodel.logs.journal import FolderJournal, create_journal
 from selfmodel.logs.mcap.contents import Contents
 from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.physical.simulated_robot import SimulatedRobot
-from selfmodel.recovery.candidate import MakeRepair
 from selfmodel.recovery.events import Event, SearchBegins
 from selfmodel.recovery.next_trial import NextTrial, Situation, by_repair, discriminating_controller
 from selfmodel.recovery.recover import recover
@@ -100,7 +99,6 @@ def recovery(
     trials: int = 3,
     gait: Controller | None = None,
     next_trial: NextTrial = by_repair,
-    make_repair: MakeRepair = RepairSearch,
 ) -> Recovery:
     """A small recovery from a failure."""
     physical = SimulatedRobot(robot), SimulatedRobot(robot, truth)
@@ -118,7 +116,7 @@ def recovery(
         kinds=PAPER_KINDS,
         gait=gait,
         next_trial=next_trial,
-        make_repair=make_repair,
+        make_repair=RepairSearch,
     )
 
 
@@ -391,15 +389,11 @@ def test_trials_that_tell_apart_differ_from_the_one_before_and_are_the_same_at_a
 
     truth = parse("sensor:front_left_touch", quadruped.anatomy)
     gait = random_controllers(quadruped, 1)[0]
-    drivers = [
-        [
-            trial.plan.controller
-            for trial in recovery(
-                quadruped, truth, Simulator(quadruped, n), [], trials=2, gait=gait, next_trial=ask
-            ).trials[1:]
-        ]
-        for n in (1, 2)
-    ]
 
-    assert drivers[0] == drivers[1]
-    assert all(one != other for one, other in pairwise(drivers[0]))
+    def drivers(threads: int) -> list[Controller]:
+        rest = {"trials": 2, "gait": gait, "next_trial": ask}
+        outcome = recovery(quadruped, truth, Simulator(quadruped, threads), [], **rest)
+        return [trial.plan.controller for trial in outcome.trials[1:]]
+
+    assert drivers(1) == drivers(2)
+    assert all(one != other for one, other in pairwise(drivers(1)))

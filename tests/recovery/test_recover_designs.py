@@ -11,7 +11,6 @@ from selfmodel.experiments.arguments import comparator_choice
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated_robot import SimulatedRobot
-from selfmodel.recovery.candidate import unpredicted
 from selfmodel.recovery.next_trial import by_repair, candidates, discriminating_controller
 from selfmodel.recovery.recover import recover
 from selfmodel.recovery.recovery import Recovery
@@ -36,7 +35,7 @@ def evolved(robot: Robot, kind: str, next_trial: str = "repair") -> Recovery:
             return by_repair(situation)
         known = situation.known
         rest = (situation.simulator, situation.settings, situation.rng)
-        return unpredicted(discriminating_controller(known.diagnoses[-1], known.controllers, *rest))
+        return discriminating_controller(known.diagnoses[-1], known.controllers, *rest)
 
     return recover(
         healthy=SimulatedRobot(robot),
@@ -51,6 +50,7 @@ def evolved(robot: Robot, kind: str, next_trial: str = "repair") -> Recovery:
         design=DESIGNS[kind](robot, None),
         calibrate=lambda _trials: SimpleNamespace(robot=fitted, summary=None),
         next_trial=choose,
+        make_repair=RepairSearch,
     )
 
 

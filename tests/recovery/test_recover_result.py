@@ -60,7 +60,8 @@ def without_base(trial: Trial) -> Trial:
 def test_an_unobserved_displacement_is_none_everywhere(trial: Trial):
     diagnosis = Diagnosis((Candidate(INTACT, 0.0),), 1, 0.0, (), "explained", "by hand")
     blind = without_base(trial)
-    recovery = Recovery((blind,) * 3, (INTACT,) * 3, diagnosis, 0, 0, 0, CHOSEN)
+    unobserved = {"predicted": (math.nan,) * 3, "scores": (math.nan,) * 3}
+    recovery = Recovery((blind,) * 3, (INTACT,) * 3, diagnosis, 0, 0, 0, CHOSEN, **unobserved)
 
     values = json.loads(json.dumps(recovery.to_dict(), allow_nan=False))
 

@@ -11,7 +11,7 @@ from selfmodel.errors import WorkError
 from selfmodel.evolution import Evolution, Generation
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
-from selfmodel.recovery.candidate import Candidate
+from selfmodel.recovery.candidate_controller import CandidateController
 from selfmodel.recovery.fitness import DISPLACEMENT
 from selfmodel.recovery.robust_fitness import RobustFitness, robust
 from selfmodel.recovery.robust_repair import COST, RobustRepair
@@ -27,7 +27,7 @@ SMALL = dataclasses.replace(Settings().scaled(20), generations=8, steps=100)
 
 def repaired(
     robot: Robot, simulator: Simulator, seed: int = 0, **options: object
-) -> tuple[tuple[Candidate, ...], list[Generation]]:
+) -> tuple[tuple[CandidateController, ...], list[Generation]]:
     repair = RobustRepair(simulator, SMALL, network_for(robot), DISPLACEMENT, **options)
     generations: list[Generation] = []
     found = repair(

@@ -20,7 +20,6 @@ from selfmodel.cli.options import (
     Neurons,
     Only,
     Population,
-    ScoreName,
     Seeds,
     Structural,
     StudyFolder,
@@ -30,6 +29,7 @@ from selfmodel.cli.options import (
 from selfmodel.cli.output import grid_display
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.tables import show
+from selfmodel.cli.repair_options import ScoreName
 from selfmodel.comparators import DEFAULT
 from selfmodel.experiments.suite.bodies import DOMAINS, bodies, tasks_of
 from selfmodel.experiments.suite.plan import Study, known_cases

@@ -17,7 +17,7 @@ from selfmodel.simulation.simulator import Simulator
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class CandidateController:
     """A controller for the next trial, with its predicted scores.
 
     Attributes:
@@ -33,11 +33,6 @@ class Candidate:
     def predicted(self) -> float:
         """Mean predicted score."""
         return float(np.mean(self.scores))
-
-
-def unpredicted(controller: Controller) -> Candidate:
-    """Returns a candidate without a prediction."""
-    return Candidate(controller, np.array([np.nan]))
 
 
 class Repair(Protocol):
@@ -57,7 +52,7 @@ class Repair(Protocol):
         rng: np.random.Generator,
         on_generation: GenerationCallback,
         /,
-    ) -> tuple[Candidate, ...]:
+    ) -> tuple[CandidateController, ...]:
         """Returns candidates for the next trial, best first, at least one.
 
         Args:
