@@ -1,0 +1,299 @@
+"""The robots in PyBullet: bodies, damage, servos, noise, trials through ``EnvironmentRobot``."""
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+pytest.importorskip("pybullet", reason="PyBullet is in the dependency group other-engine")
+
+import pybullet
+
+from benchmarks.other_engine.bullet import Bullet
+from benchmarks.other_engine.damage import Damage, damage_of
+from benchmarks.other_engine.environment import BulletEnvironment, physical_robot
+from benchmarks.other_engine.reality import Reality, draw_reality, ideal_reality
+from benchmarks.other_engine.recovery import Plan, recovered
+from benchmarks.other_engine.servos import Servos, motors_of
+from benchmarks.other_engine.table import table
+from selfmodel import read_log, run_trial
+from selfmodel.controllers.controller import Controller, draw_genomes
+from selfmodel.errors import InputError
+from selfmodel.robot.designs import network_for
+from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.tasks import ROBOTS
+from selfmodel.trials.behaviour import Behaviour, collect
+
+CASES = [(name, case) for name in ROBOTS for case in range(1, 10)]
+
+
+def random_gait(robot: Robot, seed: int = 1) -> Controller:
+    network = network_for(robot)
+    return Controller(network, draw_genomes(np.random.default_rng(seed), (network.weights,)))
+
+
+def walked(
+    robot: Robot, reality: Reality, damage: Damage, steps: int = 60, stream: int = 0
+) -> Behaviour:
+    with BulletEnvironment(robot, reality, damage, stream) as environment:
+        samples = physical_robot(environment, robot).run(random_gait(robot), steps)
+        return collect(robot.anatomy.names, samples)
+
+
+@pytest.fixture
+def bullet() -> Iterator[Callable[..., Bullet]]:
+    """Makes robots in PyBullet, and ends their clients."""
+    made = []
+
+    def make(robot: Robot, damage: Damage | None = None) -> Bullet:
+        made.append(Bullet(robot, ideal_reality(robot), damage or Damage()))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.close()
+
+
+def test_bodies_are_where_mujoco_has_them_in_random_poses(
+    robot: Robot, bullet: Callable[..., Bullet]
+):
+    model, data = robot.model, mujoco.MjData(robot.model)
+    rng, body = np.random.default_rng(0), bullet(robot)
+    for _ in range(5):
+        data.qpos[:7] = rng.normal(size=7)
+        data.qpos[7:] = rng.uniform(-0.5, 0.5, model.nq - 7)
+        mujoco.mj_normalizeQuat(model, data.qpos)
+        mujoco.mj_kinematics(model, data)
+
+        angles = np.array([data.joint(name).qpos[0] for name in robot.anatomy.hinges])
+        body.place(data.qpos[:3], data.qpos[3:7], angles)
+
+        np.testing.assert_allclose(body.base()[0], data.body(robot.root).xpos, atol=1e-6)
+        np.testing.assert_allclose(
+            body.base()[1].as_matrix().ravel(), data.body(robot.root).xmat, atol=1e-6
+        )
+        positions = body.positions()
+        names = [model.body(number).name for number in range(2, model.nbody)]
+        for name in names:
+            np.testing.assert_allclose(positions[name], data.body(name).xpos, atol=1e-6)
+
+
+def test_the_mass_is_that_of_the_model(robot: Robot, bullet: Callable[..., Bullet]):
+    assert bullet(robot).mass() == pytest.approx(robot.model.body_mass.sum(), rel=1e-6)
+
+
+def test_a_broken_joint_removes_its_links_and_their_mass(
+    robot: Robot, bullet: Callable[..., Bullet]
+):
+    joint = robot.anatomy.joints[0]
+    left = bullet(robot, damage_of(f"break:{joint.name}", robot.anatomy))
+
+    lost = sum(robot.model.body(name).mass[0] for name in joint.bodies)
+    assert left.mass() == pytest.approx(robot.model.body_mass.sum() - lost, rel=1e-6)
+    assert not joint.bodies & left.positions().keys()
+    assert set(left.positions()) >= {
+        other.name for other in map(robot.model.body, range(2, robot.model.nbody))
+    } - set(joint.bodies)
+
+
+def test_a_jammed_joint_is_a_fixed_joint_at_its_angle(robot: Robot, bullet: Callable[..., Bullet]):
+    joint, angle = robot.anatomy.joints[0], 0.3
+    fixed = bullet(robot, Damage(fixed=dict.fromkeys(joint.hinges, angle)))
+    data = mujoco.MjData(robot.model)
+    for hinge in joint.hinges:
+        data.joint(hinge).qpos[0] = angle
+    mujoco.mj_kinematics(robot.model, data)
+    torques = np.zeros(len(robot.anatomy.hinges))
+    torques[robot.anatomy.hinges.index(joint.hinges[0])] = 5.0
+
+    before = fixed.positions()
+    fixed.step(torques)
+
+    for name in joint.bodies:
+        np.testing.assert_allclose(before[name], data.body(name).xpos, atol=1e-6)
+    assert fixed.hinges()[0][robot.anatomy.hinges.index(joint.hinges[0])] == angle
+    assert np.abs(fixed.base()[3]).max() < 0.05  # gravity alone moves it
+
+
+@pytest.mark.parametrize(("name", "case"), CASES)
+def test_every_case_of_table_one_is_a_damage_under_which_a_walk_stays_finite(name: str, case: int):
+    robot = ROBOTS[name].robot()
+    damage = damage_of(ROBOTS[name].cases[case], robot.anatomy)
+
+    behaviour = walked(robot, draw_reality(robot, 3), damage, steps=30)
+
+    for signal, values in behaviour.signals.items():
+        assert np.isfinite(values).all() or signal == "joint_efforts"
+    for sensor in damage.dead:
+        assert not behaviour["sensors"][:, behaviour.names.sensors.index(sensor)].any()
+
+
+def test_other_kinds_of_faults_are_refused(quadruped: Robot):
+    with pytest.raises(InputError, match="break, jam, sensor"):
+        damage_of("friction=0.4", quadruped.anatomy)
+    with pytest.raises(InputError, match="front_left_knee"):
+        damage_of("break:front_left_kne", quadruped.anatomy)
+
+
+def test_the_encoder_of_an_absent_joint_holds_its_last_value(quadruped: Robot):
+    damage = damage_of("break:front_left_shoulder", quadruped.anatomy)
+
+    behaviour = walked(quadruped, draw_reality(quadruped, 0), damage)
+
+    held = [quadruped.anatomy.hinges.index(name) for name in sorted(damage.lost)]
+    reading = behaviour.names.sensors.index("front_left_angle")
+    assert len(held) == 2
+    assert not np.ptp(behaviour["joint_positions"][:, held], axis=0).any()
+    assert not np.ptp(behaviour["sensors"][:, reading])
+    others = np.delete(behaviour["joint_positions"], held, axis=1)
+    assert np.ptp(others, axis=0).min() > 0.01
+
+
+def test_a_robot_stands_for_a_second_at_the_height_that_it_has_in_mujoco(robot: Robot):
+    data = mujoco.MjData(robot.model)
+    with BulletEnvironment(robot, ideal_reality(robot)) as environment:
+        environment.reset()
+        for _ in range(100):
+            found = environment.step(np.zeros(robot.model.nu)).observation
+            mujoco.mj_step(robot.model, data, robot.substeps)
+
+    assert found["base_position"][2] == pytest.approx(data.qpos[2], abs=0.005)
+    assert abs(found["base_orientation"][0]) > 0.999
+    touches = [sensor.kind == "touch" for sensor in robot.anatomy.sensors]
+    assert found["sensors"][touches].all()
+    assert found["time"] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_a_servo_in_the_air_follows_a_target_as_it_does_in_mujoco(
+    robot: Robot, number: int, bullet: Callable[..., Bullet]
+):
+    body, motors, hinges = (
+        bullet(robot),
+        motors_of(robot, ideal_reality(robot)),
+        robot.anatomy.hinges,
+    )
+    driven = [hinges.index(name) for name in motors.hinges]
+    model = robot.specification().compile()
+    model.opt.gravity[:] = 0
+    data, servos = mujoco.MjData(model), Servos(motors, np.zeros(model.nu))
+    data.qpos[2] = 2.0
+    pybullet.setGravity(0, 0, 0, physicsClientId=body.client)
+    body.place(data.qpos[:3], data.qpos[3:7], np.zeros(len(hinges)))
+    motor, found, expected = motors.hinges.index(hinges[number]), [], []
+    for substep in range(500):
+        targets = np.zeros(model.nu)
+        targets[motor] = 0.4 * np.sin(4 * np.pi * 0.001 * substep)
+        if substep % 5 == 0:
+            data.ctrl[:] = targets
+            found.append(body.hinges()[0][number])
+            expected.append(data.joint(hinges[number]).qpos[0])
+            mujoco.mj_step(model, data)
+        angles, speeds = body.hinges()
+        torques = np.zeros(len(hinges))
+        torques[driven] = servos.step(targets, angles[driven], speeds[driven])
+        body.step(torques)
+
+    assert np.ptp(expected) > 0.5
+    np.testing.assert_allclose(found, expected, atol=0.02)
+
+
+def test_a_command_takes_effect_after_the_delay(quadruped: Robot):
+    ideal = ideal_reality(quadruped)
+    angles = []
+    for delay in (0, 20):
+        with BulletEnvironment(quadruped, replace(ideal, delay=delay)) as environment:
+            environment.reset()
+            target = np.full(8, 0.2)
+            angles.append([environment.step(target).observation["joint_positions"] for _ in "123"])
+
+    standing = np.abs(np.array(angles[1][:2])).max()
+    assert standing < 0.02 < np.abs(angles[0][1]).max()
+    assert np.abs(angles[1][2]).max() > standing
+
+
+def test_equal_seeds_walk_alike_to_the_bit_and_other_seeds_do_not(robot: Robot):
+    first, second, other = (
+        walked(robot, draw_reality(robot, seed), Damage())["base_position"] for seed in (0, 0, 1)
+    )
+
+    np.testing.assert_array_equal(first, second)
+    assert not np.array_equal(first, other)
+
+
+def test_the_episodes_and_the_streams_of_a_robot_differ_in_their_noise(quadruped: Robot):
+    reality = draw_reality(quadruped, 0)
+    starts = []
+    for stream in (0, 1):
+        with BulletEnvironment(quadruped, reality, Damage(), stream) as environment:
+            starts += [environment.reset().observation["joint_positions"] for _ in range(2)]
+
+    assert len(np.unique(np.array(starts), axis=0)) == 4
+
+
+def test_a_reality_is_drawn_within_its_bounds_from_its_seed(robot: Robot):
+    drawn = [draw_reality(robot, seed) for seed in range(30)]
+
+    assert drawn[4] == draw_reality(robot, 4)
+    for reality in drawn:
+        assert all(0.95 <= factor <= 1.05 for factor in reality.masses + reality.torques)
+        assert 0.7 <= reality.friction <= 1.1
+        assert 5 <= reality.delay <= 20
+        assert 0.01 <= reality.angle_noise <= 0.05
+        assert 0 <= reality.touch_flips <= 0.02
+
+
+def test_a_trial_is_logged_and_read_back(quadruped: Robot, tmp_path: Path):
+    with BulletEnvironment(quadruped, draw_reality(quadruped, 0)) as environment:
+        physical = physical_robot(environment, quadruped)
+        log = tmp_path / "walk.mcap"
+        trial = run_trial(physical, random_gait(quadruped), log, robot=quadruped, steps=40)
+
+    again = read_log(log).trial
+    assert again.behaviour.steps == 40
+    assert np.isfinite(trial.displacement)
+    np.testing.assert_array_equal(
+        again.behaviour["base_position"], trial.behaviour["base_position"]
+    )
+
+
+@pytest.mark.search
+def test_a_recovery_is_a_row_of_the_table(tmp_path: Path):
+    settings = Settings(steps=60, trials=1, generations=1).scaled(4)
+
+    row = recovered(Plan("quadruped", 1, 0, settings, threads=1), tmp_path / "run")
+
+    row = json.loads(json.dumps(row))
+    assert row["truth"] == "break:front_left_knee"
+    assert [trial["stage"] for trial in row["trials"]] == ["before", "after", "recovery"]
+    assert row["reality"]["masses"] == list(draw_reality(ROBOTS["quadruped"].robot(), 0).masses)
+    simulated = [trial["simulated"] for trial in row["trials"]]
+    assert simulated[1] is None
+    assert np.isfinite([simulated[0], simulated[2]]).all()
+    assert row["recovered"] == row["trials"][2]["displacement"]
+
+
+def row(*, before: float, recovered: float, correct: bool) -> dict[str, object]:
+    trial = {"stage": "recovery", "displacement": recovered, "simulated": 4.0, "upright": True}
+    found = {"robot": "quadruped", "case": 2, "seconds": 1.0, "after": 0.0, "trials": [trial]}
+    return {**found, "before": before, "recovered": recovered, "correct": correct}
+
+
+def test_the_table_counts_an_error_as_a_wrong_diagnosis_and_no_recovery():
+    failed = {"robot": "quadruped", "case": 2, "seconds": 1.0, "error": "the robot stopped"}
+    rows = [
+        row(before=4.0, recovered=2.0, correct=True),
+        row(before=-1.0, recovered=3.0, correct=False),
+        failed,
+    ]
+
+    line = table(rows).splitlines()[2]
+
+    assert "| 3 | 1/3, 33 % (6 to 79) |" in line
+    assert "| 0.25 (0 to 0.5) |" in line  # no ratio to a robot that went backwards
+    assert "| 2/3, 67 %" in line
