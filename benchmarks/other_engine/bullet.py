@@ -175,6 +175,14 @@ class Bullet:
         linear = linear + np.cross(angular, np.subtract(position, centre))
         return np.array(position), orientation, linear, orientation.inv().apply(angular)
 
+    def is_valid(self) -> bool:
+        """Returns whether the state is finite: Bullet has no warning of its own."""
+        centre, turn = pybullet.getBasePositionAndOrientation(
+            self._body, physicsClientId=self.client
+        )
+        numbers = np.concatenate([centre, *self.hinges()])
+        return bool(np.isfinite(numbers).all() and np.linalg.norm(turn) > 0.5)
+
     def touches(self) -> dict[str, bool]:
         """Returns whether each touch sensor feels the ground."""
         felt = dict.fromkeys(self._sites, False)

@@ -14,7 +14,7 @@ class Damage:
     """Damage, by the names of the parts.
 
     Attributes:
-        lost: Hinges that are absent, with the links beyond them.
+        lost: Hinges that are absent with the links that they move: all those beyond a break.
         fixed: Angle of each hinge that became a fixed joint, rad.
         dead: Sensors that read 0: failed ones, and touch sensors on absent links.
     """

@@ -86,9 +86,9 @@ class BulletEnvironment(dm_env.Environment):
             while self._sent and self._sent[0][0] <= self._substep:
                 _, self._targets = self._sent.popleft()
             self._advance()
+        if not self._bullet.is_valid():
+            raise FloatingPointError(f"PyBullet's simulation diverged before {self._time:.3f} s")
         observation = self._observation()
-        if not all(np.isfinite(values).all() for values in observation.values()):
-            raise FloatingPointError("the simulation of PyBullet diverged")
         speed = (self._bullet.base()[0][0] - before) / self._robot.control_timestep
         return dm_env.transition(float(speed), observation)
 
@@ -135,8 +135,12 @@ class BulletEnvironment(dm_env.Environment):
         self._substep += 1
 
     def _observation(self) -> dict[str, np.ndarray]:
-        time = np.array(self._substep * SUBSTEP)
-        return {**self._instruments.observe(self._bullet), "time": time}
+        return {**self._instruments.observe(self._bullet), "time": np.array(self._time)}
+
+    @property
+    def _time(self) -> float:
+        """Time since the reset, s."""
+        return self._substep * SUBSTEP
 
 
 def physical_robot(environment: BulletEnvironment, robot: Robot) -> EnvironmentRobot:

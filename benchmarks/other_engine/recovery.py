@@ -97,6 +97,7 @@ def _facts(recovery: Recovery, robot: Robot, truth: Hypothesis, threads: int) ->
         "indistinguishable": [str(other) for other in diagnosis.indistinguishable],
         "correct": is_correct(diagnosis.best, truth, recovery.trials[1:], found),
         "comparator": recovery.comparator.comparator.name,
+        "calibration": recovery.calibration.to_dict() if recovery.calibration else None,
         "before": recovery.before,
         "after": recovery.after,
         "recovered": recovery.recovered,

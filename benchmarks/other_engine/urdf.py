@@ -22,7 +22,7 @@ def damaged_urdf(robot: Robot, reality: Reality, damage: Damage) -> str:
     Args:
         robot: The healthy robot.
         reality: The factors of the masses.
-        damage: Hinges to remove, with all links beyond them, and to fix.
+        damage: Hinges to remove with their links, and to fix.
     """
     # The export is selfmodel's own text, so no untrusted XML is parsed.
     tree = ET.fromstring(exported_urdf(robot))  # noqa: S314  # see the line above
@@ -77,21 +77,13 @@ def _add_collision(link: ET.Element, model: mujoco.MjModel, geom: int) -> None:
 
 
 def _remove(tree: ET.Element, joint: ET.Element) -> None:
-    """Removes a joint, its child link, and everything beyond."""
-    child = _linked(joint, "child")
-    for other in tree.findall("joint"):
-        if _linked(other, "parent") == child:
-            _remove(tree, other)
-    for element in tree.findall("joint") + [
-        link for link in tree.findall("link") if link.get("name") == child
-    ]:
-        if element is joint or element.tag == "link":
-            tree.remove(element)
-
-
-def _linked(joint: ET.Element, end: str) -> str | None:
-    found = joint.find(end)
-    return None if found is None else found.get("link")
+    """Removes a joint and its child link."""
+    child = joint.find("child")
+    name = None if child is None else child.get("link")
+    for link in tree.findall("link"):
+        if link.get("name") == name:
+            tree.remove(link)
+    tree.remove(joint)
 
 
 def _fix(joint: ET.Element, angle: float) -> None:

@@ -20,6 +20,7 @@ from benchmarks.other_engine.reality import Reality, draw_reality, ideal_reality
 from benchmarks.other_engine.recovery import Plan, recovered
 from benchmarks.other_engine.servos import Servos, motors_of
 from benchmarks.other_engine.table import table
+from benchmarks.other_engine.transfer import transfer_lines
 from selfmodel import read_log, run_trial
 from selfmodel.controllers.controller import Controller, draw_genomes
 from selfmodel.errors import InputError
@@ -154,6 +155,63 @@ def test_the_encoder_of_an_absent_joint_holds_its_last_value(quadruped: Robot):
     assert np.ptp(others, axis=0).min() > 0.01
 
 
+def test_the_touch_sensor_of_an_absent_foot_reads_0(quadruped: Robot):
+    damage = damage_of("break:front_left_knee", quadruped.anatomy)
+    flipping = replace(ideal_reality(quadruped), touch_flips=0.5)
+
+    readings = walked(quadruped, flipping, damage)["sensors"]
+
+    assert readings[:, 0].tolist() == [0.0] * 60
+    assert 0 < readings[:, 1].mean() < 1
+
+
+def test_a_dead_sensor_reads_0_and_leaves_the_noise_of_the_others_unchanged(quadruped: Robot):
+    reality = draw_reality(quadruped, 0)
+    starts = []
+    for notation in ("intact", "sensor:front_right_angle"):
+        damage = damage_of(notation, quadruped.anatomy)
+        with BulletEnvironment(quadruped, reality, damage) as environment:
+            starts.append(environment.reset().observation["sensors"])
+
+    dead = [sensor.name for sensor in quadruped.anatomy.sensors].index("front_right_angle")
+    assert starts[1][dead] == 0 != starts[0][dead]
+    np.testing.assert_array_equal(np.delete(starts[0], dead), np.delete(starts[1], dead))
+
+
+def test_nothing_but_gravity_moves_a_robot_in_the_air(robot: Robot, bullet: Callable[..., Bullet]):
+    body = bullet(robot)
+    body.place(np.array([0.0, 0.0, 3.0]), np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(robot.model.nu))
+    for _ in range(300):
+        body.step(np.zeros(robot.model.nu))
+
+    _, _, velocity, turn = body.base()
+
+    np.testing.assert_allclose(velocity, [0, 0, -9.81 * 0.3], atol=1e-3)
+    np.testing.assert_allclose(turn, 0, atol=1e-3)
+
+
+def test_a_simulation_that_diverges_is_an_error(quadruped: Robot):
+    with BulletEnvironment(quadruped, ideal_reality(quadruped)) as environment:
+        environment.reset()
+
+        with pytest.raises(FloatingPointError, match=r"diverged before 0\.010 s"):
+            environment.step(np.full(8, np.nan))
+
+
+def test_observations_and_steps_keep_to_the_specs_of_the_environment(robot: Robot):
+    with BulletEnvironment(robot, draw_reality(robot, 0)) as environment:
+        actions, specs = environment.action_spec(), environment.observation_spec()
+        steps = [environment.step(actions.generate_value()) for _ in range(3)]
+
+    assert steps[0].first()  # a step before a reset is a reset
+    assert steps[1].mid()
+    assert steps[2].mid()
+    for step in steps:
+        assert step.observation.keys() == specs.keys()
+        for name, spec in specs.items():
+            spec.validate(step.observation[name])
+
+
 def test_a_robot_stands_for_a_second_at_the_height_that_it_has_in_mujoco(robot: Robot):
     data = mujoco.MjData(robot.model)
     with BulletEnvironment(robot, ideal_reality(robot)) as environment:
@@ -219,7 +277,8 @@ def test_a_command_takes_effect_after_the_delay(quadruped: Robot):
 
 def test_equal_seeds_walk_alike_to_the_bit_and_other_seeds_do_not(robot: Robot):
     first, second, other = (
-        walked(robot, draw_reality(robot, seed), Damage())["base_position"] for seed in (0, 0, 1)
+        walked(robot, draw_reality(robot, seed), Damage(), steps=30)["base_position"]
+        for seed in (0, 0, 1)
     )
 
     np.testing.assert_array_equal(first, second)
@@ -276,6 +335,17 @@ def test_a_recovery_is_a_row_of_the_table(tmp_path: Path):
     assert simulated[1] is None
     assert np.isfinite([simulated[0], simulated[2]]).all()
     assert row["recovered"] == row["trials"][2]["displacement"]
+
+
+@pytest.mark.search
+def test_gaits_of_both_engines_are_a_table(quadruped: Robot):
+    bank = Path(__file__).parents[2] / "benchmarks" / "bank"
+
+    lines = list(transfer_lines(quadruped, [bank / "quadruped-2.npz"], [0]))
+
+    name, mujoco_walk, ideal, drawn = lines[2].strip("| ").split(" | ")
+    assert name == "quadruped-2"
+    assert 0.5 * float(mujoco_walk) < min(float(ideal), float(drawn))
 
 
 def row(*, before: float, recovered: float, correct: bool) -> dict[str, object]:
