@@ -1,9 +1,7 @@
 """The robots in PyBullet: bodies, damage, servos, noise, trials through ``EnvironmentRobot``."""
 
-import json
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -17,16 +15,13 @@ from benchmarks.other_engine.bullet import Bullet
 from benchmarks.other_engine.damage import Damage, damage_of
 from benchmarks.other_engine.environment import BulletEnvironment, physical_robot
 from benchmarks.other_engine.reality import Reality, draw_reality, ideal_reality
-from benchmarks.other_engine.recovery import Plan, recovered
 from benchmarks.other_engine.servos import Servos, motors_of
-from benchmarks.other_engine.table import table
-from benchmarks.other_engine.transfer import transfer_lines
-from selfmodel import read_log, run_trial
 from selfmodel.controllers.controller import Controller, draw_genomes
+from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError
+from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
-from selfmodel.settings import Settings
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import Behaviour, collect
 
@@ -261,6 +256,35 @@ def test_a_servo_in_the_air_follows_a_target_as_it_does_in_mujoco(
     np.testing.assert_allclose(found, expected, atol=0.02)
 
 
+def tripod_walk(robot: Robot, first: tuple[str, ...], steps: int) -> Playback:
+    """An open-loop walk of the hexapod: three legs swing forward while the others push."""
+    motors, time = robot.anatomy.motors, 0.01 * np.arange(steps)
+    commands = np.zeros((steps, len(motors)))
+    for column, motor in enumerate(motors):
+        phase = 3 * np.pi * time + np.pi * (not motor.startswith(first))
+        if motor.endswith("swing"):
+            commands[:, column] = 0.4 * np.sin(phase)
+        elif motor.endswith("lift"):
+            commands[:, column] = 0.3 * np.maximum(0, np.cos(phase))
+    return Playback(motors, commands)
+
+
+def test_an_open_loop_walk_goes_as_far_as_in_mujoco_and_its_mirror_image_mirrors():
+    robot = ROBOTS["hexapod"].robot()
+    legs = ("front_left", "middle_right", "back_left"), ("front_right", "middle_left", "back_right")
+    ways = []
+    for first in legs:
+        with BulletEnvironment(robot, ideal_reality(robot)) as environment:
+            samples = physical_robot(environment, robot).run(tripod_walk(robot, first, 200), 200)
+            ways.append(collect(robot.anatomy.names, samples)["base_position"])
+    reference = SimulatedRobot(robot).run(tripod_walk(robot, legs[0], 200), 200)
+
+    expected = collect(robot.anatomy.names, reference)["base_position"]
+    assert expected[-1, 0] > 0.8
+    assert ways[0][-1, 0] == pytest.approx(expected[-1, 0], rel=0.05)
+    np.testing.assert_allclose(ways[0][-1], ways[1][-1] * [1, -1, 1], atol=0.005)
+
+
 def test_a_command_takes_effect_after_the_delay(quadruped: Robot):
     ideal = ideal_reality(quadruped)
     angles = []
@@ -305,65 +329,3 @@ def test_a_reality_is_drawn_within_its_bounds_from_its_seed(robot: Robot):
         assert 5 <= reality.delay <= 20
         assert 0.01 <= reality.angle_noise <= 0.05
         assert 0 <= reality.touch_flips <= 0.02
-
-
-def test_a_trial_is_logged_and_read_back(quadruped: Robot, tmp_path: Path):
-    with BulletEnvironment(quadruped, draw_reality(quadruped, 0)) as environment:
-        physical = physical_robot(environment, quadruped)
-        log = tmp_path / "walk.mcap"
-        trial = run_trial(physical, random_gait(quadruped), log, robot=quadruped, steps=40)
-
-    again = read_log(log).trial
-    assert again.behaviour.steps == 40
-    assert np.isfinite(trial.displacement)
-    np.testing.assert_array_equal(
-        again.behaviour["base_position"], trial.behaviour["base_position"]
-    )
-
-
-@pytest.mark.search
-def test_a_recovery_is_a_row_of_the_table(tmp_path: Path):
-    settings = Settings(steps=60, trials=1, generations=1).scaled(4)
-
-    row = recovered(Plan("quadruped", 1, 0, settings, threads=1), tmp_path / "run")
-
-    row = json.loads(json.dumps(row))
-    assert row["truth"] == "break:front_left_knee"
-    assert [trial["stage"] for trial in row["trials"]] == ["before", "after", "recovery"]
-    assert row["reality"]["masses"] == list(draw_reality(ROBOTS["quadruped"].robot(), 0).masses)
-    simulated = [trial["simulated"] for trial in row["trials"]]
-    assert simulated[1] is None
-    assert np.isfinite([simulated[0], simulated[2]]).all()
-    assert row["recovered"] == row["trials"][2]["displacement"]
-
-
-@pytest.mark.search
-def test_gaits_of_both_engines_are_a_table(quadruped: Robot):
-    bank = Path(__file__).parents[2] / "benchmarks" / "bank"
-
-    lines = list(transfer_lines(quadruped, [bank / "quadruped-2.npz"], [0]))
-
-    name, mujoco_walk, ideal, drawn = lines[2].strip("| ").split(" | ")
-    assert name == "quadruped-2"
-    assert 0.5 * float(mujoco_walk) < min(float(ideal), float(drawn))
-
-
-def row(*, before: float, recovered: float, correct: bool) -> dict[str, object]:
-    trial = {"stage": "recovery", "displacement": recovered, "simulated": 4.0, "upright": True}
-    found = {"robot": "quadruped", "case": 2, "seconds": 1.0, "after": 0.0, "trials": [trial]}
-    return {**found, "before": before, "recovered": recovered, "correct": correct}
-
-
-def test_the_table_counts_an_error_as_a_wrong_diagnosis_and_no_recovery():
-    failed = {"robot": "quadruped", "case": 2, "seconds": 1.0, "error": "the robot stopped"}
-    rows = [
-        row(before=4.0, recovered=2.0, correct=True),
-        row(before=-1.0, recovered=3.0, correct=False),
-        failed,
-    ]
-
-    line = table(rows).splitlines()[2]
-
-    assert "| 3 | 1/3, 33 % (6 to 79) |" in line
-    assert "| 0.25 (0 to 0.5) |" in line  # no ratio to a robot that went backwards
-    assert "| 2/3, 67 %" in line
