@@ -53,7 +53,9 @@ def by_trial(trials: Sequence[TrialRow]) -> Figure:
         axes.tick_params(labelbottom=True)
         axes.set_title(robot, fontsize=11)
         plain_axes(axes)
-    panels[-1].set_xlabel("case of Table I; grey: not restored in the paper")
+    is_grey = any(case in NOT_RESTORED[robot] for robot in robots for case in cases)
+    legend = "; grey: not restored in the paper" if is_grey else ""
+    panels[-1].set_xlabel(f"case of Table I{legend}")
     figure.supylabel("displacement ÷ before the failure", fontsize=10)
     _comparator_legend(figure, comparators)
     return figure
@@ -110,7 +112,14 @@ def by_cost(costs: Sequence[Cost]) -> Figure:
         plain_axes(axes)
     panels[0].set_ylabel("displacement ÷ before the failure")
     handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False)
+    figure.legend(
+        handles,
+        labels,
+        loc="outside lower center",
+        ncols=len(robots),  # as many as fit
+        frameon=False,
+        fontsize=9,
+    )
     return figure
 
 

@@ -128,7 +128,8 @@ def _files(found: PaperResults) -> dict[str, bytes]:
     return {
         **files_of("figure-1", robot_figure.of_robots([ROBOTS[name].robot() for name in robots])),
         **files_of("figure-5", figures.by_trial(found.trials)),
-        **files_of("figure-6", figures.by_cost(found.costs)),
+        # Comparators that have no run in common cannot be compared.
+        **(files_of("figure-6", figures.by_cost(found.costs)) if found.costs else {}),
         "table-1.csv": as_csv(Failure, found.failures).encode(),
         "table-2.csv": as_csv(CaseSummary, found.summaries).encode(),
         "costs.csv": as_csv(Cost, found.costs).encode(),

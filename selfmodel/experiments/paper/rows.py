@@ -95,7 +95,8 @@ class EvolutionRow:
     best: float
 
 
-Place = RecoveryRow | TrialRow | EvolutionRow
+Run = tuple[str, int, int]
+"""Robot, case and seed."""
 
 
 def ratio(displacement: float, before: float) -> float:
@@ -103,8 +104,8 @@ def ratio(displacement: float, before: float) -> float:
     return displacement / before if before > 0 else math.nan
 
 
-def run_of(row: Place) -> tuple[str, int, int]:
-    """Returns the robot, the case and the seed of a row."""
+def run_of(row: RecoveryRow | TrialRow | EvolutionRow) -> Run:
+    """Returns the run of a row."""
     return row.robot, row.case, row.seed
 
 

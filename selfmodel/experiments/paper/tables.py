@@ -12,6 +12,7 @@ from selfmodel.experiments.paper.reported import FAILURES, is_restored
 from selfmodel.experiments.paper.rows import (
     EvolutionRow,
     RecoveryRow,
+    Run,
     TrialRow,
     best_so_far,
     ratio,
@@ -87,7 +88,7 @@ class CaseSummary:
 
 @dataclass(frozen=True)
 class Cost:
-    """Function that was restored with a number of physical trials, over all runs of a robot.
+    """Function that was restored with a number of physical trials, over the runs of a robot.
 
     Attributes:
         robot: Name of the robot.
@@ -153,27 +154,36 @@ def _summary(rows: Sequence[RecoveryRow]) -> CaseSummary:
 def costs(trials: Sequence[TrialRow], evolution: Sequence[EvolutionRow]) -> tuple[Cost, ...]:
     """Returns the restored function by way and number of physical trials.
 
-    Only runs with a displacement above 0 before the failure count.
+    Only runs that all ways of a robot have count, so that the ways are paired, and only those with
+    a displacement above 0 before the failure.
 
     Args:
         trials: Physical trials of all recoveries, those of one recovery in order.
         evolution: Generations of the evolutions on the robot.
     """
-    groups: dict[tuple[str, str, int], list[float]] = {}
+    ways: dict[tuple[str, str], dict[Run, list[tuple[int, float]]]] = {}
     for recovery in recoveries(trials):
         first = recovery[0]
-        for count, value in enumerate(best_so_far(recovery)[1:], start=1):
-            groups.setdefault((first.robot, first.comparator, count), []).append(value)
+        steps = list(enumerate(best_so_far(recovery)))[1:]
+        ways.setdefault((first.robot, first.comparator), {})[run_of(first)] = steps
     for row in evolution:
-        key = (row.robot, ON_ROBOT, row.evaluations)
-        groups.setdefault(key, []).append(ratio(row.best, row.before))
+        runs = ways.setdefault((row.robot, ON_ROBOT), {})
+        runs.setdefault(run_of(row), []).append((row.evaluations, ratio(row.best, row.before)))
     found = []
-    for (robot, way, count), values in groups.items():
-        known = [value for value in values if not math.isnan(value)]
-        if known:
-            low, middle, high = map(float, np.quantile(known, (0.25, 0.5, 0.75)))
-            found.append(Cost(robot, way, count, len(known), low, middle, high))
+    for (robot, way), runs in ways.items():
+        others = [other for (name, _), other in ways.items() if name == robot]
+        values: dict[int, list[float]] = {}
+        for run in runs:
+            for count, value in runs[run] if all(run in other for other in others) else ():
+                if not math.isnan(value):
+                    values.setdefault(count, []).append(value)
+        found += [_cost(robot, way, count, known) for count, known in values.items()]
     return tuple(found)
+
+
+def _cost(robot: str, way: str, count: int, values: Sequence[float]) -> Cost:
+    low, middle, high = map(float, np.quantile(values, (0.25, 0.5, 0.75)))
+    return Cost(robot, way, count, len(values), low, middle, high)
 
 
 def last_costs(found: Sequence[Cost]) -> tuple[Cost, ...]:
@@ -188,7 +198,7 @@ def last_costs(found: Sequence[Cost]) -> tuple[Cost, ...]:
 
 def recoveries(trials: Sequence[TrialRow]) -> list[list[TrialRow]]:
     """Returns the trials of each recovery."""
-    groups: dict[tuple[object, ...], list[TrialRow]] = {}
+    groups: dict[tuple[Run, str], list[TrialRow]] = {}
     for trial in trials:
-        groups.setdefault((*run_of(trial), trial.comparator), []).append(trial)
+        groups.setdefault((run_of(trial), trial.comparator), []).append(trial)
     return list(groups.values())
