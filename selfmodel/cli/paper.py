@@ -23,7 +23,6 @@ from selfmodel.cli.output import grid_display
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.tables import show
 from selfmodel.comparators import COMPARATORS
-from selfmodel.experiments.arguments import AUTO
 from selfmodel.experiments.paper.plan import COMPARATORS as PAPER_COMPARATORS, PaperStudy
 from selfmodel.experiments.paper.reported import FAILURES
 from selfmodel.experiments.paper.results import PaperResults, write_results
@@ -68,7 +67,7 @@ def paper(
         robots=inputs.texts("--robots", robots, ROBOTS),
         cases=inputs.whole_numbers("--case", cases, FAILURES),
         seeds=range(seed, seed + seeds),
-        comparators=inputs.texts("--comparator", comparators, (*COMPARATORS, AUTO)),
+        comparators=inputs.texts("--comparator", comparators, COMPARATORS),
         settings=Settings(steps=steps, trials=trials, generations=generations).scaled(population),
     )
     failed = grid_display.run_shown(

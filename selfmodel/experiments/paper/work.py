@@ -1,4 +1,8 @@
-"""Execution of the paper's experiment; the paper's repair EA is chosen in this file alone."""
+"""Execution of the paper's experiment: gaits, recoveries, evolution on the robot.
+
+All three evolve with the paper's exact repair EA, whatever other commands use by default: this file
+alone chooses it.
+"""
 
 import math
 import shutil
