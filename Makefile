@@ -73,8 +73,11 @@ fuzz: $(READY) ## mutate the input of every reader 100,000 times; in about 25 mi
 bench: $(READY) ## measure speed and memory; on a quiet machine
 	$(BIN)/python -m benchmarks.bench
 
-results: $(READY) ## run Table I on both robots and write docs/results/table-one.md; takes over an hour
-	$(BIN)/python -m benchmarks.table_one
+PAPER ?= runs/paper
+results: $(READY) ## repeat the paper's experiment in runs/paper, with its figures and tables; takes hours
+	$(BIN)/selfmodel paper --out $(PAPER)
+	$(BIN)/selfmodel paper --out $(PAPER) --robots quadruped --case 1,2,3,5,6,9 --comparator forward-displacement --seeds 10
+	$(BIN)/python -m benchmarks.walking $(PAPER)
 
 FOREIGN ?= runs/foreign
 foreign: $(READY) ## make recordings by an independent generator and score their diagnoses; takes hours

@@ -20,7 +20,7 @@ import mujoco
 import numpy as np
 
 from benchmarks import comparators, recovery, simulation, trial_log
-from benchmarks.results import Facts
+from benchmarks.facts import Facts
 from selfmodel.settings import Settings
 from selfmodel.tasks import ROBOTS, entry, suite_bodies
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from benchmarks.results import Facts
+from benchmarks.facts import Facts
 from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT
 from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.comparator import Comparator, PiecewiseTrial

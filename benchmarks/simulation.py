@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from mujoco import rollout
 
-from benchmarks.results import Facts
+from benchmarks.facts import Facts
 from selfmodel import tasks
 from selfmodel.controllers.command_source import make_batch
 from selfmodel.controllers.controller import Controller, draw_genomes

@@ -1,16 +1,25 @@
-"""Measures of a walk: displacement, torso height, contact depth."""
+"""``python -m benchmarks.walking DIR``: how the gaits in a folder of ``selfmodel paper`` walk.
 
+Prints displacement, torso height and contact depth of the healthy robots, at every physics step.
+"""
+
+import argparse
 from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
 
 import mujoco
 import numpy as np
 
 from selfmodel.controllers.command_source import make_batch
 from selfmodel.controllers.controller import Controller
+from selfmodel.experiments.grid import finished
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT
+from selfmodel.logs import load_controller
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state.sensing import SensorReader
+from selfmodel.tasks import ROBOTS
 
 
 @dataclass(frozen=True)
@@ -54,3 +63,35 @@ def walk(robot: Robot, controller: Controller, steps: int) -> Walk:
     return Walk(
         float(data.qpos[0] - start), float(ratios.min()), float(ratios.max()), float(deepest)
     )
+
+
+def main() -> None:
+    """Prints a table in Markdown, a row per robot."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path, help="folder of `selfmodel paper --out`")
+    folder = parser.parse_args().folder / "gaits"
+    walks: dict[str, list[Walk]] = {}
+    for gait in finished(folder):
+        robot = ROBOTS[gait.parameters["robot"]].robot()
+        controller = load_controller(folder / f"{gait.key}.npz")
+        steps = gait.parameters["settings"]["steps"]
+        walks.setdefault(robot.name, []).append(walk(robot, controller, steps))
+    print("| robot | median m | lowest | highest | torso | deepest, mm | walking |")
+    print("|---|---:|---:|---:|---|---:|---:|")
+    for robot_name, found in walks.items():
+        print(_row(robot_name, found))
+
+
+def _row(robot: str, walks: list[Walk]) -> str:
+    displacements = [one.displacement for one in walks]
+    return (
+        f"| {robot} | {median(displacements):.2f} | {min(displacements):.2f} "
+        f"| {max(displacements):.2f} | {min(one.lowest for one in walks):.2f} to "
+        f"{max(one.highest for one in walks):.2f} "
+        f"| {1000 * max(one.deepest for one in walks):.1f} "
+        f"| {sum(one.is_walking for one in walks)} of {len(walks)} |"
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -51,7 +51,7 @@ TABLE_ONE_KEYS = (
 """Keys of a recovery in ``docs/results.jsonl``."""
 
 SEARCHED = ("diagnostic", "distinct_hypotheses")
-"""Keys of its ``evaluations``; the others do not count the gait, which ``table_one`` shares."""
+"""Keys of its ``evaluations``; the others do not count the gait, which its runs shared."""
 
 
 def main() -> None:

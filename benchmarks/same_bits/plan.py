@@ -38,7 +38,7 @@ SMALL = ("--population", "20", "--generations", "5", "--trials", "2")
 COMMON = ("--threads", "1", "--json")
 TABLE_ONE_SEEDS = range(10)
 TABLE_ONE_BY_SEED = (1, 2, 3, 5, 6, 9)
-"""Cases that ``benchmarks.table_one`` runs with every seed on the quadruped."""
+"""Cases that ``docs/results.jsonl`` has with every seed of the quadruped."""
 
 
 @dataclass(frozen=True)

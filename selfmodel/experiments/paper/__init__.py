@@ -1,0 +1,1 @@
+"""The paper's experiment on its two robots, beside what the paper reports."""
