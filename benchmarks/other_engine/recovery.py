@@ -14,7 +14,7 @@ from selfmodel.errors import WorkError, describe
 from selfmodel.experiments.scoring import is_correct
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
-from selfmodel.recovery.recover import Recovery
+from selfmodel.recovery.recovery import Recovery
 from selfmodel.recovery.upright import falls_of
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings

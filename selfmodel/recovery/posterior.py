@@ -16,6 +16,7 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.recovery.uncertainty import estimated_uncertainty
+from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.conditions import Condition, Uncertainty, draw_conditions
 from selfmodel.simulation.model_distribution import Weighted
@@ -25,7 +26,10 @@ from selfmodel.trials.rotation import directions
 from selfmodel.trials.trial import Trial
 
 MODELS = 128
-"""Models of the sample. Each trial is simulated once per model."""
+"""Largest number of models of the sample. Each trial is simulated once per model."""
+
+COST = 1 / 12
+"""Rollouts of a trial, one per model, relative to the evaluations of the paper's repair EA."""
 
 REPEATS = 16
 """Rollouts of one model, which measure how far noise alone moves the path."""
@@ -43,8 +47,9 @@ MAX_DIFFERENCE = 6.0
 SHARE_OF_SPREAD = 0.15
 """Error of every model's path, relative to the spread of the models' paths: no model is exact."""
 
-MIN_EFFECTIVE = 16.0
-"""Smallest effective size of the weighted sample; below it, the likelihood is flattened."""
+MIN_EFFECTIVE = 1 / 8
+"""Smallest effective size of the weighted sample, relative to its size; below it, the likelihood is
+flattened."""
 
 
 class Posterior:
@@ -54,6 +59,7 @@ class Posterior:
         simulator: Self-model, calibrated if there is a calibration.
         healthy: Trials of the healthy robot, at least one.
         calibration: Fit of the self-model to the healthy trials; None without one.
+        settings: The paper's numbers, which set the cost.
         rng: Random number generator of the sample.
     """
 
@@ -62,8 +68,10 @@ class Posterior:
         simulator: Simulator,
         healthy: Sequence[Trial],
         calibration: Calibration | None,
+        settings: Settings,
         rng: np.random.Generator,
     ) -> None:
+        self._models = max(2, min(MODELS, round(COST * settings.evaluations)))
         self._simulator, self._healthy, self._calibration = simulator, healthy, calibration
         self._rng = rng
         self._likelihoods: dict[tuple[Hypothesis, str], FloatArray] = {}
@@ -74,11 +82,11 @@ class Posterior:
 
     @cached_property
     def _conditions(self) -> tuple[Condition, ...]:
-        """``MODELS`` conditions, then ``REPEATS`` with the model of the first one."""
-        count = MODELS + REPEATS
+        """A condition per model, then ``REPEATS`` with the model of the first one."""
+        count = self._models + REPEATS
         drawn = draw_conditions((INTACT,), self._uncertainty, count, self._rng)
-        repeats = [dataclasses.replace(own, model=drawn[0].model) for own in drawn[MODELS:]]
-        return (*drawn[:MODELS], *repeats)
+        repeats = [dataclasses.replace(own, model=drawn[0].model) for own in drawn[self._models :]]
+        return (*drawn[: self._models], *repeats)
 
     def after(self, trials: Sequence[Trial], hypothesis: Hypothesis) -> Uncertainty:
         """Returns an uncertainty whose models are weighted by their predictions of trials.
@@ -88,11 +96,11 @@ class Posterior:
                 Trials whose base was not observed are left out.
             hypothesis: Faults of the robot in all other trials.
         """
-        sample = [condition.model for condition in self._conditions[:MODELS]]
+        sample = [condition.model for condition in self._conditions[: self._models]]
         if not any(model.differs for model in sample):
             return self._uncertainty
         known = [trial for trial in trials if np.isfinite(_path(trial.behaviour)).all()]
-        likelihood = np.zeros(MODELS)
+        likelihood = np.zeros(self._models)
         for trial in known:
             likelihood += self._likelihood(
                 trial, INTACT if trial.plan.stage == "before" else hypothesis
@@ -108,7 +116,7 @@ class Posterior:
             ]
             paths = _paths(self._simulator, self._uncertainty, trial, conditions)
             self._likelihoods[key] = log_likelihood(
-                _path(trial.behaviour), paths[:MODELS], paths[MODELS:]
+                _path(trial.behaviour), paths[: self._models], paths[self._models :]
             )
         return self._likelihoods[key]
 
@@ -134,7 +142,7 @@ def log_likelihood(observed: FloatArray, paths: FloatArray, repeats: FloatArray)
 def flattened_weights(likelihood: FloatArray) -> FloatArray:
     """Returns the weights of models, ``(models,)``.
 
-    The likelihood is flattened until the effective size of the sample is ``MIN_EFFECTIVE``.
+    The likelihood is flattened until the effective size of the sample is large enough.
 
     Args:
         likelihood: Logarithm of the likelihood of each model, ``(models,)``.
@@ -143,7 +151,7 @@ def flattened_weights(likelihood: FloatArray) -> FloatArray:
     while True:
         weights = np.exp((likelihood - likelihood.max()) / temperature)
         weights /= weights.sum()
-        if 1 / np.square(weights).sum() >= min(MIN_EFFECTIVE, len(weights)):
+        if 1 / np.square(weights).sum() >= MIN_EFFECTIVE * len(weights):
             return np.asarray(weights)
         temperature *= 1.5
 

@@ -129,7 +129,7 @@ def recover(
         if calibration.robot is not simulator.robot:
             simulator, evaluations_before = _fitted(simulator, calibration), repair.evaluations
             repair = make_repair(simulator, settings, design, score)
-    posterior = Posterior(simulator, healthy_trials, calibration, posterior_stream(seed))
+    posterior = Posterior(simulator, healthy_trials, calibration, settings, posterior_stream(seed))
     act(damaged, "after", INTACT, gait)
     chosen = choose_comparator(simulator.robot, database.trials)
     on_event(chosen)

@@ -34,10 +34,14 @@ FIRST_STEPS = 200
 """Control steps of the rollouts of the random first generation."""
 
 FINALISTS, FINAL_CONDITIONS = 12, 4
-"""Candidates of a search, and conditions under which they are compared."""
+"""Largest numbers of candidates of a search, and of conditions under which they are compared."""
 
 JUDGED, JUDGED_CONDITIONS = 4, 16
-"""Best candidates of that comparison, and conditions under which these are compared at last."""
+"""Number of the best candidates of that comparison, and largest number of conditions under which
+these are compared at last."""
+
+JUDGING = 0.04
+"""Cost of both comparisons relative to that of the repair, approximately."""
 
 
 class GenomeSearch(Protocol):
@@ -113,7 +117,12 @@ class RobustRepair:
         own = [controller.genome for controller in seeds if controller.design == design]
         search = self._make_search(design.weights, draw_genomes, settings, rng, own)
         finalists = min(FINALISTS, settings.population)
-        judging = finalists * FINAL_CONDITIONS + JUDGED * JUDGED_CONDITIONS
+        rollouts = JUDGING * COST * settings.evaluations / 2
+        conditions = (
+            max(1, min(FINAL_CONDITIONS, round(rollouts / finalists))),
+            max(2, min(JUDGED_CONDITIONS, round(rollouts / JUDGED))),
+        )
+        judging = finalists * conditions[0] + JUDGED * conditions[1]
         budget = (COST * settings.evaluations - judging) * steps
         spent, number, start = 0, 0, perf_counter()
         while number == 0 or (spent < budget and not search.stop()):
@@ -141,8 +150,8 @@ class RobustRepair:
             )
         self.evaluations += search.evaluations
         found = self._controllers(search.candidates(finalists))
-        for conditions in (FINAL_CONDITIONS, JUDGED_CONDITIONS):
-            judged = fitness(found, conditions, steps, rng)
+        for count in conditions:
+            judged = fitness(found, count, steps, rng)
             best = np.argsort(-robust(judged), kind="stable")[:JUDGED]
             found, judged = [found[i] for i in best], judged[best]
         if np.isneginf(judged[0]).all():

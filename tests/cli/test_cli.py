@@ -52,7 +52,7 @@ def test_recover_prints_one_json_object_with_every_key(run: str, request: pytest
         *("robot", "case", "truth", "comparator", "kinds", "gap", "structure", "seed", "trials"),
         *DIAGNOSIS,
         *("displacement", "recovery", "physical_trials", "evaluations", "seconds", "next_trial"),
-        *("controller", "neurons", "correct", "score", "comparator_reason"),
+        *("controller", "neurons", "correct", "score", "comparator_reason", "repair", "fell"),
         *({"detectable"} & set(told)),
     }
     assert (told["robot"], told["case"], told["seed"], told["gap"]) == ("quadruped", 4, 0, 0)
@@ -67,8 +67,8 @@ def test_recover_prints_one_json_object_with_every_key(run: str, request: pytest
     stages = [trial["stage"] for trial in told["trials"]]
     assert stages == ["before", "after", *["recovery"] * TRIALS[run]]
     assert told["physical_trials"] == TRIALS[run]
-    evaluations = (TRIALS[run] + 1) * (8 + 4)
-    assert told["evaluations"]["repair"] == told["evaluations"]["diagnostic"] == evaluations
+    assert told["evaluations"]["diagnostic"] == (TRIALS[run] + 1) * (8 + 4)
+    assert told["evaluations"]["repair"] >= (TRIALS[run] + 1) * 2 * 8
     assert set(told["evaluations"]) == {
         *("repair", "diagnostic", "distinct_hypotheses", "simulated_steps", "diverged"),
     }

@@ -16,6 +16,7 @@ from selfmodel.recovery.posterior import (
     log_likelihood,
 )
 from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import calibrate
 from selfmodel.simulation.model_distribution import Weighted
 from selfmodel.simulation.simulator import Simulator
@@ -36,7 +37,7 @@ def trials(robot: Robot, gap: float, folder: Path, count: int = 1) -> list[Trial
 def posterior(robot: Robot, healthy: list[Trial], seed: int = 0) -> Posterior:
     calibration = calibrate(robot, healthy, 1)
     simulator = Simulator(calibration.robot, 1)
-    return Posterior(simulator, healthy, calibration, np.random.default_rng(seed))
+    return Posterior(simulator, healthy, calibration, Settings(), np.random.default_rng(seed))
 
 
 def test_models_that_predict_the_path_weigh_more():
@@ -54,7 +55,7 @@ def test_the_effective_size_of_the_sample_is_bounded_below(spread: float):
     weights = flattened_weights(likelihood)
 
     assert weights.sum() == pytest.approx(1)
-    assert 1 / np.square(weights).sum() >= MIN_EFFECTIVE - 1e-9
+    assert 1 / np.square(weights).sum() >= MIN_EFFECTIVE * MODELS - 1e-9
     order = np.argsort(-likelihood)
     assert np.all(np.diff(weights[order]) <= 1e-12)
     if spread == 0:

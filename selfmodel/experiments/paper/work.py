@@ -168,7 +168,7 @@ def _evolve_on_robot(job: Job, run: Path) -> PartResult:
 
     # A stream that no repair of the recovery draws from: the control is an independent search.
     stream = repair_stream(job.seed, given.settings.trials + 1)
-    RepairSearch(simulator, given.settings)(given.truth, [given.gait], stream, keep)
+    RepairSearch(simulator, given.settings).best(given.truth, [given.gait], stream, keep)
     return PartResult({"evolution": as_dicts(rows)})
 
 
