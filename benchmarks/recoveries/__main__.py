@@ -11,7 +11,8 @@ from benchmarks.recoveries.table import table
 from selfmodel.settings import Settings
 
 ORACLE_GENERATIONS = 43
-"""Generations with which each search of an oracle evaluates more than 6,000 controllers."""
+"""Generations with which a search of an oracle evaluates more than 6,000 controllers, and again as
+many when it is continued."""
 
 
 def main() -> None:
