@@ -15,7 +15,6 @@ from selfmodel.controllers.controller import Controller
 from selfmodel.physical.initial_pose import start_spread
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.physical.reality_gap import perturbed_model
-from selfmodel.recovery.candidate_controller import CandidateController
 from selfmodel.recovery.robust_fitness import robust
 from selfmodel.recovery.robust_repair import RobustRepair
 from selfmodel.recovery.upright import UPRIGHT
@@ -57,15 +56,14 @@ def oracle(cell: Cell, *, settings: Settings) -> dict[str, Any]:
         start=start_spread(cell.gap),
     )
     repair = RobustRepair(Simulator(hidden, 1), settings, network_for(robot), UPRIGHT)
-    ends = []
+    found: list[Any] = []
     for number in range(SEARCHES):
-        rng = np.random.default_rng((cell.seed, cell.case, number))
-        found: tuple[CandidateController, ...] = ()
+        rng, seeds = np.random.default_rng((cell.seed, cell.case, number)), list[Controller]()
         for _ in range(1 + CONTINUED):
-            seeds = [candidate.controller for candidate in found]
-            found = repair((cell.truth,), lambda: noise, seeds, rng, lambda _generation: None)
-        ends.append(found[0])
-    best = max(ends, key=lambda candidate: float(robust(candidate.scores[np.newaxis])[0]))
+            ends = repair((cell.truth,), lambda: noise, seeds, rng, lambda _generation: None)
+            seeds = [candidate.controller for candidate in ends]
+        found += ends[:1]
+    best = max(found, key=lambda candidate: float(robust(candidate.scores[np.newaxis])[0]))
     physical = cell.reality.robot(robot, cell.truth, stream=0 if cell.case == HEALTHY else 1)
     runs = [_run(cell, physical, best.controller, settings.steps) for _ in range(RUNS)]
     return {
