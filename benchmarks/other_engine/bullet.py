@@ -14,7 +14,7 @@ from benchmarks.other_engine.urdf import damaged_urdf
 from selfmodel.robot.robot import Robot
 
 FOOT_TOLERANCE = 1.2
-"""Largest distance of a contact that a foot feels from the centre of its site, in its radii."""
+"""Largest distance of a contact that a foot senses from the centre of its site, in its radii."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,7 +184,7 @@ class Bullet:
         return bool(np.isfinite(numbers).all() and np.linalg.norm(turn) > 0.5)
 
     def touches(self) -> dict[str, bool]:
-        """Returns whether each touch sensor feels the ground."""
+        """Returns whether each touch sensor senses the ground."""
         felt = dict.fromkeys(self._sites, False)
         by_link: dict[int, list[np.ndarray]] = {}
         for contact in self._contacts():

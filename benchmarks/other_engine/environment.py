@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.other_engine.bullet import Bullet
 from benchmarks.other_engine.damage import Damage
-from benchmarks.other_engine.instruments import Instruments
+from benchmarks.other_engine.measurements import Measurements
 from benchmarks.other_engine.reality import SUBSTEP, Reality
 from benchmarks.other_engine.servos import Servos, motors_of
 from selfmodel.physical.environment_robot import EnvironmentRobot
@@ -17,7 +17,7 @@ from selfmodel.robot.robot import Robot
 
 
 class BulletEnvironment(dm_env.Environment):
-    """A robot that obeys motor targets, and is observed by its instruments.
+    """A robot that obeys motor targets, and is observed through its measurements.
 
     Every episode has noise and an initial pose of its own, from the seed of the reality and the
     number of the episode: the n-th episodes of two equal environments are equal to the bit. An
@@ -65,7 +65,7 @@ class BulletEnvironment(dm_env.Environment):
         limits = np.array([self._robot.model.joint(name).range for name in hinges])
         angles = np.clip(reality.start_angle * rng.standard_normal(len(hinges)), *limits.T)
         self._place(angles, reality.start_tilt * rng.standard_normal(2))
-        self._instruments = Instruments(self._robot, reality, self._damage, rng, angles)
+        self._measurements = Measurements(self._robot, reality, self._damage, rng, angles)
         self._servos = Servos(self._motors, self._bullet.hinges()[0][self._driven])
         self._targets = np.zeros(len(self._motors.hinges))
         self._sent: deque[tuple[int, np.ndarray]] = deque()
@@ -135,7 +135,7 @@ class BulletEnvironment(dm_env.Environment):
         self._substep += 1
 
     def _observation(self) -> dict[str, np.ndarray]:
-        return {**self._instruments.observe(self._bullet), "time": np.array(self._time)}
+        return {**self._measurements.observe(self._bullet), "time": np.array(self._time)}
 
     @property
     def _time(self) -> float:

@@ -56,7 +56,7 @@ class Repair(Protocol):
         """Returns candidates for the next trial, best first, at least one.
 
         Args:
-            hypotheses: The best hypothesis, then those that cannot be told apart from it.
+            hypotheses: The best hypothesis, then those indistinguishable from it.
             uncertainty: Returns the uncertainty of the self-model; not called by a repair that
                 simulates the self-model alone.
             seeds: Known controllers; those of another design are ignored.

@@ -92,7 +92,7 @@ class Posterior:
         """Returns an uncertainty whose models are weighted by their predictions of trials.
 
         Args:
-            trials: Trials of controllers; those of the stage ``before`` are of the intact robot.
+            trials: Trials of controllers; those of the stage ``before`` are of the healthy robot.
                 Trials whose base was not observed are left out.
             hypothesis: Faults of the robot in all other trials.
         """

@@ -175,7 +175,7 @@ def _fitted(simulator: Simulator, calibration: Calibration) -> Simulator:
 def _judged(
     robot: Robot, hypothesis: Hypothesis, trials: Sequence[Trial], score: Score
 ) -> tuple[tuple[float, ...], tuple[int | None, ...]]:
-    """Returns the score and the fall of each trial, of which the first is of the intact robot."""
+    """Returns the score and the fall of each trial, of which the first is of the healthy robot."""
     faults = (INTACT, *[hypothesis] * (len(trials) - 1))
     pairs = list(zip(faults, trials, strict=True))
     return (

@@ -29,7 +29,7 @@ class RobustFitness:
     Attributes:
         simulator: Self-model.
         score: Score of a rollout.
-        hypotheses: Hypotheses that cannot be told apart, at least one.
+        hypotheses: Indistinguishable hypotheses, at least one.
         uncertainty: Distribution of the rollouts.
     """
 

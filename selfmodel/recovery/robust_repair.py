@@ -2,7 +2,7 @@
 
 A gait that is evolved in one exact simulation depends on that simulation: on a physical robot it
 loses most of its speed. Here every generation has new conditions: noise of the readings, initial
-poses, parameters of the model and hypotheses that cannot be told apart. Source: Jakobi, Husbands
+poses, parameters of the model and indistinguishable hypotheses. Source: Jakobi, Husbands
 and Harvey, "Noise and the reality gap" (ECAL 1995); the paper, section VI (noisy transfer).
 """
 

@@ -45,7 +45,7 @@ ASSUMED_DELAYS = (0, 1, 2)
 
 MIN_SHARE = 0.5
 """Smallest deviation of the initial pose, as a fraction of the noise with which it was measured: a
-pose within the noise cannot be told from the reference pose."""
+pose within the noise is not distinguished from the reference pose."""
 
 
 def assumed_uncertainty(robot: Robot) -> Uncertainty:

@@ -77,7 +77,7 @@ def draw_conditions(
     """Returns random conditions, with the hypotheses in turn from a random one.
 
     Args:
-        hypotheses: Hypotheses that cannot be told apart, at least one.
+        hypotheses: Indistinguishable hypotheses, at least one.
         uncertainty: Distribution of the conditions.
         count: Number of conditions.
         rng: Random number generator of the draws.

@@ -1,4 +1,4 @@
-"""Instruments of a robot: sensors, encoders and motion capture, with noise and lost encoders."""
+"""Measurements of a robot: sensors, encoders and motion capture, with noise and lost encoders."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -10,8 +10,8 @@ from selfmodel.robot.anatomy.anatomy import Sensor
 from selfmodel.robot.robot import Robot
 
 
-class Instruments:
-    """The instruments of one trial.
+class Measurements:
+    """The measurements of one trial.
 
     The encoder and the angle sensor of an absent hinge hold the last value that they measured, at
     the start; a driver repeats it when the encoder no longer answers. A fixed hinge is measured at
