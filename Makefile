@@ -16,6 +16,7 @@ $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --upgrade pip
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable . --group dev --group docs
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --only-binary pybullet --group other-engine || echo 'no wheel of PyBullet for this platform: its tests are skipped'
 	touch $@
 
 demo: $(READY) ## recover a quadruped from a lost lower leg, showing what it does
