@@ -7,7 +7,6 @@ import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.errors import InputError
-from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.simulation.requests import LEAD, Segments, command_steps, cut_segments
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.magnitudes import check_magnitudes
@@ -45,13 +44,11 @@ class CalibrationSegments:
         judged: Mask of the steps whose prediction has an error, ``(segments, horizon)``: the state
             after the step is known, and so are the commands that led there. Single hinges may be
             unknown; see ``compared``.
-        hypothesis: Faults of the robot during the trial.
     """
 
     segments: Segments
     observed: Mapping[Signal, FloatArray]
     judged: BoolArray
-    hypothesis: Hypothesis = INTACT
 
     def compared(self, signal: Signal) -> BoolArray:
         """Returns a mask of the errors of one signal, ``(segments, horizon, columns)``.

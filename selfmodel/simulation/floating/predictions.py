@@ -8,9 +8,8 @@ from itertools import takewhile
 import numpy as np
 
 from selfmodel.arrays import FloatArray, IndexArray
-from selfmodel.faults.build import build
-from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.robot.editing.embodiment import Embodiment
+from selfmodel.faults.build import apply_faults
+from selfmodel.faults.hypothesis import INTACT
 from selfmodel.robot.parameters import Parameters, model_with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import DEFAULT_BUDGET
@@ -19,6 +18,7 @@ from selfmodel.simulation.calibration_segments import CalibrationSegments
 from selfmodel.simulation.losses import damped
 from selfmodel.simulation.outcome import SimulationStats
 from selfmodel.simulation.prediction import predict
+from selfmodel.simulation.requests import Segments
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signal_difference import difference
 from selfmodel.trials.signal_scales import CALIBRATION_ERROR_SCALES
@@ -129,9 +129,7 @@ class Predictions:
             segments = own.segments
             if segments.independent:
                 return own
-            predicted = predict_with(
-                replace(own, segments=replace(segments, record=(*BASE, *JOINTS)))
-            )
+            predicted = predict_with(replace(segments, record=(*BASE, *JOINTS)))
             states = dict(segments.states)
             for signal in predicted.signals:
                 begin = predicted[signal][0, :, 0]
@@ -145,7 +143,7 @@ class Predictions:
         predict_with = self._predictor(models, stats)
         rows = []
         for own in self.data:
-            predicted = predict_with(own)
+            predicted = predict_with(own.segments)
             for signal, scale in CALIBRATION_ERROR_SCALES.items():
                 if signal in own.observed:
                     with np.errstate(over="ignore", invalid="ignore"):  # bounded below
@@ -158,32 +156,20 @@ class Predictions:
 
     def _predictor(
         self, models: Sequence[Parameters], stats: SimulationStats
-    ) -> Callable[[CalibrationSegments], Behaviour]:
-        """Returns a function that predicts the segments of a trial with models of equal delay.
+    ) -> Callable[[Segments], Behaviour]:
+        """Returns a function that predicts segments with models of equal delay.
 
         The signals of its result are ``(models, segments, horizon + 1, width)``.
         """
         robot, delay = self.robot, models[0].delay
-        embodiments = {
-            hypothesis: [embodiment_of(robot, hypothesis, parameters) for parameters in models]
-            for hypothesis in {own.hypothesis for own in self.data}
-        }
+        embodiments = [
+            apply_faults(model_with_parameters(robot, parameters), robot.anatomy, INTACT)
+            for parameters in models
+        ]
 
-        def predict_with(own: CalibrationSegments) -> Behaviour:
+        def predict_with(segments: Segments) -> Behaviour:
             return predict(
-                robot,
-                embodiments[own.hypothesis],
-                own.segments,
-                threads=self.threads,
-                stats=stats,
-                delay=delay,
+                robot, embodiments, segments, threads=self.threads, stats=stats, delay=delay
             ).behaviour
 
         return predict_with
-
-
-def embodiment_of(robot: Robot, hypothesis: Hypothesis, parameters: Parameters) -> Embodiment:
-    """Returns the robot under a hypothesis with scaled parameters."""
-    return build(
-        robot, hypothesis, perturb=lambda model: model_with_parameters(robot, parameters, model)
-    )
