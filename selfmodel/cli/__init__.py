@@ -24,6 +24,7 @@ COMMANDS = {
     "render": ("selfmodel.cli.render:render", "Draw a logged trial beside its simulation."),
     "ablate": ("selfmodel.cli.ablate:ablate", "Compare comparators on the same trials."),
     "suite": ("selfmodel.cli.suite:app", "Recover the bodies of dm_control's suite."),
+    "baseline": ("selfmodel.cli.baseline:baseline", "Recover by other methods, and an oracle."),
     "repertoire": ("selfmodel.cli.repertoire:app", "Make a repertoire of a robot's gaits."),
     "logs": ("selfmodel.cli.logs:app", "Inspect, verify, salvage and import trial logs."),
 }

@@ -50,7 +50,7 @@ class BaselineSettings:
         trials: Physical trials that a method may spend.
         evaluations: Evaluations of each search in simulation.
         searches: Number of searches of the oracle.
-        population: Genomes in a generation of an EA on the physical robot, and of T-Resilience.
+        population: Genomes in a generation.
         period: Generations of T-Resilience between two physical trials.
     """
 
