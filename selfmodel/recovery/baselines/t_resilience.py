@@ -2,7 +2,8 @@
 
 Source: S. Koos, A. Cully and J.-B. Mouret, *Fast damage recovery in robotics with the T-Resilience
 algorithm* (International Journal of Robotics Research 32:1700, 2013). The surrogate is the
-Gaussian process of ``trial_and_error`` instead of a support vector machine.
+Gaussian process of ``trial_and_error`` instead of a support vector machine; docs/results/rivals.md
+lists all differences.
 """
 
 from dataclasses import dataclass
