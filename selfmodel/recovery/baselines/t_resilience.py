@@ -2,8 +2,8 @@
 
 Source: S. Koos, A. Cully and J.-B. Mouret, *Fast damage recovery in robotics with the T-Resilience
 algorithm* (International Journal of Robotics Research 32:1700, 2013). The surrogate is the
-Gaussian process of ``trial_and_error`` instead of a support vector machine; docs/results/rivals.md
-lists all differences.
+Gaussian process of ``trial_and_error`` instead of a support vector machine. All
+differences are listed in ``docs/results/rivals.md``.
 """
 
 from dataclasses import dataclass
