@@ -66,8 +66,7 @@ def t_resilience(
             parents = population.genomes[entrants.min(axis=1)]
             children = _evaluated(problem, reproduce(parents, draw_genomes, operators, rng))
             both = _joined(population, children)
-            objectives = [both.displacements, -predicted(both), _diversity(both.genomes)]
-            chosen = best_first(np.stack(objectives, axis=1))[: settings.population]
+            chosen = best_first(_objectives(both, predicted(both)))[: settings.population]
             population = _picked(both, chosen)
         member = int(rng.integers(settings.population))
         if trials.left == 1:
@@ -98,6 +97,12 @@ def _picked(members: _Population, chosen: np.ndarray) -> _Population:
     )
 
 
-def _diversity(genomes: FloatArray) -> FloatArray:
-    """Mean Euclidean distance of each genome to all others, ``(n,)``."""
-    return np.asarray(distance.cdist(genomes, genomes).mean(axis=1))
+def _objectives(members: _Population, differences: FloatArray) -> FloatArray:
+    """Returns displacement, transferability and diversity, to be maximised, ``(n, 3)``.
+
+    Args:
+        members: The population.
+        differences: Predicted difference between simulation and physical trial, m, ``(n,)``.
+    """
+    diversity = distance.cdist(members.genomes, members.genomes).mean(axis=1)
+    return np.stack([members.displacements, -differences, diversity], axis=1)
