@@ -21,6 +21,7 @@ from selfmodel.cli.options import (
 from selfmodel.cli.output import grid_display
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.tables import show
+from selfmodel.errors import InputError
 from selfmodel.experiments.baseline.plan import BaselineStudy
 from selfmodel.experiments.baseline.results import (
     AFTER,
@@ -141,6 +142,11 @@ def baseline(
     Each method has the same damaged physical robots as `selfmodel recover` with the same seed and
     gap. An interrupted study is continued by the same command.
     """
+    if table and not (out / "runs").is_dir():
+        raise InputError(
+            f"{out}: expected the folder of a study with finished runs, got none: run the study "
+            f"first, without --table"
+        )
     study = BaselineStudy(
         robots=inputs.texts("--robots", robots, ROBOTS),
         cases=inputs.whole_numbers("--case", cases, ()),

@@ -33,3 +33,11 @@ def test_an_unknown_method_is_an_error_of_usage_before_anything_is_run(tmp_path:
     assert done.returncode == 2
     assert "unknown baseline 'oracles': did you mean oracle?" in done.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_table_of_a_missing_study_is_an_error_of_usage(tmp_path: Path):
+    done = selfmodel("baseline", "--table", "--out", "study", cwd=tmp_path)
+
+    assert done.returncode == 2
+    assert "study: expected the folder of a study with finished runs, got none" in done.stderr
+    assert list(tmp_path.iterdir()) == []
