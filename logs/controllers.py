@@ -25,7 +25,7 @@ from selfmodel.controllers.network import Network
 from selfmodel.errors import InputError
 from selfmodel.files import read_file
 from selfmodel.logs.errors import LogWriteError
-from selfmodel.logs.npz import NPZ_FAILURES
+from selfmodel.logs.npz import NPZ_FAILURES, read_array
 
 MAX_CONTROLLER_BYTES = 2**20
 """Largest size of a controller file, bytes; those of the paper's robots are under 3,000."""
@@ -185,7 +185,7 @@ def _arrays(data: bytes) -> dict[str, NDArray[Any]]:
         names = {f"{name}.npy" for name in expected}
         if set(members) != names or len(archive.infolist()) != len(names):
             raise ValueError(f"it holds {', '.join(sorted(members)) or 'nothing'}")
-        found = {name: _array(archive.read(f"{name}.npy")) for name in expected}
+        found = {name: read_array(archive.read(f"{name}.npy")) for name in expected}
     types = {name: array.dtype.kind for name, array in found.items()}
     ranks = {name: array.ndim for name, array in found.items()}
     if types != {name: type_code for name, (type_code, _) in expected.items()}:
@@ -199,23 +199,7 @@ def _arrays(data: bytes) -> dict[str, NDArray[Any]]:
 
 
 def _kind(archive: zipfile.ZipFile) -> str:
-    kind = str(_array(archive.read("kind.npy")))
+    kind = str(read_array(archive.read("kind.npy")))
     if kind not in KINDS:
         raise ValueError(f"expected the kind {' or '.join(map(repr, KINDS))}, got {kind!r}")
     return kind
-
-
-def _array(data: bytes) -> NDArray[Any]:
-    """Reads an ``.npy``; the header is checked against the size before memory is allocated."""
-    file = io.BytesIO(data)
-    if np.lib.format.read_magic(file) != (1, 0):
-        raise ValueError("it has arrays of another version than 1.0")
-    shape, _, dtype = np.lib.format.read_array_header_1_0(file)
-    count = 1
-    for length in shape:
-        count *= length
-    if dtype.hasobject or dtype.itemsize * count != len(data) - file.tell():
-        raise ValueError(f"an array of shape {shape} and type {dtype} does not fit its size")
-    file.seek(0)
-    array: NDArray[Any] = np.lib.format.read_array(file, allow_pickle=False)
-    return array

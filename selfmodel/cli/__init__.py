@@ -25,6 +25,8 @@ COMMANDS = {
     "ablate": ("selfmodel.cli.ablate:ablate", "Compare comparators on the same trials."),
     "suite": ("selfmodel.cli.suite:app", "Recover the bodies of dm_control's suite."),
     "paper": ("selfmodel.cli.paper:paper", "Repeat the paper's experiment on its robots."),
+    "baseline": ("selfmodel.cli.baseline:baseline", "Recover by other methods, and an oracle."),
+    "repertoire": ("selfmodel.cli.repertoire:app", "Make a repertoire of a robot's gaits."),
     "logs": ("selfmodel.cli.logs:app", "Inspect, verify, salvage and import trial logs."),
 }
 """``module:function`` and one-line help per command."""

@@ -10,3 +10,13 @@ from .next_trial import (
 )
 from .recovery import Recovery as Recovery
 from .repair import RepairSearch as RepairSearch
+from .repertoire.evaluation import (
+    Evaluate as Evaluate,
+    simulated_evaluation as simulated_evaluation,
+)
+from .repertoire.make import (
+    Reevaluation as Reevaluation,
+    make_repertoire as make_repertoire,
+    reevaluate as reevaluate,
+)
+from .repertoire.repertoire import Repertoire as Repertoire

@@ -1,0 +1,165 @@
+"""Repertoire files: ``.npz`` archives of numpy arrays, without pickled objects.
+
+The arrays of every file: ``controller`` (the bytes of a controller file: the design, with the best
+genome), ``genomes`` (int8, hundredths), ``scores`` and ``descriptors`` (float64), ``origin`` (JSON:
+robot, digest of its model, settings, seed, version) and ``sha256``, the digest of all others. The
+digest detects damage; it is no signature.
+"""
+
+import dataclasses
+import hashlib
+import io
+import json
+import warnings
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+from selfmodel.errors import InputError
+from selfmodel.files import read_file
+from selfmodel.logs.controllers import controller_bytes, parse_controller
+from selfmodel.logs.files import replace_file
+from selfmodel.logs.npz import NPZ_FAILURES, read_array
+from selfmodel.recovery.repertoire.repertoire import Origin, Repertoire, model_digest
+
+if TYPE_CHECKING:
+    from selfmodel.robot.robot import Robot
+
+MAX_BYTES = 2**28
+"""Largest size of a repertoire file and of its arrays, bytes; 20,000 gaits of the hexapod have
+under 4 MB."""
+
+_TYPES: Mapping[str, tuple[str, int]] = {
+    "controller": ("uint8", 1),
+    "genomes": ("int8", 2),
+    "scores": ("float64", 1),
+    "descriptors": ("float64", 2),
+    "origin": ("uint8", 1),
+    "sha256": ("uint8", 1),
+}
+"""Type and rank of each array, in the order of the file."""
+
+
+def repertoire_bytes(repertoire: Repertoire) -> bytes:
+    """Returns a repertoire as the bytes of an ``.npz`` file; equal repertoires, equal bytes.
+
+    Raises:
+        ValueError: A genome is not in hundredths.
+    """
+    hundredths = np.rint(repertoire.genomes * 100)
+    if not np.array_equal(hundredths / 100, repertoire.genomes):
+        raise ValueError("expected genomes in hundredths, as a repertoire search returns them")
+    arrays: dict[str, NDArray[Any]] = {
+        "controller": _as_array(controller_bytes(repertoire.controller(0))),
+        "genomes": hundredths.astype(np.int8),
+        "scores": repertoire.scores,
+        "descriptors": repertoire.descriptors,
+        "origin": _as_array(json.dumps(dataclasses.asdict(repertoire.origin)).encode()),
+    }
+    file = io.BytesIO()
+    np.savez_compressed(file, allow_pickle=False, **arrays, sha256=_digest(arrays))
+    return file.getvalue()
+
+
+def save_repertoire(path: Path, repertoire: Repertoire) -> None:
+    """Writes a repertoire, or replaces the file.
+
+    Raises:
+        LogWriteError: Writing failed; the file keeps its old content.
+    """
+    replace_file(path, repertoire_bytes(repertoire))
+
+
+def load_repertoire(path: Path, robot: "Robot | None" = None) -> Repertoire:
+    """Returns the verified repertoire in a file.
+
+    Args:
+        path: The file.
+        robot: Robot of which the repertoire must be; None for any.
+
+    Raises:
+        InputError: The file is no repertoire, is damaged, or is of another model.
+    """
+    repertoire = parse_repertoire(read_file(path, "a repertoire file", MAX_BYTES), str(path))
+    if robot is not None and repertoire.origin.model != model_digest(robot):
+        raise InputError(
+            f"{path}: expected a repertoire of {robot.name} with the model "
+            f"{model_digest(robot)[:12]}, got one of {repertoire.origin.robot} with the model "
+            f"{repertoire.origin.model[:12]}: make a repertoire of this model with `selfmodel "
+            f"repertoire make`"
+        )
+    return repertoire
+
+
+def parse_repertoire(data: bytes, source: str) -> Repertoire:
+    """Returns the repertoire of bytes that ``repertoire_bytes`` made.
+
+    Args:
+        data: The bytes of an ``.npz`` file.
+        source: Name of the file, for the error message.
+
+    Raises:
+        InputError: The bytes are not a repertoire file, or were altered.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # Python's, for a header that is a damaged literal
+            return _repertoire(_arrays(data), source)
+    except (*NPZ_FAILURES, MemoryError, Warning) as failure:
+        raise InputError(
+            f"{source}: expected a repertoire (.npz with the arrays {', '.join(_TYPES)}): "
+            f"{failure or type(failure).__name__}; make it anew with `selfmodel repertoire make`"
+        ) from failure
+
+
+def _repertoire(arrays: Mapping[str, NDArray[Any]], source: str) -> Repertoire:
+    given = {name: array for name, array in arrays.items() if name != "sha256"}
+    if not np.array_equal(arrays["sha256"], _digest(given)):
+        raise ValueError("its digest is wrong, so it was altered or damaged")
+    best = parse_controller(arrays["controller"].tobytes(), source)
+    scores, descriptors = arrays["scores"], arrays["descriptors"]
+    if not (np.isfinite(scores).all() and np.isfinite(descriptors).all()):
+        raise ValueError("a score or a descriptor is not finite")
+    if arrays["genomes"].size and np.abs(arrays["genomes"].astype(np.int16)).max() > 100:
+        raise ValueError("a weight is outside of -1 to 1")
+    origin = _origin(json.loads(arrays["origin"].tobytes().decode()))
+    return Repertoire(best.design, arrays["genomes"] / 100, scores, descriptors, origin)
+
+
+def _origin(values: Any) -> Origin:  # noqa: ANN401  # JSON
+    types = get_type_hints(Origin)
+    if not isinstance(values, dict) or {name: type(one) for name, one in values.items()} != types:
+        raise ValueError(f"its origin needs the values {', '.join(types)}")
+    return Origin(**values)
+
+
+def _arrays(data: bytes) -> dict[str, NDArray[Any]]:
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        members = archive.infolist()
+        if sum(info.file_size for info in members) > MAX_BYTES:
+            raise ValueError(f"it unpacks to more than {MAX_BYTES} bytes")
+        if sorted(info.filename for info in members) != sorted(f"{name}.npy" for name in _TYPES):
+            raise ValueError(f"it holds {len(members)} other members")
+        found = {name: read_array(archive.read(f"{name}.npy")) for name in _TYPES}
+    types = {name: (str(array.dtype), array.ndim) for name, array in found.items()}
+    if types != _TYPES:
+        raise ValueError(f"its arrays have the types and ranks {types}")
+    return found
+
+
+def _digest(arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.uint8]:
+    digest = hashlib.sha256()
+    for name in sorted(arrays):
+        array = arrays[name]
+        # Digests have a fixed length, so that names, shapes and contents cannot be confused.
+        for part in (f"{name} {array.dtype} {array.shape}".encode(), array.tobytes()):
+            digest.update(hashlib.sha256(part).digest())
+    return _as_array(digest.digest())
+
+
+def _as_array(data: bytes) -> NDArray[np.uint8]:
+    return np.frombuffer(data, dtype=np.uint8)

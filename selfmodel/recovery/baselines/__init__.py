@@ -1,0 +1,1 @@
+"""Baselines: other methods of recovery on the same physical robots, one method a file."""

@@ -1,0 +1,40 @@
+"""The commands that make and show a repertoire."""
+
+import json
+from pathlib import Path
+
+from tests.helpers.command import selfmodel
+
+SMALL = ("--evaluations", "40", "--steps", "40", "--seed", "2")
+
+
+def test_a_repertoire_is_made_and_shown(tmp_path: Path):
+    done = selfmodel(
+        "repertoire", "make", "quadruped", "--out", "gaits.npz", *SMALL, "--json", cwd=tmp_path
+    )
+    assert done.returncode == 0, done.stderr
+    made = json.loads(done.stdout)
+    shown = selfmodel("repertoire", "info", "gaits.npz", "--json", cwd=tmp_path)
+
+    # Batches are whole.
+    assert (made["robot"], made["evaluations"], made["cells"]) == ("quadruped", 200, 160_000)
+    assert made.pop("simulated_steps") == 200 * 40
+    assert json.loads(shown.stdout) == made
+    assert "200 of 40 gaits evaluated" in done.stderr
+
+
+def test_an_existing_file_is_not_overwritten(tmp_path: Path):
+    (tmp_path / "gaits.npz").write_bytes(b"mine")
+    done = selfmodel("repertoire", "make", "quadruped", "--out", "gaits.npz", *SMALL, cwd=tmp_path)
+
+    assert done.returncode == 2
+    assert "gaits.npz exists, and is not overwritten" in done.stderr
+    assert (tmp_path / "gaits.npz").read_bytes() == b"mine"
+
+
+def test_a_file_that_is_no_repertoire_is_an_error_of_usage(tmp_path: Path):
+    (tmp_path / "gaits.npz").write_bytes(b"mine")
+    done = selfmodel("repertoire", "info", "gaits.npz", cwd=tmp_path)
+
+    assert done.returncode == 2
+    assert "gaits.npz: expected a repertoire" in done.stderr

@@ -1,0 +1,97 @@
+"""Repertoire files: what is written is read, and nothing else is."""
+
+import io
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from selfmodel.errors import InputError
+from selfmodel.logs.repertoires import (
+    load_repertoire,
+    parse_repertoire,
+    repertoire_bytes,
+    save_repertoire,
+)
+from selfmodel.recovery.repertoire.repertoire import Origin, Repertoire, model_digest
+from selfmodel.robot.designs import network_for
+from selfmodel.robot.robot import Robot
+from tests.helpers.drivers import random_controllers
+
+
+@pytest.fixture(scope="module")
+def repertoire(quadruped: Robot) -> Repertoire:
+    rng = np.random.default_rng(0)
+    return Repertoire(
+        network_for(quadruped),
+        np.array([one.genome for one in random_controllers(quadruped, 7)]),
+        rng.random(7),
+        rng.random((7, 4)),
+        Origin("quadruped", model_digest(quadruped), 60, 100, 20, 3, "0.1.0"),
+    )
+
+
+def test_a_repertoire_is_read_as_it_was_written(
+    repertoire: Repertoire, quadruped: Robot, tmp_path: Path
+):
+    save_repertoire(tmp_path / "gaits.npz", repertoire)
+    found = load_repertoire(tmp_path / "gaits.npz", quadruped)
+
+    assert (found.design, found.origin) == (repertoire.design, repertoire.origin)
+    for name in ("genomes", "scores", "descriptors"):
+        assert np.array_equal(getattr(found, name), getattr(repertoire, name)), name
+    assert repertoire_bytes(found) == (tmp_path / "gaits.npz").read_bytes()
+
+
+def test_a_repertoire_of_another_model_is_refused(
+    repertoire: Repertoire, tmp_path: Path, robot: Robot
+):
+    save_repertoire(tmp_path / "gaits.npz", repertoire)
+    if robot.name == "quadruped":
+        return
+    with pytest.raises(InputError, match=r"expected a repertoire of hexapod .* got one of quadr"):
+        load_repertoire(tmp_path / "gaits.npz", robot)
+
+
+@pytest.mark.parametrize("name", ["genomes", "scores", "descriptors", "origin", "controller"])
+def test_an_altered_array_is_noticed(repertoire: Repertoire, name: str):
+    with np.load(io.BytesIO(repertoire_bytes(repertoire))) as file:
+        arrays = dict(file)
+    arrays[name].flat[0] += 1
+    altered = io.BytesIO()
+    np.savez_compressed(altered, **arrays)
+
+    with pytest.raises(InputError, match="its digest is wrong, so it was altered or damaged; mak"):
+        parse_repertoire(altered.getvalue(), "here")
+
+
+@pytest.mark.parametrize("cut", [0, 10, 500, -1])
+def test_damaged_bytes_are_an_error_with_the_remedy(repertoire: Repertoire, cut: int):
+    with pytest.raises(InputError, match=r"here: expected a repertoire \(.npz.* repertoire make`"):
+        parse_repertoire(repertoire_bytes(repertoire)[:cut], "here")
+
+
+def test_a_controller_file_is_no_repertoire(repertoire: Repertoire):
+    file = io.BytesIO()
+    np.savez(file, genome=repertoire.genomes[0])
+    with pytest.raises(InputError, match="it holds 1 other members"):
+        parse_repertoire(file.getvalue(), "here")
+
+
+def test_a_repertoire_is_read_without_mujoco_and_pyribs(repertoire: Repertoire, tmp_path: Path):
+    save_repertoire(tmp_path / "gaits.npz", repertoire)
+    code = (
+        "import sys; sys.modules['mujoco'] = sys.modules['ribs'] = None\n"
+        "from pathlib import Path; from selfmodel.logs.repertoires import load_repertoire\n"
+        "print(len(load_repertoire(Path(sys.argv[1]))))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, tmp_path / "gaits.npz"],
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+
+    assert done.stdout == "7\n"
