@@ -12,17 +12,13 @@ import numpy as np
 
 from benchmarks.recoveries.cells import HEALTHY, Cell
 from selfmodel.controllers.controller import Controller
-from selfmodel.physical.initial_pose import start_spread
 from selfmodel.physical.interface import PhysicalRobot
-from selfmodel.physical.reality_gap import perturbed_model
 from selfmodel.recovery.robust_fitness import robust
 from selfmodel.recovery.robust_repair import RobustRepair
+from selfmodel.recovery.uncertainty import noise_of_gap
 from selfmodel.recovery.upright import UPRIGHT
 from selfmodel.robot.designs import network_for
-from selfmodel.robot.parameters import with_model
 from selfmodel.settings import Settings
-from selfmodel.simulation.conditions import Uncertainty
-from selfmodel.simulation.model_distribution import exact
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import collect
 from selfmodel.trials.trial import Trial, TrialPlan
@@ -46,15 +42,9 @@ def oracle(cell: Cell, *, settings: Settings) -> dict[str, Any]:
         settings: The paper's numbers, which set the cost of a search.
     """
     start = perf_counter()
-    robot, gap = cell.nominal, cell.reality.gap
-    hidden = with_model(robot, perturbed_model(robot.model, gap), robot.control_delay + gap.delay)
-    touch = np.array([sensor.kind == "touch" for sensor in robot.anatomy.sensors])
-    noise = Uncertainty(
-        models=exact(hidden),
-        reading_noise=np.where(touch, 0.0, cell.gap),
-        wrong_touches=np.where(touch, cell.gap / 2, 0.0),
-        start=start_spread(cell.gap),
-    )
+    robot = cell.nominal
+    hidden = cell.reality.hidden_model(robot)
+    noise = noise_of_gap(hidden, cell.gap)
     repair = RobustRepair(Simulator(hidden, 1), settings, network_for(robot), UPRIGHT)
     found: list[Any] = []
     for number in range(SEARCHES):

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 
 from selfmodel.experiments.arguments import RobotSource, check_seed, hypothesis_of, robot_of
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
-from selfmodel.physical.reality_gap import RealityGap, draw_gap
+from selfmodel.physical.reality_gap import RealityGap, draw_gap, perturbed_model
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.physical.structural_mismatch import StructuralMismatch, draw_structural_mismatch
 from selfmodel.recovery.random_streams import gap_stream, structure_stream
+from selfmodel.robot.parameters import with_model
 from selfmodel.robot.robot import Robot
 
 
@@ -31,6 +32,11 @@ class Reality:
             return None
         structure = None if self.structure is None else self.structure.as_dict()
         return json.dumps({**self.gap.as_dict(), "structure": structure}, allow_nan=False)
+
+    def hidden_model(self, robot: Robot) -> Robot:
+        """Returns a robot whose model has the factors and the delay of the gap, for an oracle."""
+        model = perturbed_model(robot.model, self.gap)
+        return with_model(robot, model, robot.control_delay + self.gap.delay)
 
     def robot(self, robot: Robot, hidden: Hypothesis = INTACT, stream: int = 0) -> SimulatedRobot:
         """Returns the physical robot with hidden faults; see ``SimulatedRobot``."""

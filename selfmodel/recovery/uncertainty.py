@@ -6,7 +6,7 @@ import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.physical.initial_pose import StartSpread
+from selfmodel.physical.initial_pose import StartSpread, start_spread
 from selfmodel.robot.anatomy.anatomy import Anatomy
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import EXACT_ERROR, Calibration
@@ -59,6 +59,22 @@ def assumed_uncertainty(robot: Robot) -> Uncertainty:
         wrong_touches=np.where(touch, ASSUMED_WRONG_TOUCHES, 0.0),
         start=ASSUMED_START,
         delays=ASSUMED_DELAYS,
+    )
+
+
+def noise_of_gap(robot: Robot, level: float) -> Uncertainty:
+    """Returns the noise of a reality gap alone: the parameters are those of the robot's model.
+
+    Args:
+        robot: The robot.
+        level: Level of the reality gap.
+    """
+    touch = _touch(robot.anatomy)
+    return Uncertainty(
+        models=exact(robot),
+        reading_noise=np.where(touch, 0.0, level),
+        wrong_touches=np.where(touch, level / 2, 0.0),
+        start=start_spread(level),
     )
 
 

@@ -7,7 +7,12 @@ import numpy as np
 import pytest
 
 import selfmodel
-from selfmodel.recovery.uncertainty import BODIES, assumed_uncertainty, estimated_uncertainty
+from selfmodel.recovery.uncertainty import (
+    BODIES,
+    assumed_uncertainty,
+    estimated_uncertainty,
+    noise_of_gap,
+)
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import Calibration, calibrate
 from selfmodel.simulation.simulator import Simulator
@@ -81,3 +86,13 @@ def test_before_the_first_trial_everything_is_uncertain(robot: Robot):
     assert (found.wrong_touches[touch] > 0).all()
     assert len(found.delays) > 1
     assert found.models.draw(np.random.default_rng(0)).differs
+
+
+def test_the_noise_of_a_gap_leaves_the_model_as_it_is(quadruped: Robot):
+    found = noise_of_gap(quadruped, 0.1)
+    touch = np.array([sensor.kind == "touch" for sensor in quadruped.anatomy.sensors])
+
+    assert not found.models.draw(np.random.default_rng(0)).differs
+    assert set(found.reading_noise[~touch]) == {0.1}
+    assert set(found.wrong_touches[touch]) == {0.05}
+    assert found.delays == (0,)

@@ -1,12 +1,14 @@
 """Execution of a study of baselines: the repertoires, then one part per cell and method."""
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 
+from selfmodel.arrays import FloatArray
+from selfmodel.controllers.controller import Controller
 from selfmodel.experiments import robots
 from selfmodel.experiments.baseline.plan import (
     WITH_REPERTOIRE,
@@ -20,18 +22,22 @@ from selfmodel.experiments.baseline.plan import (
 )
 from selfmodel.experiments.baseline.results import BaselineRow
 from selfmodel.experiments.grid import GridBegins, Job, PartEnds, PartResult, run_grid
-from selfmodel.experiments.reality import Reality, draw_reality
+from selfmodel.experiments.reality import draw_reality
 from selfmodel.faults.build import build
-from selfmodel.faults.hypothesis import INTACT
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.logs.repertoires import load_repertoire, save_repertoire
 from selfmodel.physical.reality_gap import RealityGap
-from selfmodel.recovery.baselines.ea_search import ea_search
-from selfmodel.recovery.baselines.measurement import Track, fitness_on
-from selfmodel.recovery.baselines.problem import Problem
+from selfmodel.recovery.baselines.genome_search import genome_search
+from selfmodel.recovery.baselines.measurement import Track
+from selfmodel.recovery.baselines.problem import Fitness, Problem
 from selfmodel.recovery.baselines.registry import BASELINES
+from selfmodel.recovery.cma_es import CmaEs
 from selfmodel.recovery.repertoire.evaluation import simulated_evaluation
 from selfmodel.recovery.repertoire.make import make_repertoire
+from selfmodel.recovery.robust_fitness import RobustFitness
+from selfmodel.recovery.uncertainty import noise_of_gap
+from selfmodel.recovery.upright import UPRIGHT
 from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
@@ -128,23 +134,45 @@ def _problem(job: Job, method: str, folder: Path) -> tuple[Simulator, Problem]:
     reality = draw_reality(robot, job.seed, parameters["gap"], structure=False)
     simulator = Simulator(robot, threads=1)
     track = Track(reality.robot(robot, truth, PHYSICAL), robot, build(robot, truth).normal, steps)
-    noisy = Reality(noise_of(reality.gap), None).robot(robot, INTACT, HEALTHY)
-    healthy = Track(noisy, robot, build(robot, INTACT).normal, steps)
-    hidden = dataclasses.replace(track, physical=reality.robot(robot, truth, HIDDEN))
     path = repertoire_path(folder, parameters["robot"])
     return simulator, Problem(
         track=track,
         design=network_for(robot),
         evaluate=simulated_evaluation(simulator, INTACT, steps),
-        healthy=fitness_on(healthy, simulator.stats),
-        hidden=fitness_on(hidden, simulator.stats),
-        search=ea_search(Settings().scaled(parameters["shared"]["settings"]["population"])),
+        healthy=_noisy_fitness(simulator, INTACT, reality.gap, steps, (job.seed, HEALTHY)),
+        hidden=_noisy_fitness(
+            Simulator(reality.hidden_model(robot), 1, simulator.stats),
+            truth,
+            reality.gap,
+            steps,
+            (job.seed, HIDDEN),
+        ),
+        search=genome_search(
+            CmaEs, Settings().scaled(parameters["shared"]["settings"]["population"])
+        ),
         repertoire=load_repertoire(path, robot) if method == WITH_REPERTOIRE else None,
     )
 
 
-def noise_of(gap: RealityGap) -> RealityGap:
-    """Returns a reality gap with the noise of sensors and start alone: no factors, no delay."""
-    return dataclasses.replace(
-        gap, mass={}, inertia={}, friction=1.0, damping=1.0, motors={}, delay=0
-    )
+def _noisy_fitness(
+    simulator: Simulator, hypothesis: Hypothesis, gap: RealityGap, steps: int, key: tuple[int, int]
+) -> Fitness:
+    """Returns the fitness of controllers under a hypothesis, with the noise of a reality gap.
+
+    Each call has new noise, which its controllers share.
+
+    Args:
+        simulator: Simulator of the robot.
+        hypothesis: Faults of the robot.
+        gap: The reality gap, of which the level counts.
+        steps: Control steps of a rollout.
+        key: Seed of the noise.
+    """
+    noise, rng = noise_of_gap(simulator.robot, gap.level), np.random.default_rng(key)
+    fitness = RobustFitness(simulator, UPRIGHT, (hypothesis,), noise)
+
+    def of(controllers: Sequence[Controller]) -> FloatArray:
+        scores = fitness(controllers, 1, steps, rng)[:, 0]
+        return np.where(np.isfinite(scores), scores, -1.0)
+
+    return of

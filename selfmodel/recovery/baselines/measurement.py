@@ -1,9 +1,6 @@
 """Displacement and falls of one run of a physical robot."""
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-
-import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Controller
@@ -11,7 +8,6 @@ from selfmodel.errors import TrialError
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery.falls import first_falls
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.outcome import SimulationStats
 from selfmodel.trials.behaviour import Sample, collect
 
 
@@ -71,22 +67,3 @@ def measure(track: Track, controller: Controller) -> Measured:
         fallen=fall < logged.steps,
         steps=logged.steps,
     )
-
-
-def fitness_on(
-    track: Track, stats: SimulationStats
-) -> Callable[[Sequence[Controller]], FloatArray]:
-    """Returns the fitness of controllers on a simulated physical robot: displacement to a fall, m.
-
-    Args:
-        track: The simulated physical robot; each evaluation is one run with noise of its own.
-        stats: Statistics of simulations, to which the runs are added.
-    """
-
-    def fitness(controllers: Sequence[Controller]) -> FloatArray:
-        found = [measure(track, controller) for controller in controllers]
-        stats.runs += len(found)
-        stats.steps += sum(one.steps for one in found)
-        return np.array([one.upright for one in found])
-
-    return fitness

@@ -9,14 +9,11 @@ import pytest
 from selfmodel.experiments.baseline import work
 from selfmodel.experiments.baseline.plan import BaselineStudy, cell_jobs, repertoire_jobs
 from selfmodel.experiments.baseline.results import write_results
-from selfmodel.experiments.baseline.work import noise_of, run_study
+from selfmodel.experiments.baseline.work import run_study
 from selfmodel.experiments.grid import Job, PartEnds
-from selfmodel.experiments.reality import draw_reality
-from selfmodel.physical.reality_gap import perturbed_model
 from selfmodel.recovery.baselines.measurement import measure
 from selfmodel.recovery.baselines.problem import BaselineSettings
 from selfmodel.recovery.baselines.registry import BASELINES
-from selfmodel.robot.robot import Robot
 from tests.helpers.drivers import random_of
 
 SMALL = BaselineSettings(trials=2, evaluations=6, searches=2, population=4, period=1)
@@ -77,15 +74,6 @@ def test_all_methods_have_the_same_physical_robot(study: BaselineStudy):
 
     assert measure(first.track, controller) == measure(second.track, controller)
     assert measure(first.track, controller) != measure(first.track, controller), "noise"
-
-
-def test_noise_alone_leaves_the_model_as_it_is(quadruped: Robot):
-    gap = noise_of(draw_reality(quadruped, 1, 0.1, structure=False).gap)
-    model = perturbed_model(quadruped.model, gap)
-
-    assert (gap.level, gap.delay) == (0.1, 0)
-    assert model.body_mass.tolist() == quadruped.model.body_mass.tolist()
-    assert model.actuator_gainprm.tolist() == quadruped.model.actuator_gainprm.tolist()
 
 
 @pytest.mark.process

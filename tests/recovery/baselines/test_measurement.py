@@ -3,13 +3,8 @@
 import pytest
 
 from selfmodel.errors import TrialError
-from selfmodel.experiments.reality import simulated_robot
-from selfmodel.faults.hypothesis import INTACT
-from selfmodel.recovery.baselines.measurement import Measured, Track, fitness_on, measure
+from selfmodel.recovery.baselines.measurement import Measured, Track, measure
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.outcome import SimulationStats
-from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import forward_displacement
 from tests.helpers.drivers import random_controllers
 from tests.helpers.stub_robot import StubRobot
 from tests.recovery.baselines.problems import LEVEL
@@ -39,13 +34,3 @@ def test_a_run_that_ends_early_counts_as_far_as_it_went(quadruped: Robot):
 def test_a_run_without_any_sample_is_an_error(quadruped: Robot):
     with pytest.raises(TrialError, match="the robot failed"):
         measured(quadruped, ends_after=0)
-
-
-def test_fitness_on_a_robot_without_a_gap_is_that_of_the_self_model(quadruped: Robot):
-    controllers, stats = random_controllers(quadruped, 3), SimulationStats()
-    fitness = fitness_on(Track(simulated_robot(quadruped), quadruped, LEVEL, 20), stats)
-    runs = [(INTACT, one) for one in controllers]
-    simulated = Simulator(quadruped, 1).run(runs, 20, ["base_position"]).behaviour
-
-    assert fitness(controllers).tolist() == forward_displacement(simulated).tolist()
-    assert (stats.runs, stats.steps) == (3, 60)

@@ -3,12 +3,18 @@
 import numpy as np
 import pytest
 
+from selfmodel.evolution import Evolution
 from selfmodel.experiments.reality import simulated_robot
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
-from selfmodel.recovery.baselines.ea_search import ea_search
-from selfmodel.recovery.baselines.measurement import Track, fitness_on
-from selfmodel.recovery.baselines.problem import BaselineSettings, BaselineTrial, Problem
+from selfmodel.recovery.baselines.genome_search import genome_search
+from selfmodel.recovery.baselines.measurement import Track, measure
+from selfmodel.recovery.baselines.problem import (
+    BaselineSettings,
+    BaselineTrial,
+    Fitness,
+    Problem,
+)
 from selfmodel.recovery.baselines.registry import BASELINES
 from selfmodel.recovery.repertoire.evaluation import simulated_evaluation
 from selfmodel.recovery.repertoire.make import make_repertoire
@@ -16,7 +22,6 @@ from selfmodel.recovery.repertoire.repertoire import Repertoire
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.outcome import SimulationStats
 from selfmodel.simulation.simulator import Simulator
 from tests.recovery.baselines.problems import LEVEL
 
@@ -32,11 +37,16 @@ def repertoire(quadruped: Robot) -> Repertoire:
     )
 
 
+def fitness_on(track: Track) -> Fitness:
+    """The upright displacement of one run of each controller on a track."""
+    return lambda controllers: np.array([measure(track, one).upright for one in controllers])
+
+
 def run(
     name: str, robot: Robot, repertoire: Repertoire, seed: int
 ) -> tuple[tuple[BaselineTrial, ...], list[BaselineTrial]]:
     """A method on a damaged physical robot with a reality gap, and what its callback received."""
-    truth, stats = parse("break:front_left_knee", robot.anatomy), SimulationStats()
+    truth = parse("break:front_left_knee", robot.anatomy)
 
     def track() -> Track:  # a new one has the same noise
         physical = simulated_robot(robot, truth, gap=0.1, seed=5)
@@ -46,9 +56,9 @@ def run(
         track=track(),
         design=network_for(robot),
         evaluate=simulated_evaluation(Simulator(robot, 1), INTACT, STEPS),
-        healthy=fitness_on(Track(simulated_robot(robot), robot, LEVEL, STEPS), stats),
-        hidden=fitness_on(track(), stats),
-        search=ea_search(Settings().scaled(4)),
+        healthy=fitness_on(Track(simulated_robot(robot), robot, LEVEL, STEPS)),
+        hidden=fitness_on(track()),
+        search=genome_search(Evolution, Settings().scaled(4)),
         repertoire=repertoire,
     )
     seen: list[BaselineTrial] = []

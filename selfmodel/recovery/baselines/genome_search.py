@@ -1,4 +1,4 @@
-"""The paper's EA as the search of a baseline."""
+"""CMA-ES, or the paper's EA, as the search of a baseline."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -7,33 +7,34 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Controller, Design, draw_genomes
-from selfmodel.evolution import Evolution, evolve
 from selfmodel.recovery.baselines.problem import Fitness, Search
+from selfmodel.recovery.robust_repair import MakeSearch
 from selfmodel.settings import Settings
 
 KEPT = 50
 """Number of controllers that a search returns."""
 
 
-def ea_search(settings: Settings) -> Search:
-    """Returns the search by the EA of the paper.
+def genome_search(make_search: MakeSearch, settings: Settings) -> Search:
+    """Returns the search of a baseline by a search over genomes.
 
     Args:
-        settings: Population and operators; the number of generations follows from the evaluations.
+        make_search: Makes the search over genomes, such as ``CmaEs`` or ``Evolution``.
+        settings: The paper's numbers.
     """
-    return partial(_search, settings)
+    return partial(_search, make_search=make_search, settings=settings)
 
 
 def _search(
-    settings: Settings,
     design: Design,
     fitness: Fitness,
     evaluations: int,
     rng: np.random.Generator,
+    *,
+    make_search: MakeSearch,
+    settings: Settings,
 ) -> Sequence[Controller]:
-    children = settings.population - settings.survivors
-    search = Evolution(design.weights, draw_genomes, settings, rng)
-    search.generations = 1 + max(0, -(-(evaluations - settings.population) // children))
+    search = make_search(design.weights, draw_genomes, settings, rng, ())
     known: dict[Controller, float] = {}
 
     def evaluated(genomes: FloatArray) -> FloatArray:
@@ -42,5 +43,7 @@ def _search(
         known.update(zip(controllers, scores.tolist(), strict=True))
         return scores
 
-    evolve(search, evaluated, lambda _generation: None)
+    while search.evaluations < evaluations:
+        search.tell(evaluated(search.ask()))
+    evaluated(search.candidates(KEPT))
     return sorted(known, key=lambda one: -known[one])[:KEPT]
