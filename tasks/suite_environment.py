@@ -15,7 +15,7 @@ from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.physical.environment_robot import EnvironmentRobot
 from selfmodel.physical.simulated_robot import OWN_SEED
-from selfmodel.recovery.fitness import Score
+from selfmodel.recovery.scores.fitness import Score
 from selfmodel.robot.control_delay import added_steps
 from selfmodel.robot.editing.embodiment import Embodiment
 from selfmodel.robot.mjcf.mujoco_errors import loading_a_model

@@ -2,7 +2,7 @@
 
 from selfmodel.arrays import FloatArray
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.recovery.fitness import Score
+from selfmodel.recovery.scores.fitness import Score
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Behaviour, forward_displacement
 

@@ -24,7 +24,7 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.physical.reality_gap import RealityGap, draw_gap, perturbed_model
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.recovery.random_streams import gap_stream, repair_stream
-from selfmodel.recovery.repair import RepairSearch
+from selfmodel.recovery.repair.paper_repair import RepairSearch
 from selfmodel.robot.parameters import Parameters, with_model, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings

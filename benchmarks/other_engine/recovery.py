@@ -15,7 +15,7 @@ from selfmodel.experiments.scoring import is_correct
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.recovery.recovery import Recovery
-from selfmodel.recovery.upright import falls_of
+from selfmodel.recovery.scores.upright import falls_of
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator

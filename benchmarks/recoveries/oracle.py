@@ -13,10 +13,10 @@ import numpy as np
 from benchmarks.recoveries.cells import HEALTHY, Cell
 from selfmodel.controllers.controller import Controller
 from selfmodel.physical.interface import PhysicalRobot
-from selfmodel.recovery.robust_fitness import robust
-from selfmodel.recovery.robust_repair import RobustRepair
+from selfmodel.recovery.repair.robust_fitness import robust
+from selfmodel.recovery.repair.robust_repair import RobustRepair
+from selfmodel.recovery.scores.upright import UPRIGHT
 from selfmodel.recovery.uncertainty import noise_of_gap
-from selfmodel.recovery.upright import UPRIGHT
 from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator

@@ -11,8 +11,8 @@ from benchmarks.recoveries.cells import Cell
 from selfmodel.experiments.arguments import AUTO, comparator_choice
 from selfmodel.experiments.experiment import Experiment, run
 from selfmodel.experiments.plugins import DEFAULT_SCORES
-from selfmodel.recovery.fitness import DISPLACEMENT
-from selfmodel.recovery.upright import UPRIGHT
+from selfmodel.recovery.scores.fitness import DISPLACEMENT
+from selfmodel.recovery.scores.upright import UPRIGHT
 from selfmodel.settings import Settings
 
 

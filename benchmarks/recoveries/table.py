@@ -20,8 +20,8 @@ def table(rows: Sequence[dict[str, Any]], oracles: Sequence[dict[str, Any]]) -> 
     """Returns a Markdown table, a line per robot, case and gap, and one per robot and gap.
 
     A ratio is a median, with its 95 % bootstrap interval and the lowest tenth. The oracle is the
-    larger of its controller's mean displacements on the physical robot, where the detached limb lies on
-    the ground, and on the model of that robot, where it does not.
+    larger of its controller's mean displacements on the physical robot, where a detached limb lies
+    on the ground, and on the model of that robot, where it does not.
     """
     best = {_cell(row): max(row["upright"], row["predicted"]) for row in oracles}
     lines = [HEADER]

@@ -37,7 +37,7 @@ from selfmodel.experiments.ablation.results import as_dict
 from selfmodel.experiments.ablation.scores import ComparatorScore
 from selfmodel.experiments.confidence_intervals import Interval
 from selfmodel.faults.registry import kind_names
-from selfmodel.recovery.fitness import DISPLACEMENT
+from selfmodel.recovery.scores.fitness import DISPLACEMENT
 from selfmodel.settings import Settings
 from selfmodel.simulation.threads import thread_count
 from selfmodel.tasks import ROBOTS

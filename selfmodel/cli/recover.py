@@ -45,7 +45,7 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kinds.neuron import silent_neurons
 from selfmodel.logs.files import replace_file
-from selfmodel.recovery.fitness import DISPLACEMENT, Score
+from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import Budget
 from selfmodel.settings import Settings

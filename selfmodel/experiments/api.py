@@ -34,13 +34,13 @@ from selfmodel.logs.writing.writer import write_trial
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery import recover as loop
 from selfmodel.recovery.events import Event
-from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.next_trial import NextTrial, by_repair
 from selfmodel.recovery.random_streams import repair_stream
 from selfmodel.recovery.recovery import Recovery
-from selfmodel.recovery.repair import RepairSearch
+from selfmodel.recovery.repair.paper_repair import RepairSearch
+from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
+from selfmodel.recovery.scores.upright import UPRIGHT
 from selfmodel.recovery.sequential_diagnosis import diagnose_trials
-from selfmodel.recovery.upright import UPRIGHT
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.settings import Settings

@@ -12,9 +12,9 @@ from selfmodel.experiments.references import (
     read_reference,
     simulated_reference,
 )
-from selfmodel.recovery.fitness import DISPLACEMENT, Score
-from selfmodel.recovery.tracking import TRACKING, tracking
-from selfmodel.recovery.upright import UPRIGHT
+from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
+from selfmodel.recovery.scores.tracking import TRACKING, tracking
+from selfmodel.recovery.scores.upright import UPRIGHT
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.tasks import Entry

@@ -19,9 +19,9 @@ from selfmodel.logs.journal import create_journal
 from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery.events import Event
-from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.recover import recover
 from selfmodel.recovery.recovery import Recovery
+from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.outcome import SimulationStats

@@ -10,9 +10,9 @@ from selfmodel.experiments.grid import PartResult, finished
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.logs.controllers import controller_bytes
 from selfmodel.logs.files import replace_file
-from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.random_streams import repair_stream
-from selfmodel.recovery.repair import RepairSearch
+from selfmodel.recovery.repair.paper_repair import RepairSearch
+from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator

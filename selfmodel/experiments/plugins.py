@@ -18,15 +18,15 @@ from selfmodel.errors import InputError, unknown_name
 from selfmodel.evolution import Evolution
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import ALL_KINDS, KIND_SETS, KINDS, kind_names
-from selfmodel.recovery.candidate_controller import MakeRepair
-from selfmodel.recovery.cma_es import CmaEs
-from selfmodel.recovery.energy import ENERGY
-from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.next_trial import NextTrial, by_disagreement, by_repair
-from selfmodel.recovery.repair import RepairSearch
-from selfmodel.recovery.robust_repair import MakeSearch, RobustRepair
-from selfmodel.recovery.tracking import TRACKING
-from selfmodel.recovery.upright import UPRIGHT
+from selfmodel.recovery.repair.candidate_controller import MakeRepair
+from selfmodel.recovery.repair.cma_es import CmaEs
+from selfmodel.recovery.repair.paper_repair import RepairSearch
+from selfmodel.recovery.repair.robust_repair import MakeSearch, RobustRepair
+from selfmodel.recovery.scores.energy import ENERGY
+from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
+from selfmodel.recovery.scores.tracking import TRACKING
+from selfmodel.recovery.scores.upright import UPRIGHT
 from selfmodel.robot.designs import DESIGNS
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import Entry

@@ -12,7 +12,7 @@ from selfmodel.experiments.trial_logs import logs
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.logs.recordings.tables.table import FORMATS, is_table, read_table
 from selfmodel.recovery.random_streams import repair_stream
-from selfmodel.recovery.tracking import Reference
+from selfmodel.recovery.scores.tracking import Reference
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.simulation.simulator import Simulator

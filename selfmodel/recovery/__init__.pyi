@@ -1,7 +1,5 @@
 from .database import Database as Database, Journal as Journal
-from .energy import ENERGY as ENERGY
 from .events import Event as Event
-from .fitness import DISPLACEMENT as DISPLACEMENT, Score as Score
 from .next_trial import (
     NextTrial as NextTrial,
     Situation as Situation,
@@ -9,7 +7,7 @@ from .next_trial import (
     by_repair as by_repair,
 )
 from .recovery import Recovery as Recovery
-from .repair import RepairSearch as RepairSearch
+from .repair.paper_repair import RepairSearch as RepairSearch
 from .repertoire.evaluation import (
     Evaluate as Evaluate,
     simulated_evaluation as simulated_evaluation,
@@ -20,3 +18,5 @@ from .repertoire.make import (
     reevaluate as reevaluate,
 )
 from .repertoire.repertoire import Repertoire as Repertoire
+from .scores.energy import ENERGY as ENERGY
+from .scores.fitness import DISPLACEMENT as DISPLACEMENT, Score as Score

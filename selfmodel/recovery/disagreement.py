@@ -15,7 +15,7 @@ from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.recovery.falls import first_falls
+from selfmodel.recovery.scores.falls import first_falls
 from selfmodel.simulation.cache import Cache
 from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.simulator import Simulator

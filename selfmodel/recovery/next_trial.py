@@ -10,10 +10,10 @@ from selfmodel.controllers.controller import Controller, draw_genomes
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.evolution import reproduce
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.recovery.candidate_controller import CandidateController
 from selfmodel.recovery.database import Database
 from selfmodel.recovery.disagreement import Disagreement
 from selfmodel.recovery.events import DiscriminatingTrial, Event
+from selfmodel.recovery.repair.candidate_controller import CandidateController
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 

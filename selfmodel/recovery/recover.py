@@ -13,10 +13,8 @@ from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.physical.interface import PhysicalRobot
-from selfmodel.recovery.candidate_controller import CandidateController, MakeRepair
 from selfmodel.recovery.database import Database, Journal, RunTrial
 from selfmodel.recovery.events import Event, SearchBegins
-from selfmodel.recovery.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.next_trial import NextTrial, Situation, by_repair
 from selfmodel.recovery.posterior import Posterior
 from selfmodel.recovery.random_streams import (
@@ -26,9 +24,11 @@ from selfmodel.recovery.random_streams import (
     repair_stream,
 )
 from selfmodel.recovery.recovery import Recovery
-from selfmodel.recovery.robust_repair import RobustRepair
+from selfmodel.recovery.repair.candidate_controller import CandidateController, MakeRepair
+from selfmodel.recovery.repair.robust_repair import RobustRepair
+from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
+from selfmodel.recovery.scores.upright import fall_of
 from selfmodel.recovery.uncertainty import assumed_uncertainty
-from selfmodel.recovery.upright import fall_of
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings

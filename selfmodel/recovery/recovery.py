@@ -8,7 +8,7 @@ from typing import Any
 from selfmodel.diagnosis.comparator_choice import ChosenComparator
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.recovery.fitness import DISPLACEMENT, Score
+from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.trials.data_frame import data_frame
 from selfmodel.trials.trial import Trial

@@ -34,7 +34,7 @@ def test_a_name_that_is_unknown_is_refused_before_any_work(
         ((), "upright"),
         (("--repair", "paper"), "displacement"),
         (("--search", "ea", "--score", "energy"), "energy"),
-        (("--score", "selfmodel.recovery.energy:ENERGY"), "energy"),
+        (("--score", "selfmodel.recovery.scores.energy:ENERGY"), "energy"),
     ],
 )
 def test_the_score_is_that_of_the_repair_unless_another_is_given(

@@ -28,7 +28,7 @@ from selfmodel.faults.kinds.broken import BROKEN
 from selfmodel.faults.kinds.jammed import JAMMED
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated_robot import SimulatedRobot
-from selfmodel.recovery.repair import RepairSearch
+from selfmodel.recovery.repair.paper_repair import RepairSearch
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.requests import ClosedLoop

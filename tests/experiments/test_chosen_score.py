@@ -8,7 +8,7 @@ import selfmodel
 from selfmodel.errors import InputError
 from selfmodel.experiments.chosen_score import ChosenScore, choose_score
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.recovery.upright import UPRIGHT
+from selfmodel.recovery.scores.upright import UPRIGHT
 from selfmodel.robot.designs import cpg_for, network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator

@@ -12,7 +12,6 @@ from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, Verdict
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
-from selfmodel.recovery.candidate_controller import CandidateController
 from selfmodel.recovery.database import Database
 from selfmodel.recovery.disagreement import EARLY_STEPS, Disagreement
 from selfmodel.recovery.events import DiscriminatingTrial, Event
@@ -25,6 +24,7 @@ from selfmodel.recovery.next_trial import (
     candidates_to_separate,
     discriminating_controller,
 )
+from selfmodel.recovery.repair.candidate_controller import CandidateController
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.outcome import SimulationResult

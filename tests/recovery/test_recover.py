@@ -28,7 +28,7 @@ from selfmodel.recovery.events import Event, SearchBegins
 from selfmodel.recovery.next_trial import NextTrial, Situation, by_repair, discriminating_controller
 from selfmodel.recovery.recover import recover
 from selfmodel.recovery.recovery import Recovery
-from selfmodel.recovery.repair import RepairSearch
+from selfmodel.recovery.repair.paper_repair import RepairSearch
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import Budget
 from selfmodel.settings import Settings

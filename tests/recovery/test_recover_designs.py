@@ -14,7 +14,7 @@ from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.recovery.next_trial import by_repair, candidates, discriminating_controller
 from selfmodel.recovery.recover import recover
 from selfmodel.recovery.recovery import Recovery
-from selfmodel.recovery.repair import RepairSearch
+from selfmodel.recovery.repair.paper_repair import RepairSearch
 from selfmodel.robot.designs import DESIGNS, cpg_for
 from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot

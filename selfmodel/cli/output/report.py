@@ -15,7 +15,7 @@ from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_lis
 from selfmodel.experiments.experiment import Experiment, Outcome
 from selfmodel.files import file_digest
 from selfmodel.logs.result_files import result_bytes
-from selfmodel.recovery.fitness import DISPLACEMENT
+from selfmodel.recovery.scores.fitness import DISPLACEMENT
 from selfmodel.robot.designs import network_for
 
 

@@ -11,7 +11,7 @@ from selfmodel.experiments.chosen_score import choose_score
 from selfmodel.experiments.gaits import check_not_evolved, evolve_gait, gait_settings, write_gait
 from selfmodel.experiments.grid import GridBegins, Job, PartEnds, PartResult, run_grid
 from selfmodel.experiments.study_files import key_of
-from selfmodel.recovery.fitness import DISPLACEMENT
+from selfmodel.recovery.scores.fitness import DISPLACEMENT
 from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
 from selfmodel.version import __version__

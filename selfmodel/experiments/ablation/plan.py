@@ -19,7 +19,7 @@ from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import DEFAULT_KINDS, notation_kinds
 from selfmodel.physical.reality_gap import MAX_GAP_LEVEL
-from selfmodel.recovery.fitness import DISPLACEMENT
+from selfmodel.recovery.scores.fitness import DISPLACEMENT
 from selfmodel.settings import Settings
 from selfmodel.version import __version__
 

@@ -31,9 +31,9 @@ from selfmodel.experiments.study_files import as_dicts
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
-from selfmodel.recovery.fitness import DISPLACEMENT
 from selfmodel.recovery.random_streams import repair_stream
-from selfmodel.recovery.repair import RepairSearch
+from selfmodel.recovery.repair.paper_repair import RepairSearch
+from selfmodel.recovery.scores.fitness import DISPLACEMENT
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator

@@ -18,7 +18,7 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kinds.neuron import silent_neurons
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
-from selfmodel.recovery.upright import falls_of
+from selfmodel.recovery.scores.upright import falls_of
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.trial import Trial

@@ -9,8 +9,8 @@ from selfmodel.controllers.controller import Controller, Design, draw_genomes
 from selfmodel.errors import WorkError
 from selfmodel.evolution import Evolution, GenerationCallback, evolve
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.recovery.candidate_controller import CandidateController
-from selfmodel.recovery.fitness import DISPLACEMENT, Score
+from selfmodel.recovery.repair.candidate_controller import CandidateController
+from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
 from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
 from selfmodel.simulation.cache import Cache

@@ -7,7 +7,7 @@ import pytest
 
 from selfmodel.errors import WorkError
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.recovery.repair import RepairSearch
+from selfmodel.recovery.repair.paper_repair import RepairSearch
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator

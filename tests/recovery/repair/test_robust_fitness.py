@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.recovery.fitness import DISPLACEMENT
-from selfmodel.recovery.robust_fitness import RobustFitness, robust
+from selfmodel.recovery.repair.robust_fitness import RobustFitness, robust
+from selfmodel.recovery.scores.fitness import DISPLACEMENT
 from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator

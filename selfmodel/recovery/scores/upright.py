@@ -5,8 +5,8 @@ import numpy as np
 from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.recovery.falls import first_falls
-from selfmodel.recovery.fitness import Score
+from selfmodel.recovery.scores.falls import first_falls
+from selfmodel.recovery.scores.fitness import Score
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.trial import Trial

@@ -10,7 +10,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.recovery.fitness import Score
+from selfmodel.recovery.scores.fitness import Score
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Behaviour
 

@@ -5,8 +5,8 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.recovery.fitness import Score
-from selfmodel.recovery.upright import UPRIGHT
+from selfmodel.recovery.scores.fitness import Score
+from selfmodel.recovery.scores.upright import UPRIGHT
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Behaviour
 

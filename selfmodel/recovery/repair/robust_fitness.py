@@ -9,7 +9,7 @@ import numpy as np
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.controllers.controller import Controller
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.recovery.fitness import Score
+from selfmodel.recovery.scores.fitness import Score
 from selfmodel.simulation.batch import EarlyStop
 from selfmodel.simulation.conditions import Condition, Uncertainty, draw_conditions
 from selfmodel.simulation.simulator import Simulator

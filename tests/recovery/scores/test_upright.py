@@ -6,8 +6,8 @@ import pytest
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
-from selfmodel.recovery.fitness import DISPLACEMENT
-from selfmodel.recovery.upright import UPRIGHT, falls_of
+from selfmodel.recovery.scores.fitness import DISPLACEMENT
+from selfmodel.recovery.scores.upright import UPRIGHT, falls_of
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour

@@ -4,8 +4,8 @@ import numpy as np
 
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
-from selfmodel.recovery.energy import ENERGY, WORK_WEIGHT, joint_work
-from selfmodel.recovery.upright import UPRIGHT
+from selfmodel.recovery.scores.energy import ENERGY, WORK_WEIGHT, joint_work
+from selfmodel.recovery.scores.upright import UPRIGHT
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour

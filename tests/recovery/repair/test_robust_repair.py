@@ -11,10 +11,10 @@ from selfmodel.errors import WorkError
 from selfmodel.evolution import Evolution, Generation
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
-from selfmodel.recovery.candidate_controller import CandidateController
-from selfmodel.recovery.fitness import DISPLACEMENT
-from selfmodel.recovery.robust_fitness import RobustFitness, robust
-from selfmodel.recovery.robust_repair import COST, RobustRepair
+from selfmodel.recovery.repair.candidate_controller import CandidateController
+from selfmodel.recovery.repair.robust_fitness import RobustFitness, robust
+from selfmodel.recovery.repair.robust_repair import COST, RobustRepair
+from selfmodel.recovery.scores.fitness import DISPLACEMENT
 from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot

@@ -18,11 +18,11 @@ from selfmodel.controllers.controller import Controller, Design, draw_genomes
 from selfmodel.errors import WorkError
 from selfmodel.evolution import Draw, Generation, GenerationCallback
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.recovery.candidate_controller import CandidateController
-from selfmodel.recovery.cma_es import CmaEs
-from selfmodel.recovery.fitness import Score
-from selfmodel.recovery.robust_fitness import RobustFitness, robust
-from selfmodel.recovery.upright import UPRIGHT
+from selfmodel.recovery.repair.candidate_controller import CandidateController
+from selfmodel.recovery.repair.cma_es import CmaEs
+from selfmodel.recovery.repair.robust_fitness import RobustFitness, robust
+from selfmodel.recovery.scores.fitness import Score
+from selfmodel.recovery.scores.upright import UPRIGHT
 from selfmodel.settings import Settings
 from selfmodel.simulation.conditions import Uncertainty
 from selfmodel.simulation.simulator import Simulator

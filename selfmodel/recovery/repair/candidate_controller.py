@@ -10,7 +10,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Controller, Design
 from selfmodel.evolution import GenerationCallback
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.recovery.fitness import Score
+from selfmodel.recovery.scores.fitness import Score
 from selfmodel.settings import Settings
 from selfmodel.simulation.conditions import Uncertainty
 from selfmodel.simulation.simulator import Simulator

@@ -1,0 +1,1 @@
+"""Repairs: searches for controllers that compensate for a failure."""

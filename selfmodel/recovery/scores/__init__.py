@@ -1,0 +1,1 @@
+"""Scores: fitness functions of controllers."""
