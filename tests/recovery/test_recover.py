@@ -235,7 +235,7 @@ def test_every_search_starts_from_what_the_database_holds(
             started.append([np.asarray(seed).tobytes() for seed in seeds])
             super().__init__(length, draw, settings, rng, seeds)
 
-    monkeypatch.setattr("selfmodel.recovery.repair.Evolution", Spy)
+    monkeypatch.setattr("selfmodel.recovery.repair.paper_repair.Evolution", Spy)
     monkeypatch.setattr("selfmodel.diagnosis.diagnose.Evolution", Spy)
     events: list[Event] = []
     truth = parse("break:back_left_knee", quadruped.anatomy)
