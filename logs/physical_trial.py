@@ -70,8 +70,8 @@ class TrialRunner:
             InputError: The plan's name is no file name, or the name of an existing log.
             LogError: The robot stopped early without an error, or the log failed its verification.
             LogWriteError: The disk is full, or failed.
-            TrialError: The trial ended before ``MIN_STEPS``, its driver hangs, or the robot could
-                not be stopped.
+            TrialError: The trial ended before ``MIN_STEPS`` or is of the stage ``before``, its
+                driver hangs, or the robot could not be stopped.
         """
         path = self.folder / f"{checked_name(plan.name)}.mcap"
         header = TrialHeader(self.settings, hidden=self.hidden.get(plan.stage), gap=self.gap)
@@ -80,8 +80,10 @@ class TrialRunner:
         except HangError:
             raise
         except TrialError as error:
-            # A note reports a robot that could not be stopped.
-            if getattr(error, "__notes__", ()) or not path.exists():
+            # A note reports a robot that could not be stopped. Calibration, comparators and ratios
+            # rest on the trial before the failure.
+            unsafe = bool(getattr(error, "__notes__", ()))
+            if unsafe or plan.stage == "before" or not path.exists():
                 raise
             trial = read_log(path).trial
             if trial.behaviour.steps < MIN_STEPS:

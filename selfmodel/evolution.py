@@ -20,7 +20,7 @@ class Generation:
     Attributes:
         number: Generations evaluated so far.
         total: Generations of the whole search.
-        best: Highest fitness so far.
+        best: Highest fitness so far; of the last generation if the fitness is noisy.
         evaluations: Genomes evaluated so far.
         seconds: Wall time since the start of the search.
     """
@@ -102,10 +102,6 @@ class Evolution:
         if self.generation >= self.generations:
             return {"generations": self.generations}
         return {}
-
-    def candidates(self, count: int) -> FloatArray:
-        """Returns the best genomes, best first, ``(count or fewer, length)``."""
-        return self._genomes[:count]
 
     def _children(self) -> FloatArray:
         settings, rng = self._settings, self._rng

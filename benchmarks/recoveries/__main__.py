@@ -20,13 +20,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.recoveries", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
     for name, run, text in (
-        ("run", _run, "run recoveries, and append their rows to OUT/recoveries.jsonl"),
+        ("run", _run, "run recoveries, and append their rows to OUT/recoveries-REPAIR.jsonl"),
         ("oracle", _oracle, "run oracles, and append their rows to OUT/oracles.jsonl"),
     ):
         command = commands.add_parser(name, help=text)
         command.add_argument("out", type=Path, help="folder of the rows")
         command.add_argument("--robots", default="quadruped,hexapod")
-        command.add_argument("--cases", default="1,2,4,6", help="0 is the healthy robot")
+        command.add_argument("--cases", default="0,1,2,4,6", help="0 is the healthy robot")
         command.add_argument("--gaps", default="0.1")
         command.add_argument("--seeds", default="0,1,2")
         command.add_argument("--repair", default="robust", help="robust or paper")
@@ -37,6 +37,7 @@ def main() -> None:
         command.set_defaults(run=run)
     command = commands.add_parser("table", help="print the ratios by case")
     command.add_argument("out", type=Path, help="folder of the rows")
+    command.add_argument("--repair", default="robust", help="robust or paper")
     command.set_defaults(run=_table)
     options = parser.parse_args()
     options.run(options)
@@ -46,7 +47,8 @@ def _run(options: argparse.Namespace) -> None:
     settings = _settings(options, 30)
     row_of = partial(recovered, repair=options.repair, settings=settings)
     wanted = [cell for cell in _cells(options) if cell.case != HEALTHY]
-    for row in compute(wanted, row_of, options.out / "recoveries.jsonl", options.jobs):
+    path = options.out / f"recoveries-{options.repair}.jsonl"
+    for row in compute(wanted, row_of, path, options.jobs):
         print(row, flush=True)
 
 
@@ -58,9 +60,8 @@ def _oracle(options: argparse.Namespace) -> None:
 
 
 def _table(options: argparse.Namespace) -> None:
-    print(
-        table(read_rows(options.out / "recoveries.jsonl"), read_rows(options.out / "oracles.jsonl"))
-    )
+    rows = read_rows(options.out / f"recoveries-{options.repair}.jsonl")
+    print(table(rows, read_rows(options.out / "oracles.jsonl")))
 
 
 def _cells(options: argparse.Namespace) -> list[Cell]:

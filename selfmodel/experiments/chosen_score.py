@@ -12,6 +12,7 @@ from selfmodel.experiments.references import (
     read_reference,
     simulated_reference,
 )
+from selfmodel.recovery.scores.energy import ENERGY
 from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.scores.tracking import TRACKING, tracking
 from selfmodel.recovery.scores.upright import UPRIGHT
@@ -103,7 +104,7 @@ def check_motion(name: str, robot: Robot) -> None:
     Raises:
         InputError: The score is a displacement and the base is fixed.
     """
-    if robot.has_fixed_base and name in (DISPLACEMENT.name, UPRIGHT.name):
+    if robot.has_fixed_base and name in (DISPLACEMENT.name, UPRIGHT.name, ENERGY.name):
         raise InputError(
             f"the base of {robot.name} is fixed, so its {name} is always 0: give --score "
             f"{TRACKING}, with --reference FILE for a joint trajectory to follow, or with "

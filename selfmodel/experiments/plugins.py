@@ -15,12 +15,12 @@ from selfmodel.comparators import COMPARATORS
 from selfmodel.controllers.controller import Design
 from selfmodel.diagnosis.comparator import Comparator, as_comparator
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.evolution import Evolution
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import ALL_KINDS, KIND_SETS, KINDS, kind_names
 from selfmodel.recovery.next_trial import NextTrial, by_disagreement, by_repair
 from selfmodel.recovery.repair.candidate_controller import MakeRepair
 from selfmodel.recovery.repair.cma_es import CmaEs
+from selfmodel.recovery.repair.noisy_ea import NoisyEa
 from selfmodel.recovery.repair.paper_repair import RepairSearch
 from selfmodel.recovery.repair.robust_repair import MakeSearch, RobustRepair
 from selfmodel.recovery.scores.energy import ENERGY
@@ -44,7 +44,7 @@ DEFAULT_SCORES: Mapping[str, str] = MappingProxyType(
 )
 """Name of the score of each repair, unless another is given."""
 
-SEARCHES: Mapping[str, MakeSearch] = MappingProxyType({"cma-es": CmaEs, "ea": Evolution})
+SEARCHES: Mapping[str, MakeSearch] = MappingProxyType({"cma-es": CmaEs, "ea": NoisyEa})
 """Searches of the robust repair, by name."""
 
 RETURN = "return"

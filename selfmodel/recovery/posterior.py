@@ -21,7 +21,7 @@ from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.conditions import Condition, Uncertainty, draw_conditions
 from selfmodel.simulation.model_distribution import Weighted
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.encoder_noise import encoder_noise
 from selfmodel.trials.rotation import directions
 from selfmodel.trials.trial import Trial
 
@@ -99,7 +99,7 @@ class Posterior:
         sample = [condition.model for condition in self._conditions[: self._models]]
         if not any(model.differs for model in sample):
             return self._uncertainty
-        known = [trial for trial in trials if np.isfinite(_path(trial.behaviour)).all()]
+        known = [trial for trial in trials if np.isfinite(_observed(trial)).all()]
         likelihood = np.zeros(self._models)
         for trial in known:
             likelihood += self._likelihood(
@@ -115,22 +115,28 @@ class Posterior:
                 dataclasses.replace(own, hypothesis=hypothesis) for own in self._conditions
             ]
             paths = _paths(self._simulator, self._uncertainty, trial, conditions)
+            observed = _observed(trial)
+            # Relative to the first step, a value has the noise of two measurements.
+            measured = np.sqrt(2) * np.repeat(encoder_noise(observed), MARKS)
             self._likelihoods[key] = log_likelihood(
-                _path(trial.behaviour), paths[: self._models], paths[self._models :]
+                _path(observed), paths[: self._models], paths[self._models :], measured
             )
         return self._likelihoods[key]
 
 
-def log_likelihood(observed: FloatArray, paths: FloatArray, repeats: FloatArray) -> FloatArray:
+def log_likelihood(
+    observed: FloatArray, paths: FloatArray, repeats: FloatArray, measured: FloatArray
+) -> FloatArray:
     """Returns the logarithm of the likelihood of each model, ``(models,)``.
 
     Args:
         observed: Path of the trial, ``(values,)``.
         paths: Path predicted by each model, ``(models, values)``; NaN if its simulation diverged.
         repeats: Paths of one model with different noise, ``(repeats, values)``.
+        measured: Standard deviation of the measurement of the path, ``(values,)``.
     """
     # The noise is that of the trial and that of the rollout.
-    noise = np.sqrt(2) * np.nanstd(repeats, axis=0)
+    noise = np.hypot(np.sqrt(2) * np.nanstd(repeats, axis=0), measured)
     scale = np.hypot(noise, SHARE_OF_SPREAD * np.nanstd(paths, axis=0))
     with np.errstate(divide="ignore", invalid="ignore"):
         differences = np.abs(paths - observed) / scale
@@ -164,32 +170,57 @@ def _paths(
 ) -> FloatArray:
     """Returns the path of a trial's controller under each condition, ``(conditions, values)``.
 
-    The path of a simulation that diverged is NaN.
+    The path of a simulation that diverged is NaN. The models of a batch take bounded memory.
     """
-    outcome = simulator.run_under(
-        conditions,
-        uncertainty,
-        [trial.plan.controller],
-        trial.behaviour.steps,
-        ("base_position", "base_orientation"),
-    )
-    paths: FloatArray = _path(outcome.behaviour)[0]
-    paths[outcome.diverged[0]] = np.nan
-    return paths
+    size = max(1, simulator.budget.models_bytes // int(simulator.robot.model.nbuffer))
+    paths = []
+    for first in range(0, len(conditions), size):
+        outcome = simulator.run_under(
+            conditions[first : first + size],
+            uncertainty,
+            [trial.plan.controller],
+            trial.behaviour.steps,
+            ("base_position", "base_orientation"),
+        )
+        simulated = outcome.behaviour
+        position, orientation = simulated["base_position"][0], simulated["base_orientation"][0]
+        paths += [
+            np.full(3 * MARKS, np.nan) if diverged else _path(_track(*own))
+            for *own, diverged in zip(position, orientation, outcome.diverged[0], strict=True)
+        ]
+    return np.array(paths)
 
 
-def _path(behaviour: Behaviour) -> FloatArray:
-    """Returns forward and sideways position, m, and heading, rad, at the marks, ``(..., values)``.
+def _observed(trial: Trial) -> FloatArray:
+    """Returns forward and sideways position, m, and heading, rad, of a trial, ``(steps, 3)``.
 
-    They are relative to the first step.
+    Steps at which the base was not observed are interpolated; all are NaN if it never was.
     """
-    marks = np.linspace(0, behaviour.steps - 1, MARKS + 1).round().astype(np.intp)[1:]
-    position = behaviour["base_position"][..., :2]
-    ahead = directions(behaviour["base_orientation"])
-    heading = np.unwrap(np.arctan2(ahead[..., 1], ahead[..., 0]), axis=-1)
-    moved = position - position[..., :1, :]
-    turned = heading - heading[..., :1]
-    path: FloatArray = np.concatenate(
-        [moved[..., marks, 0], moved[..., marks, 1], turned[..., marks]], axis=-1
-    )
-    return path
+    logged = trial.behaviour
+    track = _track(logged["base_position"], logged["base_orientation"])
+    steps = np.arange(len(track))
+    for column in track.T:
+        known = np.isfinite(column)
+        if known.any():
+            column[:] = np.interp(steps, steps[known], column[known])
+    return track
+
+
+def _track(position: FloatArray, orientation: FloatArray) -> FloatArray:
+    """Returns forward and sideways position, m, and heading, rad, ``(steps, 3)``.
+
+    Args:
+        position: ``(steps, 3)``.
+        orientation: ``(steps, 4)``; NaN where unknown.
+    """
+    ahead = directions(orientation)
+    heading = np.arctan2(ahead[:, 1], ahead[:, 0])
+    known = np.isfinite(heading)
+    heading[known] = np.unwrap(heading[known])
+    return np.column_stack([position[:, :2], heading])
+
+
+def _path(track: FloatArray) -> FloatArray:
+    """Returns a track at the marks, relative to its first step, ``(3 * MARKS,)``."""
+    marks = np.linspace(0, len(track) - 1, MARKS + 1).round().astype(np.intp)[1:]
+    return np.asarray((track[marks] - track[0]).T.ravel())

@@ -1,8 +1,9 @@
 """The paper's algorithm: run and log a trial, diagnose, repair, with few physical trials."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
+from typing import TypeVar
 
 from selfmodel.controllers.controller import Controller, Design
 from selfmodel.diagnosis.comparator_choice import ComparatorChoice
@@ -26,8 +27,8 @@ from selfmodel.recovery.random_streams import (
 from selfmodel.recovery.recovery import Recovery
 from selfmodel.recovery.repair.candidate_controller import CandidateController, MakeRepair
 from selfmodel.recovery.repair.robust_repair import RobustRepair
-from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
-from selfmodel.recovery.scores.upright import fall_of
+from selfmodel.recovery.scores.fitness import Score
+from selfmodel.recovery.scores.upright import UPRIGHT, fall_of
 from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
@@ -36,6 +37,8 @@ from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.conditions import Uncertainty
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
+
+Judged = TypeVar("Judged")
 
 
 def recover(
@@ -54,7 +57,7 @@ def recover(
     kinds: Sequence[FaultKind] = DEFAULT_KINDS,
     calibrate: Callable[[Sequence[Trial]], Calibration] | None = None,
     next_trial: NextTrial = by_repair,
-    score: Score = DISPLACEMENT,
+    score: Score = UPRIGHT,
     make_repair: MakeRepair = RobustRepair,
 ) -> Recovery:
     """Runs the recovery of a robot: a healthy trial, a failing one, then diagnosis and repair.
@@ -87,7 +90,8 @@ def recover(
     design = network_for(simulator.robot) if design is None else design
     repair, evaluations_before = make_repair(simulator, settings, design, score), 0
     tried: list[Hypothesis] = []
-    predicted: dict[object, float] = {}
+    predicted: list[float] = []
+    predictions: dict[Controller, float] = {}
     database = Database()
 
     def evolve_candidates(
@@ -96,7 +100,7 @@ def recover(
         on_event(SearchBegins("repair", hypotheses[0]))
         rng = repair_stream(seed, len(database.diagnoses))
         found = repair(hypotheses, uncertainty, database.controllers, rng, on_event)
-        predicted.update({candidate.controller: candidate.predicted for candidate in found})
+        predictions.update({candidate.controller: candidate.predicted for candidate in found})
         return found
 
     def diagnose() -> Diagnosis:
@@ -113,13 +117,16 @@ def recover(
         nonlocal database
         plan = TrialPlan(f"{len(tried):02d}-{stage}", stage, controller, settings.steps, seed)
         tried.append(best)
+        predicted.append(math.nan if stage == "after" else predictions.get(controller, math.nan))
         trial = run_trial(robot, plan)
         database = database.with_trial(trial)
         on_event(trial)
 
     HypothesisSpace.of(kinds, simulator.robot.anatomy)  # before any physical trial
-    before = partial(assumed_uncertainty, simulator.robot)
-    gait = gait or evolve_candidates((INTACT,), before)[0].controller
+    gait = (
+        gait
+        or evolve_candidates((INTACT,), partial(assumed_uncertainty, simulator.robot))[0].controller
+    )
     act(healthy, "before", INTACT, gait)
     healthy_trials = database.trials
     choose_comparator(simulator.robot, healthy_trials)  # before the calibration and the failure
@@ -150,7 +157,6 @@ def recover(
         act(damaged, "recovery", diagnosis.best, next_trial(situation))
     diagnosis = diagnose()
 
-    scores, falls = _judged(simulator.robot, diagnosis.best, database.trials, score)
     return Recovery(
         trials=database.trials,
         tried=tuple(tried),
@@ -161,9 +167,9 @@ def recover(
         comparator=chosen,
         calibration=calibration,
         score=score,
-        predicted=_predictions(database.trials, predicted),
-        scores=scores,
-        falls=falls,
+        predicted=tuple(predicted),
+        scores=_judged(score.of_trial, simulator.robot, diagnosis.best, database.trials),
+        falls=_judged(fall_of, simulator.robot, diagnosis.best, database.trials),
     )
 
 
@@ -173,18 +179,11 @@ def _fitted(simulator: Simulator, calibration: Calibration) -> Simulator:
 
 
 def _judged(
-    robot: Robot, hypothesis: Hypothesis, trials: Sequence[Trial], score: Score
-) -> tuple[tuple[float, ...], tuple[int | None, ...]]:
-    """Returns the score and the fall of each trial, of which the first is of the healthy robot."""
+    judge: Callable[[Robot, Hypothesis, Trial], Judged],
+    robot: Robot,
+    hypothesis: Hypothesis,
+    trials: Sequence[Trial],
+) -> tuple[Judged, ...]:
+    """Returns a judgement of each trial, of which the first is of the healthy robot."""
     faults = (INTACT, *[hypothesis] * (len(trials) - 1))
-    pairs = list(zip(faults, trials, strict=True))
-    return (
-        tuple(score.of_trial(robot, own, trial) for own, trial in pairs),
-        tuple(fall_of(robot, own, trial) for own, trial in pairs),
-    )
-
-
-def _predictions(trials: Sequence[Trial], predicted: Mapping[object, float]) -> tuple[float, ...]:
-    """Returns the predicted score of each trial, by controller; the failure was not predicted."""
-    known = (None if trial.plan.stage == "after" else trial.plan.controller for trial in trials)
-    return tuple(predicted.get(controller, math.nan) for controller in known)
+    return tuple(judge(robot, own, trial) for own, trial in zip(faults, trials, strict=True))

@@ -42,17 +42,16 @@ class Recovery:
     diagnostic_evaluations: int
     distinct_hypotheses: int
     comparator: ChosenComparator
+    predicted: tuple[float, ...]
+    scores: tuple[float, ...]
+    falls: tuple[int | None, ...]
     calibration: Calibration | None = None
     score: Score = DISPLACEMENT
-    predicted: tuple[float, ...] = ()
-    scores: tuple[float, ...] = ()
-    falls: tuple[int | None, ...] = ()
 
     @property
     def fell(self) -> bool:
         """Whether the robot fell in the recovery trial with the largest score."""
-        scores = [-math.inf if math.isnan(score) else score for score in self.scores[2:]]
-        return bool(scores) and self.falls[2 + scores.index(max(scores))] is not None
+        return self.falls[self._best] is not None
 
     @property
     def best_score(self) -> float:
@@ -71,13 +70,22 @@ class Recovery:
 
     @property
     def recovered(self) -> float:
-        """Largest forward displacement of the recovery trials, m; NaN if unobserved in all."""
-        return _largest([trial.displacement for trial in self.trials[2:]])
+        """Forward displacement in the recovery trial with the largest score, m.
+
+        NaN if the base was not observed in that trial.
+        """
+        return self.trials[self._best].displacement
+
+    @property
+    def _best(self) -> int:
+        """Number of the recovery trial with the largest score; of the first if all are NaN."""
+        scores = [-math.inf if math.isnan(score) else score for score in self.scores[2:]]
+        return 2 + scores.index(max(scores))
 
     def __repr__(self) -> str:
         lines = [f"<Recovery: {self.diagnosis.best}, {self.diagnosis.verdict}"]
         lines += [
-            f"  {trial.plan.name:14} {trial.displacement:8.3f} m  {tried}"
+            f"  {trial.plan.name:14} {trial.displacement:8.3f} m  {tried}{trial.early_end}"
             for trial, tried in zip(self.trials, self.tried, strict=True)
         ]
         return "\n".join(lines) + ">"
@@ -133,4 +141,4 @@ def _largest(values: Sequence[float]) -> float:
 
 def _observed(displacement: float) -> float | None:
     """JSON has no NaN, which is the displacement of an unobserved base."""
-    return None if math.isnan(displacement) else displacement
+    return displacement if math.isfinite(displacement) else None

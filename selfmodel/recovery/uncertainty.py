@@ -1,6 +1,7 @@
 """Uncertainty of a self-model: assumed before the first trial, estimated from healthy trials."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -84,31 +85,36 @@ def estimated_uncertainty(
     """Returns the uncertainty of a robot after its healthy trials.
 
     The noise is that of the trials in excess of the same estimate in noise-free simulations of
-    them: a contact changes a reading within a step, too. Without a calibration, the parameters of
-    the model count as known.
+    them: a contact changes a reading within a step, too. A model that predicts the trials
+    exactly is exact. Without a calibration, the parameters are as uncertain as before the trials.
 
     Args:
         simulator: The self-model, calibrated if there is a calibration.
         trials: Trials of the healthy robot, at least one.
         calibration: Fit of the self-model to the trials; None without one.
     """
-    robot = simulator.robot
-    touch, models = _touch(robot.anatomy), exact(robot)
-    if calibration is not None and calibration.error_before >= EXACT_ERROR:
-        models = LogNormal(CALIBRATED * calibration.deviations, np.full(robot.model.nbody, BODIES))
+    robot, assumed = simulator.robot, assumed_uncertainty(simulator.robot)
+    touch = _touch(robot.anatomy)
     pairs = [(trial.behaviour, _simulated(simulator, trial)) for trial in trials]
     noise = [_excess(_variance, *_signals(pair, _readings)) for pair in pairs]
     wrong = [_excess(_flips, *_signals(pair, _readings)) for pair in pairs]
     angles = [_start_variance(*_signals(pair, _angles)) for pair in pairs]
     tilts = [_start_variance(*_signals(pair, _tilts)) for pair in pairs]
     angle = _deviation(angles)
-    return Uncertainty(
-        models=models,
+    found = Uncertainty(
+        models=exact(robot),
         reading_noise=np.where(touch, 0.0, np.sqrt(np.mean(noise, axis=0))),
         wrong_touches=np.where(touch, np.mean(wrong, axis=0), 0.0),
         # A base that was not observed is assumed to tilt by half of the joints' deviation.
         start=StartSpread(angle, angle / 2 if np.isnan(tilts).all() else _deviation(tilts)),
     )
+    if calibration is None:
+        known = replace(found, models=assumed.models, delays=assumed.delays)
+        return found if found.is_none else known
+    if calibration.error_before < EXACT_ERROR:
+        return found
+    deviations = CALIBRATED * calibration.deviations
+    return replace(found, models=LogNormal(deviations, np.full(robot.model.nbody, BODIES)))
 
 
 def _touch(anatomy: Anatomy) -> BoolArray:

@@ -53,12 +53,12 @@ class EarlyStop:
 
     Attributes:
         steps: Numbers of finished steps after which runs are chosen.
-        chosen: Function from the behaviour so far, ``(runs, steps, width)`` per signal, to a mask
-            of the runs to stop, ``(runs,)``.
+        chosen: Function from the behaviour so far, ``(runs, steps, width)`` per signal, and a mask
+            of the runs that diverged, ``(runs,)``, to a mask of the runs to stop, ``(runs,)``.
     """
 
     steps: tuple[int, ...]
-    chosen: Callable[[Behaviour], BoolArray]
+    chosen: Callable[[Behaviour, BoolArray], BoolArray]
 
 
 class LiveBatch:

@@ -43,6 +43,15 @@ class Uncertainty:
     start: StartSpread
     delays: tuple[int, ...] = (0,)
 
+    @property
+    def is_none(self) -> bool:
+        """Whether all runs equal those of the self-model."""
+        noise = self.reading_noise.any() or self.wrong_touches.any() or self.start != NO_SPREAD
+        return self.models.is_exact and not noise and self.delays == (0,)
+
+
+NO_SPREAD = StartSpread(0.0, 0.0)
+
 
 @dataclass(frozen=True, eq=False)
 class Condition:
@@ -52,18 +61,19 @@ class Condition:
         hypothesis: Faults of the robot.
         model: Parameters of the model.
         delay: Control delay in addition to the self-model's, control steps.
-        seed: Seed of the initial pose and of the noise of the readings.
+        seed: Seed of the initial pose, of the noise of the readings, and of the random parts of
+            faults, such as terrain; None for the self-model itself.
     """
 
     hypothesis: Hypothesis
     model: ModelDraw
     delay: int
-    seed: int
+    seed: int | None
 
     def embodiment(self, robot: Robot) -> Embodiment:
         """Returns the model and sensor parameters of a robot, given its self-model."""
         perturb = partial(self.model.applied_to, robot)
-        embodiment = build(robot, self.hypothesis, perturb=perturb)
+        embodiment = build(robot, self.hypothesis, self.seed or 0, perturb=perturb)
         embodiment.added_delay[0] += self.delay
         return embodiment
 
@@ -83,12 +93,13 @@ def draw_conditions(
         rng: Random number generator of the draws.
     """
     first = int(rng.integers(len(hypotheses)))
+    certain = uncertainty.is_none
     return tuple(
         Condition(
             hypotheses[(first + number) % len(hypotheses)],
             uncertainty.models.draw(rng),
             int(rng.choice(uncertainty.delays)),
-            int(rng.integers(_SEEDS)),
+            None if certain else int(rng.integers(_SEEDS)),
         )
         for number in range(count)
     )
@@ -111,8 +122,8 @@ def initial_positions(
     poses = []
     for embodiment, condition in zip(embodiments, conditions, strict=True):
         data = mujoco.MjData(embodiment.model)
-        if spread != StartSpread(0.0, 0.0):
-            rng = np.random.default_rng((condition.seed, 0))
+        if spread != NO_SPREAD:
+            rng = np.random.default_rng((condition.seed or 0, 0))
             randomize_initial_pose(robot, embodiment.model, data, spread, rng)
         poses.append(data.qpos.copy())
     return np.array(poses)
@@ -132,14 +143,14 @@ class ReadingNoise:
     def __init__(
         self, conditions: Sequence[Condition], uncertainty: Uncertainty, silent: BoolArray
     ) -> None:
-        self._generators = [np.random.default_rng((own.seed, 1)) for own in conditions]
+        self._generators = [np.random.default_rng((own.seed or 0, 1)) for own in conditions]
         self._deviations = np.where(silent, 0.0, uncertainty.reading_noise)
         self._wrong = np.where(silent, 0.0, uncertainty.wrong_touches)
 
     def add(self, readings: FloatArray) -> None:
         """Adds the noise of the next step to the readings, ``(runs * conditions, sensors)``."""
         count, sensors = self._deviations.shape
-        by_condition = readings.reshape(-1, count, sensors)
+        by_condition = readings.reshape(len(readings) // count, count, sensors)
         uniform = np.array([rng.random(sensors) for rng in self._generators])
         normal = np.array([rng.standard_normal(sensors) for rng in self._generators])
         by_condition += self._deviations * normal

@@ -49,6 +49,11 @@ class ModelDraw:
 class ModelDistribution(Protocol):
     """Distribution of a model's parameters."""
 
+    @property
+    def is_exact(self) -> bool:
+        """Whether all draws are the self-model."""
+        ...
+
     def draw(self, rng: np.random.Generator) -> ModelDraw:
         """Returns random parameters."""
         ...
@@ -67,6 +72,11 @@ class LogNormal:
 
     factors: FloatArray
     bodies: FloatArray
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether all draws are the self-model."""
+        return not (self.factors.any() or self.bodies.any())
 
     def draw(self, rng: np.random.Generator) -> ModelDraw:
         """Returns random parameters."""
@@ -88,6 +98,11 @@ class Weighted:
 
     models: Sequence[ModelDraw]
     weights: FloatArray
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether all draws are the self-model."""
+        return not any(model.differs for model in self.models)
 
     def draw(self, rng: np.random.Generator) -> ModelDraw:
         """Returns one of the models."""

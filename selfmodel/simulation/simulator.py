@@ -271,7 +271,7 @@ class Simulator:
             for signal, rows in kept.items():
                 rows[k] = live[signal]()
             if early_stop is not None and k + 1 in early_stop.steps:
-                alive.stop(early_stop.chosen(_behaviour(robot, kept, k + 1)))
+                alive.stop(early_stop.chosen(_behaviour(robot, kept, k + 1), alive.diverged()))
             self.stats.steps += alive.running
             if k + 1 < steps:
                 clock = perf_counter()

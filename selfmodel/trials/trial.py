@@ -99,6 +99,12 @@ class Trial:
     behaviour: Behaviour
     path: str
 
+    @property
+    def early_end(self) -> str:
+        """Clause about an early end, such as ``, ended at step 55 of 150``; "" without one."""
+        steps = self.behaviour.steps
+        return "" if steps == self.plan.steps else f", ended at step {steps} of {self.plan.steps}"
+
     def __repr__(self) -> str:
         plan = self.plan
         return (

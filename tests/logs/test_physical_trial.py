@@ -1,5 +1,6 @@
 """A physical trial is logged while it runs, and returned as its log has it."""
 
+import dataclasses
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -85,14 +86,15 @@ def test_a_trial_that_the_robot_cannot_finish_is_a_trial_as_far_as_it_goes(
 ):
     run = TrialRunner(tmp_path, biped, Settings())
     robot = Falling(biped, MIN_STEPS, TrialError("a limit was exceeded"))
-    trial = run(robot, plan_of(biped, 2 * MIN_STEPS, "02-recovery"))
+    plan = dataclasses.replace(plan_of(biped, 2 * MIN_STEPS, "02-recovery"), stage="recovery")
+    trial = run(robot, plan)
     log = read_log(tmp_path / "02-recovery.mcap")
 
     assert (trial.plan.steps, trial.behaviour.steps) == (2 * MIN_STEPS, MIN_STEPS)
     assert (log.status, log.reason) == ("stopped", "TrialError: a limit was exceeded")
 
 
-@pytest.mark.parametrize("case", ["short", "hanging", "not stopped"])
+@pytest.mark.parametrize("case", ["short", "hanging", "not stopped", "before"])
 def test_a_trial_that_is_too_short_or_whose_robot_is_not_safe_is_an_error(
     biped: Robot, tmp_path: Path, case: str
 ):
@@ -101,8 +103,10 @@ def test_a_trial_that_is_too_short_or_whose_robot_is_not_safe_is_an_error(
         error.add_note("the safe command could not be sent")
     robot = Falling(biped, MIN_STEPS - (case == "short"), error)
     run = TrialRunner(tmp_path, biped, Settings())
+    plan = plan_of(biped, 2 * MIN_STEPS, "02-recovery")
+    stage = "before" if case == "before" else "recovery"
     with pytest.raises(TrialError, match=str(error)):
-        run(robot, plan_of(biped, 2 * MIN_STEPS, "02-recovery"))
+        run(robot, dataclasses.replace(plan, stage=stage))
 
 
 def test_a_plan_names_the_log_and_a_name_that_is_none_is_refused(biped: Robot, tmp_path: Path):

@@ -1,5 +1,6 @@
 """Promises of the posterior of a self-model: models that predict the trials weigh more."""
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ from selfmodel.simulation.model_distribution import Weighted
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Trial
 from tests.helpers.drivers import random_controllers
+from tests.helpers.hostile import lacking
 
 
 def trials(robot: Robot, gap: float, folder: Path, count: int = 1) -> list[Trial]:
@@ -43,10 +45,12 @@ def posterior(robot: Robot, healthy: list[Trial], seed: int = 0) -> Posterior:
 def test_models_that_predict_the_path_weigh_more():
     repeats = np.random.default_rng(0).normal(0, 0.1, (16, 3))
     paths = np.array([[1.0, 0, 0], [1.5, 0, 0], [3.0, 0, 0], [np.nan] * 3])
-    found = log_likelihood(np.array([1.0, 0, 0]), paths, repeats)
+    found = log_likelihood(np.array([1.0, 0, 0]), paths, repeats, np.zeros(3))
 
     assert found[0] > found[1] > found[2] >= found[3]
     assert np.isfinite(found).all()
+    vague = log_likelihood(np.array([1.0, 0, 0]), paths, repeats, np.full(3, 9.0))
+    assert np.ptp(vague[:3]) < np.ptp(found[:3]) / 100
 
 
 @pytest.mark.parametrize("spread", [0.0, 1.0, 1e6])
@@ -96,3 +100,15 @@ def test_a_recording_of_other_software_is_a_trial_too(quadruped: Robot, tmp_path
     found = posterior(quadruped, [recording]).after([recording], INTACT)
 
     assert isinstance(found.models, Weighted)
+
+
+def test_a_base_that_was_missed_for_some_steps_is_interpolated(quadruped: Robot, tmp_path: Path):
+    (walked,) = trials(quadruped, 0.1, tmp_path)
+    gappy = lacking(walked, ("base_position", "base_orientation"), slice(50, 55))
+    never = lacking(walked, ("base_position", "base_orientation"))
+    own = posterior(quadruped, [walked])
+    whole, some = (own.after([trial], INTACT).models.weights for trial in (walked, gappy))
+    none = own.after([dataclasses.replace(never, path="never")], INTACT).models.weights
+
+    np.testing.assert_allclose(some, whole, atol=0.02)
+    np.testing.assert_allclose(none, 1 / len(none))

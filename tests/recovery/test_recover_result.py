@@ -60,8 +60,9 @@ def without_base(trial: Trial) -> Trial:
 def test_an_unobserved_displacement_is_none_everywhere(trial: Trial):
     diagnosis = Diagnosis((Candidate(INTACT, 0.0),), 1, 0.0, (), "explained", "by hand")
     blind = without_base(trial)
-    unobserved = {"predicted": (math.nan,) * 3, "scores": (math.nan,) * 3}
-    recovery = Recovery((blind,) * 3, (INTACT,) * 3, diagnosis, 0, 0, 0, CHOSEN, **unobserved)
+    unknown = (math.nan,) * 3
+    found = (diagnosis, 0, 0, 0, CHOSEN, unknown, unknown, (None,) * 3)
+    recovery = Recovery((blind,) * 3, (INTACT,) * 3, *found)
 
     values = json.loads(json.dumps(recovery.to_dict(), allow_nan=False))
 

@@ -75,7 +75,9 @@ def test_a_base_that_was_not_observed_tilts_by_half_of_the_joints_deviation(
     found = estimated_uncertainty(Simulator(quadruped, 1), [blind], None)
 
     assert found.start.tilt == found.start.angles / 2 > 0
-    assert not found.models.draw(np.random.default_rng(0)).differs  # no calibration: as given
+    # Without a calibration, the parameters are as uncertain as before.
+    assert found.models.draw(np.random.default_rng(0)).differs
+    assert found.delays == assumed_uncertainty(quadruped).delays
 
 
 def test_before_the_first_trial_everything_is_uncertain(robot: Robot):

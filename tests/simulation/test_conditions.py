@@ -10,7 +10,7 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.physical.initial_pose import StartSpread
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.conditions import Uncertainty, draw_conditions
+from selfmodel.simulation.conditions import ReadingNoise, Uncertainty, draw_conditions
 from selfmodel.simulation.model_distribution import LogNormal, exact
 from selfmodel.simulation.simulator import Simulator
 from tests.helpers.drivers import random_controllers
@@ -103,6 +103,29 @@ def test_a_dead_sensor_has_no_noise(quadruped: Robot):
     )
 
     assert not outcome.behaviour["sensors"][..., columns].any()
+
+
+def test_the_noise_of_a_faulty_sensor_differs_between_conditions(quadruped: Robot):
+    noisy = parse("sensor:front_left_angle=noise0.3", quadruped.anatomy)
+    column = quadruped.anatomy.names.sensors.index("front_left_angle")
+    unknown = dataclasses.replace(certain(quadruped), start=StartSpread(1e-9, 0.0))
+    drawn = draw_conditions((noisy,), unknown, 3, np.random.default_rng(7))
+    still = Playback(quadruped.anatomy.names.motors, np.zeros((5, len(quadruped.anatomy.motors))))
+    outcome = Simulator(quadruped, 1).run_under(drawn, unknown, [still], 5, ("sensors",))
+
+    readings = outcome.behaviour["sensors"][0, :, 0, column]
+    assert len(set(readings.round(4).tolist())) == 3
+
+
+def test_a_robot_without_sensors_has_conditions(quadruped: Robot):
+    noise = ReadingNoise(
+        draw_conditions((INTACT,), certain(quadruped), 2, np.random.default_rng(0)),
+        dataclasses.replace(
+            certain(quadruped), reading_noise=np.zeros(0), wrong_touches=np.zeros(0)
+        ),
+        np.zeros((2, 0), dtype=bool),
+    )
+    noise.add(np.zeros((4, 0)))
 
 
 def test_hypotheses_that_cannot_be_told_apart_are_simulated_in_turn(quadruped: Robot):

@@ -71,7 +71,8 @@ def _sentence(found: dict[str, Any]) -> str:
 def _result(trial: dict[str, Any], key: str) -> str:
     """Returns the result of a trial, with its early end or its fall."""
     fall = trial["fell_at_step"]
-    return f"{trial[key]:.3f}" + ("" if fall is None else f", fell at step {fall}")
+    end = f", ended at step {trial['steps']}" if trial["ended_early"] else ""
+    return f"{trial[key]:.3f}" + ("" if fall is None else f", fell at step {fall}") + end
 
 
 def _no_recovery(found: dict[str, Any]) -> list[str]:
@@ -129,6 +130,7 @@ def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
                 "stage": trial.plan.stage,
                 "displacement": trial.displacement,
                 "steps": trial.behaviour.steps,
+                "ended_early": trial.early_end != "",
                 "score": score,
                 "predicted_score": predicted if math.isfinite(predicted) else None,
                 "fell_at_step": fall,

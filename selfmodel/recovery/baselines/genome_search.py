@@ -19,7 +19,7 @@ def genome_search(make_search: MakeSearch, settings: Settings) -> Search:
     """Returns the search of a baseline by a search over genomes.
 
     Args:
-        make_search: Makes the search over genomes, such as ``CmaEs`` or ``Evolution``.
+        make_search: Makes the search over genomes, such as ``CmaEs`` or ``NoisyEa``.
         settings: The paper's numbers.
     """
     return partial(_search, make_search=make_search, settings=settings)

@@ -1,5 +1,6 @@
 """Candidates of a repair, and the interface of repairs."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -31,8 +32,9 @@ class CandidateController:
 
     @property
     def predicted(self) -> float:
-        """Mean predicted score."""
-        return float(np.mean(self.scores))
+        """Mean predicted score of the rollouts that did not diverge; NaN if all did."""
+        finite = self.scores[np.isfinite(self.scores)]
+        return float(np.mean(finite)) if len(finite) else math.nan
 
 
 class Repair(Protocol):

@@ -93,14 +93,24 @@ class CmaEs:
         if not self._runs:
             self._runs = self._started(fitness)
         else:
-            for run, own in zip(self._runs, np.split(fitness, len(self._runs)), strict=True):
-                run.tell(own)
+            # A diverged simulation is worse than all others by a finite number.
+            finite = fitness[np.isfinite(fitness)]
+            worst = finite.min() - 1.0 if len(finite) else 0.0
+            ranked = np.where(np.isfinite(fitness), fitness, worst)
+            parts = (np.split(values, len(self._runs)) for values in (fitness, ranked))
+            for run, own, finite_own in zip(self._runs, *parts, strict=True):
+                run.tell(own, finite_own)
             if self.generation in PRUNED_AFTER:
                 order = sorted(self._runs, key=lambda run: -run.recent_fitness)
                 self._runs = order[: len(order) // 2]
         self.generation += 1
         self.evaluations += len(fitness)
         self._asked = np.concatenate([run.ask() for run in self._runs])
+
+    @property
+    def groups(self) -> int:
+        """Number of runs whose genomes ``ask`` returns one after the other; 0 for random ones."""
+        return len(self._runs)
 
     def stop(self) -> dict[str, int]:
         """Returns no reason: the caller's budget ends the search."""
@@ -168,12 +178,8 @@ class _Run:
         self._genomes = _bounded(np.array(self._search.ask()))
         return self._genomes
 
-    def tell(self, fitness: FloatArray) -> None:
-        # A diverged simulation is worse than all others by a finite number.
-        finite = fitness[np.isfinite(fitness)]
-        worst = finite.min() - 1.0 if len(finite) else 0.0
-        fitness = np.where(np.isfinite(fitness), fitness, worst)
-        self._search.tell(list(self._genomes), list(-fitness))
+    def tell(self, fitness: FloatArray, finite: FloatArray) -> None:
+        self._search.tell(list(self._genomes), list(-finite))
         order = np.argsort(-fitness, kind="stable")
         self._best_halves.append(float(fitness[order[: len(order) // 2]].mean()))
         best = (float(fitness[order[0]]), self._genomes[order[0]])

@@ -39,31 +39,44 @@ class RobustFitness:
     uncertainty: Uncertainty
 
     def race(
-        self, controllers: Sequence[Controller], steps: int, rng: np.random.Generator
+        self,
+        controllers: Sequence[Controller],
+        groups: int,
+        steps: int,
+        rng: np.random.Generator,
     ) -> FloatArray:
-        """Returns scores under one condition, ``(controllers,)``, at two thirds of the cost.
+        """Returns scores under one condition, ``(controllers,)``, at 70 % of the cost.
 
-        Controllers that are behind are stopped early, and have the score up to then. A search that
-        recombines the better half of a generation needs no more.
+        Controllers that are behind in their group are stopped early, and have the score up to then.
+        A search that recombines the better half of each group needs no more.
 
         Args:
-            controllers: At least one controller.
+            controllers: At least one controller per group, group by group.
+            groups: Number of groups of equal size.
             steps: Control steps of a rollout.
             rng: Random number generator of the condition.
         """
         conditions = draw_conditions(self.hypotheses, self.uncertainty, 1, rng)
         shares = {round(time * steps): share for time, share in RACE}
+        size = len(controllers) // groups
+        at_stop = np.full(len(controllers), np.nan)
 
-        def behind(behaviour: Behaviour) -> BoolArray:
+        def behind(behaviour: Behaviour, diverged: BoolArray) -> BoolArray:
             scores = self.score.of(self.simulator.robot, conditions[0].hypothesis, behaviour)
-            first = math.ceil(shares[behaviour.steps] * len(scores))
-            behind = np.ones(len(scores), dtype=bool)
-            known = np.where(np.isnan(scores), -np.inf, scores)  # of a simulation that diverged
-            behind[np.argsort(-known, kind="stable")[:first]] = False
-            return behind
+            # Those that were stopped before are behind, and remain so.
+            out = diverged | np.isnan(scores) | np.isfinite(at_stop)
+            ranked = np.where(out, -np.inf, scores).reshape(groups, size)
+            order = np.argsort(-ranked, axis=1, kind="stable")
+            stopped = np.ones((groups, size), dtype=bool)
+            first = math.ceil(shares[behaviour.steps] * size)
+            np.put_along_axis(stopped, order[:, :first], values=False, axis=1)
+            new = stopped.ravel() & np.isnan(at_stop) & ~diverged
+            at_stop[new] = scores[new]
+            return stopped.ravel()
 
         stop = EarlyStop(tuple(shares), behind)
-        return self._scores(controllers, conditions, steps, stop)[:, 0]
+        scores = self._scores(controllers, conditions, steps, stop)[:, 0]
+        return np.where(np.isneginf(scores) | np.isnan(at_stop), scores, at_stop)
 
     def __call__(
         self, controllers: Sequence[Controller], count: int, steps: int, rng: np.random.Generator
@@ -103,8 +116,16 @@ class RobustFitness:
 def robust(scores: FloatArray) -> FloatArray:
     """Returns the mean of the mean score and of the mean of the lower tail, ``(controllers,)``.
 
+    A rollout that diverged counts as worse than all others by 1; a controller of which all did has
+    negative infinity.
+
     Args:
         scores: ``(controllers, conditions)``.
     """
-    tail = np.sort(scores, axis=1)[:, : max(1, round(TAIL * scores.shape[1]))]
-    return np.asarray((scores.mean(axis=1) + tail.mean(axis=1)) / 2)
+    finite = np.isfinite(scores)
+    if not finite.any():
+        return np.full(len(scores), -np.inf)
+    known = np.where(finite, scores, scores[finite].min() - 1.0)
+    tail = np.sort(known, axis=1)[:, : max(1, round(TAIL * scores.shape[1]))]
+    values = (known.mean(axis=1) + tail.mean(axis=1)) / 2
+    return np.asarray(np.where(finite.any(axis=1), values, -np.inf))

@@ -50,7 +50,7 @@ class GenomeSearch(Protocol):
     evaluations: int
 
     def ask(self) -> FloatArray:
-        """Returns the genomes to evaluate, ``(n, length)``."""
+        """Returns the genomes to evaluate, ``(n, length)``; the same ones until ``tell``."""
         ...
 
     def tell(self, fitness: FloatArray) -> None:
@@ -126,18 +126,16 @@ class RobustRepair:
         budget = (COST * settings.evaluations - judging) * steps
         spent, number, start = 0, 0, perf_counter()
         while number == 0 or (spent < budget and not search.stop()):
-            genomes = search.ask()
-            horizon = steps if number else min(FIRST_STEPS, steps)
-            before = self._simulator.stats.steps
-            if number:
-                scores = fitness.race(self._controllers(genomes), steps, rng)
+            controllers, before = self._controllers(search.ask()), self._simulator.stats.steps
+            if isinstance(search, CmaEs):
+                scores = _raced(fitness, search, controllers, steps, rng)
             else:
-                scores = fitness(self._controllers(genomes), 1, horizon, rng)[:, 0]
+                scores = fitness(controllers, 1, steps, rng)[:, 0]
             search.tell(scores)
             cost = self._simulator.stats.steps - before
             spent += cost
             number += 1
-            ahead = cost * len(search.ask()) / len(genomes)
+            ahead = cost * len(search.ask()) / len(controllers)
             left = math.ceil(max(0, budget - spent) / ahead)
             on_generation(
                 Generation(
@@ -154,7 +152,7 @@ class RobustRepair:
             judged = fitness(found, count, steps, rng)
             best = np.argsort(-robust(judged), kind="stable")[:JUDGED]
             found, judged = [found[i] for i in best], judged[best]
-        if np.isneginf(judged[0]).all():
+        if not np.isfinite(judged).any():
             raise WorkError(
                 f"no simulation of {self._simulator.robot.name} as {hypotheses[0]} remained "
                 f"finite, with {search.evaluations} controllers: check the model, such as its "
@@ -164,3 +162,20 @@ class RobustRepair:
 
     def _controllers(self, genomes: FloatArray) -> list[Controller]:
         return [Controller(self._design, genome) for genome in genomes]
+
+
+def _raced(
+    fitness: RobustFitness,
+    search: CmaEs,
+    controllers: Sequence[Controller],
+    steps: int,
+    rng: np.random.Generator,
+) -> FloatArray:
+    """Returns scores of a generation of CMA-ES at a part of the cost, ``(controllers,)``.
+
+    The random first generation has short rollouts. Later, only the leaders of each run, which it
+    recombines, are simulated to the end.
+    """
+    if not search.groups:
+        return fitness(controllers, 1, min(FIRST_STEPS, steps), rng)[:, 0]
+    return fitness.race(controllers, search.groups, steps, rng)

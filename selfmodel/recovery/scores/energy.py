@@ -20,11 +20,13 @@ def joint_work(robot: Robot, behaviour: Behaviour) -> FloatArray:
 
     Args:
         robot: The robot, for its control time step.
-        behaviour: Efforts and velocities of the joints, ``(..., steps, hinges)`` each; NaN counts
-            as 0.
+        behaviour: Efforts and velocities of the joints, ``(..., steps, hinges)`` each; single NaN
+            count as 0, and the work of a run without any number is NaN.
     """
     power = np.abs(behaviour["joint_efforts"] * behaviour["joint_velocities"])
-    return np.asarray(np.nansum(power, axis=(-2, -1)) * robot.control_timestep)
+    observed = np.isfinite(power).any(axis=(-2, -1))
+    work = np.nansum(power, axis=(-2, -1)) * robot.control_timestep
+    return np.asarray(np.where(observed, work, np.nan))
 
 
 def _score(robot: Robot, hypothesis: Hypothesis, behaviour: Behaviour) -> FloatArray:

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from selfmodel.controllers.controller import Controller
-from selfmodel.evolution import Evolution
 from selfmodel.recovery.baselines.genome_search import KEPT, genome_search
 from selfmodel.recovery.repair.cma_es import CmaEs
+from selfmodel.recovery.repair.noisy_ea import NoisyEa
 from selfmodel.recovery.repair.robust_repair import MakeSearch
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
@@ -14,7 +14,7 @@ from selfmodel.settings import Settings
 from tests.recovery.baselines.problems import fitness
 
 
-@pytest.mark.parametrize("make", [CmaEs, Evolution])
+@pytest.mark.parametrize("make", [CmaEs, NoisyEa])
 @pytest.mark.parametrize("evaluations", [8, 30, 200])
 def test_a_search_spends_its_evaluations_and_returns_the_best_first(
     quadruped: Robot, make: MakeSearch, evaluations: int

@@ -1,4 +1,4 @@
-"""Evolution of new gaits for the healthy robot."""
+"""NoisyEa of new gaits for the healthy robot."""
 
 from collections.abc import Sequence
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from selfmodel.evolution import Evolution
 from selfmodel.experiments.reality import simulated_robot
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
@@ -16,6 +15,7 @@ from selfmodel.recovery.baselines.problem import (
     Problem,
 )
 from selfmodel.recovery.baselines.registry import BASELINES
+from selfmodel.recovery.repair.noisy_ea import NoisyEa
 from selfmodel.recovery.repertoire.evaluation import simulated_evaluation
 from selfmodel.recovery.repertoire.make import make_repertoire
 from selfmodel.recovery.repertoire.repertoire import Repertoire
@@ -58,7 +58,7 @@ def run(
         evaluate=simulated_evaluation(Simulator(robot, 1), INTACT, STEPS),
         healthy=fitness_on(Track(simulated_robot(robot), robot, LEVEL, STEPS)),
         hidden=fitness_on(track()),
-        search=genome_search(Evolution, Settings().scaled(4)),
+        search=genome_search(NoisyEa, Settings().scaled(4)),
         repertoire=repertoire,
     )
     seen: list[BaselineTrial] = []

@@ -69,6 +69,20 @@ def test_diverged_simulations_are_the_worst():
     assert np.isfinite(search.ask()).all()
 
 
+def test_a_run_whose_simulations_all_diverge_does_not_win_the_race():
+    search = CmaEs(LENGTH, draw_genomes, Settings().scaled(40), np.random.default_rng(0))
+    search.tell(fitness(search.ask()) - 9)
+    size = len(search.ask()) // STARTS
+    for _ in range(PRUNED_AFTER[0]):
+        values = fitness(search.ask()) - 9  # all are negative
+        values[:size] = -np.inf
+        search.tell(values)
+    best = search.candidates(1 + STARTS)
+
+    assert search.groups == STARTS // 2
+    assert np.isfinite(fitness(best)).all()
+
+
 @pytest.mark.parametrize("values", [np.zeros(3), np.full(80, np.nan)])
 def test_a_fitness_of_another_shape_or_a_nan_is_refused(values: np.ndarray):
     search = CmaEs(LENGTH, draw_genomes, Settings().scaled(40), np.random.default_rng(0))

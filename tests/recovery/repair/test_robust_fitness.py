@@ -5,10 +5,11 @@ import pytest
 
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.recovery.repair.robust_fitness import RobustFitness, robust
-from selfmodel.recovery.scores.fitness import DISPLACEMENT
+from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.behaviour import Behaviour
 from tests.helpers.drivers import random_controllers
 from tests.helpers.hostile import unstable
 
@@ -49,9 +50,30 @@ def test_a_race_has_the_full_scores_of_the_leaders_at_two_thirds_of_the_cost(qua
     drivers = random_controllers(quadruped, 24)
     whole = fitness(drivers, 1, steps, np.random.default_rng(0))[:, 0]
     before = simulator.stats.steps
-    raced = fitness.race(drivers, steps, np.random.default_rng(0))
+    raced = fitness.race(drivers, 2, steps, np.random.default_rng(0))
 
     assert (simulator.stats.steps - before) / (24 * steps) == pytest.approx(0.7, abs=0.02)
     assert (raced == whole).sum() == 12
-    best = np.argsort(-whole)[:3]
-    np.testing.assert_array_equal(raced[best], whole[best])
+    for group in (slice(0, 12), slice(12, 24)):  # the leader of each group goes on to the end
+        leader = np.argmax(whole[group])
+        assert raced[group][leader] == whole[group][leader]
+        assert (raced[group] == whole[group]).sum() == 6
+
+
+def test_a_controller_that_is_stopped_has_the_score_up_to_then(quadruped: Robot):
+    def count(_robot: Robot, _hypothesis: object, behaviour: Behaviour) -> np.ndarray:
+        return np.arange(24.0) + behaviour.steps
+
+    simulator, steps = Simulator(quadruped, 1), 100
+    score = Score("count", ("base_position",), count)
+    fitness = RobustFitness(simulator, score, (INTACT,), assumed_uncertainty(quadruped))
+    raced = fitness.race(random_controllers(quadruped, 24), 1, steps, np.random.default_rng(0))
+
+    ends = np.repeat([30, 60, 100], [8, 4, 12])
+    np.testing.assert_array_equal(raced, np.arange(24) + ends)
+
+
+def test_one_diverged_rollout_does_not_reject_a_controller():
+    some, none = [5.0, 5.0, 5.0, -np.inf], [-np.inf] * 4
+    assert np.argsort(-robust(np.array([none, some]))).tolist() == [1, 0]
+    assert np.isfinite(robust(np.array([some]))).all()

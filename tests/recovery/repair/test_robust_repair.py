@@ -8,10 +8,11 @@ import pytest
 
 from selfmodel.controllers.controller import draw_genomes
 from selfmodel.errors import WorkError
-from selfmodel.evolution import Evolution, Generation
+from selfmodel.evolution import Generation
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.recovery.repair.candidate_controller import CandidateController
+from selfmodel.recovery.repair.noisy_ea import NoisyEa
 from selfmodel.recovery.repair.robust_fitness import RobustFitness, robust
 from selfmodel.recovery.repair.robust_repair import COST, RobustRepair
 from selfmodel.recovery.scores.fitness import DISPLACEMENT
@@ -76,9 +77,11 @@ def test_the_number_of_threads_changes_nothing(quadruped: Robot):
 
 
 def test_the_papers_ea_can_be_its_search(quadruped: Robot):
-    found, generations = repaired(quadruped, Simulator(quadruped, 2), make_search=Evolution)
+    found, generations = repaired(quadruped, Simulator(quadruped, 2), make_search=NoisyEa)
     assert np.isfinite(found[0].scores).all()
     assert generations[0].evaluations == SMALL.population
+    assert generations[-1].number == generations[-1].total
+    assert generations[-1].evaluations >= 0.85 * COST * SMALL.evaluations
 
 
 def test_only_the_hypotheses_that_are_given_are_simulated(quadruped: Robot):

@@ -19,6 +19,8 @@ def test_work_is_power_over_time_in_either_direction(quadruped: Robot):
     names, time = quadruped.anatomy.names, np.arange(3) * quadruped.control_timestep
     run = Behaviour(names, time, {"joint_efforts": effort, "joint_velocities": velocity})
     np.testing.assert_allclose(joint_work(quadruped, run), [5 * quadruped.control_timestep])
+    unknown = {"joint_efforts": np.full_like(effort, np.nan), "joint_velocities": velocity}
+    assert np.isnan(joint_work(quadruped, Behaviour(names, time, unknown))).all()
 
 
 def test_the_score_is_the_upright_displacement_less_the_work_over_the_weight(quadruped: Robot):
