@@ -14,7 +14,7 @@ import warnings
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_type_hints
+from typing import Any, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,10 +24,8 @@ from selfmodel.files import read_file
 from selfmodel.logs.controllers import controller_bytes, parse_controller
 from selfmodel.logs.files import replace_file
 from selfmodel.logs.npz import NPZ_FAILURES, read_array
-from selfmodel.recovery.repertoire.repertoire import Origin, Repertoire, model_digest
-
-if TYPE_CHECKING:
-    from selfmodel.robot.robot import Robot
+from selfmodel.recovery.repertoire.model_digest import Modelled, model_digest
+from selfmodel.recovery.repertoire.repertoire import Origin, Repertoire
 
 MAX_BYTES = 2**28
 """Largest size of a repertoire file and of its arrays, bytes; 20,000 gaits of the hexapod have
@@ -74,7 +72,7 @@ def save_repertoire(path: Path, repertoire: Repertoire) -> None:
     replace_file(path, repertoire_bytes(repertoire))
 
 
-def load_repertoire(path: Path, robot: "Robot | None" = None) -> Repertoire:
+def load_repertoire(path: Path, robot: Modelled | None = None) -> Repertoire:
     """Returns the verified repertoire in a file.
 
     Args:

@@ -14,7 +14,7 @@ from selfmodel.experiments.study_files import check_keys, key_of
 from selfmodel.physical.reality_gap import MAX_GAP_LEVEL
 from selfmodel.recovery.baselines.problem import BaselineSettings
 from selfmodel.recovery.baselines.registry import BASELINES, ORACLE
-from selfmodel.recovery.repertoire.repertoire import model_digest
+from selfmodel.recovery.repertoire.model_digest import model_digest
 from selfmodel.version import __version__
 
 ORACLE_TRIALS = 6

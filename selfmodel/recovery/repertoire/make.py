@@ -11,7 +11,8 @@ from selfmodel.controllers.controller import Controller, Design
 from selfmodel.errors import WorkError
 from selfmodel.recovery.repertoire.evaluation import Evaluate, feet_of
 from selfmodel.recovery.repertoire.map_elites import MapElites, levels_for
-from selfmodel.recovery.repertoire.repertoire import Origin, Repertoire, model_digest
+from selfmodel.recovery.repertoire.model_digest import model_digest
+from selfmodel.recovery.repertoire.repertoire import Origin, Repertoire
 from selfmodel.robot.robot import Robot
 from selfmodel.version import __version__
 

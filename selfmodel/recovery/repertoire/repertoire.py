@@ -1,17 +1,12 @@
 """A repertoire: the gaits that a MAP-Elites search found, with their origin."""
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from selfmodel.arrays import FloatArray, IndexArray, frozen
 from selfmodel.controllers.controller import Controller, Design
-
-if TYPE_CHECKING:
-    from selfmodel.robot.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -86,15 +81,3 @@ class Repertoire:
     def controllers(self, gaits: Sequence[int] | IndexArray) -> list[Controller]:
         """Returns the controllers of some gaits, in their order."""
         return [self.controller(int(gait)) for gait in gaits]
-
-
-def model_digest(robot: "Robot") -> str:
-    """Returns the SHA-256 of all that defines a robot: MJCF, control time step, assets."""
-    digest = hashlib.sha256()
-    parts = [robot.mjcf.encode(), repr(robot.control_timestep).encode()]
-    for name, content in sorted(robot.assets.items()):
-        parts += [name.encode(), content]
-    for part in parts:
-        # Digests have a fixed length, so that names and contents cannot be confused.
-        digest.update(hashlib.sha256(part).digest())
-    return digest.hexdigest()

@@ -10,7 +10,8 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.recovery.repertoire.evaluation import simulated_evaluation
 from selfmodel.recovery.repertoire.make import Filling, make_repertoire, reevaluate
-from selfmodel.recovery.repertoire.repertoire import Origin, Repertoire, model_digest
+from selfmodel.recovery.repertoire.model_digest import model_digest
+from selfmodel.recovery.repertoire.repertoire import Origin, Repertoire
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator

@@ -5,7 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from selfmodel.recovery.repertoire.repertoire import Origin, Repertoire, model_digest
+from selfmodel.recovery.repertoire.model_digest import model_digest
+from selfmodel.recovery.repertoire.repertoire import Origin, Repertoire
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 
