@@ -67,8 +67,8 @@ class TrialLog:
         control_timestep: Control time step, s.
         settings: The paper's numbers at the time of the trial.
         software: Versions by the name of the software.
-        status: ``finished``; ``interrupted`` for a salvaged trial; or ``stopped`` for a robot with
-            its own clock that ended early.
+        status: ``finished``; ``interrupted`` for a salvaged trial; or ``stopped`` for a trial that
+            its robot could not finish.
         reason: Cause of the stop, or "".
         timing: Measured timing of the steps, on a robot with its own clock.
         imported: Whether the trial is an imported recording, resampled and thereby rounded.

@@ -26,7 +26,7 @@ class ChosenScore:
     """A score and the first controller of the recovery.
 
     Attributes:
-        score: Fitness of the repair EA.
+        score: Fitness of the repair.
         gait: The controller whose motion in simulation is the reference trajectory; None if the
             first controller is to be evolved.
     """

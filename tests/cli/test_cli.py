@@ -208,9 +208,9 @@ def test_progress_goes_to_standard_error_in_plain_lines_when_piped(
     assert "\x1b" not in done.stderr + done.stdout
     lines = done.stderr.splitlines()
     begins = [
-        *("repair EA for intact:", "trial 00-before:", "calibration: error ", "trial 01-after:"),
+        *("repair for intact:", "trial 00-before:", "calibration: error ", "trial 01-after:"),
         *("comparator segment-prediction: ", "diagnostic EA:"),
-        *("diagnosis from 1 trial:", "repair EA for ", "trial 02-recovery:", "diagnostic EA:"),
+        *("diagnosis from 1 trial:", "repair for ", "trial 02-recovery:", "diagnostic EA:"),
         "diagnosis from 2 trials:",
     ]
     assert len(lines) == len(begins)

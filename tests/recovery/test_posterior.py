@@ -9,10 +9,13 @@ import pytest
 import selfmodel
 from selfmodel.controllers.playback import Playback
 from selfmodel.faults.hypothesis import INTACT
+from selfmodel.faults.notation import parse
 from selfmodel.recovery.posterior import (
     MIN_EFFECTIVE,
     MODELS,
     Posterior,
+    _path,
+    _track,
     flattened_weights,
     log_likelihood,
 )
@@ -112,3 +115,22 @@ def test_a_base_that_was_missed_for_some_steps_is_interpolated(quadruped: Robot,
 
     np.testing.assert_allclose(some, whole, atol=0.02)
     np.testing.assert_allclose(none, 1 / len(none))
+
+
+def test_a_path_has_forward_and_sideways_position_and_heading_at_the_marks():
+    turn = np.linspace(0, 4, 101)  # more than half a turn
+    position = np.column_stack([np.sin(turn), 1 - np.cos(turn), np.full(101, 0.3)])
+    orientation = np.column_stack([np.cos(turn / 2), 0 * turn, 0 * turn, np.sin(turn / 2)])
+    marks = slice(20, 101, 20)
+    expected = [position[marks, 0], position[marks, 1], turn[marks]]
+    np.testing.assert_allclose(_path(_track(position, orientation)), np.concatenate(expected))
+
+
+def test_the_healthy_trial_is_simulated_without_the_fault(quadruped: Robot, tmp_path: Path):
+    (walked,) = trials(quadruped, 0.1, tmp_path)
+    after = dataclasses.replace(walked, plan=dataclasses.replace(walked.plan, stage="after"))
+    own, fault = posterior(quadruped, [walked]), parse("break:front_left_knee", quadruped.anatomy)
+    healthy, damaged = (own.after([one], fault).models.weights for one in (walked, after))
+
+    np.testing.assert_array_equal(healthy, own.after([walked], INTACT).models.weights)
+    assert not np.array_equal(healthy, damaged)

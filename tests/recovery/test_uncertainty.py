@@ -46,7 +46,8 @@ def test_the_noise_of_the_readings_is_that_of_the_physical_robot(
     assert found.wrong_touches[touch].mean() == pytest.approx(level / 2, rel=0.5)
     assert not found.reading_noise[touch].any()
     assert not found.wrong_touches[~touch].any()
-    assert 0.2 * level / 2 < found.start.angles < 0.2 * level * 3
+    assert 0.2 * level / 2 < found.start.angles < 0.2 * level * 2.2
+    np.testing.assert_allclose(found.models.factors, 0.65 * calibration.deviations)
     assert found.models.bodies.max() == BODIES
 
 

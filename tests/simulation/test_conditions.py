@@ -9,6 +9,7 @@ from selfmodel.controllers.playback import Playback
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.physical.initial_pose import StartSpread
+from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.conditions import ReadingNoise, Uncertainty, draw_conditions
 from selfmodel.simulation.model_distribution import LogNormal, exact
@@ -145,3 +146,10 @@ def test_an_added_delay_makes_commands_arrive_later(quadruped: Robot, delay: int
     (condition,) = draw_conditions((INTACT,), late, 1, np.random.default_rng(6))
 
     assert condition.embodiment(quadruped).added_delay.tolist() == [delay]
+    slow = with_parameters(quadruped, dataclasses.replace(nominal(quadruped), delay=delay))
+    (driver,) = random_controllers(quadruped, 1)
+    outcome = Simulator(quadruped, 1).run_under([condition], late, [driver], STEPS, RECORD)
+    expected = Simulator(slow, 1).run([(INTACT, driver)], STEPS, RECORD)
+    np.testing.assert_allclose(
+        outcome.behaviour["joint_positions"][0], expected.behaviour["joint_positions"], atol=1e-3
+    )

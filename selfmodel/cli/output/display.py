@@ -21,6 +21,9 @@ from selfmodel.recovery.events import DiscriminatingTrial, Event, SearchBegins
 from selfmodel.simulation.calibration import UNDETERMINED, Calibration
 from selfmodel.trials.trial import Trial
 
+_SEARCHES = {"repair": "repair", "diagnostic": "diagnostic EA"}
+"""Text of each kind of search."""
+
 
 def displacement_text(trial: Trial) -> str:
     """Returns the displacement of a trial as text."""
@@ -64,7 +67,8 @@ class _Lines:
     def __call__(self, event: Event) -> None:
         match event:
             case SearchBegins(kind, hypothesis):
-                self._search = f"{kind} EA" if hypothesis is None else f"{kind} EA for {hypothesis}"
+                purpose = "" if hypothesis is None else f" for {hypothesis}"
+                self._search = f"{_SEARCHES[kind]}{purpose}"
             case Generation() if event.number == event.total:
                 self._print_line(
                     f"{self._search}: {counted(event.number, 'generation')}, "
@@ -108,7 +112,7 @@ class _Bar:
         match event:
             case SearchBegins():
                 self._task = self._progress.add_task(
-                    f"{event.kind} EA", total=None, best="-", rate="-"
+                    _SEARCHES[event.kind], total=None, best="-", rate="-"
                 )
             case Generation() if self._task is not None:
                 self._progress.update(
