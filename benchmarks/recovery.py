@@ -1,4 +1,4 @@
-"""Time shares and peak memory of one recovery.
+"""Time shares and peak memory of one recovery with the paper's repair.
 
 ``python -m benchmarks.recovery`` measures one recovery in this process and prints one JSON object;
 ``measure`` repeats this in separate processes.
@@ -28,6 +28,8 @@ from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.recovery.database import Journal, RunTrial
 from selfmodel.recovery.recover import recover
+from selfmodel.recovery.repair.paper_repair import RepairSearch
+from selfmodel.recovery.scores.fitness import DISPLACEMENT
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
@@ -120,6 +122,8 @@ def measure_once() -> dict[str, float]:
             settings=settings,
             seed=0,
             on_event=lambda _: None,
+            score=DISPLACEMENT,
+            make_repair=RepairSearch,
         )
     seconds = perf_counter() - start
     return {
