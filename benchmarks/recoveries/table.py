@@ -10,6 +10,9 @@ from selfmodel.experiments.confidence_intervals import proportion
 
 RESAMPLES = 2000
 
+MIN_SAMPLE = 5
+"""Smallest number of values whose median has a bootstrap interval."""
+
 HEADER = """\
 | robot | case | gap | n | diagnosis right | before, m | ÷ oracle | first trial ÷ oracle | best ÷ \
 oracle | observed ÷ predicted | fell |
@@ -71,10 +74,13 @@ def _ratio(value: float, reference: float | None) -> float:
 
 
 def _median(values: Iterable[float]) -> str:
-    """Returns the median with its interval and the lowest tenth as text; "-" without values."""
+    """Returns the median as text, with its interval and the lowest tenth; "-" without values.
+
+    Fewer than ``MIN_SAMPLE`` values have no interval.
+    """
     known = np.array([value for value in values if np.isfinite(value)])
-    if not len(known):
-        return "-"
+    if len(known) < MIN_SAMPLE:
+        return f"{np.median(known):.2f} (n {len(known)})" if len(known) else "-"
     rng = np.random.default_rng(0)
     medians = np.median(rng.choice(known, (RESAMPLES, len(known))), axis=1)
     low, high = np.quantile(medians, [0.025, 0.975])

@@ -49,6 +49,7 @@ def test_a_recovery_is_that_of_the_command_with_the_papers_options(
 ):
     options = ("--case", "1", "--seed", "3", *SMALL, "--steps", "60", "--trials", "2")
     options += ("--kinds", "paper", "--comparator", "forward-displacement", "--no-calibrate")
+    options += ("--repair", "paper")
 
     done = selfmodel("recover", "quadruped", *options, "--out", "out", "--json", cwd=tmp_path)
     found = json.loads(done.stdout)
