@@ -63,9 +63,7 @@ class Evolution:
         self._settings = settings
         self._draw = draw
         self._rng = rng
-        known = list(seeds)[: settings.population]
-        fresh = draw(rng, (settings.population - len(known), length))
-        self._asked = np.concatenate([np.array(known).reshape(-1, length), fresh])
+        self._asked = first_generation(settings.population, length, draw, rng, seeds)
         self._genomes = np.empty((0, length))
         self._fitness = np.empty(0)
         self.generations = settings.generations
@@ -82,11 +80,7 @@ class Evolution:
         Raises:
             ValueError: ``fitness`` has another shape, or a NaN.
         """
-        if fitness.shape != (len(self._asked),) or np.isnan(fitness).any():
-            raise ValueError(
-                f"expected a fitness other than NaN for each of the {len(self._asked)} genomes "
-                f"asked for, got shape {fitness.shape}"
-            )
+        check_fitness(fitness, self._asked)
         genomes = np.concatenate([self._genomes, self._asked])
         scores = np.concatenate([self._fitness, fitness])
         best = np.argsort(-scores, kind="stable")
@@ -104,11 +98,62 @@ class Evolution:
         return {}
 
     def _children(self) -> FloatArray:
-        settings, rng = self._settings, self._rng
-        count = settings.population - settings.survivors
-        # Survivors are sorted, so the entrant with the lowest index wins a tournament.
-        entrants = rng.integers(len(self._genomes), size=(count, settings.tournament))
-        return reproduce(self._genomes[entrants.min(axis=1)], self._draw, settings, rng)
+        return offspring_of(self._genomes, self._draw, self._settings, self._rng)
+
+
+def first_generation(
+    size: int,
+    length: int,
+    draw: Draw,
+    rng: np.random.Generator,
+    seeds: Sequence[FloatArray],
+) -> FloatArray:
+    """Returns seeds, then random genomes, ``(size, length)``; no more than ``size`` seeds.
+
+    Args:
+        size: Number of genomes.
+        length: Number of values of a genome.
+        draw: Draws random genomes.
+        rng: Source of all random numbers.
+        seeds: Known genomes, each ``(length,)``.
+    """
+    known = list(seeds)[:size]
+    fresh = draw(rng, (size - len(known), length))
+    return np.concatenate([np.array(known).reshape(-1, length), fresh])
+
+
+def check_fitness(fitness: FloatArray, genomes: FloatArray) -> None:
+    """Checks that there is a fitness for each genome.
+
+    Args:
+        fitness: ``(n,)``.
+        genomes: The genomes that a search asked for, ``(n, length)``.
+
+    Raises:
+        ValueError: ``fitness`` has another shape, or a NaN.
+    """
+    if fitness.shape != (len(genomes),) or np.isnan(fitness).any():
+        raise ValueError(
+            f"expected a fitness other than NaN for each of the {len(genomes)} genomes asked for, "
+            f"got shape {fitness.shape}"
+        )
+
+
+def offspring_of(
+    survivors: FloatArray, draw: Draw, settings: Settings, rng: np.random.Generator
+) -> FloatArray:
+    """Returns the children of a generation, ``(children, length)``.
+
+    Args:
+        survivors: Genomes, best first, ``(n, length)``.
+        draw: Draws the values of mutations.
+        settings: Parameters of the search.
+        rng: Source of all random numbers.
+    """
+    count = settings.population - settings.survivors
+    # The entrant with the lowest index, which is the best one, wins a tournament.
+    entrants = rng.integers(len(survivors), size=(count, settings.tournament))
+    return reproduce(survivors[entrants.min(axis=1)], draw, settings, rng)
 
 
 def reproduce(

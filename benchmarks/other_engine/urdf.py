@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.other_engine.damage import Damage
 from benchmarks.other_engine.reality import Reality
+from selfmodel.errors import InputError
 from selfmodel.logs.writing.urdf import urdf as exported_urdf
 from selfmodel.robot.robot import Robot
 
@@ -67,7 +68,10 @@ def _add_collision(link: ET.Element, model: mujoco.MjModel, geom: int) -> None:
         length = 2 * float(model.geom_size[geom][1])
         shape = ET.Element("capsule", radius=repr(float(size[0])), length=repr(length))
     else:
-        raise NotImplementedError(f"a collision shape of type {mujoco.mjtGeom(kind).name}")
+        raise InputError(
+            f"expected collision shapes that are boxes or capsules, as those of our robots are, "
+            f"got {mujoco.mjtGeom(kind).name}: add its URDF shape here"
+        )
     collision = ET.SubElement(link, "collision")
     turn = Rotation.from_quat(model.geom_quat[geom], scalar_first=True)
     ET.SubElement(

@@ -13,6 +13,7 @@ from selfmodel.cli.options import (
     GapLevels,
     Json,
     Only,
+    Population,
     Seeds,
     Steps,
     StudyFolder,
@@ -104,16 +105,7 @@ def baseline(
             rich_help_panel=SEARCH,
         ),
     ] = 6000,
-    population: Annotated[
-        int,
-        typer.Option(
-            min=2,
-            max=10_000,
-            metavar="N",
-            help="Genomes in a generation.",
-            rich_help_panel=SEARCH,
-        ),
-    ] = 100,
+    population: Population = 100,
     period: Annotated[
         int,
         typer.Option(

@@ -20,9 +20,10 @@ from selfmodel.faults.registry import ALL_KINDS, KIND_SETS, KINDS, kind_names
 from selfmodel.recovery.next_trial import NextTrial, by_disagreement, by_repair
 from selfmodel.recovery.repair.candidate_controller import MakeRepair
 from selfmodel.recovery.repair.cma_es import CmaEs
+from selfmodel.recovery.repair.genome_search import MakeSearch
 from selfmodel.recovery.repair.noisy_ea import NoisyEa
 from selfmodel.recovery.repair.paper_repair import RepairSearch
-from selfmodel.recovery.repair.robust_repair import MakeSearch, RobustRepair
+from selfmodel.recovery.repair.robust_repair import RobustRepair
 from selfmodel.recovery.scores.energy import ENERGY
 from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.scores.tracking import TRACKING

@@ -61,8 +61,6 @@ def test_an_arm_with_a_weak_motor_follows_its_trajectory_better_than_before(fold
         folder,
         *("recover", "arm.xml", "--damage", "motor:joint2=0.4", "--score", "tracking"),
         *("--controller", "cpg", "--steps", "300", "--trials", "2", *SEARCH, "--out", "recovery"),
-        # CMA-ES needs the whole budget to come as near to the first controller as its mutants are.
-        *("--repair", "paper"),
     )
     assert found["correct"]
     score = found["score"]

@@ -1,4 +1,4 @@
-"""CMA-ES with raced starts, with the interface ``ask``, ``tell``, ``stop``.
+"""CMA-ES with raced starts, a ``GenomeSearch``.
 
 Source: Hansen, *The CMA evolution strategy: a tutorial* (arXiv:1604.00772); the implementation is
 that of the library ``cma``.
@@ -11,7 +11,8 @@ import cma
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.evolution import Draw
+from selfmodel.evolution import Draw, check_fitness, first_generation
+from selfmodel.recovery.repair.genome_search import Rollouts
 from selfmodel.settings import Settings
 
 DEVIATION = 0.4
@@ -68,9 +69,8 @@ class CmaEs:
         self._rng = rng
         self._seeds = len(seeds)
         self._population = max(MIN_POPULATION, round(SHARE * settings.population))
-        random = max(STARTS, round(RANDOM_SHARE * settings.population) - len(seeds))
-        fresh = draw(rng, (random, length))
-        self._asked = np.concatenate([np.array(list(seeds)).reshape(-1, length), fresh])
+        size = max(STARTS + len(seeds), round(RANDOM_SHARE * settings.population))
+        self._asked = first_generation(size, length, draw, rng, seeds)
         self._runs: list[_Run] = []
         self.generation = 0
         self.evaluations = 0
@@ -85,11 +85,7 @@ class CmaEs:
         Raises:
             ValueError: ``fitness`` has another shape, or a NaN.
         """
-        if fitness.shape != (len(self._asked),) or np.isnan(fitness).any():
-            raise ValueError(
-                f"expected a fitness other than NaN for each of the {len(self._asked)} genomes "
-                f"asked for, got shape {fitness.shape}"
-            )
+        check_fitness(fitness, self._asked)
         if not self._runs:
             self._runs = self._started(fitness)
         else:
@@ -108,13 +104,14 @@ class CmaEs:
         self._asked = np.concatenate([run.ask() for run in self._runs])
 
     @property
-    def groups(self) -> int:
-        """Number of runs whose genomes ``ask`` returns one after the other; 0 for random ones."""
-        return len(self._runs)
+    def rollouts(self) -> Rollouts:
+        """Rollouts that the generation needs: a run recombines the better half of its genomes."""
+        return "raced" if self._runs else "short"
 
-    def stop(self) -> dict[str, int]:
-        """Returns no reason: the caller's budget ends the search."""
-        return {}
+    @property
+    def groups(self) -> int:
+        """Number of runs whose genomes ``ask`` returns one after the other; 1 for random ones."""
+        return max(1, len(self._runs))
 
     def _started(self, fitness: FloatArray) -> list["_Run"]:
         """Returns the runs from the best seeds and the best random genomes."""

@@ -1,11 +1,13 @@
-"""The paper's EA for a noisy fitness, with the interface ``ask``, ``tell``, ``stop``."""
+"""The paper's EA for a noisy fitness, a ``GenomeSearch``."""
 
 from collections.abc import Sequence
+from typing import ClassVar
 
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.evolution import Draw, reproduce
+from selfmodel.evolution import Draw, check_fitness, first_generation, offspring_of
+from selfmodel.recovery.repair.genome_search import Rollouts
 from selfmodel.settings import Settings
 
 
@@ -23,7 +25,8 @@ class NoisyEa:
         seeds: Genomes of the first generation beside random genomes.
     """
 
-    groups = 0
+    rollouts: ClassVar[Rollouts] = "whole"
+    groups: ClassVar[int] = 1
 
     def __init__(
         self,
@@ -34,9 +37,7 @@ class NoisyEa:
         seeds: Sequence[FloatArray] = (),
     ) -> None:
         self._settings, self._draw, self._rng = settings, draw, rng
-        known = list(seeds)[: settings.population]
-        fresh = draw(rng, (settings.population - len(known), length))
-        self._asked = np.concatenate([np.array(known).reshape(-1, length), fresh])
+        self._asked = first_generation(settings.population, length, draw, rng, seeds)
         self._best = self._asked
         self.evaluations = 0
 
@@ -50,23 +51,12 @@ class NoisyEa:
         Raises:
             ValueError: ``fitness`` has another shape, or a NaN.
         """
-        if fitness.shape != (len(self._asked),) or np.isnan(fitness).any():
-            raise ValueError(
-                f"expected a fitness other than NaN for each of the {len(self._asked)} genomes "
-                f"asked for, got shape {fitness.shape}"
-            )
-        settings, rng = self._settings, self._rng
+        check_fitness(fitness, self._asked)
         self._best = self._asked[np.argsort(-fitness, kind="stable")]
         self.evaluations += len(fitness)
-        survivors = self._best[: settings.survivors]
-        count = settings.population - settings.survivors
-        entrants = rng.integers(len(survivors), size=(count, settings.tournament))
-        children = reproduce(survivors[entrants.min(axis=1)], self._draw, settings, rng)
+        survivors = self._best[: self._settings.survivors]
+        children = offspring_of(survivors, self._draw, self._settings, self._rng)
         self._asked = np.concatenate([survivors, children])
-
-    def stop(self) -> dict[str, int]:
-        """Returns no reason: the caller's budget ends the search."""
-        return {}
 
     def candidates(self, count: int) -> FloatArray:
         """Returns the best genomes of the last generation, best first, ``(count, length)``."""

@@ -9,17 +9,17 @@ and Harvey, "Noise and the reality gap" (ECAL 1995); the paper, section VI (nois
 import math
 from collections.abc import Callable, Sequence
 from time import perf_counter
-from typing import Protocol
 
 import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Controller, Design, draw_genomes
 from selfmodel.errors import WorkError
-from selfmodel.evolution import Draw, Generation, GenerationCallback
+from selfmodel.evolution import Generation, GenerationCallback, reproduce
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.recovery.repair.candidate_controller import CandidateController
 from selfmodel.recovery.repair.cma_es import CmaEs
+from selfmodel.recovery.repair.genome_search import GenomeSearch, MakeSearch
 from selfmodel.recovery.repair.robust_fitness import RobustFitness, robust
 from selfmodel.recovery.scores.fitness import Score
 from selfmodel.recovery.scores.upright import UPRIGHT
@@ -31,7 +31,7 @@ COST = 2.0
 """Simulated control steps of a repair, relative to those of the paper's repair EA."""
 
 FIRST_STEPS = 200
-"""Control steps of the rollouts of the random first generation."""
+"""Control steps of short rollouts."""
 
 FINALISTS, FINAL_CONDITIONS = 12, 4
 """Largest numbers of candidates of a search, and of conditions under which they are compared."""
@@ -42,35 +42,6 @@ these are compared at last."""
 
 JUDGING = 0.04
 """Cost of both comparisons relative to that of the repair, approximately."""
-
-
-class GenomeSearch(Protocol):
-    """Search over genomes; fitness is maximised."""
-
-    evaluations: int
-
-    def ask(self) -> FloatArray:
-        """Returns the genomes to evaluate, ``(n, length)``; the same ones until ``tell``."""
-        ...
-
-    def tell(self, fitness: FloatArray) -> None:
-        """Sets the fitness of the genomes that ``ask`` returned, ``(n,)``."""
-        ...
-
-    def stop(self) -> dict[str, int]:
-        """Returns the stop reason; empty while the search runs."""
-        ...
-
-    def candidates(self, count: int) -> FloatArray:
-        """Returns at most ``count`` genomes that may be the best, ``(n, length)``."""
-        ...
-
-
-MakeSearch = Callable[
-    [int, Draw, Settings, np.random.Generator, Sequence[FloatArray]], GenomeSearch
-]
-"""Function from the length of a genome, the distribution of random genomes, the settings, the
-random number generator and initial genomes to a search."""
 
 
 class RobustRepair:
@@ -112,44 +83,16 @@ class RobustRepair:
         Raises:
             WorkError: The simulation diverged with every controller.
         """
-        design, settings, steps = self._design, self._settings, self._settings.steps
         fitness = RobustFitness(self._simulator, self._score, hypotheses, uncertainty())
-        own = [controller.genome for controller in seeds if controller.design == design]
-        search = self._make_search(design.weights, draw_genomes, settings, rng, own)
-        finalists = min(FINALISTS, settings.population)
-        rollouts = JUDGING * COST * settings.evaluations / 2
-        conditions = (
-            max(1, min(FINAL_CONDITIONS, round(rollouts / finalists))),
-            max(2, min(JUDGED_CONDITIONS, round(rollouts / JUDGED))),
-        )
-        judging = finalists * conditions[0] + JUDGED * conditions[1]
-        budget = (COST * settings.evaluations - judging) * steps
-        spent, number, start = 0, 0, perf_counter()
-        while number == 0 or (spent < budget and not search.stop()):
-            controllers, before = self._controllers(search.ask()), self._simulator.stats.steps
-            if isinstance(search, CmaEs):
-                scores = _raced(fitness, search, controllers, steps, rng)
-            else:
-                scores = fitness(controllers, 1, steps, rng)[:, 0]
-            search.tell(scores)
-            cost = self._simulator.stats.steps - before
-            spent += cost
-            number += 1
-            ahead = cost * len(search.ask()) / len(controllers)
-            left = math.ceil(max(0, budget - spent) / ahead)
-            on_generation(
-                Generation(
-                    number=number,
-                    total=number + left,
-                    best=float(scores.max()),
-                    evaluations=search.evaluations,
-                    seconds=perf_counter() - start,
-                )
-            )
+        known = [controller for controller in seeds if controller.design == self._design]
+        comparisons = _comparisons(self._settings)
+        judging = sum(candidates * conditions for candidates, conditions in comparisons)
+        budget = (COST * self._settings.evaluations - judging) * self._settings.steps
+        search = self._searched(fitness, known, budget, rng, on_generation)
         self.evaluations += search.evaluations
-        found = self._controllers(search.candidates(finalists))
-        for count in conditions:
-            judged = fitness(found, count, steps, rng)
+        found = self._finalists(search, known, comparisons[0][0], rng)
+        for count, conditions in comparisons:
+            judged = fitness(found[:count], conditions, self._settings.steps, rng)
             best = np.argsort(-robust(judged), kind="stable")[:JUDGED]
             found, judged = [found[i] for i in best], judged[best]
         if not np.isfinite(judged).any():
@@ -160,22 +103,78 @@ class RobustRepair:
             )
         return tuple(map(CandidateController, found, judged))
 
+    def _searched(
+        self,
+        fitness: RobustFitness,
+        known: Sequence[Controller],
+        budget: float,
+        rng: np.random.Generator,
+        on_generation: GenerationCallback,
+    ) -> GenomeSearch:
+        """Returns the search after it has spent a budget of control steps."""
+        genomes = [controller.genome for controller in known]
+        design, settings, stats = self._design, self._settings, self._simulator.stats
+        search = self._make_search(design.weights, draw_genomes, settings, rng, genomes)
+        begin, number, start = stats.steps, 0, perf_counter()
+        while not number or stats.steps - begin < budget:
+            before, asked = stats.steps, self._controllers(search.ask())
+            scores = _scores(fitness, search, asked, settings.steps, rng)
+            search.tell(scores)
+            number += 1
+            ahead = (stats.steps - before) * len(search.ask()) / len(asked)
+            left = math.ceil(max(0.0, begin + budget - stats.steps) / ahead)
+            on_generation(
+                Generation(
+                    number=number,
+                    total=number + left,
+                    best=float(scores.max()),
+                    evaluations=search.evaluations,
+                    seconds=perf_counter() - start,
+                )
+            )
+        return search
+
+    def _finalists(
+        self,
+        search: GenomeSearch,
+        known: Sequence[Controller],
+        count: int,
+        rng: np.random.Generator,
+    ) -> list[Controller]:
+        """Returns the candidates of a search and mutants of known controllers, ``count`` or fewer.
+
+        A search with a small budget may end far below a known controller; its mutants do not.
+        """
+        near: list[Controller] = []
+        if known:
+            share = count // 3
+            genomes = np.resize([one.genome for one in known], (share, self._design.weights))
+            near = self._controllers(reproduce(genomes, draw_genomes, self._settings, rng))
+        distinct = dict.fromkeys([*near, *self._controllers(search.candidates(count))])
+        return [one for one in distinct if one not in known][:count]
+
     def _controllers(self, genomes: FloatArray) -> list[Controller]:
         return [Controller(self._design, genome) for genome in genomes]
 
 
-def _raced(
+def _comparisons(settings: Settings) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Returns the number of candidates and of conditions of both comparisons."""
+    finalists = min(FINALISTS, settings.population)
+    rollouts = JUDGING * COST * settings.evaluations / 2
+    first = max(1, min(FINAL_CONDITIONS, round(rollouts / finalists)))
+    last = max(2, min(JUDGED_CONDITIONS, round(rollouts / JUDGED)))
+    return (finalists, first), (JUDGED, last)
+
+
+def _scores(
     fitness: RobustFitness,
-    search: CmaEs,
+    search: GenomeSearch,
     controllers: Sequence[Controller],
     steps: int,
     rng: np.random.Generator,
 ) -> FloatArray:
-    """Returns scores of a generation of CMA-ES at a part of the cost, ``(controllers,)``.
-
-    The random first generation has short rollouts. Later, only the leaders of each run, which it
-    recombines, are simulated to the end.
-    """
-    if not search.groups:
-        return fitness(controllers, 1, min(FIRST_STEPS, steps), rng)[:, 0]
-    return fitness.race(controllers, search.groups, steps, rng)
+    """Returns the scores of a generation, ``(controllers,)``, with the rollouts that it needs."""
+    if search.rollouts == "raced":
+        return fitness.race(controllers, search.groups, steps, rng)
+    horizon = min(FIRST_STEPS, steps) if search.rollouts == "short" else steps
+    return fitness(controllers, 1, horizon, rng)[:, 0]

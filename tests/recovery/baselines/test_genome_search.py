@@ -6,8 +6,8 @@ import pytest
 from selfmodel.controllers.controller import Controller
 from selfmodel.recovery.baselines.genome_search import KEPT, genome_search
 from selfmodel.recovery.repair.cma_es import CmaEs
+from selfmodel.recovery.repair.genome_search import MakeSearch
 from selfmodel.recovery.repair.noisy_ea import NoisyEa
-from selfmodel.recovery.repair.robust_repair import MakeSearch
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
