@@ -8,23 +8,19 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from selfmodel.experiments.reality import Reality, draw_reality
-from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import ROBOTS
 
-HEALTHY = 0
-"""Number of the case without a failure."""
-
 
 @dataclass(frozen=True)
 class Cell:
-    """One recovery, or one oracle.
+    """One recovery.
 
     Attributes:
         robot: Name of the robot.
-        case: Number of the failure in Table I; ``HEALTHY`` for none.
+        case: Number of the failure in Table I.
         gap: Level of the reality gap.
         seed: Seed of the gap, and of all random choices.
     """
@@ -42,14 +38,7 @@ class Cell:
     @property
     def truth(self) -> Hypothesis:
         """Faults of the physical robot."""
-        if self.case == HEALTHY:
-            return INTACT
         return parse(ROBOTS[self.robot].cases[self.case], self.nominal.anatomy)
-
-    @property
-    def reality(self) -> Reality:
-        """Reality gap of the physical robot."""
-        return draw_reality(self.nominal, self.seed, self.gap, structure=False)
 
 
 def cells(
