@@ -13,6 +13,7 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.recovery.repair.candidate_controller import CandidateController
 from selfmodel.recovery.repair.noisy_ea import NoisyEa
+from selfmodel.recovery.repair.paper_repair import RepairSearch
 from selfmodel.recovery.repair.robust_fitness import RobustFitness, robust
 from selfmodel.recovery.repair.robust_repair import COST, RobustRepair
 from selfmodel.recovery.scores.fitness import DISPLACEMENT
@@ -107,3 +108,21 @@ def test_only_the_hypotheses_that_are_given_are_simulated(quadruped: Robot):
 def test_a_repair_that_no_simulation_survives_is_an_error(quadruped: Robot):
     with pytest.raises(WorkError, match="no simulation of quadruped as intact remained finite"):
         repaired(quadruped, Simulator(unstable(quadruped), 2))
+
+
+def test_mutants_of_a_known_controller_are_candidates_and_itself_is_not(quadruped: Robot):
+    least = dataclasses.replace(Settings().scaled(12), generations=1, steps=100)
+    known = RepairSearch(Simulator(quadruped, 2), SMALL, score=DISPLACEMENT).best(
+        INTACT, (), np.random.default_rng(5), lambda _generation: None
+    )
+    found = RobustRepair(Simulator(quadruped, 2), least, network_for(quadruped), DISPLACEMENT)(
+        (INTACT,),
+        partial(assumed_uncertainty, quadruped),
+        (known,),
+        np.random.default_rng(0),
+        lambda _generation: None,
+    )
+    different = [np.count_nonzero(own.controller.genome != known.genome) for own in found]
+
+    assert min(different) <= 5, "one in a hundred weights of a mutant is drawn anew"
+    assert known not in [own.controller for own in found]
