@@ -1,6 +1,7 @@
 """One process of a campaign: makes and judges cases, and keeps the findings."""
 
 import faulthandler
+import gc
 import os
 import resource
 import signal
@@ -49,6 +50,7 @@ class Player:
             numbers: Numbers of the cases.
             sender: Receives a verdict for each case.
         """
+        gc.freeze()  # freed during a case, garbage of the parent would hide growth of its memory
         pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
         limit = pages * resource.getpagesize() + ADDRESS_SPACE
         resource.setrlimit(resource.RLIMIT_AS, (limit, limit))

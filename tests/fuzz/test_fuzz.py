@@ -1,5 +1,6 @@
 """No input of any reader leads to anything but a declared error; and the campaign can fail."""
 
+import gc
 import os
 import signal
 import struct
@@ -101,6 +102,11 @@ def _fill() -> str:
     return "fine" if np.ones(20_000_000).any() else ""
 
 
+def _collect_and_fill() -> str:
+    gc.collect()
+    return _fill()
+
+
 def _spin() -> str:
     while time.process_time() < 1e6:
         pass
@@ -155,6 +161,18 @@ def test_a_finding_is_reported_with_its_command_and_ends_no_campaign(
     report = reports(tmp_path)
     assert "python -m tests.fuzz --only failing --seed 0 --first " in report
     assert reported in report
+
+
+def test_garbage_from_before_a_campaign_hides_no_memory_of_a_case(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(oracle, "MEGABYTES", 20)
+    garbage: list[object] = [np.ones(20_000_000)]
+    garbage.append(garbage)  # a cycle, which only a collection frees
+    gc.collect()  # moves it to the oldest generation, so that none collects it before the case
+    del garbage
+
+    assert campaign(tmp_path, failing(_collect_and_fill), 5).findings.total() == 1
 
 
 def test_a_part_file_may_be_left(tmp_path: Path):
