@@ -5,11 +5,22 @@ SLOW := process or search or bodies or opengl or fuzz
 READY := .venv/.ready
 VIEWERS := .viewers
 NODE_READY := .ci/viewers/node_modules/.ready
+PAGE := selfmodel/report/template.html
+PAGE_SOURCES := $(shell find report_page -path report_page/node_modules -prune -o -type f -print)
+BROWSER_READY := .ci/browser/node_modules/.ready
 
 help: ## show this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
 
-setup: $(READY) ## make .venv with the locked versions
+setup: $(READY) ## make .venv with the locked versions, and the page of a report where there is Node.js
+	@if command -v npm >/dev/null; then $(MAKE) --no-print-directory page; else echo 'no Node.js: `selfmodel report` needs `make page`, and all else works'; fi
+
+page: $(PAGE) ## build the page of `selfmodel report`; needs Node.js
+
+$(PAGE): $(PAGE_SOURCES)
+	@command -v npm >/dev/null || { echo 'make page needs Node.js 20 or newer with npm, and found none' >&2; exit 1; }
+	npm ci --prefix report_page --ignore-scripts --no-audit --no-fund --silent
+	node report_page/build.mjs
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "selfmodel needs Python 3.11 or newer: make PYTHON=python3.11 ...")'
@@ -22,7 +33,7 @@ $(READY): pyproject.toml constraints.txt
 demo: $(READY) ## recover a quadruped from a lost lower leg, showing what it does
 	$(BIN)/selfmodel recover quadruped --case 1
 
-test: $(READY) ## run the fast tests: every promise, in about two minutes on two cores
+test: $(READY) ## run the fast tests: every promise, in about three minutes on two cores
 	$(BIN)/pytest --numprocesses auto --dist loadfile --durations 10
 
 test-slow: $(READY) ## run the tests that `make test` leaves out; in about ten minutes on two cores
@@ -42,12 +53,12 @@ types: $(READY) ## check types, strictly
 	$(BIN)/mypy
 	$(BIN)/mypy benchmarks examples .ci
 
-wheel: $(READY) ## build the wheel and check what it holds
+wheel: $(READY) $(PAGE) ## build the wheel and check what it holds
 	rm -rf build dist
 	$(BIN)/python -m build --quiet --wheel
 	$(BIN)/python .ci/check_wheel.py dist/*.whl
 
-viewers: $(READY) $(VIEWERS)/rerun/.ready $(VIEWERS)/pymcap/.ready $(NODE_READY) ## prove that fresh logs open in other people's tools; needs Node.js
+viewers: $(READY) $(VIEWERS)/pymcap/.ready $(NODE_READY) ## prove that fresh logs open in other people's tools; needs Node.js
 	rm -rf $(VIEWERS)/logs
 	mkdir $(VIEWERS)/logs
 	$(BIN)/selfmodel trial quadruped --out $(VIEWERS)/logs/quadruped.mcap
@@ -56,7 +67,7 @@ viewers: $(READY) $(VIEWERS)/rerun/.ready $(VIEWERS)/pymcap/.ready $(NODE_READY)
 	$(BIN)/python .ci/viewers/can_fail.py $(VIEWERS)/logs/quadruped.mcap
 	node .ci/viewers/layout.mjs docs/foxglove-layout.json $(VIEWERS)/logs/quadruped.mcap
 
-# The tools have environments of their own: some are heavy, one is GPL, none is a dependency.
+# pymcap-cli has an environment of its own: it is GPL, and no dependency.
 $(VIEWERS)/%/.ready: .ci/viewers/requirements-%.txt
 	rm -rf $(@D)
 	$(PYTHON) -m venv $(@D)
@@ -66,6 +77,13 @@ $(VIEWERS)/%/.ready: .ci/viewers/requirements-%.txt
 $(NODE_READY): .ci/viewers/package.json .ci/viewers/package-lock.json
 	@command -v npm >/dev/null || { echo 'make viewers needs Node.js 20 or newer with npm, and found none' >&2; exit 1; }
 	npm ci --prefix .ci/viewers --ignore-scripts
+	touch $@
+
+browser: $(BROWSER_READY) ## install what tests drive a browser with; needs Node.js and Chromium
+
+$(BROWSER_READY): .ci/browser/package.json .ci/browser/package-lock.json
+	@command -v npm >/dev/null || { echo 'make browser needs Node.js 20 or newer with npm, and found none' >&2; exit 1; }
+	npm ci --prefix .ci/browser --ignore-scripts --no-audit --no-fund --silent
 	touch $@
 
 fuzz: $(READY) ## mutate the input of every reader 100,000 times; in about 25 minutes on two cores
@@ -87,4 +105,4 @@ foreign: $(READY) ## make recordings by an independent generator and score their
 	$(BIN)/python -m benchmarks.foreign score $(FOREIGN)
 	$(BIN)/python -m benchmarks.foreign table $(FOREIGN)/scores.jsonl
 
-.PHONY: help setup demo test test-slow test-all docs lint types wheel viewers fuzz bench results foreign
+.PHONY: help setup page browser demo test test-slow test-all docs lint types wheel viewers fuzz bench results foreign

@@ -19,7 +19,7 @@ from selfmodel.logs.errors import LogError
 HERE = Path(__file__).parent
 ENVIRONMENTS = HERE.parents[1] / ".viewers"
 PYMCAP = ENVIRONMENTS / "pymcap" / "bin" / "pymcap-cli"
-RERUN = ENVIRONMENTS / "rerun" / "bin"
+RERUN = Path(sys.executable).parent
 
 
 class ProofError(Exception):
@@ -86,6 +86,15 @@ def rerun(log: Path) -> str:
     return f"{len(rows)} rows of {len(expected)} joint positions as Scalars, equal to the log's"
 
 
+def view(log: Path) -> str:
+    """The file that `selfmodel view` writes is one that Rerun verifies without a warning."""
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "view.rrd"
+        said(RERUN / "selfmodel", "view", log, "-o", out)
+        said(RERUN / "rerun", "rrd", "verify", out, quiet=True)
+        return f"{out.stat().st_size} bytes with both bodies, verified"
+
+
 def said(*command: str | Path, quiet: bool = False) -> str:
     """Returns a tool's standard output.
 
@@ -112,7 +121,7 @@ def said(*command: str | Path, quiet: bool = False) -> str:
     return done.stdout
 
 
-PROOFS = {"foxglove": foxglove, "pymcap-cli": doctor, "rerun": rerun}
+PROOFS = {"foxglove": foxglove, "pymcap-cli": doctor, "rerun": rerun, "view": view}
 
 
 if __name__ == "__main__":

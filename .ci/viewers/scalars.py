@@ -1,14 +1,12 @@
 """Prints what Rerun would plot of an entity: one JSON line a row, with its time, names and numbers.
 
-Runs in Rerun's environment, which has nothing of this project.
-
 Usage: python scalars.py RECORDING.rrd ENTITY
 """
 
 import json
 import sys
 
-from rerun.chunk import RrdReader  # type: ignore[import-not-found]
+from rerun.chunk import RrdReader
 
 
 def main(recording: str, entity: str) -> None:

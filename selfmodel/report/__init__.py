@@ -1,0 +1,1 @@
+"""Reports of runs, logs and campaigns as one HTML file."""

@@ -1,0 +1,1 @@
+"""What a diagnosis was made with, as files of earlier commands name it."""

@@ -1,0 +1,161 @@
+import json
+import shutil
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+from selfmodel.report import html
+from selfmodel.report.document import Report
+from tests.helpers.browser import built
+from tests.helpers.command import SMALL, selfmodel
+
+BANK = Path(__file__).parents[2] / "benchmarks" / "bank" / "quadruped-0.npz"
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a log before and a log after a failure."""
+    folder = tmp_path_factory.mktemp("logs")
+    common = ("--controller", str(BANK), "--steps", "80")
+    trials = (("before", "--stage", "before"), ("after", "--damage", "jam:back_left_knee=0.3"))
+    for name, *options in trials:
+        done = selfmodel(
+            "trial", "quadruped", *common, *options, "--out", f"{name}.mcap", cwd=folder
+        )
+        assert done.returncode == 0, done.stderr
+    return folder
+
+
+@pytest.fixture(scope="module")
+def diagnosed(logs: Path) -> Path:
+    """The JSON file of a diagnosis of the logs."""
+    done = selfmodel("diagnose", "before.mcap", "after.mcap", *SMALL, "--json", cwd=logs)
+    assert done.returncode == 0, done.stderr
+    (logs / "found.json").write_text(done.stdout)
+    return logs / "found.json"
+
+
+@built
+def test_logs_are_diagnosed_and_reported_and_a_diagnosis_made_before_gives_the_same(
+    logs: Path, diagnosed: Path
+):
+    given = ("before.mcap", "after.mcap")
+    done = selfmodel("report", *given, *SMALL, "--json", "-o", "a.html", cwd=logs)
+    again = selfmodel(
+        "report", *reversed(given), "--diagnosis", diagnosed.name, "-o", "again.html", cwd=logs
+    )
+
+    assert (done.returncode, again.returncode) == (0, 0), done.stderr + again.stderr
+    told = json.loads(done.stdout)
+    assert told["bytes"] == (logs / "a.html").stat().st_size
+    assert told["headline"].startswith("1 trial of the quadruped: it ")
+    assert "quadruped: after" in (logs / "a.html").read_text()
+    assert (logs / "again.html").read_bytes() == (logs / "a.html").read_bytes()
+    assert "diagnostic EA" not in again.stderr
+
+
+@built
+def test_a_diagnosis_of_other_logs_is_refused(logs: Path, diagnosed: Path):
+    (logs / "moved").mkdir()
+    shutil.copy(logs / "before.mcap", logs / "moved" / "after.mcap")
+
+    for given in (("after.mcap",), ("after.mcap", "moved/after.mcap", "before.mcap")):
+        done = selfmodel(
+            "report", *given, "--diagnosis", diagnosed.name, "-o", "other.html", cwd=logs
+        )
+
+        assert (done.returncode, done.stdout) == (2, "")
+        assert (
+            "found.json is a diagnosis of other logs: expected after.mcap, before.mcap, the "
+            in (done.stderr)
+        )
+
+
+@built
+def test_a_diagnosis_with_another_self_model_is_refused_and_without_a_digest_noted(
+    logs: Path, diagnosed: Path
+):
+    values = json.loads(diagnosed.read_text())
+    (logs / "other.json").write_text(json.dumps({**values, "model": "0" * 64}))
+    del values["model"]
+    (logs / "earlier.json").write_text(json.dumps(values))
+    given = ("report", "before.mcap", "after.mcap", "-o")
+
+    refused = selfmodel(*given, "refused.html", "--diagnosis", "other.json", cwd=logs)
+    noted = selfmodel(*given, "noted.html", "--diagnosis", "earlier.json", cwd=logs)
+
+    assert refused.returncode == 2
+    assert "other.json is a diagnosis with another self-model of the name" in refused.stderr
+    assert noted.returncode == 0, noted.stderr
+    assert "note: earlier.json is of an earlier version, which did not record" in noted.stderr
+
+
+@built
+def test_a_campaign_is_reported_into_its_folder(tmp_path: Path):
+    (tmp_path / "results.csv").write_text("robot,correct\nquadruped,true\n")
+
+    done = selfmodel("report", str(tmp_path), cwd=tmp_path)
+
+    assert done.returncode == 0, done.stderr
+    assert "1 of 1 diagnoses are right" in done.stdout
+    assert (tmp_path / "report.html").exists()
+
+
+@built
+def test_a_file_that_appears_while_the_report_is_made_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    (tmp_path / "results.csv").write_text("robot,correct\nquadruped,true\n")
+    command = import_module("selfmodel.cli.report")
+    monkeypatch.setattr(command, "html_of", lambda report: _meanwhile(tmp_path, report))
+
+    done = selfmodel("report", ".", "-o", "a.html", cwd=tmp_path)
+
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "a.html was created meanwhile" in done.stderr
+    assert "the finished report is a-2.html" in done.stderr
+    assert (tmp_path / "a.html").read_text() == "of another"
+    assert "1 of 1 diagnoses are right" in (tmp_path / "a-2.html").read_text()
+
+
+def _meanwhile(folder: Path, report: Report) -> bytes:
+    """The page of a report, while another program writes a file of that name."""
+    (folder / "a.html").write_text("of another")
+    return html.html_of(report)
+
+
+@built
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("empty",), "expected the folder of a run with its trials"),
+        (("empty", "after.mcap"), "expected one folder, or logs"),
+        (("after.mcap", "-o", "a.pdf"), "--out needs a name that ends in .html"),
+        (("after.mcap", "-o", "taken.html"), "taken.html exists, and is not overwritten"),
+        (("missing.mcap", "-o", "b.html"), "missing.mcap"),
+        (("empty", "--diagnosis", "a.json", "-o", "b.html"), "--diagnosis is for logs, and empty"),
+        (("after.mcap", "--diagnosis", "a.json", "-o", "b.html"), "a.json: expected the output of"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_status_2(logs: Path, arguments: tuple[str, ...], said: str):
+    (logs / "empty").mkdir(exist_ok=True)
+    (logs / "taken.html").touch()
+
+    done = selfmodel("report", *arguments, cwd=logs)
+
+    assert (done.returncode, done.stdout) == (2, "")
+    assert said in done.stderr
+
+
+def test_a_missing_page_is_an_error_before_any_work(
+    logs: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+):
+    monkeypatch.setattr(html, "files", lambda _package: tmp_path)
+    shutil.copy(logs / "after.mcap", tmp_path)
+
+    done = selfmodel("report", "after.mcap", cwd=tmp_path)
+
+    assert done.returncode == 2
+    assert "run `make page` in a checkout" in done.stderr
+    assert "diagnostic EA" not in done.stderr

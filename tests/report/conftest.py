@@ -1,0 +1,30 @@
+"""A small recovery of which reports are made, and its subject."""
+
+from pathlib import Path
+
+import pytest
+
+from selfmodel.report.rollouts import TrialRollouts, rollouts_of
+from selfmodel.report.run_folder import subject_of_run
+from selfmodel.report.subject import Subject
+from tests.helpers.command import SMALL, selfmodel
+
+
+@pytest.fixture(scope="session")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a small recovery."""
+    folder = tmp_path_factory.mktemp("report")
+    arguments = ("--case", "2", *SMALL, "--steps", "60", "--trials", "1", "--gap", "0.1")
+    done = selfmodel("recover", "quadruped", *arguments, "--out", "run", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    return folder / "run"
+
+
+@pytest.fixture(scope="session")
+def subject(run: Path) -> Subject:
+    return subject_of_run(run, threads=1)
+
+
+@pytest.fixture(scope="session")
+def rolled(subject: Subject) -> tuple[TrialRollouts, ...]:
+    return rollouts_of(subject)
