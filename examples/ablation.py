@@ -6,6 +6,7 @@ Usage: python examples/ablation.py FOLDER
 import sys
 from pathlib import Path
 
+from selfmodel.experiments import processes
 from selfmodel.experiments.ablation import Ablation, ablate, write_results
 from selfmodel.settings import Settings
 
@@ -21,7 +22,7 @@ def main(folder: Path) -> None:
         folder=folder,
         settings=Settings(steps=200, generations=3).scaled(10),
     )
-    failed = ablate(ablation, workers=2, on_progress=print)
+    failed = ablate(ablation, workers=processes(2), on_progress=print)
     results = write_results(folder)
     for score in results.scores:
         print(f"{score.comparator}, {score.trials} trials: {score.right} of {score.runs} right")

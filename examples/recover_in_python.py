@@ -22,8 +22,8 @@ def main(folder: Path) -> None:
     """Recovers a quadruped that lost a leg, with a small budget."""
     robot = ROBOTS["quadruped"].robot()
     truth = parse("break:back_left_shoulder", robot.anatomy)
-    settings = Settings(generations=5).scaled(20)
-    journal = create_journal(folder, robot.anatomy)
+    settings = Settings(steps=300, trials=2, generations=5).scaled(20)
+    journal = create_journal(folder, robot.anatomy, calibrated=False)
     recovery = recover(
         healthy=SimulatedRobot(robot),  # or any object with PhysicalRobot's `run`
         damaged=SimulatedRobot(robot, truth),

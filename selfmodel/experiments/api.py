@@ -18,6 +18,7 @@ from selfmodel.experiments.arguments import (
     comparator_choice,
     hypothesis_of,
     kinds_of,
+    repertoire_of,
     robot_of,
     sources_of,
     trials_of,
@@ -38,6 +39,7 @@ from selfmodel.recovery.next_trial import NextTrial, by_repair
 from selfmodel.recovery.random_streams import repair_stream
 from selfmodel.recovery.recovery import Recovery
 from selfmodel.recovery.repair.paper_repair import RepairSearch
+from selfmodel.recovery.repertoire.repertoire import Repertoire
 from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.scores.upright import UPRIGHT
 from selfmodel.recovery.sequential_diagnosis import diagnose_trials
@@ -323,6 +325,7 @@ def recover(
     score: Score | None = None,
     repair: str = plugins.ROBUST,
     search: str | None = None,
+    repertoire: Repertoire | str | Path | None = None,
     seed: int = 0,
     threads: int = 0,
     on_event: Callable[[Event], None] = _ignore,
@@ -358,7 +361,9 @@ def recover(
             the whole displacement for the paper's repair.
         repair: ``robust``, on rollouts under random conditions; or ``paper``, in one exact
             simulation.
-        search: ``cma-es`` or ``ea``; None for that of the repair, CMA-ES or the paper's EA.
+        search: ``cma-es``, ``ea`` or ``repertoire``; by default that of the repair, CMA-ES or the
+            paper's EA, or the repertoire if one is given.
+        repertoire: Gaits from which the search begins, or the path of their file.
         seed: Seed of all random numbers.
         threads: Threads of the physics; 0 for all processors.
         on_event: Called with the progress of the recovery.
@@ -373,7 +378,9 @@ def recover(
     score = score or (UPRIGHT if repair == plugins.ROBUST else DISPLACEMENT)
     check_motion(score.name, robot)
     chosen, searched = settings or Settings(), kinds_of(kinds)
-    journal = create_journal(Path(folder), robot.anatomy, searched)
+    drawn = _design(design, robot)
+    make_repair = plugins.repair(repair, search, repertoire_of(repertoire, robot, drawn))
+    journal = create_journal(Path(folder), robot.anatomy, searched, calibrated=calibrate)
     return loop.recover(
         healthy=healthy,
         damaged=damaged,
@@ -384,10 +391,10 @@ def recover(
         settings=chosen,
         seed=seed,
         on_event=on_event,
-        design=_design(design, robot),
+        design=drawn,
         kinds=searched,
         calibrate=partial(fitted, robot, threads=count) if calibrate else None,
         next_trial=next_trial,
         score=score,
-        make_repair=plugins.repair(repair, search),
+        make_repair=make_repair,
     )

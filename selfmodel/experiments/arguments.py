@@ -5,6 +5,7 @@ from functools import partial
 from pathlib import Path
 
 from selfmodel.comparators import PREFERENCE
+from selfmodel.controllers.controller import Design
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.comparator_choice import (
     ComparatorChoice,
@@ -17,6 +18,8 @@ from selfmodel.experiments.robots import is_model, robot_entry
 from selfmodel.faults import KINDS, FaultKind
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.notation import parse
+from selfmodel.logs.repertoires import check_model, load_repertoire
+from selfmodel.recovery.repertoire.repertoire import Repertoire
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.robot.robot import Robot
@@ -192,3 +195,29 @@ def check_seed(seed: int | None) -> None:
 def _unexpected(expected: str, got: object) -> InputError:
     remedy = ": give its attribute trial" if hasattr(got, "trial") else ""
     return InputError(f"expected {expected}, got an object of type {type(got).__name__}{remedy}")
+
+
+def repertoire_of(
+    source: Repertoire | str | Path | None, robot: Robot, design: Design
+) -> Repertoire | None:
+    """Returns a repertoire or that of a file, which is of a robot and a design; None if not given.
+
+    Raises:
+        InputError: The file is no repertoire or damaged, or the repertoire is of another model or
+            another design.
+    """
+    if source is None:
+        return None
+    found = source if isinstance(source, Repertoire) else load_repertoire(Path(source))
+    named = "the repertoire" if isinstance(source, Repertoire) else str(source)
+    check_model(found, robot, named)
+    if found.design != design:
+        raise InputError(
+            f"{named}: expected gaits of the controllers to evolve, {_described(design)}, got "
+            f"{_described(found.design)}: leave the design out, or make a repertoire of it"
+        )
+    return found
+
+
+def _described(design: Design) -> str:
+    return f"a {design.name} of {design.weights} weights"

@@ -1,5 +1,7 @@
 """The score of a recovery by name, with the first controller that the score implies."""
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +16,7 @@ from selfmodel.experiments.references import (
 )
 from selfmodel.recovery.scores.energy import ENERGY
 from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
+from selfmodel.recovery.scores.joint_limits import upright_within
 from selfmodel.recovery.scores.tracking import TRACKING, tracking
 from selfmodel.recovery.scores.upright import UPRIGHT
 from selfmodel.robot.robot import Robot
@@ -44,6 +47,9 @@ def choose_score(
     seed: int,
     reference: Path | None = None,
     gait: Controller | None = None,
+    max_speed: float | None = None,
+    max_torque: float | None = None,
+    max_self_collision: float | None = None,
     budget: Budget = DEFAULT_BUDGET,
 ) -> ChosenScore:
     """Returns the score of that name for a robot.
@@ -57,17 +63,25 @@ def choose_score(
         reference: File of the trajectory to follow; None for the motion of the first controller in
             simulation.
         gait: The first controller; None for one with random weights if its motion is needed.
+        max_speed: Largest speed of a joint, rad/s; None for no limit.
+        max_torque: Largest torque of a joint, N m; None for no limit.
+        max_self_collision: Largest depth to which two bodies penetrate each other, m; None for no
+            limit.
         budget: Memory and time that the file may take.
 
     Raises:
-        InputError: The name is unknown or the robot has no such score, a reference is given for
-            another score, or the motion of the first controller stops.
+        InputError: The name is unknown or the robot has no such score, a reference or a limit is
+            given for another score, a limit is out of range, or the motion of the first controller
+            stops.
     """
     robot = entry.robot()
     check_score(name, entry)
+    if reference is not None and name != TRACKING:
+        raise InputError(f"--reference is a trajectory for --score {TRACKING}, got {name}")
+    limits = (max_speed, max_torque, max_self_collision)
+    if any(limit is not None for limit in limits):
+        return ChosenScore(_limited(name, limits), gait)
     if name != TRACKING:
-        if reference is not None:
-            raise InputError(f"--reference is a trajectory for --score {TRACKING}, got {name}")
         return ChosenScore(plugins.score(name, robot.name, entry), gait)
     if reference is not None:
         return ChosenScore(tracking(read_reference(reference, robot, budget), robot), gait)
@@ -75,6 +89,28 @@ def choose_score(
     motion = simulated_reference(robot, first, steps)
     check_moving(motion)
     return ChosenScore(tracking(motion, robot), first)
+
+
+def _limited(name: str, given: Sequence[float | None]) -> Score:
+    """Returns the score ``upright`` with limits.
+
+    Args:
+        name: Name of the score.
+        given: Limits of ``upright_within``; None for no limit.
+    """
+    if name != UPRIGHT.name:
+        raise InputError(
+            f"--max-joint-speed, --max-joint-torque and --max-self-collision are limits of "
+            f"--score {UPRIGHT.name}, got {name}"
+        )
+    speed, torque, depth = (math.inf if limit is None else limit for limit in given)
+    if not (speed > 0 and torque > 0):
+        raise InputError(
+            f"expected limits of the joints above 0, got {speed:g} rad/s and {torque:g} N m"
+        )
+    if not depth >= 0:
+        raise InputError(f"expected a limit of self-collision of 0 m or above, got {depth:g}")
+    return upright_within(speed, torque, depth)
 
 
 def check_score(name: str, entry: Entry) -> None:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
+from selfmodel.arrays import FloatArray
+
 CONFIDENCE = 0.95
 RESAMPLES = 2000
 
@@ -76,14 +78,27 @@ def ratio(numerators: Sequence[float], denominators: Sequence[float]) -> Interva
     estimate = float(above.mean() / below.mean())
     if len(above) == 1:
         return Interval(estimate, math.nan, math.nan)
+    return Interval(estimate, *bootstrap_ratio(above, below, np.random.default_rng(0)))
+
+
+def bootstrap_ratio(
+    numerators: FloatArray, denominators: FloatArray, rng: np.random.Generator
+) -> tuple[float, float]:
+    """Returns the ends of a percentile bootstrap interval of a ratio of means.
+
+    Args:
+        numerators: One number per pair, ``(pairs,)``.
+        denominators: One number per pair, ``(pairs,)``.
+        rng: Draws the pairs.
+    """
     found = stats.bootstrap(
-        (above, below),
-        lambda up, down, axis: up.mean(axis=axis) / down.mean(axis=axis),
+        (numerators, denominators),
+        lambda above, below, axis: above.mean(axis=axis) / below.mean(axis=axis),
         paired=True,
         vectorized=True,
         n_resamples=RESAMPLES,
         confidence_level=CONFIDENCE,
         method="percentile",
-        rng=np.random.default_rng(0),
+        rng=rng,
     ).confidence_interval
-    return Interval(estimate, float(found.low), float(found.high))
+    return float(found.low), float(found.high)

@@ -21,6 +21,7 @@ from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery.events import Event
 from selfmodel.recovery.recover import recover
 from selfmodel.recovery.recovery import Recovery
+from selfmodel.recovery.repertoire.repertoire import Repertoire
 from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
@@ -51,6 +52,7 @@ class Experiment:
         score: Fitness of the repair.
         repair: Name of the repair, ``robust`` or ``paper``.
         search: Name of the search of the repair; None for its own.
+        repertoire: Gaits from which the search ``repertoire`` begins.
         physical: Returns the physical robot with a hypothesis, for robots beyond a simulation of
             the model; unused with a reality gap or structural mismatches.
     """
@@ -74,6 +76,7 @@ class Experiment:
     physical: Callable[[Robot, Hypothesis], PhysicalRobot] | None = None
     repair: str = PAPER
     search: str | None = None
+    repertoire: Repertoire | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +106,9 @@ def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
         healthy, damaged = (experiment.physical(robot, hidden) for hidden in (INTACT, truth))
     else:
         healthy, damaged = reality.robot(robot), reality.robot(robot, truth, stream=1)
-    journal = create_journal(experiment.folder, robot.anatomy, experiment.kinds)
+    journal = create_journal(
+        experiment.folder, robot.anatomy, experiment.kinds, calibrated=experiment.calibrated
+    )
     recovery = recover(
         healthy=healthy,
         damaged=damaged,
@@ -128,7 +133,7 @@ def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
         else None,
         next_trial=NEXT_TRIAL[experiment.next_trial],
         score=experiment.score,
-        make_repair=repair(experiment.repair, experiment.search),
+        make_repair=repair(experiment.repair, experiment.search, experiment.repertoire),
     )
     return Outcome(
         recovery=recovery,

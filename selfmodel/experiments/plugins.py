@@ -23,7 +23,9 @@ from selfmodel.recovery.repair.cma_es import CmaEs
 from selfmodel.recovery.repair.genome_search import MakeSearch
 from selfmodel.recovery.repair.noisy_ea import NoisyEa
 from selfmodel.recovery.repair.paper_repair import RepairSearch
+from selfmodel.recovery.repair.repertoire_search import FromRepertoire
 from selfmodel.recovery.repair.robust_repair import RobustRepair
+from selfmodel.recovery.repertoire.repertoire import Repertoire
 from selfmodel.recovery.scores.energy import ENERGY
 from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.scores.tracking import TRACKING
@@ -46,7 +48,13 @@ DEFAULT_SCORES: Mapping[str, str] = MappingProxyType(
 """Name of the score of each repair, unless another is given."""
 
 SEARCHES: Mapping[str, MakeSearch] = MappingProxyType({"cma-es": CmaEs, "ea": NoisyEa})
-"""Searches of the robust repair, by name."""
+"""Searches of the robust repair that need nothing else, by name."""
+
+REPERTOIRE = "repertoire"
+"""Name of the search that begins from a repertoire."""
+
+OWN_SEARCH: Mapping[str, str] = MappingProxyType({ROBUST: "cma-es", PAPER: "ea"})
+"""Name of the search of each repair, unless another is given."""
 
 RETURN = "return"
 """Name of the score that is the sum of a task's rewards."""
@@ -83,28 +91,52 @@ def next_trial(name: str) -> str:
     return name
 
 
-def repair(name: str = ROBUST, search: str | None = None) -> MakeRepair:
+def repair(
+    name: str = ROBUST, search: str | None = None, repertoire: Repertoire | None = None
+) -> MakeRepair:
     """Returns a function that makes a repair.
 
     Args:
         name: ``robust`` or ``paper``.
-        search: Name of one of ``SEARCHES``; None for the repair's own, CMA-ES or the paper's EA.
+        search: Name of one of ``SEARCHES``, or ``repertoire``; None for that of the repair: the
+            repertoire if there is one, otherwise CMA-ES or the paper's EA.
+        repertoire: Gaits from which the search ``repertoire`` begins.
 
     Raises:
-        InputError: A name is unknown, or the paper's repair is to have another search.
+        InputError: A name is unknown, the paper's repair is to have another search, or a repertoire
+            is given without the search that needs it, or the search without a repertoire.
     """
     if name not in (ROBUST, PAPER):
         raise unknown_name("repair", name, (ROBUST, PAPER))
-    if search is not None and search not in SEARCHES:
-        raise unknown_name("search", search, SEARCHES)
-    if name == ROBUST:
-        return partial(RobustRepair, make_search=SEARCHES[search or "cma-es"])
-    if search not in (None, "ea"):
+    if search is not None and search not in (*SEARCHES, REPERTOIRE):
+        raise unknown_name("search", search, (*SEARCHES, REPERTOIRE))
+    chosen = search_name(name, search, repertoire)
+    if (chosen == REPERTOIRE) != (repertoire is not None):
         raise InputError(
-            f"the paper's repair has its own EA, got the search {search}: leave --search out, or "
-            f"give --repair {ROBUST}"
+            f"expected a repertoire with the search {REPERTOIRE}, and with no other; got the "
+            f"search {chosen} {'with' if repertoire is not None else 'without'} a repertoire: "
+            f"give --search {REPERTOIRE} --repertoire FILE, or neither"
         )
-    return RepairSearch
+    if name == PAPER and chosen != OWN_SEARCH[PAPER]:
+        raise InputError(
+            f"the paper's repair has its own EA, got the search {chosen}: leave --search and "
+            f"--repertoire out, or give --repair {ROBUST}"
+        )
+    if name == PAPER:
+        return RepairSearch
+    make_search = SEARCHES[chosen] if repertoire is None else FromRepertoire(repertoire)
+    return partial(RobustRepair, make_search=make_search)
+
+
+def search_name(repair: str, search: str | None, repertoire: Repertoire | None) -> str:
+    """Returns the name of the search of a repair.
+
+    Args:
+        repair: ``robust`` or ``paper``.
+        search: The name, if one is given.
+        repertoire: Gaits from which the search begins.
+    """
+    return search or (REPERTOIRE if repertoire is not None else OWN_SEARCH[repair])
 
 
 def kinds(names: str) -> tuple[FaultKind, ...]:

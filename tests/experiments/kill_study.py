@@ -3,9 +3,9 @@
     python -m tests.experiments.kill_study --count 60 --seed 1
 
 Each kill ends the command, one of its workers, or the whole process group, by SIGKILL or SIGTERM.
-Then the same command runs again. The harness checks that a kill leaves no unknown file except
-``.part``, that no process prints a traceback, and that the resumed study has the same files and,
-but for wall times, the same table to the bit as an unbroken one.
+Then the same command runs again. The harness checks that a kill leaves no unknown file except in
+``unfinished``, that no process prints a traceback, and that the resumed study has the same files
+and, but for wall times, the same table to the bit as an unbroken one.
 """
 
 import argparse
@@ -102,7 +102,7 @@ def kill_and_resume(kill: Kill, reference: Unbroken, folder: Path) -> int:
     """Kills a study in a new folder and resumes it.
 
     Returns:
-        Number of parts that were finished at the kill.
+        Number of cells that were finished at the kill.
 
     Raises:
         AssertionError: A promise is broken.
@@ -113,7 +113,7 @@ def kill_and_resume(kill: Kill, reference: Unbroken, folder: Path) -> int:
     _send(kill, process)
     process.wait(timeout=120)
     found = files_of(folder / "out")
-    unknown = {name for name in found - reference.files if not name.endswith(".part")}
+    unknown = {name for name in found - reference.files if not name.startswith("unfinished/")}
     assert not unknown, f"{kill} left {unknown}"
 
     again = _start(kill.study, folder)
@@ -121,7 +121,7 @@ def kill_and_resume(kill: Kill, reference: Unbroken, folder: Path) -> int:
     assert "Traceback" not in (folder / "stderr").read_text(), kill
     assert files_of(folder / "out") == reference.files, kill
     assert rows_of(folder) == reference.rows, kill
-    return sum("/parts/" in name for name in found)
+    return sum(name.endswith("/cell.json") for name in found & reference.files)
 
 
 def files_of(folder: Path) -> frozenset[str]:
@@ -198,8 +198,8 @@ def main() -> None:
         for number, kill in enumerate(kills(options.count, options.seed), start=1):
             what = f"{kill.study}: {kill.victim} {kill.number.name} at {kill.moment:.2f}"
             try:
-                parts = kill_and_resume(kill, references[kill.study], folder / str(number))
-                print(f"{number} {what}, {parts} parts kept, same table", flush=True)
+                cells = kill_and_resume(kill, references[kill.study], folder / str(number))
+                print(f"{number} {what}, {cells} cells kept, same table", flush=True)
             except (AssertionError, subprocess.TimeoutExpired) as error:
                 broken.append(what)
                 print(f"{number} {what}: {error}", flush=True)

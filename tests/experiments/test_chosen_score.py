@@ -13,7 +13,7 @@ from selfmodel.robot.designs import cpg_for, network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import Entry
-from tests.helpers.arms import arm
+from tests.helpers.robots.arms import arm
 
 
 def chosen(name: str, robot: Robot, reference: Path | None = None, seed: int = 0) -> ChosenScore:
@@ -44,6 +44,18 @@ def test_a_first_controller_that_settles_in_a_pose_is_refused_with_the_remedy():
 
 def test_another_score_evolves_the_first_controller(quadruped: Robot):
     assert chosen("upright", quadruped) == ChosenScore(UPRIGHT, None)
+
+
+def test_a_limit_is_that_of_its_quantity(quadruped: Robot):
+    def name(**limits: float) -> str:
+        entry = Entry(robot=lambda: quadruped)
+        found = choose_score("upright", entry, cpg_for(quadruped), steps=30, seed=0, **limits)
+        return found.score.name
+
+    assert [name(max_speed=9), name(max_torque=8), name(max_self_collision=0)] == [
+        *("upright within 9 rad/s", "upright within 8 N m"),
+        "upright within 0 m of self-collision",
+    ]
 
 
 def test_a_reference_for_another_score_is_refused(quadruped: Robot):

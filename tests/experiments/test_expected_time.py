@@ -40,7 +40,7 @@ def planned(robot: Robot, population: int, threads: int = 1) -> LogDiagnosis:
 @pytest.fixture
 def slow_model(monkeypatch: pytest.MonkeyPatch) -> None:
     """A model that takes 1 s for a physics step, and 10 s to compile."""
-    cost = ModelCost(1, 1, 1, compile_seconds=10.0, step_seconds=1.0, failure="")
+    cost = ModelCost(1, 1, compile_seconds=10.0, step_seconds=1.0, failure="")
     monkeypatch.setattr(expected_time, "rehearse", lambda *_: cost)
 
 

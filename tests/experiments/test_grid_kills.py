@@ -1,16 +1,23 @@
 """Promises of studies that are killed: the resumed study has the same files and the same table."""
 
+import signal
 from pathlib import Path
 
 import pytest
 
-from tests.experiments.kill_study import STUDIES, kill_and_resume, kills, unbroken
+from tests.experiments.kill_study import Kill, kill_and_resume, unbroken
+
+KILLS = (
+    Kill("ablate", "worker", signal.SIGKILL, 0.5),
+    Kill("ablate --next-trial repair", "command", signal.SIGTERM, 0.6),
+    Kill("suite run", "group", signal.SIGKILL, 0.4),
+)
+"""Each study and each victim once; ``tests.experiments.kill_study`` draws more."""
 
 
 @pytest.mark.process
-@pytest.mark.parametrize("study", STUDIES)
-def test_a_killed_study_is_resumed_to_the_same_table(study: str, tmp_path: Path):
-    reference = unbroken(study, tmp_path / "unbroken")
+@pytest.mark.parametrize("kill", KILLS, ids=lambda kill: kill.study)
+def test_a_killed_study_is_resumed_to_the_same_table(kill: Kill, tmp_path: Path):
+    reference = unbroken(kill.study, tmp_path / "unbroken")
 
-    for number, kill in enumerate([kill for kill in kills(18, 7) if kill.study == study][:4]):
-        kill_and_resume(kill, reference, tmp_path / str(number))
+    kill_and_resume(kill, reference, tmp_path / "killed")

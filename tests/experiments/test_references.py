@@ -13,8 +13,8 @@ from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.recovery.scores.tracking import Reference
 from selfmodel.settings import Settings
 from selfmodel.trials.trial import TrialPlan
-from tests.helpers.arms import arm
 from tests.helpers.drivers import random_cpgs
+from tests.helpers.robots.arms import arm
 
 (DRIVER,) = random_cpgs(arm(), 1)
 

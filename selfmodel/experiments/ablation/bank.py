@@ -1,69 +1,41 @@
-"""Bank of gaits: controllers of the healthy robots, shared by the trials of all runs."""
+"""Bank of gaits that is given: controllers of the healthy robots, from files of the user."""
 
-import hashlib
-from collections.abc import Callable, Sequence
+import base64
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from selfmodel.controllers.controller import Controller
 from selfmodel.experiments import robots, trial_logs
-from selfmodel.experiments.ablation.plan import Ablation, Cell, model_digest
-from selfmodel.experiments.chosen_score import choose_score
-from selfmodel.experiments.gaits import check_not_evolved, evolve_gait, gait_settings, write_gait
-from selfmodel.experiments.grid import GridBegins, Job, PartEnds, PartResult, run_grid
-from selfmodel.experiments.study_files import key_of
-from selfmodel.recovery.scores.fitness import DISPLACEMENT
-from selfmodel.robot.designs import network_for
-from selfmodel.settings import Settings
-from selfmodel.version import __version__
+from selfmodel.experiments.grid import Cell
+from selfmodel.experiments.study.files import key_of
+from selfmodel.experiments.study.gaits import FILE, GAIT, GAITS
+from selfmodel.files import read_file
+from selfmodel.logs.files import replace_file
+from selfmodel.logs.result_files import MAX_BYTES
+
+WRITE = "selfmodel.experiments.ablation.bank:write"
 
 
-def fill(
-    ablation: Ablation,
-    cells: Sequence[Cell],
-    workers: int,
-    on_progress: Callable[[GridBegins | PartEnds], None],
-) -> tuple[PartEnds, ...]:
-    """Evolves the missing gaits of the runs and returns the failed parts.
+def given_gait(bank: Path, robot: Mapping[str, str], number: int) -> Cell:
+    """Returns the cell of a gait of a bank; its parameters contain the file.
 
     Args:
-        ablation: The ablation.
-        cells: Its runs.
-        workers: Number of worker processes.
-        on_progress: Callback of the grid of gaits.
+        bank: Folder with the file ``ROBOT-K.npz``, or the gaits of another study.
+        robot: The robot, as planned.
+        number: Number of the gait, from 0.
 
     Raises:
-        InputError: A given bank lacks a gait, or the bank was made with other settings.
+        InputError: The bank has no such gait, or the gait is for another robot.
     """
-    needed = sorted({(cell.robot, k) for cell in cells for k in cell.gaits(ablation.settings)})
-    if ablation.bank is not None:
-        for robot, number in needed:
-            gait(ablation.bank, robot, number)
-        return ()
-    jobs = [
-        Job(
-            key=f"{key_of(robot)}-{number}",
-            parameters={
-                "robot": robot,
-                "model": model_digest(robot),
-                "selfmodel": __version__,
-                "settings": gait_settings(ablation.settings),
-                **({} if ablation.score == DISPLACEMENT.name else {"score": ablation.score}),
-            },
-            seed=number,
-            parts=("gait",),
-        )
-        for robot, number in needed
-    ]
-    return run_grid(folder(ablation), jobs, _evolve, workers=workers, on_progress=on_progress)
-
-
-def folder(ablation: Ablation) -> Path:
-    """Returns the folder of the bank of an ablation."""
-    return ablation.folder / "bank" if ablation.bank is None else ablation.bank
+    gait(bank, robot["robot"], number)
+    data = read_file(_path(bank, robot["robot"], number), "a gait", MAX_BYTES)
+    parameters = {**robot, "controller": base64.b64encode(data).decode()}
+    return Cell(WRITE, f"{key_of(robot['robot'])}-{number}", parameters, number, GAIT, GAITS)
 
 
 def gait(bank: Path, robot: str, number: int) -> Controller:
-    """Returns a gait of the bank.
+    """Returns a gait of a bank.
 
     Raises:
         InputError: The bank has no such gait, or the gait is for another robot.
@@ -71,35 +43,14 @@ def gait(bank: Path, robot: str, number: int) -> Controller:
     return trial_logs.controller(_path(bank, robot, number), robots.robot_entry(robot).robot())
 
 
-def digests(bank: Path, cell: Cell, settings: Settings) -> list[str] | None:
-    """Returns the SHA-256 of each gait of a run; None if the evolution of a gait failed.
-
-    Raises:
-        InputError: The file of an evolved gait is missing.
-    """
-    paths = [_path(bank, cell.robot, number) for number in cell.gaits(settings)]
-    for path in paths:
-        if not path.exists():
-            check_not_evolved(path)
-            return None
-    return [hashlib.sha256(path.read_bytes()).hexdigest() for path in paths]
-
-
-def _evolve(job: Job, _part: str, run: Path) -> PartResult:
-    name, settings = job.parameters["robot"], Settings(**job.parameters["settings"])
-    entry, path = robots.robot_entry(name), _path(run.parent, name, job.seed)
-    robot = entry.robot()
-    chosen = choose_score(
-        job.parameters.get("score", DISPLACEMENT.name),
-        entry,
-        network_for(robot),
-        steps=settings.steps,
-        seed=job.seed,
-    )
-    if chosen.gait is not None:
-        return write_gait(path, chosen.gait, evaluations=0)
-    return evolve_gait(path, robot, settings, job.seed, score=chosen.score)
-
-
 def _path(bank: Path, robot: str, number: int) -> Path:
-    return bank / f"{key_of(robot)}-{number}.npz"
+    key = key_of(robot)
+    evolved = sorted(bank.glob(f"{key}-seed{number:03d}-{GAIT}-*/{FILE}"))
+    own = bank / f"{key}-{number}.npz"
+    return evolved[0] if evolved and not own.exists() else own
+
+
+def write(cell: Cell, _needs: Mapping[str, Path], folder: Path) -> dict[str, Any]:
+    """Writes the gait into the folder of its cell."""
+    replace_file(folder / FILE, base64.b64decode(cell.parameters["controller"]))
+    return {"evaluations": 0}

@@ -1,7 +1,7 @@
-"""Figures of an ablation: right diagnoses by reality gap, and by case."""
+"""Figures of an ablation: right diagnoses by reality gap, and by case, with numbers of runs."""
 
-import io
 import math
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
@@ -11,36 +11,39 @@ from matplotlib.figure import Figure
 
 from selfmodel.experiments.ablation.rows import AblationRow
 from selfmodel.experiments.ablation.scores import ComparatorScore
-from selfmodel.experiments.confidence_intervals import Interval
-from selfmodel.experiments.study_files import key_of
+from selfmodel.experiments.study.drawing import counts_text, figure_style, files_of, look
+from selfmodel.experiments.study.files import key_of
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
-
-MARKERS = "osD^v<>pP*Xhd"
 
 
 def draw(
     rows: Sequence[AblationRow], scores: Sequence[ComparatorScore]
 ) -> Iterator[tuple[str, bytes]]:
-    """Yields the name and the PNG of each figure; no figures without rows."""
+    """Yields the name and the bytes of the PNG, PDF and SVG of each figure; none without rows."""
     if not rows:
         return
-    yield "gap.png", _png(by_gap(scores))
+    yield from files_of("gap", by_gap(scores)).items()
     shown = _first_and_last(sorted({row.trials for row in rows}))
     for robot in sorted({row.robot for row in rows}):
         for trials in shown:
             same = [row for row in rows if (row.robot, row.trials) == (robot, trials)]
             if same:
-                yield f"cases-{key_of(robot)}-{trials}.png", _png(_by_case(robot, trials, same))
+                name = f"cases-{key_of(robot)}-{trials}"
+                yield from files_of(name, by_case(robot, trials, same)).items()
 
 
 def _first_and_last(trials: Sequence[int]) -> list[int]:
     return sorted({trials[0], trials[-1]})
 
 
+@figure_style()
 def by_gap(scores: Sequence[ComparatorScore]) -> Figure:
-    """Returns right diagnoses by gap: a panel per robot and trial count, a line per comparator."""
+    """Returns right diagnoses by gap: a panel per robot and trial count, a line per comparator.
+
+    The legend has the number n of diagnoses per point of each line.
+    """
     robots = sorted({score.robot for score in scores})
     shown = _first_and_last(sorted({score.trials for score in scores}))
     comparators = sorted({score.comparator for score in scores})
@@ -53,7 +56,7 @@ def by_gap(scores: Sequence[ComparatorScore]) -> Figure:
             axes = panels[i, j]
             for k, comparator in enumerate(comparators):
                 line = {
-                    score.gap: score.correct
+                    score.gap: score
                     for score in scores
                     if (score.robot, score.comparator, score.trials) == (robot, comparator, trials)
                 }
@@ -63,8 +66,7 @@ def by_gap(scores: Sequence[ComparatorScore]) -> Figure:
             axes.set_title(f"{robot}, {trials} {'trial' if trials == 1 else 'trials'}")
             axes.set_ylim(-0.03, 1.03)
             axes.set_xticks(gaps)
-            axes.spines[["top", "right"]].set_visible(False)
-            axes.grid(axis="y", alpha=0.3)
+            axes.grid(axis="y")
             axes.tick_params(labelbottom=True)
     for axes in panels[-1]:
         axes.set_xlabel("reality gap")
@@ -75,18 +77,22 @@ def by_gap(scores: Sequence[ComparatorScore]) -> Figure:
         handles.update(zip(labels, found, strict=True))
     figure.legend(
         [handles[name] for name in comparators],
-        comparators,
+        [
+            f"{name} ({counts_text(one.runs for one in scores if one.comparator == name)})"
+            for name in comparators
+        ],
         loc="outside lower center",
-        ncols=min(3, len(comparators)),
-        frameon=False,
+        ncols=min(2, len(comparators)),
     )
     return figure
 
 
-def _line(axes: Axes, line: dict[float, Interval], label: str, number: int, shift: float) -> None:
+def _line(
+    axes: Axes, line: dict[float, ComparatorScore], label: str, number: int, shift: float
+) -> None:
     gaps = sorted(line)
-    middle = np.array([line[gap].estimate for gap in gaps])
-    ends = np.array([[line[gap].low, line[gap].high] for gap in gaps]).T
+    middle = np.array([line[gap].correct.estimate for gap in gaps])
+    ends = np.array([[line[gap].correct.low, line[gap].correct.high] for gap in gaps]).T
     # Wilson's interval may end a rounding error inside its estimate.
     bars = np.maximum([middle - ends[0], ends[1] - middle], 0)
     axes.errorbar(
@@ -94,23 +100,26 @@ def _line(axes: Axes, line: dict[float, Interval], label: str, number: int, shif
         middle,
         yerr=bars,
         label=label,
-        marker=MARKERS[number % len(MARKERS)],
-        color=f"C{number}",  # the same in panels without all comparators
+        **look(number),  # the same in panels without all comparators
         markersize=5,
         capsize=2,
-        linewidth=1.5,
         elinewidth=0.8,
     )
 
 
-def _by_case(robot: str, trials: int, rows: Sequence[AblationRow]) -> Figure:
-    """Returns right diagnoses by case and comparator, a panel per gap."""
+@figure_style()
+def by_case(robot: str, trials: int, rows: Sequence[AblationRow]) -> Figure:
+    """Returns right diagnoses by case and comparator, a panel per gap.
+
+    The name of a comparator has the number n of diagnoses per square of its row.
+    """
     gaps = sorted({row.gap for row in rows})
     cases = sorted({row.failure for row in rows})
     comparators = sorted({row.comparator for row in rows})
+    labels = [f"{name} ({_per_square(rows, name)})" for name in comparators]
     across = min(2, len(gaps))
     down = math.ceil(len(gaps) / across)
-    names = 0.09 * max(map(len, comparators))
+    names = 0.09 * max(map(len, labels))
     width = 1.2 + names + across * (0.4 + 0.42 * len(cases))
     size = (width, 0.6 + down * (0.8 + 0.36 * len(comparators)))
     figure = Figure(figsize=size, layout="constrained")
@@ -131,21 +140,20 @@ def _by_case(robot: str, trials: int, rows: Sequence[AblationRow]) -> Figure:
                     _write(axes, j, i, shares[i, j])
         axes.imshow(shares, vmin=0, vmax=1, cmap="viridis", aspect="auto")
         axes.set_xticks(range(len(cases)), cases)
-        axes.set_yticks(range(len(comparators)), comparators)
+        axes.set_yticks(range(len(comparators)), labels)
+        axes.spines[:].set_visible(False)
         axes.set_title(f"gap {gap:g}", fontsize=10)
         axes.set_xlabel("case")
-    figure.suptitle(
-        f"{robot}, {trials} {'trial' if trials == 1 else 'trials'}: right diagnoses, %", fontsize=11
-    )
+    figure.suptitle(f"{robot}, {trials} {'trial' if trials == 1 else 'trials'}: right diagnoses, %")
     return figure
+
+
+def _per_square(rows: Sequence[AblationRow], comparator: str) -> str:
+    """Returns the smallest and the largest number of diagnoses in a comparator's squares."""
+    counts = Counter((row.gap, row.failure) for row in rows if row.comparator == comparator)
+    return counts_text(counts.values())
 
 
 def _write(axes: Axes, column: int, row: int, share: float) -> None:
     colour = "white" if share < 0.5 else "black"
     axes.text(column, row, f"{100 * share:.0f}", ha="center", va="center", fontsize=7, color=colour)
-
-
-def _png(figure: Figure) -> bytes:
-    data = io.BytesIO()
-    figure.savefig(data, format="png", dpi=150)
-    return data.getvalue()

@@ -1,9 +1,8 @@
-"""Definition of an ablation and its runs, as jobs of a grid."""
+"""Definition of an ablation and its runs, as cells of a grid."""
 
 import dataclasses
-import hashlib
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,22 +10,33 @@ from urllib.parse import quote
 
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.experiments import plugins, robots
+from selfmodel.experiments.ablation import bank
 from selfmodel.experiments.chosen_score import check_score
-from selfmodel.experiments.grid import Job, check_shared
-from selfmodel.experiments.study_files import check_keys, key_of
+from selfmodel.experiments.grid import Cell, check_shared
+from selfmodel.experiments.study.files import check_keys, key_of
+from selfmodel.experiments.study.gaits import gait_cell
+from selfmodel.experiments.study.planned_robots import planned
+from selfmodel.experiments.study.repairs import check_repair, repair_parameters, score_name
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import DEFAULT_KINDS, notation_kinds
 from selfmodel.physical.reality_gap import MAX_GAP_LEVEL
-from selfmodel.recovery.scores.fitness import DISPLACEMENT
 from selfmodel.settings import Settings
-from selfmodel.version import __version__
 
-NEXT_TRIAL = ("bank", "repair", "disagreement")
+BANK = "bank"
+NEXT_TRIAL = (BANK, "repair", "disagreement")
 """Choices of the trials' controllers: gaits from the bank, the same for every comparator; or, after
-the first trial, the controller that the repair EA evolves for the diagnosis so far; or the
+the first trial, the controller that the repair evolves for the diagnosis so far; or the
 controller with the largest disagreement of the diagnosis so far."""
+
+TRIALS = "trials"
+"""Kind and part of the cell with the trials of a run."""
+
+RUN_TRIALS = "selfmodel.experiments.ablation.trials:run_trials"
+DIAGNOSE = "selfmodel.experiments.ablation.run_one:diagnose"
+RECOVER = "selfmodel.experiments.ablation.run_one:recover"
+"""Functions of the cells."""
 
 GAITS = 6
 """Number of gaits per robot in the bank."""
@@ -52,7 +62,9 @@ class Ablation:
         structure: Whether the physical robots have structural mismatches.
         next_trial: One of ``NEXT_TRIAL``.
         bank: Folder of gaits, ``ROBOT-K.npz``; None to evolve them.
-        score: Name of the fitness of the repair EA, which evolves gaits and recoveries.
+        score: Name of the fitness of the repair; None for that of the repair.
+        repair: Name of the repair that evolves gaits and recoveries, ``robust`` or ``paper``.
+        search: Name of its search; None for that of the repair.
     """
 
     robots: Sequence[str]
@@ -65,14 +77,16 @@ class Ablation:
     damages: Sequence[str] = ()
     kinds: str = ",".join(kind.name for kind in DEFAULT_KINDS)
     structure: bool = False
-    next_trial: str = "bank"
+    next_trial: str = BANK
     bank: Path | None = None
-    score: str = DISPLACEMENT.name
+    score: str | None = None
+    repair: str = plugins.PAPER
+    search: str | None = None
 
 
 @dataclass(frozen=True)
-class Cell:
-    """One run of the grid, for all comparators.
+class Run:
+    """One run, for all comparators.
 
     Attributes:
         robot: Name of the robot.
@@ -93,27 +107,6 @@ class Cell:
         return [(self.seed + k) % GAITS for k in range(max(HEALTHY_TRIALS, settings.trials))]
 
 
-@dataclass(frozen=True)
-class Spec:
-    """Complete specification of a run, as in its ``run.json``.
-
-    Attributes:
-        cell: The run.
-        settings: Parameters of the search.
-        kinds: Fault kinds to search.
-        structure: Whether the physical robot has structural mismatches.
-        next_trial: Choice of the trials' controllers, one of ``NEXT_TRIAL``.
-        score: Name of the fitness of the repair EA.
-    """
-
-    cell: Cell
-    settings: Settings
-    kinds: str
-    structure: bool
-    next_trial: str
-    score: str = DISPLACEMENT.name
-
-
 def check(ablation: Ablation) -> None:
     """Checks the definition of an ablation, before anything is run.
 
@@ -130,24 +123,35 @@ def check(ablation: Ablation) -> None:
         if not 0 <= gap <= MAX_GAP_LEVEL:
             raise InputError(f"expected a gap from 0 to {MAX_GAP_LEVEL}, such as 0.05, got {gap}")
     _check_trials(ablation)
+    _check_evolved(ablation)
     check_shared(ablation.folder, _shared(ablation), "an ablation")
 
 
 def _check_trials(ablation: Ablation) -> None:
     trials = ablation.settings.trials
-    if ablation.next_trial != "bank" and trials < 2:
+    if ablation.next_trial != BANK and trials < 2:
         raise InputError(
             f"expected at least 2 trials with --next-trial {ablation.next_trial}, got 1: the first "
             f"diagnosis chooses the second trial"
         )
-    if ablation.next_trial == "bank" and trials > GAITS and 0 in ablation.gaps:
+    if ablation.next_trial == BANK and trials > GAITS and 0 in ablation.gaps:
         raise InputError(
             f"without a gap, the same gait gives the same trial, and the bank has {GAITS} gaits: "
             f"give at most {GAITS} trials, got {trials}, or only gaps above 0"
         )
 
 
-def cells(ablation: Ablation, only: tuple[int, int] = (1, 1)) -> list[Cell]:
+def _check_evolved(ablation: Ablation) -> None:
+    """Checks that a repair other than the default has anything to evolve."""
+    given = ablation.bank is not None and ablation.next_trial == BANK
+    if given and ablation.repair != plugins.PAPER:
+        raise InputError(
+            f"with --bank and --next-trial bank all gaits are given and nothing is evolved, got "
+            f"--repair {ablation.repair}: leave one of them out, or give --next-trial repair"
+        )
+
+
+def runs(ablation: Ablation, only: tuple[int, int] = (1, 1)) -> list[Run]:
     """Returns the runs of an ablation, one seed after another.
 
     Args:
@@ -155,7 +159,7 @@ def cells(ablation: Ablation, only: tuple[int, int] = (1, 1)) -> list[Cell]:
         only: ``(i, n)``: share i of n of the runs, from 1.
     """
     found = [
-        Cell(robot, case, truth, gap, seed)
+        Run(robot, case, truth, gap, seed)
         for seed, robot in itertools.product(ablation.seeds, ablation.robots)
         for case, truth in _failures(ablation, robot)
         for gap in ablation.gaps
@@ -164,44 +168,65 @@ def cells(ablation: Ablation, only: tuple[int, int] = (1, 1)) -> list[Cell]:
     return found[part - 1 :: parts]
 
 
-def job(ablation: Ablation, cell: Cell, gaits: Sequence[str]) -> Job:
-    """Returns the job of a run.
+def cells(ablation: Ablation, only: tuple[int, int] = (1, 1)) -> list[Cell]:
+    """Returns a cell per run and comparator, with the cells that they need.
+
+    The diagnoses of a run need its trials, which need its gaits; with other choices of the next
+    trial than the bank, a recovery needs the first gait alone.
 
     Args:
         ablation: The ablation.
-        cell: The run.
-        gaits: SHA-256 of each gait of the run.
+        only: ``(i, n)``: share i of n of the runs, from 1.
+
+    Raises:
+        InputError: The ablation is invalid, its folder contains another one, or its bank lacks a
+            gait.
     """
-    failure = f"case{cell.case:02d}" if cell.case is not None else quote(cell.truth, safe="=")
-    return Job(
-        key=f"{key_of(cell.robot)}-{failure}-gap{cell.gap!r}-seed{cell.seed:03d}",
-        parameters={
-            "robot": cell.robot,
-            "model": model_digest(cell.robot),
-            "case": cell.case,
-            "truth": cell.truth,
-            "gap": cell.gap,
-            "gaits": list(gaits),
-            "shared": _shared(ablation),
-        },
-        seed=cell.seed,
-        parts=tuple(ablation.comparators),
-    )
+    check(ablation)
+    chosen = runs(ablation, only)
+    robots_of = {name: planned(name) for name in {run.robot for run in chosen}}
+    gaits = {
+        (run.robot, number): _gait(ablation, robots_of[run.robot], number)
+        for run in chosen
+        for number in run.gaits(ablation.settings)
+    }
+    shared = _shared(ablation)
+    found = []
+    for run in chosen:
+        failure = f"case{run.case:02d}" if run.case is not None else quote(run.truth, safe="=")
+        key = f"{key_of(run.robot)}-{failure}-gap{run.gap!r}-seed{run.seed:03d}"
+        parameters = {
+            **robots_of[run.robot],
+            "case": run.case,
+            "truth": run.truth,
+            "gap": run.gap,
+            "shared": shared,
+        }
+        own = [gaits[run.robot, number] for number in run.gaits(ablation.settings)]
+        function, needs = RECOVER, {"gait": own[0]}
+        if ablation.next_trial == BANK:
+            named = {f"gait-{number}": gait for number, gait in enumerate(own)}
+            trials = Cell(RUN_TRIALS, key, parameters, run.seed, TRIALS, TRIALS, named)
+            function, needs = DIAGNOSE, {TRIALS: trials}
+        found += [
+            Cell(function, key, parameters, run.seed, comparator, needs=needs)
+            for comparator in ablation.comparators
+        ]
+    return found
 
 
-def spec(of: Job) -> Spec:
-    """Returns the specification in the job of a run."""
-    parameters = of.parameters
-    return Spec(
-        cell=Cell(
-            parameters["robot"], parameters["case"], parameters["truth"], parameters["gap"], of.seed
-        ),
-        settings=Settings(**parameters["shared"]["settings"]),
-        kinds=parameters["shared"]["kinds"],
-        structure=parameters["shared"]["structure"],
-        next_trial=parameters["shared"]["next_trial"],
-        score=parameters["shared"].get("score", DISPLACEMENT.name),
-    )
+def _gait(ablation: Ablation, robot: Mapping[str, str], number: int) -> Cell:
+    """Returns the cell of a gait: evolved, or given by its file in a bank."""
+    if ablation.bank is None:
+        return gait_cell(
+            robot,
+            ablation.settings,
+            number,
+            score=score_name(ablation.repair, ablation.score),
+            repair=ablation.repair,
+            search=ablation.search,
+        )
+    return bank.given_gait(ablation.bank, robot, number)
 
 
 def _failures(ablation: Ablation, robot: str) -> list[tuple[int | None, str]]:
@@ -220,16 +245,13 @@ def _notation_kinds(ablation: Ablation) -> tuple[FaultKind, ...]:
     return notation_kinds(plugins.kinds(ablation.kinds))
 
 
-def model_digest(robot: str) -> str:
-    """Returns the SHA-256 of a robot's MJCF."""
-    return hashlib.sha256(robots.robot_entry(robot).robot().mjcf.encode()).hexdigest()
-
-
 def _check_names(ablation: Ablation) -> None:
     check_keys(ablation.robots)
+    check_repair(ablation.repair, ablation.search)
+    score = score_name(ablation.repair, ablation.score)
     for robot in ablation.robots:
         entry = robots.robot_entry(robot)
-        check_score(ablation.score, entry)
+        check_score(score, entry)
         for case in ablation.cases or ():
             if case not in entry.cases:
                 raise unknown_name(f"case of {robot}", str(case), map(str, entry.cases))
@@ -246,11 +268,10 @@ def _check_names(ablation: Ablation) -> None:
 def _shared(ablation: Ablation) -> dict[str, Any]:
     """Returns the parameters that all runs of one results table share."""
     return {
-        "selfmodel": __version__,
         "settings": dataclasses.asdict(ablation.settings),
         "kinds": ablation.kinds,
         "structure": ablation.structure,
         "next_trial": ablation.next_trial,
-        # Left out by default, as in folders of earlier versions.
-        **({} if ablation.score == DISPLACEMENT.name else {"score": ablation.score}),
+        "score": score_name(ablation.repair, ablation.score),
+        **repair_parameters(ablation.repair, ablation.search),
     }

@@ -11,8 +11,8 @@ from typing import Any
 from selfmodel.experiments.ablation.figures import draw
 from selfmodel.experiments.ablation.rows import AblationRow
 from selfmodel.experiments.ablation.scores import ComparatorScore, summarise
-from selfmodel.experiments.grid import FinishedPart, finished
-from selfmodel.experiments.study_files import as_csv, as_dicts, as_rows, write_files
+from selfmodel.experiments.grid import finished
+from selfmodel.experiments.study.files import as_csv, as_dicts, as_rows, write_files
 
 
 @dataclass(frozen=True)
@@ -23,13 +23,11 @@ class AblationResults:
         rows: All diagnoses in the folder.
         scores: Scores of the comparators.
         files: Paths of the CSV, the JSON and the figures.
-        unverified: Number of parts of version 0.1, which have no digest.
     """
 
     rows: tuple[AblationRow, ...]
     scores: tuple[ComparatorScore, ...]
     files: tuple[Path, ...]
-    unverified: int
 
 
 def collect(folder: Path) -> tuple[AblationRow, ...]:
@@ -38,11 +36,7 @@ def collect(folder: Path) -> tuple[AblationRow, ...]:
     Raises:
         InputError: A file in the folder is damaged.
     """
-    return _rows(finished(folder / "runs"))
-
-
-def _rows(parts: Iterable[FinishedPart]) -> tuple[AblationRow, ...]:
-    rows = [row for part in parts for row in as_rows(AblationRow, part)]
+    rows = [row for part in finished(folder / "runs") for row in as_rows(AblationRow, part)]
     return tuple(sorted(rows, key=lambda row: (*row.run, row.comparator, row.trials)))
 
 
@@ -53,8 +47,7 @@ def write_results(folder: Path) -> AblationResults:
         InputError: A file in the folder is damaged.
         OSError: The results cannot be written.
     """
-    parts = [*finished(folder / "runs")]
-    rows = _rows(parts)
+    rows = collect(folder)
     scores = summarise(rows)
     text = json.dumps(as_dict(rows, scores), indent=1, allow_nan=False)
     files = {
@@ -62,19 +55,18 @@ def write_results(folder: Path) -> AblationResults:
         "results.json": f"{text}\n".encode(),
         **{f"figures/{name}": data for name, data in draw(rows, scores)},
     }
-    unverified = sum(part.made_with is None for part in parts)
-    return AblationResults(rows, scores, write_files(folder, files), unverified)
+    return AblationResults(rows, scores, write_files(folder, files))
 
 
 def as_dict(rows: Iterable[AblationRow], scores: Iterable[ComparatorScore]) -> dict[str, Any]:
     """Returns rows and scores as JSON; null for an unknown number."""
     return {
         "rows": as_dicts(rows),
-        "scores": [_nan_as_none(dataclasses.asdict(score)) for score in scores],
+        "scores": [_finite_or_none(dataclasses.asdict(score)) for score in scores],
     }
 
 
-def _nan_as_none(value: Any) -> Any:  # noqa: ANN401  # JSON
+def _finite_or_none(value: Any) -> Any:  # noqa: ANN401  # JSON
     if isinstance(value, dict):
-        return {key: _nan_as_none(inner) for key, inner in value.items()}
-    return None if isinstance(value, float) and math.isnan(value) else value
+        return {key: _finite_or_none(inner) for key, inner in value.items()}
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from selfmodel.experiments.plugins import OWN_SEARCH, PAPER
+
 
 @dataclass(frozen=True)
 class AblationRow:
@@ -28,6 +30,9 @@ class AblationRow:
         before: Score before the failure; the forward displacement, m, by default.
         after: Score of the same controller after the failure.
         recovered: Score of the best recovery trial so far.
+        repair: Name of the repair that evolved gaits or recoveries; None if nothing was evolved,
+            as all gaits were given. Versions that did not record it had the paper's alone.
+        search: Name of the search of the repair; None if nothing was evolved.
     """
 
     robot: str
@@ -50,6 +55,8 @@ class AblationRow:
     before: float | None
     after: float | None
     recovered: float | None
+    repair: str | None = PAPER
+    search: str | None = OWN_SEARCH[PAPER]
 
     @property
     def run(self) -> tuple[str, str, float, int]:

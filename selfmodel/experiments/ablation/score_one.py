@@ -42,28 +42,32 @@ class DiagnosisCost:
 
 
 def row_of(
-    setting: Setting, diagnosis: Diagnosis, trials: Sequence[Trial], cost: DiagnosisCost
+    setting: Setting,
+    comparator: str,
+    diagnosis: Diagnosis,
+    trials: Sequence[Trial],
+    cost: DiagnosisCost,
 ) -> AblationRow:
     """Returns the row of a diagnosis, without displacements and number of distinct hypotheses.
 
     Args:
         setting: The run.
+        comparator: Name of the comparator.
         diagnosis: Diagnosis of all trials so far.
         trials: Trials of the damaged robot so far.
         cost: Cost of the diagnoses of the run so far.
     """
-    cell = setting.spec.cell
     best = diagnosis.ranked[0]
     # A separate simulator: scoring does not count as cost of the diagnosis.
     simulator = Simulator(setting.robot, threads=1)
     return AblationRow(
-        robot=cell.robot,
-        case=cell.case,
+        robot=setting.name,
+        case=setting.case,
         truth=str(setting.truth),
-        gap=cell.gap,
-        seed=cell.seed,
-        next_trial=setting.spec.next_trial,
-        comparator=setting.name,
+        gap=setting.gap,
+        seed=setting.seed,
+        next_trial=setting.shared["next_trial"],
+        comparator=comparator,
         trials=diagnosis.trials,
         best=str(best.hypothesis),
         correct=is_correct(best.hypothesis, setting.truth, trials, simulator),
@@ -77,6 +81,8 @@ def row_of(
         before=None,
         after=None,
         recovered=None,
+        repair=setting.shared["repair"] if setting.evolves else None,
+        search=setting.shared["search"] if setting.evolves else None,
     )
 
 

@@ -1,86 +1,121 @@
-"""Physical trials of a run: run once, then read from their logs."""
+"""Physical trials of a run, which all its diagnoses share: run once, then read from their logs."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from selfmodel.controllers.controller import Controller
-from selfmodel.diagnosis.comparator import Comparator
-from selfmodel.experiments.ablation.plan import HEALTHY_TRIALS, Spec
+from selfmodel.experiments import plugins
+from selfmodel.experiments.ablation import bank
+from selfmodel.experiments.ablation.plan import BANK, HEALTHY_TRIALS, TRIALS
+from selfmodel.experiments.grid import Cell
 from selfmodel.experiments.reality import draw_reality
+from selfmodel.experiments.study.gaits import read_gait
+from selfmodel.experiments.study.planned_robots import planned_entry
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
-from selfmodel.logs.atomic import partial_path
-from selfmodel.logs.files import make_folder, replace_file
+from selfmodel.faults.hypothesis_space import HypothesisSpace
+from selfmodel.logs.files import replace_file
 from selfmodel.logs.physical_trial import run_trial
 from selfmodel.logs.reader import read_log
 from selfmodel.logs.records import TrialHeader
 from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import calibrate
+from selfmodel.tasks import Entry
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
+
+CALIBRATED = "calibrated.xml"
 
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """Objects of a run's specification.
+    """Objects of a run.
 
     Attributes:
-        spec: Specification of the run.
-        comparator: The comparator.
-        name: Name of the comparator, or ``package.module:object``.
+        name: Name of the robot.
+        entry: The robot with its cases and tasks.
         robot: The nominal robot.
+        case: Number of the failure in Table I; None for a failure that is not in it.
         truth: The failure of the physical robot.
-        gaits: Gaits of the run, in the order of the trials.
-        folder: Folder of the run.
+        gap: Level of the reality gap.
+        seed: Seed of all random numbers.
+        settings: Parameters of the search.
+        shared: Parameters that all runs of the ablation share.
+        evolves: Whether anything of the run is evolved by the repair: its gaits or its recovery.
     """
 
-    spec: Spec
-    comparator: Comparator
     name: str
+    entry: Entry
     robot: Robot
+    case: int | None
     truth: Hypothesis
-    gaits: tuple[Controller, ...]
-    folder: Path
+    gap: float
+    seed: int
+    settings: Settings
+    shared: Mapping[str, Any]
+    evolves: bool
 
 
-def before_failure(setting: Setting) -> list[Trial]:
-    """Returns the logged trials of the healthy robot; runs the missing ones."""
-    return [
-        _trial(setting, number, "before", gait)
-        for number, gait in enumerate(setting.gaits[:HEALTHY_TRIALS])
-    ]
+def setting_of(cell: Cell) -> Setting:
+    """Returns the objects of a run, from a cell of it."""
+    parameters, shared = cell.parameters, cell.parameters["shared"]
+    gaits = cell.needs[TRIALS].needs.values() if TRIALS in cell.needs else cell.needs.values()
+    entry = planned_entry(parameters)
+    robot = entry.robot()
+    space = HypothesisSpace(robot.anatomy, plugins.kinds(shared["kinds"]))
+    return Setting(
+        name=parameters["robot"],
+        entry=entry,
+        robot=robot,
+        case=parameters["case"],
+        truth=space.parse(parameters["truth"]),
+        gap=parameters["gap"],
+        seed=cell.seed,
+        settings=Settings(**shared["settings"]),
+        shared=shared,
+        evolves=any(gait.function != bank.WRITE for gait in gaits) or shared["next_trial"] != BANK,
+    )
 
 
-def after_failure(setting: Setting, number: int, controller: Controller) -> Trial:
-    """Returns a logged trial of the damaged robot, numbered from 0; runs it if missing."""
-    return _trial(setting, HEALTHY_TRIALS + number, "after", controller)
+def run_trials(cell: Cell, needs: Mapping[str, Path], folder: Path) -> list[str]:
+    """Runs the trials before and after the failure, and fits the self-model to the former.
 
-
-def calibrated_robot(setting: Setting, healthy: Sequence[Trial]) -> Robot:
-    """Returns the calibrated self-model, the same for all comparators.
-
-    The first call fits the model to the trials before the failure and writes it into the folder of
-    the run.
+    Returns:
+        The names of the trials.
     """
-    path, robot = setting.folder / "calibrated.xml", setting.robot
-    if not path.exists():
-        replace_file(path, calibrate(robot, healthy, threads=1).robot.mjcf.encode())
-    return dataclasses.replace(robot, mjcf=path.read_text(encoding="utf-8"))
+    setting = setting_of(cell)
+    gaits = [read_gait(needs[f"gait-{number}"], setting.robot) for number in range(len(needs))]
+    stages: list[tuple[Stage, int]] = [("before", number) for number in range(HEALTHY_TRIALS)]
+    stages += [("after", number) for number in range(setting.settings.trials)]
+    trials = []
+    for number, (stage, gait) in enumerate(stages):
+        plan = TrialPlan(
+            f"{number:02d}-{stage}", stage, gaits[gait], setting.settings.steps, setting.seed
+        )
+        trials.append(_run(setting, plan, number, folder))
+    healthy = trials[:HEALTHY_TRIALS]
+    fitted = calibrate(setting.robot, healthy, threads=1).robot
+    replace_file(folder / CALIBRATED, fitted.mjcf.encode())
+    return [trial.plan.name for trial in trials]
 
 
-def _trial(setting: Setting, number: int, stage: Stage, gait: Controller) -> Trial:
-    """Returns a trial from its log; runs it if there is no log."""
-    steps, seed = setting.spec.settings.steps, setting.spec.cell.seed
-    plan = TrialPlan(f"{number:02d}-{stage}", stage, gait, steps, seed)
-    path = setting.folder / "trials" / f"{plan.name}.mcap"
-    if path.exists():
-        return read_log(path).trial
-    make_folder(path.parent)
-    partial_path(path).unlink(missing_ok=True)  # of a killed run
-    hidden = INTACT if stage == "before" else setting.truth
-    cell, robot = setting.spec.cell, setting.robot
-    reality = draw_reality(robot, cell.seed, cell.gap, structure=setting.spec.structure)
+def read_trials(folder: Path) -> tuple[list[Trial], list[Trial]]:
+    """Returns the trials before and those after the failure, from the folder of their cell."""
+    trials = [read_log(path).trial for path in sorted(folder.glob("*.mcap"))]
+    return trials[:HEALTHY_TRIALS], trials[HEALTHY_TRIALS:]
+
+
+def calibrated_robot(robot: Robot, folder: Path) -> Robot:
+    """Returns the calibrated self-model, the same for all comparators."""
+    return dataclasses.replace(robot, mjcf=(folder / CALIBRATED).read_text(encoding="utf-8"))
+
+
+def _run(setting: Setting, plan: TrialPlan, number: int, folder: Path) -> Trial:
+    hidden = INTACT if plan.stage == "before" else setting.truth
+    structure = setting.shared["structure"]
+    reality = draw_reality(setting.robot, setting.seed, setting.gap, structure=structure)
     # Noise differs between trials and is the same for every comparator.
-    physical = reality.robot(robot, hidden, stream=number)
-    header = TrialHeader(setting.spec.settings, hidden=str(hidden), gap=reality.text)
-    return run_trial(physical, plan, path, robot, header)
+    physical = reality.robot(setting.robot, hidden, stream=number)
+    header = TrialHeader(setting.settings, hidden=str(hidden), gap=reality.text)
+    return run_trial(physical, plan, folder / f"{plan.name}.mcap", setting.robot, header)

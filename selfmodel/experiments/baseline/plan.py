@@ -1,7 +1,8 @@
-"""Definition of a study of baselines, as jobs of two grids: repertoires, then cells."""
+"""Definition of a study of baselines, as cells of a grid."""
 
 import dataclasses
 import hashlib
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,16 +10,19 @@ from typing import Any
 
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.experiments import robots
-from selfmodel.experiments.grid import Job, check_shared, finished
-from selfmodel.experiments.study_files import check_keys, key_of
+from selfmodel.experiments.grid import Cell, check_shared
+from selfmodel.experiments.study.files import check_keys, key_of
+from selfmodel.experiments.study.planned_robots import planned
 from selfmodel.physical.reality_gap import MAX_GAP_LEVEL
 from selfmodel.recovery.baselines.problem import BaselineSettings
 from selfmodel.recovery.baselines.registry import BASELINES, ORACLE
-from selfmodel.recovery.repertoire.model_digest import model_digest
-from selfmodel.version import __version__
 
 ORACLE_TRIALS = 6
 """Physical trials whose mean is the value of the oracle."""
+
+MAKE = "selfmodel.experiments.baseline.work:make"
+RUN = "selfmodel.experiments.baseline.work:run"
+"""Functions of the cells."""
 
 WITH_REPERTOIRE = "trial-and-error"
 """Name of the method that needs a repertoire."""
@@ -77,65 +81,51 @@ def check(study: BaselineStudy) -> None:
     check_shared(study.folder, _shared(study), "a study of baselines")
 
 
-def repertoire_jobs(study: BaselineStudy) -> list[Job]:
-    """Returns the jobs that make the repertoires, one per robot; none if no method needs them."""
-    if WITH_REPERTOIRE not in study.methods:
-        return []
-    return [
-        Job(
-            key=key_of(name),
-            parameters={
-                **_robot(name),
-                "steps": study.steps,
-                "evaluations": study.repertoire_evaluations,
-            },
-            seed=0,
-            parts=("repertoire",),
-        )
-        for name in study.robots
-    ]
-
-
-def repertoire_path(folder: Path, robot: str) -> Path:
-    """Returns the file of a robot's repertoire in the folder of a study."""
-    return folder / "repertoires" / f"{key_of(robot)}.npz"
-
-
-def cell_jobs(study: BaselineStudy, only: tuple[int, int] = (1, 1)) -> list[Job]:
-    """Returns the jobs of the cells: robot x case x gap x seed, each with a part per method.
+def cells(study: BaselineStudy, only: tuple[int, int] = (1, 1)) -> list[Cell]:
+    """Returns a cell per robot, case, gap, seed and method, with the repertoires that they need.
 
     Args:
         study: The study.
-        only: ``(i, n)``: share i of n of the cells, from 1.
+        only: ``(i, n)``: share i of n of the physical robots, from 1.
+
+    Raises:
+        InputError: The study is invalid, or its folder contains another study.
     """
-    made = {part.key for part in finished(study.folder / "repertoires")}
+    check(study)
+    shared = _shared(study)
+    planned_robots = {name: planned(name) for name in study.robots}
+    axes = itertools.product(study.seeds, study.robots, study.cases, study.gaps)
     part, parts = only
-    jobs = []
-    for seed in study.seeds:
-        for name in study.robots:
-            entry = robots.robot_entry(name)
-            methods = [
-                method
-                for method in study.methods
-                if method != WITH_REPERTOIRE or key_of(name) in made
-            ]
-            jobs += [
-                Job(
-                    key=f"{key_of(name)}-case{case:02d}-gap{gap:g}-seed{seed:03d}",
-                    parameters={
-                        **_robot(name),
-                        "case": case,
-                        "truth": entry.cases[case],
-                        "gap": gap,
-                        "shared": _shared(study),
-                    },
-                    seed=seed,
-                    parts=tuple(methods),
-                )
-                for case in study.cases
-                for gap in study.gaps
-            ]
-    return jobs[part - 1 :: parts]
+    found = []
+    for seed, name, case, gap in list(axes)[part - 1 :: parts]:
+        parameters = {
+            **planned_robots[name],
+            "case": case,
+            "truth": robots.robot_entry(name).cases[case],
+            "gap": gap,
+            "shared": shared,
+        }
+        key = f"{key_of(name)}-case{case:02d}-gap{gap:g}-seed{seed:03d}"
+        repertoire = {"repertoire": _repertoire(study, planned_robots[name])}
+        found += [
+            Cell(
+                RUN,
+                key,
+                parameters,
+                seed,
+                method,
+                needs=repertoire if method == WITH_REPERTOIRE else {},
+            )
+            for method in study.methods
+        ]
+    return found
+
+
+def _repertoire(study: BaselineStudy, robot: dict[str, str]) -> Cell:
+    """Returns the cell of the repertoire of a robot."""
+    sizes = {"steps": study.steps, "evaluations": study.repertoire_evaluations}
+    key = key_of(robot["robot"])
+    return Cell(MAKE, key, {**robot, **sizes}, 0, "repertoire", "repertoires")
 
 
 def settings_of(shared: dict[str, Any], method: str) -> BaselineSettings:
@@ -145,14 +135,9 @@ def settings_of(shared: dict[str, Any], method: str) -> BaselineSettings:
     return dataclasses.replace(settings, trials=own.get(method, settings.trials))
 
 
-def _robot(name: str) -> dict[str, Any]:
-    return {"robot": name, "model": model_digest(robots.robot_entry(name).robot())}
-
-
 def _shared(study: BaselineStudy) -> dict[str, Any]:
     """Returns the parameters that all cells of one results table share."""
     return {
-        "selfmodel": __version__,
         "steps": study.steps,
         "settings": dataclasses.asdict(study.settings),
         "evolution_trials": study.evolution_trials,

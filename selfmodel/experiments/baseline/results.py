@@ -2,15 +2,16 @@
 
 import dataclasses
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import mean, median
-from typing import Any
+from typing import Any, get_args, get_type_hints
 
 from selfmodel.errors import InputError
 from selfmodel.experiments.grid import FinishedPart, finished
-from selfmodel.experiments.study_files import write_files
+from selfmodel.experiments.study.files import write_files
 from selfmodel.recovery.baselines.registry import ORACLE
 
 AFTER = (1, 3, 20)
@@ -113,6 +114,18 @@ class BaselineResults:
         }
 
 
+def collect(folder: Path) -> tuple[BaselineRow, ...]:
+    """Returns the rows of all finished parts in the folder of a study, in order.
+
+    Raises:
+        InputError: A file in the folder is damaged.
+    """
+    found = [_row(part) for part in finished(folder / "runs")]
+    return tuple(
+        sorted(found, key=lambda row: (row.robot, row.case, row.gap, row.seed, row.method))
+    )
+
+
 def write_results(folder: Path) -> BaselineResults:
     """Writes ``results.jsonl``, one line per cell and method, from the finished parts of a study.
 
@@ -120,11 +133,10 @@ def write_results(folder: Path) -> BaselineResults:
         InputError: A file in the folder is damaged.
         OSError: The results cannot be written.
     """
-    found = [_row(part) for part in finished(folder / "runs")]
-    rows = sorted(found, key=lambda row: (row.robot, row.case, row.gap, row.seed, row.method))
+    rows = collect(folder)
     lines = [json.dumps(dataclasses.asdict(row), allow_nan=False) + "\n" for row in rows]
     files = write_files(folder, {"results.jsonl": "".join(lines).encode()})
-    return BaselineResults(tuple(rows), summarise(rows), files)
+    return BaselineResults(rows, summarise(rows), files)
 
 
 def summarise(rows: Sequence[BaselineRow]) -> tuple[BaselineSummary, ...]:
@@ -163,10 +175,37 @@ def _summary(
 
 
 def _row(part: FinishedPart) -> BaselineRow:
-    names = {field.name for field in dataclasses.fields(BaselineRow)}
-    if not isinstance(part.result, dict) or part.result.keys() != names:
+    try:
+        return row_of(part.result)
+    except InputError as error:
         raise InputError(
-            f"{part.path}: expected the row of a baseline with the keys {', '.join(sorted(names))}"
-            f", got others; delete the file, and the same command runs its part again"
+            f"{part.path}: {error}; delete the file, and the same command computes its cell again"
+        ) from error
+
+
+def row_of(values: Any) -> BaselineRow:  # noqa: ANN401  # JSON
+    """Returns the row in an object of JSON.
+
+    Raises:
+        InputError: It has other keys, a value of another type, a number that is not finite, or no
+            trial.
+    """
+    types = get_type_hints(BaselineRow)
+    if not isinstance(values, dict) or values.keys() != types.keys():
+        got = ", ".join(values)[:300] if isinstance(values, dict) else json.dumps(values)[:80]
+        raise InputError(
+            f"expected the row of a baseline with the keys {', '.join(sorted(types))}, got {got}"
         )
-    return BaselineRow(**part.result)
+    for name, value in values.items():
+        inner = get_args(types[name])
+        kind, items = (inner[0], value) if inner else (types[name], [value])
+        if not isinstance(items, list) or not items or not all(_is_a(kind, one) for one in items):
+            what = f"numbers or flags per trial ({kind.__name__})" if inner else kind.__name__
+            raise InputError(f"expected {name} as {what}, got {json.dumps(value)[:80]}")
+    return BaselineRow(**values)
+
+
+def _is_a(kind: type, value: object) -> bool:
+    if kind is float:
+        return type(value) in (float, int) and math.isfinite(value)  # type: ignore[arg-type]
+    return type(value) is kind

@@ -1,28 +1,20 @@
-"""Execution of a study of baselines: the repertoires, then one part per cell and method."""
+"""Cells of a study of baselines: repertoires, and methods on damaged physical robots."""
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Controller
-from selfmodel.experiments import robots
-from selfmodel.experiments.baseline.plan import (
-    WITH_REPERTOIRE,
-    BaselineStudy,
-    cell_jobs,
-    check,
-    method_key,
-    repertoire_jobs,
-    repertoire_path,
-    settings_of,
-)
+from selfmodel.experiments.baseline.plan import method_key, settings_of
 from selfmodel.experiments.baseline.results import BaselineRow
-from selfmodel.experiments.grid import GridBegins, Job, PartEnds, PartResult, run_grid
+from selfmodel.experiments.grid import Cell
 from selfmodel.experiments.reality import draw_reality
+from selfmodel.experiments.study.planned_robots import planned_entry
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
@@ -42,70 +34,35 @@ from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 
+FILE = "repertoire.npz"
+"""File of a repertoire in the folder of its cell."""
+
 PHYSICAL, HEALTHY, HIDDEN = 1, 2, 3
 """Streams of the noise of the damaged robot, as in a recovery, and of the two fitnesses."""
 
 
-def run_study(
-    study: BaselineStudy,
-    *,
-    workers: int,
-    on_progress: Callable[[GridBegins | PartEnds], None],
-    only: tuple[int, int] = (1, 1),
-) -> tuple[PartEnds, ...]:
-    """Runs the unfinished parts of a study and returns the failed ones.
-
-    Args:
-        study: The study.
-        workers: Number of worker processes, each with one thread of physics.
-        on_progress: Callback of the grid of repertoires, then of the grid of cells.
-        only: ``(i, n)``: share i of n of the cells, from 1, for n machines with a folder each.
-
-    Raises:
-        InputError: The study is invalid, or its folder contains another study.
-    """
-    check(study)
-    jobs = repertoire_jobs(study)
-    missing = (
-        run_grid(
-            study.folder / "repertoires", jobs, _make, workers=workers, on_progress=on_progress
-        )
-        if jobs
-        else ()
-    )
-    failed = run_grid(
-        study.folder / "runs",
-        cell_jobs(study, only),
-        _run,
-        workers=workers,
-        on_progress=on_progress,
-    )
-    return missing + failed
-
-
-def _make(job: Job, _part: str, run: Path) -> PartResult:
+def make(cell: Cell, _needs: Mapping[str, Path], folder: Path) -> dict[str, Any]:
     """Makes and writes the repertoire of a robot."""
-    parameters = job.parameters
-    robot = robots.robot_entry(parameters["robot"]).robot()
+    parameters = cell.parameters
+    robot = planned_entry(parameters).robot()
     steps = parameters["steps"]
     made = make_repertoire(
         robot,
         network_for(robot),
         simulated_evaluation(Simulator(robot, threads=1), INTACT, steps),
         steps=steps,
-        seed=job.seed,
+        seed=cell.seed,
         evaluations=parameters["evaluations"],
     )
-    path = repertoire_path(run.parents[1], parameters["robot"])
-    save_repertoire(path, made)
-    return PartResult({"gaits": len(made)}, [path])
+    save_repertoire(folder / FILE, made)
+    return {"gaits": len(made)}
 
 
-def _run(job: Job, method: str, run: Path) -> PartResult:
+def run(cell: Cell, needs: Mapping[str, Path], _folder: Path) -> dict[str, Any]:
     """Runs a method on a damaged physical robot and returns its row."""
-    start, parameters = perf_counter(), job.parameters
-    simulator, problem = _problem(job, method, run.parents[1])
-    rng = np.random.default_rng([job.seed, method_key(method)])
+    start, parameters, method = perf_counter(), cell.parameters, cell.part
+    simulator, problem = problem_of(cell, needs)
+    rng = np.random.default_rng([cell.seed, method_key(method)])
     settings = settings_of(parameters["shared"], method)
     trials = BASELINES[method](problem, settings, rng, lambda _trial: None)
     row = BaselineRow(
@@ -114,7 +71,7 @@ def _run(job: Job, method: str, run: Path) -> PartResult:
         case=parameters["case"],
         truth=parameters["truth"],
         gap=parameters["gap"],
-        seed=job.seed,
+        seed=cell.seed,
         best=[trial.best for trial in trials],
         upright=[trial.measured.upright for trial in trials],
         displacement=[trial.measured.displacement for trial in trials],
@@ -123,34 +80,33 @@ def _run(job: Job, method: str, run: Path) -> PartResult:
         simulated_steps=simulator.stats.steps,
         seconds=perf_counter() - start,
     )
-    return PartResult(dataclasses.asdict(row))
+    return dataclasses.asdict(row)
 
 
-def _problem(job: Job, method: str, folder: Path) -> tuple[Simulator, Problem]:
+def problem_of(cell: Cell, needs: Mapping[str, Path]) -> tuple[Simulator, Problem]:
     """Returns the problem of a cell, and the simulator that counts its simulated steps."""
-    parameters = job.parameters
-    robot, steps = robots.robot_entry(parameters["robot"]).robot(), parameters["shared"]["steps"]
+    parameters = cell.parameters
+    robot, steps = planned_entry(parameters).robot(), parameters["shared"]["steps"]
     truth = parse(parameters["truth"], robot.anatomy)
-    reality = draw_reality(robot, job.seed, parameters["gap"], structure=False)
+    reality = draw_reality(robot, cell.seed, parameters["gap"], structure=False)
     simulator = Simulator(robot, threads=1)
     track = Track(reality.robot(robot, truth, PHYSICAL), robot, build(robot, truth).normal, steps)
-    path = repertoire_path(folder, parameters["robot"])
     return simulator, Problem(
         track=track,
         design=network_for(robot),
         evaluate=simulated_evaluation(simulator, INTACT, steps),
-        healthy=_noisy_fitness(simulator, INTACT, reality.gap, steps, (job.seed, HEALTHY)),
+        healthy=_noisy_fitness(simulator, INTACT, reality.gap, steps, (cell.seed, HEALTHY)),
         hidden=_noisy_fitness(
             Simulator(reality.hidden_model(robot), 1, simulator.stats),
             truth,
             reality.gap,
             steps,
-            (job.seed, HIDDEN),
+            (cell.seed, HIDDEN),
         ),
         search=genome_search(
             CmaEs, Settings().scaled(parameters["shared"]["settings"]["population"])
         ),
-        repertoire=load_repertoire(path, robot) if method == WITH_REPERTOIRE else None,
+        repertoire=load_repertoire(needs["repertoire"] / FILE, robot) if needs else None,
     )
 
 

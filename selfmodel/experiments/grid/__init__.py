@@ -1,19 +1,23 @@
-"""Grid of independent runs in worker processes, resumable from its folder."""
+"""Grid of independent cells, computed by any executor, resumable from its folder."""
 
-from selfmodel.experiments.grid.definition import check_shared, difference
+from selfmodel.experiments.grid.cell import Cell, Work
+from selfmodel.experiments.grid.cell_file import FinishedPart, finished
+from selfmodel.experiments.grid.checks import check_shared, difference
 from selfmodel.experiments.grid.grid import GridBegins, PartEnds, run_grid
-from selfmodel.experiments.grid.job import Job, Work
-from selfmodel.experiments.grid.parts import FinishedPart, PartResult, finished
+from selfmodel.experiments.grid.process_workers import processes
+from selfmodel.experiments.grid.workers import OpenWorkers, Workers
 
 __all__ = [
+    "Cell",
     "FinishedPart",
     "GridBegins",
-    "Job",
+    "OpenWorkers",
     "PartEnds",
-    "PartResult",
     "Work",
+    "Workers",
     "check_shared",
     "difference",
     "finished",
+    "processes",
     "run_grid",
 ]

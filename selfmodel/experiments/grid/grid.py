@@ -1,26 +1,31 @@
-"""Grid of independent runs, each in its own folder, that is resumable after an interruption.
+"""A study as a grid of cells, computed by any executor, resumable after any interruption.
 
-The grid is independent of robots. Finished parts are kept; failed parts are tried again by the
-next call. One process at a time runs a grid in a folder (see ``lock.exclusive``).
+The grid is independent of robots. Nothing but the finished cells is kept: the same call continues a
+killed study, with the same executor or another, and tries the cells that failed again.
 """
 
-from collections.abc import Callable, Sequence
-from contextlib import closing
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import Executor, Future
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from selfmodel.experiments.grid.definition import (
-    check_definition,
-    check_extensible,
-    check_versions,
-    write_definition,
+from selfmodel.errors import InputError
+from selfmodel.experiments.grid.cell import Cell, with_needs
+from selfmodel.experiments.grid.cell_file import FinishedPart, has_files
+from selfmodel.experiments.grid.cell_runner import (
+    UNFINISHED,
+    CellAnswer,
+    Outcome,
+    run_cell,
+    write_error,
 )
-from selfmodel.experiments.grid.job import Job, Work
-from selfmodel.experiments.grid.lock import exclusive
-from selfmodel.experiments.grid.part_runner import PartAnswer, run_part
-from selfmodel.experiments.grid.parts import failed, part_bytes, unfinished, write_part
-from selfmodel.experiments.grid.worker_pool import WorkerExit, run_tasks
+from selfmodel.experiments.grid.checks import read_study
+from selfmodel.experiments.grid.schedule import compute
+from selfmodel.experiments.grid.workers import OpenWorkers
+from selfmodel.logs import result_files
+from selfmodel.logs.files import make_folder
 
 
 @dataclass(frozen=True)
@@ -28,8 +33,8 @@ class GridBegins:
     """Start or resumption of a grid.
 
     Attributes:
-        total: Number of parts of all runs.
-        finished: Number of parts that were finished before.
+        total: Number of cells, with those that others need.
+        finished: Number of cells that were finished before, or that no other cell needs any more.
     """
 
     total: int
@@ -38,15 +43,15 @@ class GridBegins:
 
 @dataclass(frozen=True)
 class PartEnds:
-    """End of a part of a run.
+    """End of a cell.
 
     Attributes:
-        key: Key of the run.
-        part: Name of the part.
-        number: Number of parts that have finished or failed so far.
-        total: Number of parts of all runs.
-        seconds: Wall time of the part.
-        error: Reason of a failure; None for a finished part.
+        key: Key of its run.
+        part: Name of the cell among those of its run.
+        number: Number of cells that have finished or failed so far.
+        total: Number of cells.
+        seconds: Wall time of the cell.
+        error: Reason of a failure; None for a finished cell.
     """
 
     key: str
@@ -59,63 +64,85 @@ class PartEnds:
 
 def run_grid(
     folder: Path,
-    jobs: Sequence[Job],
-    work: Work,
+    cells: Sequence[Cell],
     *,
-    workers: int,
+    workers: OpenWorkers,
     on_progress: Callable[[GridBegins | PartEnds], None],
 ) -> tuple[PartEnds, ...]:
-    """Runs all unfinished parts of a grid and returns the failed ones.
+    """Computes all cells that are not finished, and returns the failed ones.
 
-    The failure of a part is written to its file and stops no other part; the traceback of an
-    unexpected exception is in a file of the run's folder. If the files of a part cannot be written,
-    such as on a full disk, the grid ends: the other parts would fail too.
+    The failure of a cell is in the folder ``errors``, an unexpected one with its traceback, and
+    stops no cell that does not need it. If files cannot be written, such as on a full disk, the
+    grid ends: the other cells would fail too.
 
     Args:
-        folder: Folder of the grid, with one folder per run.
-        jobs: The runs, with unique keys.
-        work: Runs one part. Worker processes receive the function pickled, so it must be defined
-            at the top of a module.
-        workers: Number of worker processes.
-        on_progress: Callback for the start of the grid and for every part that ends.
+        folder: Folder of the study, which all workers know by the same path.
+        cells: The cells; those that they need are computed as well, once.
+        workers: The workers, started if a cell is not finished.
+        on_progress: Callback for the start of the grid and for every cell that ends.
 
     Raises:
-        InputError: A run in the folder has another definition or other versions, a file there is
-            damaged or altered, or another process runs a grid there; no part has been run then.
-        OSError: The folder cannot be written; all finished parts are kept.
+        InputError: A cell in the folder has other versions, or is damaged or altered, and no cell
+            has been computed; or a worker has other versions.
+        OSError: The folder cannot be written; all finished cells are kept.
+        WorkError: The executor ended; all finished cells are kept.
     """
-    if len({job.key for job in jobs}) < len(jobs):
-        raise ValueError("expected a unique key per run of a grid")
-    with exclusive(folder):
-        check_versions(folder)
-        for job in jobs:
-            check_definition(folder / job.key, job.definition)
-        chains = [
-            [(job, part) for part in unfinished(folder / job.key, job.definition, job.parts)]
-            for job in jobs
-        ]
-        if any(chains):
-            check_extensible(folder)
-        for job in jobs:
-            write_definition(folder / job.key, job.definition)
-        total = sum(len(job.parts) for job in jobs)
-        before = total - sum(map(len, chains))
-        on_progress(GridBegins(total, before))
-        failures = []
-        with closing(run_tasks(partial(run_part, folder, work), chains, workers)) as answers:
-            for number, ((job, part), end) in enumerate(answers, start=before + 1):
-                answer = _write_exit(folder, job, part, end) if isinstance(end, WorkerExit) else end
-                if answer.ends_grid:
-                    raise OSError(answer.error)
-                ends = PartEnds(job.key, part, number, total, answer.seconds, answer.error)
-                if ends.error is not None:
-                    failures.append(ends)
-                on_progress(ends)
+    wanted = with_needs(cells)
+    left = _unfinished(cells, read_study(folder))
+    total, before = len(wanted), len(wanted) - len(left)
+    on_progress(GridBegins(total, before))
+    failures: list[PartEnds] = []
+    if not left:
+        return ()
+    make_folder(folder)
+    with workers as given:
+        submit = partial(_submit, given.executor, folder)
+        in_order = {place: cell for place, cell in wanted.items() if place in left}
+        ends = compute(in_order, submit, given)
+        for number, (cell, answer) in enumerate(ends, start=before + 1):
+            _check(folder, cell, answer)
+            end = PartEnds(cell.key, cell.part, number, total, answer.seconds, answer.error)
+            if end.error is not None:
+                failures.append(end)
+            on_progress(end)
+    for empty in (*(folder / UNFINISHED).glob("*"), folder / UNFINISHED):
+        with suppress(OSError):  # another command computes cells there
+            empty.rmdir()
     return tuple(failures)
 
 
-def _write_exit(folder: Path, job: Job, part: str, end: WorkerExit) -> PartAnswer:
-    """Writes and returns the error of a part whose worker process exited."""
-    error = f"its process ended with status {end.status}; standard error may have the reason"
-    write_part(folder / job.key, part, part_bytes(job.definition, part, failed(error)))
-    return PartAnswer(0.0, error)
+def _submit(executor: Executor, folder: Path, cell: Cell) -> "Future[CellAnswer]":
+    return executor.submit(run_cell, folder, cell, cell.place, dict(result_files.versions()))
+
+
+def _unfinished(cells: Iterable[Cell], found: Mapping[str, FinishedPart]) -> dict[str, Cell]:
+    """Returns the cells that have to be computed, by place.
+
+    A cell that only finished ones need is not computed; one that others need, and that lacks files,
+    is.
+    """
+    left: dict[str, Cell] = {}
+
+    def add(cell: Cell) -> None:
+        if cell.place in left:
+            return
+        left[cell.place] = cell
+        for need in cell.needs.values():
+            if need.place not in found or not has_files(found[need.place]):
+                add(need)
+
+    for cell in cells:
+        if cell.place not in found:
+            add(cell)
+    return left
+
+
+def _check(folder: Path, cell: Cell, answer: CellAnswer) -> None:
+    """Keeps the error of a lost worker, and raises that of an end which ends the grid."""
+    match answer.outcome:
+        case Outcome.LOST:
+            write_error(folder, cell.place, str(answer.error))
+        case Outcome.NOT_WRITTEN:
+            raise OSError(answer.error)
+        case Outcome.REFUSED:
+            raise InputError(answer.error)

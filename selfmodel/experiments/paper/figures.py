@@ -1,12 +1,12 @@
 """Figures 5 and 6 of the paper's experiment: recovery by trial, and by number of trials."""
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from selfmodel.experiments.paper.drawing import look, plain_axes
 from selfmodel.experiments.paper.plan import ON_ROBOT
 from selfmodel.experiments.paper.reported import (
     EVALUATIONS_ON_ROBOT,
@@ -15,6 +15,7 @@ from selfmodel.experiments.paper.reported import (
 )
 from selfmodel.experiments.paper.rows import TrialRow, best_so_far
 from selfmodel.experiments.paper.tables import Cost, recoveries
+from selfmodel.experiments.study.drawing import counts_text, figure_style, look, plain_axes
 
 SLOT = 0.8
 """Width of all lines of one case; the distance between two cases is 1."""
@@ -22,6 +23,7 @@ SLOT = 0.8
 REFERENCE = {"color": "0.35", "linestyle": "--", "linewidth": 1.0}
 
 
+@figure_style()
 def by_trial(trials: Sequence[TrialRow]) -> Figure:
     """Returns Figure 5: the function restored by each trial, by case, a panel per robot.
 
@@ -51,7 +53,8 @@ def by_trial(trials: Sequence[TrialRow]) -> Figure:
         axes.set_xlim(-0.5, len(cases) - 0.5)
         axes.set_xticks(range(len(cases)), [str(case) for case in cases])
         axes.tick_params(labelbottom=True)
-        axes.set_title(robot, fontsize=11)
+        per_line = Counter((one[0].case, one[0].comparator) for one in own)
+        axes.set_title(f"{robot} ({counts_text(per_line.values())} per line)")
         plain_axes(axes)
     is_grey = any(case in NOT_RESTORED[robot] for robot in robots for case in cases)
     legend = "; grey: not restored in the paper" if is_grey else ""
@@ -76,6 +79,7 @@ def _case_line(
     axes.plot(x[:1], middle[:1], **look(number), markersize=3.5, markerfacecolor="white")
 
 
+@figure_style()
 def by_cost(costs: Sequence[Cost]) -> Figure:
     """Returns Figure 6: the function restored by the number of physical trials, per robot.
 
@@ -108,7 +112,8 @@ def by_cost(costs: Sequence[Cost]) -> Figure:
         axes.set_xticks([1, 3, 10, 100, 1000], ["1", "3", "10", "100", "1,000"])
         axes.minorticks_off()
         axes.set_xlabel("physical trials after the failing one")
-        axes.set_title(robot, fontsize=11)
+        runs = counts_text(cost.runs for cost in costs if cost.robot == robot)
+        axes.set_title(f"{robot} ({runs})")
         plain_axes(axes)
     panels[0].set_ylabel("displacement ÷ before the failure")
     handles, labels = panels[0].get_legend_handles_labels()

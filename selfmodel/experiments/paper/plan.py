@@ -1,27 +1,30 @@
-"""Definition of the paper's experiment, as jobs of two grids: gaits, then recoveries."""
+"""Definition of the paper's experiment, as cells of a grid."""
 
 import dataclasses
-import hashlib
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.experiments.arguments import AUTO, comparator_choice
-from selfmodel.experiments.gaits import check_not_evolved, gait_settings
-from selfmodel.experiments.grid import Job, check_shared
+from selfmodel.experiments.grid import Cell, check_shared
 from selfmodel.experiments.paper.reported import FAILURES
+from selfmodel.experiments.study.gaits import gait_cell
+from selfmodel.experiments.study.planned_robots import planned
 from selfmodel.settings import Settings
 from selfmodel.tasks import ROBOTS
-from selfmodel.version import __version__
 
 COMPARATORS = (FORWARD_DISPLACEMENT.name, AUTO)
 """Comparators by default: the paper's, then selfmodel's."""
 
 ON_ROBOT = "evolution-on-robot"
 """Name of the part of a run that is the paper's control: the repair EA on the damaged robot."""
+
+RECOVER = "selfmodel.experiments.paper.work:recover"
+EVOLVE = "selfmodel.experiments.paper.work:evolve_on_robot"
+"""Functions of the cells."""
 
 
 @dataclass(frozen=True)
@@ -61,71 +64,33 @@ def check(study: PaperStudy) -> None:
         if comparator == ON_ROBOT:
             raise InputError(f"{ON_ROBOT} is no comparator: it is run in addition to any of them")
         comparator_choice(comparator)
-    check_shared(study.folder, _shared(study), "the paper's experiment")
+    shared = {"settings": dataclasses.asdict(study.settings)}
+    check_shared(study.folder, shared, "the paper's experiment")
 
 
-def gait_jobs(study: PaperStudy) -> list[Job]:
-    """Returns the jobs that evolve the gaits before the failure, one per robot and seed."""
-    return [
-        Job(
-            key=f"{robot}-seed{seed:03d}",
-            parameters={
-                **_robot(robot),
-                "selfmodel": __version__,
-                "settings": gait_settings(study.settings),
-            },
-            seed=seed,
-            parts=("gait",),
-        )
-        for seed in study.seeds
-        for robot in study.robots
-    ]
+def cells(study: PaperStudy) -> list[Cell]:
+    """Returns the cells of the runs, one seed after another, with the gaits that they need.
 
-
-def recovery_jobs(study: PaperStudy) -> list[Job]:
-    """Returns the jobs of the runs with an evolved gait, one seed after another.
-
-    The parts of a run are a recovery with each comparator, and the paper's control.
+    A run has a recovery with each comparator, and the paper's control.
 
     Raises:
-        InputError: The file of an evolved gait is missing.
+        InputError: The experiment is invalid, or its folder contains another.
     """
+    check(study)
+    shared = {"settings": dataclasses.asdict(study.settings)}
+    planned_robots = {robot: planned(robot) for robot in study.robots}
     found = []
-    for gait in gait_jobs(study):
-        path = gait_path(study.folder, gait.key)
-        if not path.exists():
-            check_not_evolved(path)
-            continue
-        robot = gait.parameters["robot"]
-        found += [
-            Job(
-                key=f"{robot}-case{case:02d}-seed{gait.seed:03d}",
-                parameters={
-                    **_robot(robot),
-                    "case": case,
-                    "truth": ROBOTS[robot].cases[case],
-                    "gait": gait.key,
-                    "gait_sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
-                    "shared": _shared(study),
-                },
-                seed=gait.seed,
-                parts=(*study.comparators, ON_ROBOT),
-            )
-            for case in study.cases
-        ]
+    for seed, robot in itertools.product(study.seeds, study.robots):
+        gait = gait_cell(planned_robots[robot], study.settings, seed)
+        for case in study.cases:
+            key = f"{robot}-case{case:02d}-seed{seed:03d}"
+            truth = ROBOTS[robot].cases[case]
+            parameters = {**planned_robots[robot], "case": case, "truth": truth, "shared": shared}
+            found += [
+                Cell(function, key, parameters, seed, part, needs={"gait": gait})
+                for function, part in (
+                    *((RECOVER, comparator) for comparator in study.comparators),
+                    (EVOLVE, ON_ROBOT),
+                )
+            ]
     return found
-
-
-def gait_path(folder: Path, key: str) -> Path:
-    """Returns the file of a gait in the folder of an experiment."""
-    return folder / "gaits" / f"{key}.npz"
-
-
-def _robot(name: str) -> dict[str, Any]:
-    model = ROBOTS[name].robot().mjcf
-    return {"robot": name, "model": hashlib.sha256(model.encode()).hexdigest()}
-
-
-def _shared(study: PaperStudy) -> dict[str, Any]:
-    """Returns the parameters that all runs of one table share."""
-    return {"selfmodel": __version__, "settings": dataclasses.asdict(study.settings)}

@@ -29,9 +29,6 @@ NOT_RESTORED: Mapping[str, tuple[int, ...]] = MappingProxyType(
 )
 """Cases in which the function was not restored, by robot."""
 
-PHYSICAL_TRIALS = 3
-"""Physical trials of the damaged robot, with which the function is almost completely restored."""
-
 EVALUATIONS_ON_ROBOT = 3000
 """The abstract has more evaluations than these for evolution on the physical robot."""
 

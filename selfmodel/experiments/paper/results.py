@@ -10,7 +10,6 @@ from typing import Any
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.experiments.grid import FinishedPart, finished
 from selfmodel.experiments.paper import figures, robot_figure
-from selfmodel.experiments.paper.drawing import files_of
 from selfmodel.experiments.paper.page import page
 from selfmodel.experiments.paper.plan import ON_ROBOT
 from selfmodel.experiments.paper.rows import EvolutionRow, RecoveryRow, TrialRow, run_of
@@ -23,7 +22,8 @@ from selfmodel.experiments.paper.tables import (
     last_costs,
     summaries,
 )
-from selfmodel.experiments.study_files import Row, as_csv, as_dicts, as_rows, write_files
+from selfmodel.experiments.study.drawing import files_of
+from selfmodel.experiments.study.files import Row, as_csv, as_dicts, as_rows, write_files
 from selfmodel.settings import Settings
 from selfmodel.tasks import ROBOTS
 

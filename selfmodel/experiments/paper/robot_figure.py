@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from scipy.spatial import ConvexHull
 
 from selfmodel.arrays import FloatArray
-from selfmodel.experiments.paper.drawing import COLOURS
+from selfmodel.experiments.study.drawing import COLOURS, figure_style
 from selfmodel.robot.robot import Robot
 
 SIDE = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]).T
@@ -30,6 +30,7 @@ TOUCH: dict[str, Any] = {**OPEN, "marker": "^", "color": COLOURS[2]}
 ANGLE: dict[str, Any] = {**OPEN, "marker": "o", "color": COLOURS[0]}
 
 
+@figure_style()
 def of_robots(robots: Sequence[Robot]) -> Figure:
     """Returns Figure 1: a row per robot in its standing pose, with its joints and sensors."""
     figure = Figure(figsize=(8.4, 0.7 + 2.5 * len(robots)), layout="constrained")

@@ -1,7 +1,7 @@
-"""Definition of a study of many bodies, as jobs of two grids."""
+"""Definition of a study of many bodies, as cells of a grid."""
 
 import dataclasses
-import hashlib
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,23 +11,20 @@ from selfmodel.errors import InputError, unknown_name
 from selfmodel.experiments import plugins, robots
 from selfmodel.experiments.arguments import comparator_choice
 from selfmodel.experiments.chosen_score import check_score
-from selfmodel.experiments.gaits import check_not_evolved, gait_settings
-from selfmodel.experiments.grid import Job, check_shared
-from selfmodel.experiments.study_files import check_keys, key_of
+from selfmodel.experiments.grid import Cell, check_shared
+from selfmodel.experiments.study.files import check_keys, key_of
+from selfmodel.experiments.study.gaits import gait_cell
+from selfmodel.experiments.study.planned_robots import planned
+from selfmodel.experiments.study.repairs import check_repair, repair_parameters, score_name
 from selfmodel.faults.kinds.neuron import silent_neurons
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.physical.reality_gap import MAX_GAP_LEVEL
 from selfmodel.settings import Settings
 from selfmodel.tasks import Entry
-from selfmodel.version import __version__
 
-GAIT_PARAMETERS = ("selfmodel", "score", "controller", "neurons")
-"""Names of the parameters that affect a gait."""
-
-OPTIONAL_PARAMETERS = ("kinds", "gap", "structure", "neurons")
-"""Names of the parameters that ``run.json`` contains only if they differ from their defaults, so
-that the same command reads a folder of version 0.1, which has no such parameters."""
+RECOVER = "selfmodel.experiments.suite.work:recover"
+"""Function of the cells."""
 
 
 @dataclass(frozen=True)
@@ -41,13 +38,15 @@ class Study:
         seeds: Seeds, one run each.
         folder: Folder of the gaits, runs and results.
         settings: Parameters of the recoveries.
-        score: Fitness of the repair EA, also reported per trial.
+        score: Fitness of the repair, also reported per trial; None for that of the repair.
         controller: Name of the controller design.
         comparator: Name of the comparator, ``package.module:object``, or ``auto``.
         kinds: Fault kinds to search, as in ``--kinds``.
         gap: Level of the reality gap.
         structure: Whether the physical robots have structural mismatches.
         neurons: Number of hidden neurons; None for the design's default.
+        repair: Name of the repair that evolves gaits and recoveries, ``robust`` or ``paper``.
+        search: Name of its search; None for that of the repair.
     """
 
     bodies: Sequence[str]
@@ -55,13 +54,15 @@ class Study:
     seeds: Sequence[int]
     folder: Path
     settings: Settings
-    score: str
+    score: str | None
     controller: str
     comparator: str
     kinds: str = ",".join(kind.name for kind in PAPER_KINDS)
     gap: float = 0.0
     structure: bool = False
     neurons: int | None = None
+    repair: str = plugins.PAPER
+    search: str | None = None
 
 
 def known_cases(bodies: Sequence[str]) -> tuple[int, ...]:
@@ -77,11 +78,13 @@ def check(study: Study) -> None:
     """
     comparator_choice(study.comparator)
     plugins.kinds(study.kinds)
+    check_repair(study.repair, study.search)
+    score = score_name(study.repair, study.score)
     check_keys(study.bodies)
     for body in study.bodies:
         entry = robots.robot_entry(body)
         plugins.design(study.controller, entry.robot(), study.neurons)
-        check_score(study.score, entry)
+        check_score(score, entry)
     if not 0 <= study.gap <= MAX_GAP_LEVEL:
         raise InputError(f"expected a gap from 0 to {MAX_GAP_LEVEL}, such as 0.05, got {study.gap}")
     known = known_cases(study.bodies)
@@ -91,63 +94,47 @@ def check(study: Study) -> None:
     check_shared(study.folder, _shared(study), "a study")
 
 
-def gait_jobs(study: Study, only: tuple[int, int] = (1, 1)) -> list[Job]:
-    """Returns the jobs that evolve the gaits before the failure, one per body and seed.
+def cells(study: Study, only: tuple[int, int] = (1, 1)) -> list[Cell]:
+    """Returns a cell per recovery, one seed after another, with the gaits that they need.
 
     Args:
         study: The study.
-        only: ``(i, n)``: share i of n of the gaits, from 1.
-    """
-    shared = _shared(study)
-    part, parts = only
-    jobs = [
-        Job(
-            key=f"{key_of(body)}-seed{seed:03d}",
-            parameters={
-                **_body(body),
-                "settings": gait_settings(study.settings),
-                **{name: shared[name] for name in GAIT_PARAMETERS if name in shared},
-            },
-            seed=seed,
-            parts=("gait",),
-        )
-        for seed in study.seeds
-        for body in study.bodies
-    ]
-    return jobs[part - 1 :: parts]
-
-
-def recovery_jobs(study: Study, only: tuple[int, int] = (1, 1)) -> list[Job]:
-    """Returns the jobs of the recoveries with an evolved gait, one seed after another.
-
-    Args:
-        study: The study.
-        only: ``(i, n)``: the recoveries of share i of n of the gaits, from 1.
+        only: ``(i, n)``: the recoveries of share i of n of the bodies with their seeds, from 1.
 
     Raises:
-        InputError: The file of an evolved gait is missing.
+        InputError: The study is invalid, or its folder contains another study.
     """
+    check(study)
+    shared = _shared(study)
+    planned_bodies = {body: planned(body) for body in study.bodies}
+    part, parts = only
+    pairs = list(itertools.product(study.seeds, study.bodies))[part - 1 :: parts]
     found = []
-    for gait in gait_jobs(study, only):
-        path = gait_path(study.folder, gait.key)
-        if not path.exists():
-            check_not_evolved(path)
-            continue
-        body = gait.parameters["body"]
+    for seed, body in pairs:
         entry = robots.robot_entry(body)
+        gait = gait_cell(
+            planned_bodies[body],
+            study.settings,
+            seed,
+            score=score_name(study.repair, study.score),
+            controller=study.controller,
+            neurons=study.neurons,
+            repair=study.repair,
+            search=study.search,
+        )
         found += [
-            Job(
-                key=f"{key_of(body)}-case{case:02d}-seed{gait.seed:03d}",
-                parameters={
-                    **_body(body),
+            Cell(
+                RECOVER,
+                f"{key_of(body)}-case{case:02d}-seed{seed:03d}",
+                {
+                    **planned_bodies[body],
                     "case": case,
                     "truth": entry.cases[case],
-                    "gait": gait.key,
-                    "gait_sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
-                    "shared": _shared(study),
+                    "shared": shared,
                 },
-                seed=gait.seed,
-                parts=("recovery",),
+                seed,
+                "recovery",
+                needs={"gait": gait},
             )
             for case in study.cases
             if case in entry.cases and _applies(study, entry, case)
@@ -162,38 +149,12 @@ def _applies(study: Study, entry: Entry, case: int) -> bool:
     return max(silent, default=-1) < plugins.design(study.controller, robot, study.neurons).hidden
 
 
-def gait_path(folder: Path, key: str) -> Path:
-    """Returns the file of a gait in the folder of a study."""
-    return folder / "gaits" / f"{key}.npz"
-
-
-def _body(body: str) -> dict[str, Any]:
-    robot = robots.robot_entry(body).robot()
-    assets = hashlib.sha256()
-    for name, content in sorted(robot.assets.items()):
-        # Digests have a fixed length, so that names and contents cannot be confused.
-        for part in (name.encode(), content):
-            assets.update(hashlib.sha256(part).digest())
-    return {
-        "body": body,
-        "robot": robot.name,
-        "control_timestep": robot.control_timestep,
-        "model": hashlib.sha256(robot.mjcf.encode()).hexdigest(),
-        "assets": assets.hexdigest(),
-    }
-
-
 def _shared(study: Study) -> dict[str, Any]:
     """Returns the parameters that all runs of one results table share."""
+    names = ("controller", "comparator", "kinds", "gap", "structure", "neurons")
     return {
-        "selfmodel": __version__,
         "settings": dataclasses.asdict(study.settings),
-        "score": study.score,
-        "controller": study.controller,
-        "comparator": study.comparator,
-        **{
-            field.name: getattr(study, field.name)
-            for field in dataclasses.fields(study)
-            if field.name in OPTIONAL_PARAMETERS and getattr(study, field.name) != field.default
-        },
+        "score": score_name(study.repair, study.score),
+        **{name: getattr(study, name) for name in names},
+        **repair_parameters(study.repair, study.search),
     }

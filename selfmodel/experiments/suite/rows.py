@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from statistics import median
 
 from selfmodel.experiments.confidence_intervals import Interval, proportion
+from selfmodel.experiments.plugins import OWN_SEARCH, PAPER
 
 SINGLE = (1, 2, 3, 5, 6)
 """Numbers of the cases with a single fault."""
@@ -30,6 +31,8 @@ class SuiteRow:
         seconds: Wall time of the recovery without the evolution of its first gait, on one thread.
         upright: Whether the robot did not fall in the best recovery trial; None in a row of a
             version that did not record it.
+        repair: Name of the repair; versions that did not record it had the paper's alone.
+        search: Name of the search of the repair.
     """
 
     robot: str
@@ -46,6 +49,8 @@ class SuiteRow:
     diverged: int
     seconds: float
     upright: bool | None = None
+    repair: str = PAPER
+    search: str = OWN_SEARCH[PAPER]
 
 
 @dataclass(frozen=True)

@@ -1,118 +1,68 @@
-"""Execution of a study of many bodies: a grid of gaits, then a grid of recoveries."""
+"""Cells of a study of many bodies: recoveries."""
 
-import shutil
-from collections.abc import Callable
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from selfmodel.controllers.controller import check_silent_neurons
-from selfmodel.experiments import plugins, robots, trial_logs
+from selfmodel.experiments import plugins
 from selfmodel.experiments.arguments import comparator_choice
 from selfmodel.experiments.chosen_score import choose_score
-from selfmodel.experiments.experiment import Experiment, run as run_experiment
-from selfmodel.experiments.gaits import evolve_gait, write_gait
-from selfmodel.experiments.grid import GridBegins, Job, PartEnds, PartResult, run_grid
-from selfmodel.experiments.study_files import as_dicts
-from selfmodel.experiments.suite.plan import Study, check, gait_jobs, gait_path, recovery_jobs
+from selfmodel.experiments.experiment import Experiment, run
+from selfmodel.experiments.grid import Cell
+from selfmodel.experiments.study.files import as_dicts
+from selfmodel.experiments.study.gaits import read_gait
+from selfmodel.experiments.study.planned_robots import planned_entry
 from selfmodel.experiments.suite.rows import SuiteRow
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kinds.neuron import silent_neurons
 from selfmodel.faults.notation import parse
-from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.recovery.scores.upright import falls_of
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.trial import Trial
 
 
-def run_study(
-    study: Study,
-    *,
-    workers: int,
-    on_progress: Callable[[GridBegins | PartEnds], None],
-    only: tuple[int, int] = (1, 1),
-) -> tuple[PartEnds, ...]:
-    """Runs the unfinished parts of a study and returns the failed ones.
-
-    Args:
-        study: The study.
-        workers: Number of worker processes, each with one thread of physics.
-        on_progress: Callback of the grid of gaits, then of the grid of recoveries.
-        only: ``(i, n)``: share i of n of the gaits and their recoveries, from 1, for n machines
-            with a folder each.
-
-    Raises:
-        InputError: The study is invalid, or its folder contains another study.
-    """
-    check(study)
-    no_gait = run_grid(
-        study.folder / "gaits",
-        gait_jobs(study, only),
-        _evolve,
-        workers=workers,
-        on_progress=on_progress,
-    )
-    jobs = recovery_jobs(study, only)
-    failed = run_grid(
-        study.folder / "runs", jobs, _recover, workers=workers, on_progress=on_progress
-    )
-    return no_gait + failed
-
-
-def _evolve(job: Job, _part: str, run: Path) -> PartResult:
-    """Evolves and writes the gait of a body before the failure."""
-    parameters = job.parameters
-    entry = robots.robot_entry(parameters["body"])
-    robot = entry.robot()
-    path, settings = run.parent / f"{job.key}.npz", Settings(**parameters["settings"])
-    design = plugins.design(parameters["controller"], robot, parameters.get("neurons"))
-    chosen = choose_score(parameters["score"], entry, design, steps=settings.steps, seed=job.seed)
-    if chosen.gait is not None:
-        return write_gait(path, chosen.gait, evaluations=0)
-    return evolve_gait(path, robot, settings, job.seed, design=design, score=chosen.score)
-
-
-def _recover(job: Job, _part: str, run: Path) -> PartResult:
-    """Runs the recovery of a body and returns its row, with its trial logs."""
-    parameters, shared = job.parameters, job.parameters["shared"]
-    entry = robots.robot_entry(parameters["body"])
+def recover(cell: Cell, needs: Mapping[str, Path], folder: Path) -> list[dict[str, Any]]:
+    """Runs the recovery of a body and returns its row."""
+    parameters, shared = cell.parameters, cell.parameters["shared"]
+    entry = planned_entry(parameters)
     robot = entry.robot()
     truth = parse(parameters["truth"], robot.anatomy)
-    design = plugins.design(shared["controller"], robot, shared.get("neurons"))
+    design = plugins.design(shared["controller"], robot, shared["neurons"])
     check_silent_neurons(design, silent_neurons(truth))
-    folder = run / "recovery"
-    shutil.rmtree(folder, ignore_errors=True)  # files of a killed run
-    settings = Settings(**shared["settings"])
-    gait = trial_logs.controller(gait_path(run.parents[1], parameters["gait"]), robot)
-    chosen = choose_score(
-        shared["score"], entry, design, steps=settings.steps, seed=job.seed, gait=gait
-    )
+    settings, gait = Settings(**shared["settings"]), read_gait(needs["gait"], robot)
+    score = choose_score(
+        shared["score"], entry, design, steps=settings.steps, seed=cell.seed, gait=gait
+    ).score
     experiment = Experiment(
         robot=robot,
         case=parameters["case"],
         truth=truth,
         choose_comparator=comparator_choice(shared["comparator"]),
-        kinds=plugins.kinds(shared["kinds"]) if "kinds" in shared else PAPER_KINDS,
-        gap=shared.get("gap", 0.0),
-        structure=shared.get("structure", False),
+        kinds=plugins.kinds(shared["kinds"]),
+        gap=shared["gap"],
+        structure=shared["structure"],
         settings=settings,
-        seed=job.seed,
+        seed=cell.seed,
         threads=1,
-        folder=folder,
+        folder=folder / "recovery",
         gait=gait,
         design=design,
-        score=chosen.score,
+        score=score,
         physical=entry.physical,
+        repair=shared["repair"],
+        search=shared["search"],
     )
-    outcome = run_experiment(experiment, on_event=lambda _: None)
+    outcome = run(experiment, on_event=lambda _: None)
     before, *since = outcome.recovery.trials
-    score = experiment.score
     after, *recoveries = (score.of_trial(robot, truth, trial) for trial in since)
     diagnosis = outcome.recovery.diagnosis
     row = SuiteRow(
         robot=robot.name,
         case=parameters["case"],
         truth=str(truth),
-        seed=job.seed,
+        seed=cell.seed,
         best=str(diagnosis.best),
         correct=outcome.correct,
         verdict=diagnosis.verdict,
@@ -123,8 +73,10 @@ def _recover(job: Job, _part: str, run: Path) -> PartResult:
         diverged=outcome.stats.diverged,
         seconds=outcome.seconds,
         upright=_stayed_upright(robot, truth, since[1 + recoveries.index(max(recoveries))]),
+        repair=shared["repair"],
+        search=shared["search"],
     )
-    return PartResult(as_dicts([row]), sorted((folder / "trials").glob("*.mcap")))
+    return as_dicts([row])
 
 
 def _stayed_upright(robot: Robot, hidden: Hypothesis, trial: Trial) -> bool:

@@ -16,16 +16,19 @@ from pathlib import Path
 import pytest
 from hypothesis import given, strategies as st
 
+from selfmodel.controllers.controller import Controller
 from selfmodel.errors import InputError
 from selfmodel.experiments.ablation import Ablation, AblationRow, ablate, collect, write_results
-from selfmodel.experiments.ablation.plan import cells
+from selfmodel.experiments.ablation.plan import runs
 from selfmodel.experiments.ablation.scores import summarise
-from selfmodel.experiments.grid import GridBegins, PartEnds
+from selfmodel.experiments.grid import GridBegins, PartEnds, processes
+from selfmodel.experiments.study.gaits import FILE
 from selfmodel.logs import load_controller, read_gap, read_log, read_truth
 from selfmodel.settings import Settings
 from tests.helpers.command import selfmodel
 
 PAPERS = "forward-displacement"
+BEGINS = {".png": b"\x89PNG", ".pdf": b"%PDF-", ".svg": b"<?xml"}  # files of figures
 DAMAGES = ("break:back_left_knee+friction=0.4", "motor:front_left_knee=0.5")
 THEIRS = """
 from dataclasses import dataclass
@@ -64,11 +67,17 @@ def small(folder: Path, **changes: object) -> Ablation:
 
 
 def run(ablation: Ablation, workers: int = 1, **more: object) -> tuple[PartEnds, ...]:
-    return ablate(ablation, workers=workers, on_progress=lambda _event: None, **more)
+    return ablate(ablation, workers=processes(workers), on_progress=lambda _event: None, **more)
 
 
-def timeless(rows: Sequence[AblationRow]) -> list[AblationRow]:
-    return [dataclasses.replace(row, seconds=0) for row in rows]
+def evolved(folder: Path, number: int) -> Controller:
+    """The gait of an ablation with a number."""
+    (gait,) = folder.glob(f"gaits/quadruped-seed{number:03d}-*")
+    return load_controller(gait / FILE)
+
+
+def timeless(rows: Sequence[AblationRow], **changes: object) -> list[AblationRow]:
+    return [dataclasses.replace(row, seconds=0, **changes) for row in rows]
 
 
 @pytest.fixture(scope="module")
@@ -80,9 +89,9 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_run_keeps_its_trials_and_has_a_row_for_the_diagnosis_after_each(done: Path):
-    (folder,) = done.glob("runs/*case01*")
-    logs = sorted((folder / "trials").iterdir())
-    bank = {k: load_controller(done / "bank" / f"quadruped-{k}.npz") for k in (5, 0)}
+    (folder,) = done.glob("trials/*case01*")
+    logs = sorted(folder.glob("*.mcap"))
+    bank = {k: evolved(done, k) for k in (5, 0)}
     rows = [row for row in collect(done) if row.case == 1]
 
     assert [path.name for path in logs] == [
@@ -93,7 +102,7 @@ def test_a_run_keeps_its_trials_and_has_a_row_for_the_diagnosis_after_each(done:
     assert [read_truth(path) for path in logs] == ["intact"] * 2 + ["break:front_left_knee"] * 2
     assert [row.trials for row in rows] == [1, 2]
     assert [row.evaluations for row in rows] == [9, 18]
-    assert {row.truth for row in rows} == {"break:front_left_knee"}
+    assert {(row.truth, row.repair) for row in rows} == {("break:front_left_knee", "paper")}
     assert all(row.intact_distance >= row.distance >= 0 for row in rows)
 
 
@@ -112,14 +121,14 @@ def test_one_more_comparator_diagnoses_from_the_same_logs_and_nothing_is_done_ag
     done: Path, tmp_path: Path
 ):
     extended = tmp_path / "extended"
-    run(small(extended, bank=done / "bank"))
+    run(small(extended, bank=done / "gaits"))
     kept = {path: path.read_bytes() for path in extended.rglob("*") if path.is_file()}
     events: list[GridBegins | PartEnds] = []
     same = "their_comparators:SAME"
-    both = small(extended, bank=done / "bank", comparators=[PAPERS, same])
-    ablate(both, workers=1, on_progress=events.append)
+    both = small(extended, bank=done / "gaits", comparators=[PAPERS, same])
+    ablate(both, workers=processes(1), on_progress=events.append)
 
-    assert events[0] == GridBegins(total=4, finished=2)
+    assert events[0] == GridBegins(total=8, finished=6)
     assert [event.part for event in events[1:]] == [same, same]
     assert all(path.read_bytes() == data for path, data in kept.items())
     rows = timeless(collect(extended))
@@ -131,14 +140,14 @@ def test_one_more_comparator_diagnoses_from_the_same_logs_and_nothing_is_done_ag
 
 def test_what_fails_is_told_and_stops_nothing(done: Path, tmp_path: Path):
     picky = "their_comparators:PICKY"
-    ablation = small(tmp_path / "out", bank=done / "bank", comparators=[picky, PAPERS])
+    ablation = small(tmp_path / "out", bank=done / "gaits", comparators=[picky, PAPERS])
     failed = run(ablation)
 
     assert {(one.part, one.error) for one in failed} == {
         (picky, "; ".join(["this trial does not please"] * 4))  # two before the failure, two after
     }
     assert len(failed) == 2
-    assert timeless(collect(ablation.folder)) == timeless(collect(done))
+    assert timeless(collect(ablation.folder)) == timeless(collect(done), repair=None, search=None)
 
 
 @pytest.mark.process
@@ -148,14 +157,13 @@ def test_a_command_with_a_failure_ends_with_status_one_and_prints_one_object(
     told = selfmodel(
         *("ablate", "--robots", "quadruped", "--cases", "3", "--population", "4"),
         *("--comparators", f"{PAPERS},their_comparators:PICKY", "--generations", "1"),
-        *("--trials", "1", "--bank", str(done / "bank"), "--seed", "5", "--out", "out", "--json"),
+        *("--trials", "1", "--bank", str(done / "gaits"), "--seed", "5", "--out", "out", "--json"),
         cwd=tmp_path,
         PYTHONPATH=os.pathsep.join([str(tmp_path / "theirs"), os.environ.get("PYTHONPATH", "")]),
     )
     assert told.stdout, told.stderr
-    found = json.loads(told.stdout)
-
     assert told.returncode == 1
+    found = json.loads(told.stdout)
     assert [row["comparator"] for row in found["rows"]] == [PAPERS]
     assert found["failures"] == [
         {
@@ -180,22 +188,23 @@ def test_the_csv_says_what_the_json_says(done: Path):
         for name, cell in line.items():
             text = values[name] is not None and isinstance(values[name], str)
             assert (cell if text else json.loads(cell or "null")) == values[name]
+    assert {path.suffix for path in results.files[2:]} == set(BEGINS)
     for path in results.files[2:]:
-        assert path.read_bytes().startswith(b"\x89PNG")
+        assert path.read_bytes().startswith(BEGINS[path.suffix])
 
 
 def test_repairs_are_tried_and_their_way_is_told(done: Path, tmp_path: Path):
-    ablation = small(tmp_path / "out", cases=[1], bank=done / "bank", next_trial="repair")
+    ablation = small(tmp_path / "out", cases=[1], bank=done / "gaits", next_trial="repair")
     assert run(ablation) == ()
     first, last = collect(ablation.folder)
     (score,) = (s for s in summarise([first, last]) if s.trials == 2)
 
     assert (first.trials, first.recovered) == (1, None)
-    assert last.trials == 2
+    assert (last.trials, last.repair, last.search) == (2, "paper", "ea")
     assert isinstance(last.recovered, float)
     assert first.before == last.before
     assert (score.recovery is None) == (last.before <= 0)
-    assert len(list(ablation.folder.glob("runs/*/forward-displacement/trials/*.mcap"))) == 3
+    assert len(list(ablation.folder.glob("runs/*/recovery/trials/*.mcap"))) == 3
 
 
 @pytest.mark.search
@@ -209,14 +218,14 @@ def test_trials_that_are_chosen_are_a_comparators_own(tmp_path: Path, way: str):
         settings=Settings(steps=60, generations=2, trials=3).scaled(6),
     )
     assert run(ablation) == ()
-    (folder,) = ablation.folder.glob("runs/*")
-    healthy, *own = sorted((folder / PAPERS / "trials").iterdir())
+    (folder,) = ablation.folder.glob(f"runs/*{PAPERS}*")
+    healthy, *own = sorted((folder / "recovery" / "trials").iterdir())
     drivers = [read_log(path).trial.plan.controller for path in (healthy, *own)]
     rows = timeless(collect(ablation.folder))
     papers, theirs = rows[:3], rows[3:]
 
     assert [path.name[3:] for path in own] == ["after.mcap", *["recovery.mcap"] * 2]
-    assert drivers[0] == drivers[1] == load_controller(ablation.folder / "bank" / "quadruped-5.npz")
+    assert drivers[0] == drivers[1] == evolved(ablation.folder, 5)
     # A repair may find nothing better than what walked before.
     assert drivers[2] != drivers[1] or way == "repair"
     assert {read_truth(path) for path in own} == {"break:front_left_knee"}
@@ -246,17 +255,12 @@ def test_a_killed_ablation_goes_on_and_finds_what_an_unbroken_one_finds(done: Pa
     )
     root = str(Path(__file__).parents[3])
     process = subprocess.Popen([sys.executable, script], env={**os.environ, "PYTHONPATH": root})
-    while not list(out.glob("runs/*/trials/*.mcap*")):
+    while not list(out.rglob("*.mcap*")):
         assert process.poll() is None
         time.sleep(0.005)
     process.send_signal(signal.SIGKILL)
     process.wait()
     assert len(collect(out)) < 4
-    for folder in out.glob("runs/*"):  # wherever the kill came, a trial may be unfinished
-        (folder / "trials").mkdir(exist_ok=True)
-        left = folder / "trials" / "03-after.mcap"
-        if not left.exists():
-            left.with_name("03-after.mcap.part").write_bytes(b"half a log")
 
     assert run(small(out)) == ()
     assert timeless(collect(out)) == timeless(collect(done))
@@ -272,13 +276,13 @@ def test_a_folder_with_another_ablation_is_refused(done: Path):
 
 def test_a_bank_without_a_gait_is_refused_before_anything_is_run(done: Path, tmp_path: Path):
     with pytest.raises(InputError, match=r"quadruped-1.npz: expected a controller file"):
-        run(small(tmp_path / "out", seeds=[0], bank=done / "bank"))
+        run(small(tmp_path / "out", seeds=[0], bank=done / "gaits"))
     assert not (tmp_path / "out").exists()
 
 
 def test_a_row_changed_by_hand_is_in_no_table(done: Path, tmp_path: Path):
     altered = shutil.copytree(done, tmp_path / "altered")
-    path = next(altered.glob("runs/*case01*/parts/*.json"))
+    path = next(altered.glob("runs/*case01*/cell.json"))
     path.write_text(path.read_text().replace('"correct": false', '"correct": true', 1))
     (altered / "results.csv").unlink()
     command = ("ablate", "--robots", "quadruped", "--case", "1,9", "--comparator", PAPERS)
@@ -287,10 +291,8 @@ def test_a_row_changed_by_hand_is_in_no_table(done: Path, tmp_path: Path):
     told = selfmodel(*command, cwd=tmp_path)
 
     assert told.returncode == 2
-    assert f"parts/{path.name}: expected a part of a run: its digest is missing or wrong" in (
-        told.stderr
-    )
-    assert "delete the file, and the same command runs its part again" in told.stderr
+    assert f"{path.name}: expected a cell of a study: its digest is missing or wrong" in told.stderr
+    assert "delete the file, and the same command computes its cell again" in told.stderr
     assert not (altered / "results.csv").exists()
 
 
@@ -300,7 +302,7 @@ def otherwise(tmp_path_factory: pytest.TempPathFactory, done: Path) -> Path:
     folder = tmp_path_factory.mktemp("otherwise") / "ablation"
     ablation = small(
         folder,
-        bank=done / "bank",
+        bank=done / "gaits",
         cases=[9],
         damages=["friction=0.4+break:back_left_knee", "motor:front_left_knee=0.5"],
         kinds="break,friction",
@@ -353,11 +355,11 @@ def test_rows_say_how_sure_each_diagnosis_is(otherwise: Path, done: Path):
 
 @pytest.mark.search
 def test_every_trial_of_a_robot_built_differently_hides_how(otherwise: Path, done: Path):
-    logs = sorted(otherwise.glob("runs/*/trials/*.mcap"))
+    logs = sorted(otherwise.glob("trials/*/*.mcap"))
 
     assert len(logs) == 3 * 4
     assert all(read_gap(log)["structure"] for log in logs)
-    assert all(read_gap(log) is None for log in done.glob("runs/*/trials/*.mcap"))
+    assert all(read_gap(log) is None for log in done.glob("trials/*/*.mcap"))
 
 
 @pytest.mark.parametrize(
@@ -371,9 +373,9 @@ def test_what_is_not_of_one_table_does_not_go_into_one_folder(done: Path, change
 @given(st.integers(1, 7), st.integers(1, 5), st.integers(1, 9))
 def test_the_shares_of_a_cluster_are_the_whole_and_nothing_twice(seeds: int, gaps: int, n: int):
     ablation = small(Path("nowhere"), seeds=range(seeds), gaps=[float(gap) for gap in range(gaps)])
-    shares = [cells(ablation, (i, n)) for i in range(1, n + 1)]
+    shares = [runs(ablation, (i, n)) for i in range(1, n + 1)]
 
-    assert sorted(map(str, itertools.chain(*shares))) == sorted(map(str, cells(ablation)))
+    assert sorted(map(str, itertools.chain(*shares))) == sorted(map(str, runs(ablation)))
     assert max(map(len, shares)) - min(map(len, shares)) <= 1
 
 
@@ -382,7 +384,7 @@ def scored(comparator: str, case: int, seconds: float, *, correct: bool) -> Abla
         **dict.fromkeys(field.name for field in dataclasses.fields(AblationRow))
         | {"robot": "quadruped", "gap": 0.05, "seed": 0, "trials": 1, "best": "intact"}
         | {"comparator": comparator, "case": case, "seconds": seconds, "correct": correct}
-        | {"truth": f"the failure of case {case}"}
+        | {"truth": f"the failure of case {case}", "repair": "paper", "search": "ea"}
     )
 
 

@@ -3,7 +3,7 @@
 import dataclasses
 import itertools
 
-from selfmodel.experiments.ablation.figures import by_gap, draw
+from selfmodel.experiments.ablation.figures import by_case, by_gap, draw
 from selfmodel.experiments.ablation.scores import summarise
 from tests.experiments.ablation.test_ablate import scored
 
@@ -18,7 +18,10 @@ def test_a_figure_is_drawn_for_any_subset_of_a_grid():
     ]
 
     names = [name for name, _ in draw(rows, summarise(rows))]
-    assert names == ["gap.png", "cases-hexapod-1.png", "cases-quadruped-1.png"]
+    assert [name for name in names if name.endswith(".png")] == [
+        *("gap.png", "cases-hexapod-1.png", "cases-quadruped-1.png"),
+    ]
+    assert {name.partition(".")[2] for name in names} == {"png", "pdf", "svg"}
     assert list(draw([], [])) == []
 
 
@@ -40,3 +43,17 @@ def test_a_comparator_has_its_colour_and_its_marker_in_every_panel():
 
     assert [set(look) for look in looks] == [{"a", "b"}, {"b"}]
     assert looks[0]["b"] == looks[1]["b"] != looks[0]["a"]
+
+
+def test_figures_have_the_number_of_diagnoses_of_each_comparator():
+    rows = [
+        dataclasses.replace(scored(name, case, 1.0, correct=True), seed=seed)
+        for name, seeds in (("a", 3), ("b", 1))
+        for seed in range(seeds)
+        for case in (1, 3)
+    ]
+    legend = [text.get_text() for text in by_gap(summarise(rows)).legends[0].get_texts()]
+    squares = [text.get_text() for text in by_case("quadruped", 1, rows).axes[0].get_yticklabels()]
+
+    assert legend == ["a (n = 6)", "b (n = 2)"]
+    assert squares == ["a (n = 3)", "b (n = 1)"]

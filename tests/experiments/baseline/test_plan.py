@@ -1,4 +1,4 @@
-"""The jobs of a study of baselines."""
+"""The cells of a study of baselines."""
 
 import dataclasses
 from pathlib import Path
@@ -8,10 +8,9 @@ import pytest
 from selfmodel.errors import InputError
 from selfmodel.experiments.baseline.plan import (
     BaselineStudy,
-    cell_jobs,
+    cells,
     check,
     method_key,
-    repertoire_jobs,
     settings_of,
 )
 from selfmodel.recovery.baselines.problem import BaselineSettings
@@ -31,37 +30,39 @@ def study(folder: Path, **given: object) -> BaselineStudy:
     return dataclasses.replace(whole, **given)
 
 
-def test_there_is_a_cell_per_robot_case_gap_and_seed(tmp_path: Path):
-    jobs = cell_jobs(study(tmp_path))
+def test_there_is_a_cell_per_robot_case_gap_seed_and_method(tmp_path: Path):
+    found = cells(study(tmp_path))
 
-    assert len({job.key for job in jobs}) == len(jobs) == 2 * 2 * 2 * 2
-    assert jobs[0].key == "quadruped-case01-gap0-seed000"
-    assert jobs[0].parameters["truth"]
-    assert {job.parts for job in jobs} == {("oracle", "random-search")}
+    assert len({cell.place for cell in found}) == len(found) == 2 * 2 * 2 * 2 * 2
+    assert found[0].key == found[1].key == "quadruped-case01-gap0-seed000"
+    assert found[0].parameters["truth"]
+    assert [cell.part for cell in found[:2]] == ["oracle", "random-search"]
 
 
 def test_shares_are_disjoint_and_together_complete(tmp_path: Path):
     whole = study(tmp_path)
-    shares = [{job.key for job in cell_jobs(whole, (part, 3))} for part in (1, 2, 3)]
+    shares = [{cell.place for cell in cells(whole, (part, 3))} for part in (1, 2, 3)]
 
-    assert set.union(*shares) == {job.key for job in cell_jobs(whole)}
-    assert sum(map(len, shares)) == len(cell_jobs(whole))
+    assert set.union(*shares) == {cell.place for cell in cells(whole)}
+    assert sum(map(len, shares)) == len(cells(whole))
 
 
-def test_a_repertoire_is_made_only_for_the_method_that_needs_it(tmp_path: Path):
-    assert repertoire_jobs(study(tmp_path)) == []
-    needing = study(tmp_path, methods=("trial-and-error", "oracle"))
+def test_one_repertoire_of_a_robot_is_made_for_the_method_that_needs_it(tmp_path: Path):
+    needing = cells(study(tmp_path, methods=("trial-and-error", "oracle")))
+    repertoires = {cell.needs["repertoire"].place for cell in needing if cell.needs}
 
-    assert [job.key for job in repertoire_jobs(needing)] == ["quadruped", "hexapod"]
-    # Until it is made, the method waits.
-    assert {job.parts for job in cell_jobs(needing)} == {("oracle",)}
+    assert {cell.part for cell in needing if cell.needs} == {"trial-and-error"}
+    assert sorted(place.partition("-")[0] for place in repertoires) == [
+        "repertoires/hexapod",
+        "repertoires/quadruped",
+    ]
 
 
 @pytest.mark.parametrize(
     ("method", "trials"), [("oracle", 6), ("physical-evolution", 77), ("random-search", 20)]
 )
 def test_methods_have_their_own_numbers_of_trials(tmp_path: Path, method: str, trials: int):
-    (first, *_) = cell_jobs(study(tmp_path, evolution_trials=77))
+    (first, *_) = cells(study(tmp_path, evolution_trials=77))
 
     assert settings_of(first.parameters["shared"], method).trials == trials
 

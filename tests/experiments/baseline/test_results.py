@@ -7,7 +7,8 @@ import pytest
 
 from selfmodel.errors import InputError
 from selfmodel.experiments.baseline.results import BaselineRow, summarise, write_results
-from selfmodel.experiments.grid import Job, run_grid
+from selfmodel.experiments.grid import Cell
+from selfmodel.experiments.grid.cell_file import CELL, cell_bytes
 
 
 def row(method: str, upright: list[float], seed: int = 0) -> BaselineRow:
@@ -62,15 +63,12 @@ def test_without_an_oracle_there_are_no_ratios():
     assert found.ratios is None
 
 
-def other_row(_job: Job, _part: str, _run: Path) -> dict:
-    return {"method": "oracle"}
-
-
-@pytest.mark.process
 def test_a_row_with_other_keys_is_an_error_with_the_remedy(tmp_path: Path):
-    run_grid(
-        tmp_path / "runs", [Job("one", {}, 0)], other_row, workers=1, on_progress=lambda _: None
-    )
+    cell = Cell("made:up", "one", {}, 0)
+    folder = tmp_path / cell.place
+    folder.mkdir(parents=True)
+    (folder / CELL).write_bytes(cell_bytes(folder, cell, {"method": "oracle"}, 1.0, {}))
+
     with pytest.raises(InputError, match=r"expected the row of a baseline .* delete the file"):
         write_results(tmp_path)
 

@@ -7,10 +7,9 @@ from pathlib import Path
 import pytest
 
 from selfmodel.experiments.baseline import work
-from selfmodel.experiments.baseline.plan import BaselineStudy, cell_jobs, repertoire_jobs
+from selfmodel.experiments.baseline.plan import WITH_REPERTOIRE, BaselineStudy, cells
 from selfmodel.experiments.baseline.results import write_results
-from selfmodel.experiments.baseline.work import run_study
-from selfmodel.experiments.grid import Job, PartEnds
+from selfmodel.experiments.grid import Cell, PartEnds, processes, run_grid
 from selfmodel.recovery.baselines.measurement import measure
 from selfmodel.recovery.baselines.problem import BaselineSettings
 from selfmodel.recovery.baselines.registry import BASELINES
@@ -34,15 +33,18 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> BaselineStudy:
         evolution_trials=5,
         repertoire_evaluations=20,
     )
-    (job,) = repertoire_jobs(whole)
-    (whole.folder / "repertoires").mkdir()
-    work._make(job, "repertoire", whole.folder / "repertoires" / job.key)
+    repertoire = cell(whole, WITH_REPERTOIRE).needs["repertoire"]
+    work.make(repertoire, {}, whole.folder)
     return whole
 
 
-def cell(study: BaselineStudy) -> Job:
-    (job,) = cell_jobs(dataclasses.replace(study, methods=("oracle",)))
-    return job
+def cell(study: BaselineStudy, method: str = "oracle") -> Cell:
+    (one,) = cells(dataclasses.replace(study, methods=(method,)))
+    return one
+
+
+def needs(study: BaselineStudy, method: str) -> dict[str, Path]:
+    return dict.fromkeys(cell(study, method).needs, study.folder)
 
 
 @pytest.mark.parametrize(
@@ -51,7 +53,7 @@ def cell(study: BaselineStudy) -> Job:
 def test_a_row_has_the_trials_and_the_cost_of_a_method(
     study: BaselineStudy, method: str, trials: int
 ):
-    row = work._run(cell(study), method, study.folder / "runs" / "one").result
+    row = work.run(cell(study, method), needs(study, method), study.folder)
 
     assert (row["method"], row["robot"], row["case"], row["seed"]) == (method, "quadruped", 2, 3)
     assert 1 <= len(row["best"]) <= trials
@@ -61,7 +63,7 @@ def test_a_row_has_the_trials_and_the_cost_of_a_method(
 
 
 def test_simulated_steps_of_a_search_are_counted(study: BaselineStudy):
-    row = work._run(cell(study), "healthy-evolution", study.folder / "runs" / "one").result
+    row = work.run(cell(study, "healthy-evolution"), {}, study.folder)
 
     # A first generation of 8, then the 4 means of the runs.
     assert row["simulated_steps"] == (8 + 4) * 20
@@ -69,7 +71,7 @@ def test_simulated_steps_of_a_search_are_counted(study: BaselineStudy):
 
 def test_all_methods_have_the_same_physical_robot(study: BaselineStudy):
     first, second = (
-        work._problem(cell(study), method, study.folder)[1] for method in ("oracle", "t-resilience")
+        work.problem_of(cell(study, method), {})[1] for method in ("oracle", "t-resilience")
     )
     (controller,) = random_of(first.design, 1)
 
@@ -86,9 +88,9 @@ def test_a_study_is_continued_and_runs_nothing_twice(study: BaselineStudy, tmp_p
     def note(event: object) -> None:
         ends.extend([event] if isinstance(event, PartEnds) else [])
 
-    assert run_study(own, workers=1, on_progress=note) == ()
+    assert run_grid(tmp_path, cells(own), workers=processes(1), on_progress=note) == ()
     first = write_results(tmp_path)
-    assert run_study(own, workers=1, on_progress=note) == ()
+    assert run_grid(tmp_path, cells(own), workers=processes(1), on_progress=note) == ()
 
     assert len(ends) == 1 + len(BASELINES)
     assert {row.method for row in first.rows} == set(BASELINES)

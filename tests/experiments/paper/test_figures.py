@@ -74,3 +74,10 @@ def test_the_evolution_on_the_robot_is_a_line_over_its_evaluations():
 
     wanted = [[10, 0.25], [20, 0.5], [30, 0.75]]
     assert any(np.array_equal(line, wanted) for line in drawn)
+
+
+def test_the_titles_have_the_numbers_of_recoveries():
+    rows = [row for seed in range(3) for row in trials([2.0, 0.0, 2.0], seed=seed)]
+
+    assert by_trial(rows).axes[0].get_title() == "quadruped (n = 3 per line)"
+    assert by_cost(costs(rows, [])).axes[0].get_title() == "quadruped (n = 3)"

@@ -7,12 +7,11 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from selfmodel.experiments.grid import Job, PartResult
-from selfmodel.experiments.grid.definition import write_definition
-from selfmodel.experiments.grid.parts import done, part_bytes, write_part
+from selfmodel.experiments.grid import Cell
+from selfmodel.experiments.grid.cell_file import CELL, cell_bytes
 from selfmodel.experiments.paper.plan import ON_ROBOT
 from selfmodel.experiments.paper.results import collect, write_results
-from selfmodel.experiments.study_files import as_dicts
+from selfmodel.experiments.study.files import as_dicts
 from selfmodel.settings import Settings
 from tests.helpers.paper_rows import evolution, recovery, trials
 
@@ -30,12 +29,13 @@ def made(folder: Path, *parts: str) -> Path:
     """Makes a folder with made-up runs of both robots."""
     shared = {"shared": {"settings": asdict(Settings())}}
     for robot, case in product(("hexapod", "quadruped"), (10, 2)):
-        job = Job(f"{robot}-case{case:02d}-seed000", {"robot": robot, "case": case, **shared}, 0)
-        run = folder / "runs" / job.key
-        write_definition(run, job.definition)
+        parameters = {"robot": robot, "case": case, **shared}
         for part in parts:
-            result = PartResult(rows_of(part, {"robot": robot, "case": case, "seed": 0}))
-            write_part(run, part, part_bytes(job.definition, part, done(run, result)))
+            cell = Cell("made:up", f"{robot}-case{case:02d}-seed000", parameters, 0, part)
+            rows = rows_of(part, {"robot": robot, "case": case, "seed": 0})
+            (folder / cell.place).mkdir(parents=True)
+            data = cell_bytes(folder / cell.place, cell, rows, 1.0, {})
+            (folder / cell.place / CELL).write_bytes(data)
     return folder
 
 

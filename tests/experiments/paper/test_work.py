@@ -6,10 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from selfmodel.experiments.grid import GridBegins, PartEnds
-from selfmodel.experiments.paper.plan import ON_ROBOT, PaperStudy
+from selfmodel.experiments.grid import GridBegins, PartEnds, finished, processes, run_grid
+from selfmodel.experiments.paper.plan import ON_ROBOT, PaperStudy, cells
 from selfmodel.experiments.paper.results import PaperResults, collect, write_results
-from selfmodel.experiments.paper.work import run_paper
 from selfmodel.settings import Settings
 from tests.helpers.command import SMALL, selfmodel
 
@@ -32,7 +31,8 @@ def study(folder: Path, *comparators: str) -> PaperStudy:
 def run(wanted: PaperStudy) -> list[GridBegins | PartEnds]:
     """Runs an experiment and returns its events."""
     events: list[GridBegins | PartEnds] = []
-    assert run_paper(wanted, workers=1, on_progress=events.append) == ()
+    pool = processes(1)
+    assert run_grid(wanted.folder, cells(wanted), workers=pool, on_progress=events.append) == ()
     return events
 
 
@@ -81,18 +81,17 @@ def test_a_further_comparator_runs_nothing_again(made: tuple[Path, PaperResults]
     assert found.evolution == made[1].evolution
 
 
-def test_a_deleted_part_is_made_again_the_same_to_the_bit(
+def test_a_deleted_result_is_made_again_the_same_to_the_bit(
     made: tuple[Path, PaperResults], tmp_path: Path
 ):
     folder = tmp_path / "copy"
     shutil.copytree(made[0], folder)
-    (parts,) = folder.glob("runs/*/parts")
-    for part in parts.iterdir():
-        part.unlink()
+    for cell in folder.glob("runs/*/cell.json"):
+        cell.unlink()
 
     run(study(folder, "forward-displacement"))
 
     found = collect(folder)
     assert found.trials == made[1].trials
     assert found.evolution == made[1].evolution
-    assert {part.stem for part in parts.iterdir()} == {"forward-displacement", ON_ROBOT}
+    assert {part.part for part in finished(folder / "runs")} == {"forward-displacement", ON_ROBOT}

@@ -1,0 +1,1 @@
+"""Comparison of the methods of a study: its rows as outcomes, tables, figures."""

@@ -1,0 +1,1 @@
+"""What the studies share: files, figures, gaits and planned robots."""
