@@ -108,7 +108,7 @@ def measure_once() -> dict[str, float]:
     healthy = TimedRobot(SimulatedRobot(robot))
     damaged = TimedRobot(SimulatedRobot(robot, parse(entry.cases[1], robot.anatomy)))
     with tempfile.TemporaryDirectory() as folder:
-        journal = create_journal(Path(folder) / "run", robot.anatomy)
+        journal = create_journal(Path(folder) / "run", robot.anatomy, calibrated=False)
         run_trial = TrialRunner(journal.trials, robot, settings)
         timed = TimedLogs(run_trial, journal, (healthy, damaged))
         recover(

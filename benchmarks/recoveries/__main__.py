@@ -1,12 +1,11 @@
 """``python -m benchmarks.recoveries``: runs recoveries, prints their ratios to the oracle."""
 
 import argparse
-from functools import partial
 from pathlib import Path
 
-from benchmarks.recoveries.cells import cells, compute, read_rows
-from benchmarks.recoveries.recover import recovered
+from benchmarks.recoveries.cells import cells, read_rows, write_rows
 from benchmarks.recoveries.table import table
+from selfmodel.experiments.grid import processes, run_grid
 from selfmodel.settings import Settings
 
 
@@ -14,8 +13,8 @@ def main() -> None:
     """Runs a command."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.recoveries", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
-    command = commands.add_parser("run", help="run recoveries, and append their rows to a file")
-    command.add_argument("rows", type=Path, help="file of the rows, ROWS.jsonl")
+    command = commands.add_parser("run", help="run recoveries in a folder, and write their rows")
+    command.add_argument("folder", type=Path, help="folder; the rows are in its results.jsonl")
     command.add_argument("--robots", default="quadruped,hexapod")
     command.add_argument("--cases", default="1,2,4,6")
     command.add_argument("--gaps", default="0.1")
@@ -36,15 +35,18 @@ def main() -> None:
 
 def _run(options: argparse.Namespace) -> None:
     settings = Settings(steps=options.steps, generations=options.generations)
-    row_of = partial(recovered, repair=options.repair, settings=settings.scaled(options.population))
     wanted = cells(
         options.robots.split(","),
         [int(case) for case in options.cases.split(",")],
         [float(gap) for gap in options.gaps.split(",")],
         [int(seed) for seed in options.seeds.split(",")],
+        repair=options.repair,
+        settings=settings.scaled(options.population),
     )
-    for row in compute(wanted, row_of, options.rows, options.jobs):
-        print(row, flush=True)
+    failed = run_grid(options.folder, wanted, workers=processes(options.jobs), on_progress=print)
+    print(write_rows(options.folder))
+    if failed:
+        raise SystemExit("\n".join(f"{end.key} failed: {end.error}" for end in failed))
 
 
 def _table(options: argparse.Namespace) -> None:

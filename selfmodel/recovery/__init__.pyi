@@ -20,3 +20,4 @@ from .repertoire.make import (
 from .repertoire.repertoire import Repertoire as Repertoire
 from .scores.energy import ENERGY as ENERGY
 from .scores.fitness import DISPLACEMENT as DISPLACEMENT, Score as Score
+from .scores.joint_limits import upright_within as upright_within

@@ -21,7 +21,7 @@ from selfmodel.recovery.posterior import (
 )
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.calibration import calibrate
+from selfmodel.simulation.calibration import Calibration, calibrate
 from selfmodel.simulation.model_distribution import Weighted
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Trial
@@ -39,10 +39,23 @@ def trials(robot: Robot, gap: float, folder: Path, count: int = 1) -> list[Trial
     ]
 
 
-def posterior(robot: Robot, healthy: list[Trial], seed: int = 0) -> Posterior:
-    calibration = calibrate(robot, healthy, 1)
+@pytest.fixture(scope="module")
+def healthy(quadruped: Robot, tmp_path_factory: pytest.TempPathFactory) -> list[Trial]:
+    """Two trials of a healthy robot across a gap."""
+    return trials(quadruped, 0.1, tmp_path_factory.mktemp("healthy"), count=2)
+
+
+@pytest.fixture(scope="module")
+def calibration(quadruped: Robot, healthy: list[Trial]) -> Calibration:
+    """Fit of the self-model to the first trial."""
+    return calibrate(quadruped, healthy[:1], 1)
+
+
+def posterior(calibration: Calibration, healthy: list[Trial], seed: int = 0) -> Posterior:
+    """The posterior of a small sample: 33 models."""
+    settings = Settings(generations=7).scaled(100)
     simulator = Simulator(calibration.robot, 1)
-    return Posterior(simulator, healthy, calibration, Settings(), np.random.default_rng(seed))
+    return Posterior(simulator, healthy, calibration, settings, np.random.default_rng(seed))
 
 
 def test_models_that_predict_the_path_weigh_more():
@@ -70,10 +83,9 @@ def test_the_effective_size_of_the_sample_is_bounded_below(spread: float):
 
 
 def test_a_trial_changes_the_weights_once_and_other_random_numbers_the_sample(
-    quadruped: Robot, tmp_path: Path
+    healthy: list[Trial], calibration: Calibration
 ):
-    healthy = trials(quadruped, 0.1, tmp_path, count=2)
-    own = posterior(quadruped, healthy[:1])
+    own = posterior(calibration, healthy[:1])
     first, again = (own.after(healthy[:1], INTACT) for _ in range(2))
     both = own.after(healthy, INTACT)
 
@@ -81,38 +93,44 @@ def test_a_trial_changes_the_weights_once_and_other_random_numbers_the_sample(
     np.testing.assert_array_equal(first.models.weights, again.models.weights)
     assert np.ptp(first.models.weights) > 0
     assert not np.array_equal(first.models.weights, both.models.weights)
-    other = posterior(quadruped, healthy[:1], seed=1).after(healthy[:1], INTACT)
+    other = posterior(calibration, healthy[:1], seed=1).after([], INTACT)
     assert not np.array_equal(other.models.models[0].factors, first.models.models[0].factors)
 
 
 def test_a_model_that_is_exact_stays_so_without_a_simulation(quadruped: Robot, tmp_path: Path):
-    healthy = trials(quadruped, 0.0, tmp_path)
-    own = posterior(quadruped, healthy)
+    exact = trials(quadruped, 0.0, tmp_path)
+    own = posterior(calibrate(quadruped, exact, 1), exact)
     before = own._simulator.stats.runs
-    found = own.after(healthy, INTACT)
+    found = own.after(exact, INTACT)
 
     assert not found.models.draw(np.random.default_rng(0)).differs
     assert own._simulator.stats.runs == before + 1  # the noise-free trial of the estimate
 
 
-def test_a_recording_of_other_software_is_a_trial_too(quadruped: Robot, tmp_path: Path):
-    (walked,) = trials(quadruped, 0.1, tmp_path)
+def test_a_recording_of_other_software_is_a_trial_too(
+    healthy: list[Trial], calibration: Calibration
+):
+    walked = healthy[0]
     played = Playback(walked.behaviour.names.motors, walked.behaviour["commands"])
     plan = walked.plan.__class__("played", "before", played, walked.plan.steps, 0)
     recording = Trial(plan, walked.robot, walked.behaviour, "played.mcap")
-    found = posterior(quadruped, [recording]).after([recording], INTACT)
+    found = posterior(calibration, [recording]).after([recording], INTACT)
 
     assert isinstance(found.models, Weighted)
 
 
-def test_a_base_that_was_missed_for_some_steps_is_interpolated(quadruped: Robot, tmp_path: Path):
-    (walked,) = trials(quadruped, 0.1, tmp_path)
+def test_a_base_that_was_missed_for_some_steps_is_interpolated(
+    healthy: list[Trial], calibration: Calibration
+):
+    walked = healthy[0]
     gappy = lacking(walked, ("base_position", "base_orientation"), slice(50, 55))
     never = lacking(walked, ("base_position", "base_orientation"))
-    own = posterior(quadruped, [walked])
-    whole, some = (own.after([trial], INTACT).models.weights for trial in (walked, gappy))
+    own = posterior(calibration, [walked])
+    whole = own.after([walked], INTACT).models.weights
+    some = own.after([dataclasses.replace(gappy, path="gappy")], INTACT).models.weights
     none = own.after([dataclasses.replace(never, path="never")], INTACT).models.weights
 
+    assert np.ptp(whole) > 0.05
     np.testing.assert_allclose(some, whole, atol=0.02)
     np.testing.assert_allclose(none, 1 / len(none))
 
@@ -126,11 +144,14 @@ def test_a_path_has_forward_and_sideways_position_and_heading_at_the_marks():
     np.testing.assert_allclose(_path(_track(position, orientation)), np.concatenate(expected))
 
 
-def test_the_healthy_trial_is_simulated_without_the_fault(quadruped: Robot, tmp_path: Path):
-    (walked,) = trials(quadruped, 0.1, tmp_path)
-    after = dataclasses.replace(walked, plan=dataclasses.replace(walked.plan, stage="after"))
-    own, fault = posterior(quadruped, [walked]), parse("break:front_left_knee", quadruped.anatomy)
-    healthy, damaged = (own.after([one], fault).models.weights for one in (walked, after))
+def test_the_healthy_trial_is_simulated_without_the_fault(
+    quadruped: Robot, healthy: list[Trial], calibration: Calibration
+):
+    walked = healthy[0]
+    plan = dataclasses.replace(walked.plan, stage="after")
+    after = dataclasses.replace(walked, plan=plan, path="after")
+    own, fault = posterior(calibration, [walked]), parse("break:front_left_knee", quadruped.anatomy)
+    weights, damaged = (own.after([one], fault).models.weights for one in (walked, after))
 
-    np.testing.assert_array_equal(healthy, own.after([walked], INTACT).models.weights)
-    assert not np.array_equal(healthy, damaged)
+    np.testing.assert_array_equal(weights, own.after([walked], INTACT).models.weights)
+    assert not np.array_equal(weights, damaged)

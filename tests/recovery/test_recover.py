@@ -41,7 +41,7 @@ from tests.helpers.drivers import random_controllers
 from tests.helpers.memory import MemoryJournal, in_memory
 
 TINY = dataclasses.replace(Settings().scaled(6), generations=2, steps=60)
-SMALL = dataclasses.replace(Settings().scaled(20), generations=5, steps=200)
+SMALL = dataclasses.replace(Settings().scaled(12), generations=3, steps=120)
 BUDGET = TINY
 """The settings of every recovery here: each test runs with both budgets."""
 
@@ -295,7 +295,7 @@ def recovery_in_files(
     robot: Robot, truth: Hypothesis, folder: Path, hidden: dict[Stage, str]
 ) -> tuple[Recovery, FolderJournal]:
     """A small recovery with logs, of which the algorithm reaches no more than it is given."""
-    journal = create_journal(folder, robot.anatomy)
+    journal = create_journal(folder, robot.anatomy, calibrated=False)
 
     class SealedJournal:
         add = staticmethod(journal.add)

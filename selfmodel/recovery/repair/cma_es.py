@@ -56,6 +56,8 @@ class CmaEs:
         settings: The paper's numbers, which set the size of a generation.
         rng: Source of all random numbers.
         seeds: Further genomes of the first generation.
+        share: Size of the first generation, relative to the population of the paper's EA.
+        deviation: Standard deviation of the first generation of a run from a random genome.
     """
 
     def __init__(
@@ -65,11 +67,14 @@ class CmaEs:
         settings: Settings,
         rng: np.random.Generator,
         seeds: Sequence[FloatArray] = (),
+        *,
+        share: float = RANDOM_SHARE,
+        deviation: float = DEVIATION,
     ) -> None:
-        self._rng = rng
+        self._rng, self._deviation = rng, deviation
         self._seeds = len(seeds)
         self._population = max(MIN_POPULATION, round(SHARE * settings.population))
-        size = max(STARTS + len(seeds), round(RANDOM_SHARE * settings.population))
+        size = max(STARTS + len(seeds), round(share * settings.population))
         self._asked = first_generation(size, length, draw, rng, seeds)
         self._runs: list[_Run] = []
         self.generation = 0
@@ -118,7 +123,7 @@ class CmaEs:
         order = np.argsort(-fitness, kind="stable")
         seeds = order[order < self._seeds][: STARTS // 2]
         random = order[order >= self._seeds][: STARTS - len(seeds)]
-        starts = [(i, SEED_DEVIATION) for i in seeds] + [(i, DEVIATION) for i in random]
+        starts = [(i, SEED_DEVIATION) for i in seeds] + [(i, self._deviation) for i in random]
         return [
             _Run(self._asked[i], deviation, self._population, self._rng) for i, deviation in starts
         ]

@@ -10,8 +10,12 @@ from selfmodel.evolution import Draw
 from selfmodel.settings import Settings
 
 Rollouts = Literal["short", "raced", "whole"]
-"""Rollouts of a generation: short ones, as of a random sample; whole ones of the leaders of each
-group alone; or whole ones."""
+"""Rollouts of a generation: short ones of ``SHORT_STEPS``, as of a random sample; ones of which
+only the leaders of each group go on to the end; or ones of which all do."""
+
+
+SHORT_STEPS = 200
+"""Control steps of short rollouts."""
 
 
 class GenomeSearch(Protocol):

@@ -19,7 +19,7 @@ from selfmodel.evolution import Generation, GenerationCallback, reproduce
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.recovery.repair.candidate_controller import CandidateController
 from selfmodel.recovery.repair.cma_es import CmaEs
-from selfmodel.recovery.repair.genome_search import GenomeSearch, MakeSearch
+from selfmodel.recovery.repair.genome_search import SHORT_STEPS, GenomeSearch, MakeSearch
 from selfmodel.recovery.repair.robust_fitness import RobustFitness, robust
 from selfmodel.recovery.scores.fitness import Score
 from selfmodel.recovery.scores.upright import UPRIGHT
@@ -27,11 +27,17 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.conditions import Uncertainty
 from selfmodel.simulation.simulator import Simulator
 
-COST = 2.0
-"""Simulated control steps of a repair, relative to those of the paper's repair EA."""
+FIRST_COST, COST = 2.8, 0.8
+"""Simulated control steps of a repair without and with a known controller to begin from, relative
+to those of the paper's repair EA."""
 
-FIRST_STEPS = 200
-"""Control steps of short rollouts."""
+ENOUGH = 600
+"""Rollouts up to which a repair with a known controller costs as much as one without: fewer may end
+below the known controller."""
+
+HALVED = 0.4
+"""Share of a search's budget in which its rollouts have half of the steps of a trial, with a score
+that grows with time."""
 
 FINALISTS, FINAL_CONDITIONS = 12, 4
 """Largest numbers of candidates of a search, and of conditions under which they are compared."""
@@ -40,8 +46,8 @@ JUDGED, JUDGED_CONDITIONS = 4, 16
 """Number of the best candidates of that comparison, and largest number of conditions under which
 these are compared at last."""
 
-JUDGING = 0.04
-"""Cost of both comparisons relative to that of the repair, approximately."""
+JUDGING = 0.08
+"""Cost of both comparisons relative to the evaluations of the paper's repair EA, at most."""
 
 
 class RobustRepair:
@@ -85,9 +91,10 @@ class RobustRepair:
         """
         fitness = RobustFitness(self._simulator, self._score, hypotheses, uncertainty())
         known = [controller for controller in seeds if controller.design == self._design]
+        evaluations = rollouts_of(self._settings, known=bool(known))
         comparisons = _comparisons(self._settings)
         judging = sum(candidates * conditions for candidates, conditions in comparisons)
-        budget = (COST * self._settings.evaluations - judging) * self._settings.steps
+        budget = float(evaluations - judging) * self._settings.steps
         search = self._searched(fitness, known, budget, rng, on_generation)
         self.evaluations += search.evaluations
         found = self._finalists(search, known, comparisons[0][0], rng)
@@ -114,15 +121,22 @@ class RobustRepair:
         """Returns the search after it has spent a budget of control steps."""
         genomes = [controller.genome for controller in known]
         design, settings, stats = self._design, self._settings, self._simulator.stats
+        halved = HALVED * budget if self._score.grows_with_time else 0.0
         search = self._make_search(design.weights, draw_genomes, settings, rng, genomes)
         begin, number, start = stats.steps, 0, perf_counter()
         while not number or stats.steps - begin < budget:
             before, asked = stats.steps, self._controllers(search.ask())
-            scores = _scores(fitness, search, asked, settings.steps, rng)
+            steps = _half(settings.steps) if before - begin < halved else settings.steps
+            scores = _scores(fitness, search, asked, steps, rng)
             search.tell(scores)
             number += 1
-            ahead = (stats.steps - before) * len(search.ask()) / len(asked)
-            left = math.ceil(max(0.0, begin + budget - stats.steps) / ahead)
+            ahead = (stats.steps - before) / steps * len(search.ask()) / len(asked)
+            left = _generations(begin + budget - stats.steps, ahead * settings.steps)
+            if stats.steps - begin < halved:
+                short = ahead * _half(settings.steps)
+                left = _generations(begin + halved - stats.steps, short) + _generations(
+                    budget - halved, ahead * settings.steps
+                )
             on_generation(
                 Generation(
                     number=number,
@@ -157,10 +171,31 @@ class RobustRepair:
         return [Controller(self._design, genome) for genome in genomes]
 
 
+def rollouts_of(settings: Settings, *, known: bool) -> int:
+    """Returns the number of whole rollouts that a repair may cost.
+
+    Args:
+        settings: The paper's numbers.
+        known: Whether there is a known controller to begin from.
+    """
+    most = FIRST_COST * settings.evaluations
+    return round(min(most, max(COST * settings.evaluations, ENOUGH)) if known else most)
+
+
+def _half(steps: int) -> int:
+    """Returns half of the steps of a rollout, but no fewer than those of a short one."""
+    return min(steps, max(SHORT_STEPS, steps // 2))
+
+
+def _generations(budget: float, cost: float) -> int:
+    """Returns the number of generations of a cost that spend a budget."""
+    return math.ceil(max(0.0, budget) / cost)
+
+
 def _comparisons(settings: Settings) -> tuple[tuple[int, int], tuple[int, int]]:
     """Returns the number of candidates and of conditions of both comparisons."""
     finalists = min(FINALISTS, settings.population)
-    rollouts = JUDGING * COST * settings.evaluations / 2
+    rollouts = JUDGING * settings.evaluations / 2
     first = max(1, min(FINAL_CONDITIONS, round(rollouts / finalists)))
     last = max(2, min(JUDGED_CONDITIONS, round(rollouts / JUDGED)))
     return (finalists, first), (JUDGED, last)
@@ -176,5 +211,5 @@ def _scores(
     """Returns the scores of a generation, ``(controllers,)``, with the rollouts that it needs."""
     if search.rollouts == "raced":
         return fitness.race(controllers, search.groups, steps, rng)
-    horizon = min(FIRST_STEPS, steps) if search.rollouts == "short" else steps
+    horizon = min(SHORT_STEPS, steps) if search.rollouts == "short" else steps
     return fitness(controllers, 1, horizon, rng)[:, 0]

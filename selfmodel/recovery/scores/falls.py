@@ -1,8 +1,10 @@
 """Falls of a robot, from the pose of its base."""
 
+import math
+
 import numpy as np
 
-from selfmodel.arrays import FloatArray, IndexArray
+from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.rotation import directions
 
@@ -13,12 +15,20 @@ the ground, as a swimmer's, cannot fall by this rule."""
 FALLEN_TILT = np.radians(60)
 """Tilt above which a base has fallen, relative to its initial orientation, rad."""
 
+FALLEN_TIME = 0.25
+"""Time over which a fall is judged, s: a base that has fallen is low or tilted in more than half of
+the measurements. A low stride or a wrong measurement is shorter."""
+
 
 def first_falls(behaviour: Behaviour, normals: FloatArray, standing_height: float) -> IndexArray:
     """Returns the first step at which the robot has fallen, or the number of steps without a fall.
 
+    At that step the base is low or tilted, and so it is in more than half of the measurements of
+    the next ``FALLEN_TIME``, or of the rest of the run if that is shorter.
+
     Args:
-        behaviour: Position and orientation of the base, ``(..., steps, width)`` each.
+        behaviour: Position and orientation of the base, ``(..., steps, width)`` each; NaN where not
+            observed.
         normals: Unit normals of the ground, ``(..., 3)``, broadcast to the shape of the runs. The
             ground passes through the origin.
         standing_height: Height of the base in the initial pose, m.
@@ -27,9 +37,55 @@ def first_falls(behaviour: Behaviour, normals: FloatArray, standing_height: floa
         Step indices, ``(...)``.
     """
     height = np.einsum("...sk,...k->...s", behaviour["base_position"], normals)
-    upward = directions(behaviour["base_orientation"])[..., 2:]  # world's up, in the base frame
-    # Cosine of the tilt.
-    upright = (upward * upward[..., :1, :]).sum(axis=-1)
+    upright = _cosines_of_tilt(directions(behaviour["base_orientation"])[..., 2:])
     low = (height < FALLEN_HEIGHT * standing_height) & (standing_height > 0)
-    fallen = low | (upright < np.cos(FALLEN_TILT))
-    return np.where(fallen.any(axis=-1), fallen.argmax(axis=-1), behaviour.steps)
+    down = low | (upright < np.cos(FALLEN_TILT))
+    up = ~down & (np.isfinite(height) | np.isfinite(upright))
+    return first_lasting(down, up, steps_of(FALLEN_TIME, behaviour))
+
+
+def first_lasting(state: BoolArray, other: BoolArray, steps: int) -> IndexArray:
+    """Returns the first step of a state that lasts, or the number of steps without one, ``(...)``.
+
+    Args:
+        state: Steps of the state, ``(..., steps)``; it lasts if it is more frequent in the next
+            steps than the other.
+        other: Steps of the other state; a step of neither is not known.
+        steps: Number of the next steps, with the step itself.
+    """
+    lasting = state & (_ahead(state, steps) > _ahead(other, steps))
+    first: IndexArray = np.where(lasting.any(axis=-1), lasting.argmax(axis=-1), state.shape[-1])
+    return first
+
+
+def steps_of(duration: float, behaviour: Behaviour) -> int:
+    """Returns the control steps in a time, s, at least 1."""
+    return max(1, round(duration / _timestep(behaviour)))
+
+
+def _cosines_of_tilt(upward: FloatArray) -> FloatArray:
+    """Returns the cosine of the tilt from the first known orientation, ``(..., steps)``.
+
+    Args:
+        upward: The world's upward direction in the base frame, ``(..., steps, 3)``.
+    """
+    first = np.isfinite(upward).all(axis=-1).argmax(axis=-1)
+    reference = np.take_along_axis(upward, first[..., np.newaxis, np.newaxis], axis=-2)
+    return np.asarray((upward * reference).sum(axis=-1))
+
+
+def _timestep(behaviour: Behaviour) -> float:
+    """Returns the control time step, s; infinity for a single step."""
+    return float(behaviour.time[1] - behaviour.time[0]) if behaviour.steps > 1 else math.inf
+
+
+def _ahead(state: BoolArray, steps: int) -> IndexArray:
+    """Returns the number of the next steps, from each one on, in which a state holds.
+
+    Args:
+        state: ``(..., steps)``.
+        steps: Number of steps to count; fewer at the end.
+    """
+    total: IndexArray = np.cumsum(state, axis=-1)
+    last = np.minimum(np.arange(state.shape[-1]) + steps - 1, state.shape[-1] - 1)
+    return np.asarray(total[..., last] - total + state)

@@ -24,12 +24,15 @@ class Score:
             ``(n, steps, width)`` per signal, that returns the scores, ``(n,)``. The score of a
             rollout does not depend on the other rollouts of the batch.
         unit: Unit of the score; "" for none.
+        grows_with_time: Whether rollouts of half the steps rank controllers approximately as whole
+            ones do, so that a search may begin with them.
     """
 
     name: str
     record: tuple[Signal, ...]
     of: Callable[[Robot, Hypothesis, Behaviour], FloatArray]
     unit: str = ""
+    grows_with_time: bool = False
 
     def of_trial(self, robot: Robot, hypothesis: Hypothesis, trial: Trial) -> float:
         """Returns the score of a physical trial; NaN where its signals were not observed.
@@ -49,5 +52,7 @@ def _displacement(_robot: Robot, _hypothesis: Hypothesis, behaviour: Behaviour) 
     return forward_displacement(behaviour)
 
 
-DISPLACEMENT = Score("displacement", ("base_position",), _displacement, "m")
+DISPLACEMENT = Score(
+    "displacement", ("base_position",), _displacement, unit="m", grows_with_time=True
+)
 """Forward displacement, m. Source: the paper, section III."""

@@ -52,12 +52,16 @@ def _displacement_until_a_fall(
 
 
 UPRIGHT = Score(
-    "upright", ("base_position", "base_orientation"), _displacement_until_a_fall, unit="m"
+    "upright",
+    ("base_position", "base_orientation"),
+    _displacement_until_a_fall,
+    unit="m",
+    grows_with_time=True,
 )
 """Forward displacement up to the last step before the robot falls, m.
 
-A robot has fallen at the first step at which its base is tilted by more than ``FALLEN_TILT`` from
-its initial orientation, or is lower than ``FALLEN_HEIGHT`` of its standing height. What follows a
-fall counts nothing: a controller that tips the robot over and crawls on its back earns what it
-walked before.
+A robot has fallen at the first step from which its base is, for most of ``FALLEN_TIME`` or of the
+rest of the run, tilted by more than ``FALLEN_TILT`` from its initial orientation, or lower than
+``FALLEN_HEIGHT`` of its standing height. What follows a fall counts nothing: a controller that tips
+the robot over and crawls on its back earns what it walked before.
 """

@@ -14,7 +14,7 @@ from selfmodel.recovery.repertoire.repertoire import Origin, Repertoire
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from tests.helpers.stub_robot import StubRobot
+from tests.helpers.robots.stub_robot import StubRobot
 
 LEVEL = np.array([0.0, 0.0, 1.0])
 """Normal of a level ground."""

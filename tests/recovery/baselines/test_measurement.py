@@ -6,7 +6,7 @@ from selfmodel.errors import TrialError
 from selfmodel.recovery.baselines.measurement import Measured, Track, measure
 from selfmodel.robot.robot import Robot
 from tests.helpers.drivers import random_controllers
-from tests.helpers.stub_robot import StubRobot
+from tests.helpers.robots.stub_robot import StubRobot
 from tests.recovery.baselines.problems import LEVEL
 
 

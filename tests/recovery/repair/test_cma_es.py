@@ -32,8 +32,7 @@ def test_it_finds_the_maximum():
 def test_after_the_race_one_start_is_left():
     sizes = [len(run(count).ask()) for count in (1, 1 + PRUNED_AFTER[0], 1 + PRUNED_AFTER[1])]
     one = round(0.24 * 40)
-    assert sizes == [STARTS * one, STARTS * one, STARTS // 2 * one] or sizes[-1] == one
-    assert len(run(2 + PRUNED_AFTER[1]).ask()) == one
+    assert sizes == [STARTS * one, STARTS // 2 * one, one]
 
 
 def test_a_run_starts_from_a_good_seed_and_stays_near_it():

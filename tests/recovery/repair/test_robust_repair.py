@@ -1,22 +1,31 @@
 """Promises of the robust repair: its cost, its candidates, its errors."""
 
 import dataclasses
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
 import pytest
 
-from selfmodel.controllers.controller import draw_genomes
+from selfmodel.controllers.controller import Controller, draw_genomes
 from selfmodel.errors import WorkError
 from selfmodel.evolution import Generation
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.recovery.repair.candidate_controller import CandidateController
+from selfmodel.recovery.repair.genome_search import SHORT_STEPS
 from selfmodel.recovery.repair.noisy_ea import NoisyEa
 from selfmodel.recovery.repair.paper_repair import RepairSearch
 from selfmodel.recovery.repair.robust_fitness import RobustFitness, robust
-from selfmodel.recovery.repair.robust_repair import COST, RobustRepair
-from selfmodel.recovery.scores.fitness import DISPLACEMENT
+from selfmodel.recovery.repair.robust_repair import (
+    COST,
+    FIRST_COST,
+    RobustRepair,
+    rollouts_of,
+)
+from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
+from selfmodel.recovery.scores.joint_limits import upright_within
+from selfmodel.recovery.scores.upright import UPRIGHT
 from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
@@ -24,18 +33,24 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from tests.helpers.hostile import unstable
 
+LAST = Score("last", ("base_position",), lambda *given: given[2]["base_position"][..., -1, 0])
+
 SMALL = dataclasses.replace(Settings().scaled(20), generations=8, steps=100)
 
 
 def repaired(
-    robot: Robot, simulator: Simulator, seed: int = 0, **options: object
+    robot: Robot,
+    simulator: Simulator,
+    seed: int = 0,
+    seeds: Sequence[Controller] = (),
+    **options: object,
 ) -> tuple[tuple[CandidateController, ...], list[Generation]]:
     repair = RobustRepair(simulator, SMALL, network_for(robot), DISPLACEMENT, **options)
     generations: list[Generation] = []
     found = repair(
         (INTACT,),
         partial(assumed_uncertainty, robot),
-        (),
+        seeds,
         np.random.default_rng(seed),
         generations.append,
     )
@@ -57,15 +72,86 @@ def test_candidates_are_better_than_chance_under_new_conditions_and_best_first(q
     assert found[0].predicted == pytest.approx(found[0].scores.mean())
 
 
-def test_it_costs_twice_the_papers_search_and_reports_its_progress(quadruped: Robot):
-    # Of a budget that exceeds the last comparison of the candidates.
-    simulator = Simulator(quadruped, 2)
-    _, generations = repaired(quadruped, simulator)
+@pytest.mark.parametrize("known", [0, 1])
+def test_it_costs_what_it_may_and_reports_its_progress(quadruped: Robot, known: int):
+    simulator, design = Simulator(quadruped, 2), network_for(quadruped)
+    seeds = [Controller(design, np.zeros(design.weights))] * known
+    _, generations = repaired(quadruped, simulator, seeds=seeds)
     largest = max(len(range(4)) * 5, 40)  # a generation more, at most
+    cost, spent = rollouts_of(SMALL, known=bool(known)), simulator.stats.steps / SMALL.steps
 
-    assert simulator.stats.steps <= (COST * SMALL.evaluations + largest + 150) * SMALL.steps
+    assert 0.9 * cost < spent < cost + largest + 150
     assert [own.number for own in generations] == list(range(1, len(generations) + 1))
     assert generations[-1].number == generations[-1].total
+
+
+@pytest.mark.parametrize(
+    ("score", "steps"),
+    [
+        (DISPLACEMENT, {300, 600}),
+        (UPRIGHT, {300, 600}),
+        (upright_within(), {300, 600}),
+        (LAST, {600}),
+    ],
+    ids=lambda given: getattr(given, "name", ""),
+)
+def test_rollouts_have_half_of_the_steps_at_first_with_a_score_that_grows_with_time(
+    quadruped: Robot, score: Score, steps: set[int]
+):
+    settings = dataclasses.replace(Settings().scaled(6), generations=4, steps=600)
+    asked: list[int] = []
+
+    class Watched(Simulator):
+        def run_under(self, conditions, uncertainty, controllers, steps, *rest, **options):  # noqa: ANN001, ANN002, ANN003, ANN202
+            asked.append(steps)
+            return super().run_under(conditions, uncertainty, controllers, steps, *rest, **options)
+
+    RobustRepair(Watched(quadruped, 2), settings, network_for(quadruped), score)(
+        (INTACT,),
+        partial(assumed_uncertainty, quadruped),
+        (),
+        np.random.default_rng(0),
+        lambda _generation: None,
+    )
+    random, *searched = asked[:-2]
+    assert random == SHORT_STEPS
+    assert searched == sorted(searched)
+    halves = sum(300 for one in searched if one == 300)
+    assert halves <= 0.5 * sum(searched), "the share of half rollouts is HALVED"
+    assert {*searched} == steps
+    assert asked[-2:] == [600, 600], "candidates are compared over whole trials"
+
+
+def test_candidates_of_every_repair_of_the_papers_budget_are_compared_under_many_conditions(
+    quadruped: Robot,
+):
+    compared: list[int] = []
+
+    class Watched(Simulator):
+        def run_under(self, conditions, uncertainty, controllers, *rest, **options):  # noqa: ANN001, ANN002, ANN003, ANN202
+            compared.append(len(conditions))
+            return super().run_under(conditions, uncertainty, controllers, *rest, **options)
+
+    settings = dataclasses.replace(Settings(), steps=2)
+    known = Controller(design := network_for(quadruped), np.zeros(design.weights))
+    RobustRepair(Watched(quadruped, 2), settings, design, DISPLACEMENT)(
+        (INTACT,),
+        partial(assumed_uncertainty, quadruped),
+        (known,),
+        np.random.default_rng(0),
+        lambda _generation: None,
+    )
+    assert compared[-2:] == [4, 16]
+
+
+def test_a_known_controller_makes_a_large_repair_cheaper_and_no_small_one():
+    large = Settings()
+    assert rollouts_of(large, known=True) == round(COST * large.evaluations)
+    assert rollouts_of(large, known=False) == FIRST_COST * large.evaluations
+    assert rollouts_of(SMALL, known=True) == rollouts_of(SMALL, known=False)
+    medium = Settings().scaled(30)
+    assert rollouts_of(medium, known=True) == 600
+    assert COST * medium.evaluations < 600 < FIRST_COST * medium.evaluations
 
 
 def test_the_number_of_threads_changes_nothing(quadruped: Robot):
@@ -82,7 +168,7 @@ def test_the_papers_ea_can_be_its_search(quadruped: Robot):
     assert np.isfinite(found[0].scores).all()
     assert generations[0].evaluations == SMALL.population
     assert generations[-1].number == generations[-1].total
-    assert generations[-1].evaluations >= 0.85 * COST * SMALL.evaluations
+    assert generations[-1].evaluations >= 0.85 * FIRST_COST * SMALL.evaluations
 
 
 def test_only_the_hypotheses_that_are_given_are_simulated(quadruped: Robot):

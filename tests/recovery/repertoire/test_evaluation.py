@@ -12,8 +12,8 @@ from selfmodel.recovery.scores.upright import falls_of
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import forward_displacement
-from tests.helpers.arms import arm
 from tests.helpers.drivers import random_controllers
+from tests.helpers.robots.arms import arm
 
 STEPS = 150
 

@@ -10,8 +10,8 @@ from selfmodel.faults.notation import parse
 from selfmodel.recovery.scores.tracking import Reference, tracking
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.helpers.arms import arm
 from tests.helpers.drivers import random_cpgs
+from tests.helpers.robots.arms import arm
 
 HINGES = arm().anatomy.hinges
 TIME = np.arange(50) * arm().control_timestep

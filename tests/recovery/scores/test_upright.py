@@ -6,13 +6,14 @@ import pytest
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
+from selfmodel.recovery.scores.falls import FALLEN_TIME
 from selfmodel.recovery.scores.fitness import DISPLACEMENT
 from selfmodel.recovery.scores.upright import UPRIGHT, falls_of
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
-from tests.helpers.arms import arm
 from tests.helpers.drivers import random_controllers, random_cpgs
+from tests.helpers.robots.arms import arm
 
 STEPS = 5
 
@@ -23,7 +24,7 @@ def walked(robot: Robot, x: list[float], tilts: list[float], heights: list[float
     orientation = np.stack([np.cos(half), 0 * half, np.sin(half), 0 * half], axis=1)
     position = np.stack([x, np.zeros(len(x)), heights], axis=1)
     signals = {"base_position": position[None], "base_orientation": orientation[None]}
-    return Behaviour(robot.anatomy.names, np.arange(len(x)) * 0.01, signals)
+    return Behaviour(robot.anatomy.names, np.arange(len(x)) * FALLEN_TIME, signals)
 
 
 def test_a_run_without_a_fall_has_its_displacement(quadruped: Robot):
