@@ -9,22 +9,27 @@ signals of the healthy robot.
 
 import argparse
 import dataclasses
-from collections.abc import Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from selfmodel.experiments.ablation.plan import spec
 from selfmodel.experiments.ablation.results import write_results
-from selfmodel.experiments.ablation.run_one import diagnose_run, setting_of
+from selfmodel.experiments.ablation.run_one import diagnose_run
 from selfmodel.experiments.ablation.scores import ComparatorScore
-from selfmodel.experiments.grid import GridBegins, Job, PartEnds, finished, run_grid
-from selfmodel.experiments.study_files import as_dicts
-from selfmodel.logs.reader import read_log
+from selfmodel.experiments.ablation.trials import read_trials, setting_of
+from selfmodel.experiments.grid import (
+    Cell,
+    GridBegins,
+    PartEnds,
+    finished,
+    processes,
+    run_grid,
+)
+from selfmodel.experiments.study.files import as_dicts
 from selfmodel.simulation.calibration import calibrate
-from selfmodel.trials.state_estimation import BASE
+from selfmodel.trials.estimation.state_estimation import BASE
 from selfmodel.trials.trial import Trial
 
 COMPARATOR = "segment-prediction-onboard"
@@ -39,20 +44,21 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=4, help="the runs of the seeds below this")
     parser.add_argument("--workers", type=int, default=2)
     options = parser.parse_args()
-    done = {part.key: part for part in finished(options.folder / "runs")}.values()
-    jobs = [
-        Job(run.key, run.parameters, run.seed, (COMPARATOR,))
-        for run in done
-        if run.seed < options.seeds
-        and run.parameters["robot"] in options.robots.split(",")
-        and run.parameters["shared"]["next_trial"] == "bank"
+    cells = [
+        Cell(
+            "benchmarks.onboard:diagnoses",
+            run.key,
+            {**run.parameters, "trials": str(run.path.parent.resolve())},
+            run.seed,
+            COMPARATOR,
+        )
+        for run in finished(options.folder / "trials")
+        if run.seed < options.seeds and run.parameters["robot"] in options.robots.split(",")
     ]
-    if not jobs:
+    if not cells:
         raise SystemExit(f"{options.folder} has no run of an ablation with these robots and seeds")
-    diagnose = partial(_diagnoses, options.folder / "runs")
-    failed = run_grid(
-        options.out / "runs", jobs, diagnose, workers=options.workers, on_progress=_print_progress
-    )
+    workers = processes(options.workers)
+    failed = run_grid(options.out, cells, workers=workers, on_progress=_print_progress)
     print(table(write_results(options.out).scores))
     if failed:
         raise SystemExit("\n".join(f"{part.key} failed: {part.error}" for part in failed))
@@ -90,16 +96,15 @@ def _print_progress(event: GridBegins | PartEnds) -> None:
         print(f"{event.number} of {event.total}: {event.key}, {event.seconds:.0f} s", flush=True)
 
 
-def _diagnoses(runs: Path, of: Job, comparator: str, _folder: Path) -> list[dict[str, Any]]:
-    folder = runs / of.key
-    setting = setting_of(spec(of), comparator, folder)
-    trials = [
-        without_base(read_log(path).trial) for path in sorted((folder / "trials").glob("*.mcap"))
-    ]
-    healthy = [trial for trial in trials if trial.plan.stage == "before"]
-    failed = [trial for trial in trials if trial.plan.stage == "after"]
+def diagnoses(cell: Cell, _needs: Mapping[str, Path], _folder: Path) -> list[dict[str, Any]]:
+    """Returns the rows of the diagnoses of a run."""
+    setting = setting_of(cell)
+    healthy, failed = (
+        [without_base(trial) for trial in trials]
+        for trials in read_trials(Path(cell.parameters["trials"]))
+    )
     fitted = calibrate(setting.robot, healthy, threads=1).robot
-    return as_dicts(diagnose_run(setting, fitted, healthy, failed))
+    return as_dicts(diagnose_run(setting, cell.part, fitted, healthy, failed))
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ import numpy as np
 from selfmodel.controllers.command_source import make_batch
 from selfmodel.controllers.controller import Controller
 from selfmodel.experiments.grid import finished
+from selfmodel.experiments.study.gaits import FILE
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.logs import load_controller
@@ -73,7 +74,7 @@ def main() -> None:
     walks: dict[str, list[Walk]] = {}
     for gait in finished(folder):
         robot = ROBOTS[gait.parameters["robot"]].robot()
-        controller = load_controller(folder / f"{gait.key}.npz")
+        controller = load_controller(gait.path.with_name(FILE))
         steps = gait.parameters["settings"]["steps"]
         walks.setdefault(robot.name, []).append(walk(robot, controller, steps))
     print("| robot | median m | lowest | highest | torso | deepest, mm | walking |")

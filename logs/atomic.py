@@ -30,6 +30,23 @@ def write_atomic(path: Path, data: bytes) -> None:
     sync_folder(path.parent)
 
 
+def write_exclusive(path: Path, data: bytes) -> None:
+    """Writes a file that does not exist yet.
+
+    Raises:
+        FileExistsError: The file exists; it is unchanged.
+        OSError: Writing failed; no file is left.
+    """
+    with path.open("xb") as file:
+        try:
+            file.write(data)
+            sync(file)
+        except OSError:
+            with suppress(OSError):  # the first error is the reason
+                path.unlink()
+            raise
+
+
 def sync(file: IO[bytes]) -> None:
     """Flushes a file to the disk."""
     file.flush()

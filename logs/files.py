@@ -3,13 +3,20 @@
 import errno
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from itertools import chain, count
 from os import PathLike
 from pathlib import Path
 from typing import IO
 
 from selfmodel.errors import InputError
-from selfmodel.logs.atomic import partial_path, sync, sync_folder, write_atomic
+from selfmodel.logs.atomic import (
+    partial_path,
+    sync,
+    sync_folder,
+    write_atomic,
+    write_exclusive,
+)
 from selfmodel.logs.errors import LogWriteError
 
 
@@ -86,6 +93,71 @@ def replace_file(path: Path, data: bytes) -> None:
         raise not_written(path, error) from error
 
 
+def write_new(path: Path, data: bytes) -> Path:
+    """Writes a new file in one atomic step, and replaces none that was created meanwhile.
+
+    Returns:
+        ``path``; if that name was taken, the next one that is free, such as ``NAME-2.html``.
+
+    Raises:
+        LogWriteError: Writing failed, and no file is left; or the finished file could not get its
+            name, and the error has the name that it has.
+    """
+    try:
+        part = _written(map(partial_path, _numbered(path)), data)
+    except OSError as error:
+        raise not_written(path, error) from error
+    try:
+        name = _named(part, _numbered(path))
+        sync_folder(path.parent)
+    except OSError as error:
+        raise not_written(path, error, kept=f"the finished file is {part}: rename it") from error
+    return name
+
+
+def _numbered(path: Path) -> Iterator[Path]:
+    """Yields a name, and further ones with a number."""
+    yield path
+    for number in count(2):
+        yield path.with_stem(f"{path.stem}-{number}")
+
+
+def _written(names: Iterator[Path], data: bytes) -> Path:
+    """Writes a file under the first name that is free, and returns the name."""
+    for name in names:
+        with suppress(FileExistsError):
+            write_exclusive(name, data)
+            break
+    return name
+
+
+def _named(part: Path, names: Iterator[Path]) -> Path:
+    """Gives a complete file the first name that is free, and returns the name."""
+    for name in names:
+        try:
+            os.link(part, name)  # unlike a rename, a link never replaces a file
+        except FileExistsError:
+            continue
+        except OSError:
+            # File systems and sandboxes refuse hard links with many errors. An empty file that is
+            # created exclusively keeps the name free for a rename.
+            return _renamed(part, _written(chain([name], names), b""))
+        part.unlink()
+        break
+    return name
+
+
+def _renamed(part: Path, empty: Path) -> Path:
+    """Renames a complete file to the name of an empty one, and returns the name."""
+    try:
+        part.replace(empty)
+    except OSError:
+        with suppress(OSError):  # the first error is the reason
+            empty.unlink()
+        raise
+    return empty
+
+
 def make_folder(path: Path) -> None:
     """Makes a folder with its parents, unless it exists.
 
@@ -98,11 +170,13 @@ def make_folder(path: Path) -> None:
         raise not_written(path, error) from error
 
 
-def not_written(path: str | PathLike[str], cause: OSError) -> LogWriteError:
+def not_written(
+    path: str | PathLike[str],
+    cause: OSError,
+    kept: str = "files that were finished before are kept",
+) -> LogWriteError:
     """Returns the error of a file that is written as a whole."""
-    return LogWriteError(
-        path, cause, again="run the command again", kept="files that were finished before are kept"
-    )
+    return LogWriteError(path, cause, again="run the command again", kept=kept)
 
 
 @contextmanager

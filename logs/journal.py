@@ -1,4 +1,4 @@
-"""Folder of a recovery: one log per trial, and the diagnoses."""
+"""Folder of a recovery: its options, one log per trial, and the diagnoses."""
 
 import json
 from collections.abc import Sequence
@@ -15,12 +15,14 @@ from selfmodel.files import read_file
 from selfmodel.logs.errors import CorruptError, SchemaMismatchError
 from selfmodel.logs.files import replace_file
 from selfmodel.logs.reader import read_log
-from selfmodel.logs.result_files import MAX_BYTES, parse_json
+from selfmodel.logs.result_files import MAX_BYTES, parse_json, read_result, result_bytes
 from selfmodel.recovery.database import Database
 from selfmodel.robot.anatomy.anatomy import Anatomy
 
 TRIALS = "trials"
 DIAGNOSES = "diagnoses.json"
+OPTIONS = "options.json"
+"""File of the options that no log has, written before the first trial."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +51,7 @@ class FolderJournal:
             CorruptError: The file of the earlier diagnoses is damaged.
             LogWriteError: The disk is full, or failed.
         """
-        earlier = _read_diagnoses(self.folder, self.space)
+        earlier = read_diagnoses(self.folder, self.space)
         values = [each.to_dict() for each in (*earlier, diagnosis)]
         text = json.dumps(values, indent=1, allow_nan=False)
         replace_file(self.folder / DIAGNOSES, text.encode())
@@ -68,7 +70,7 @@ class FolderJournal:
                 f"{self.folder}: expected the folder of a run, with a folder {TRIALS} in it"
             )
         trials = tuple(
-            read_log(path).trial for path in sorted(self.trials.glob("*.mcap"), key=_trial_order)
+            read_log(path).trial for path in sorted(self.trials.glob("*.mcap"), key=trial_order)
         )
         for trial in trials:
             if trial.behaviour.names != self.space.anatomy.names:
@@ -77,11 +79,11 @@ class FolderJournal:
                     f"it is of the robot {trial.robot!r}, with other sensors, motors or hinges",
                     advice="give the folder of a run of one robot",
                 )
-        return Database(trials, _read_diagnoses(self.folder, self.space))
+        return Database(trials, read_diagnoses(self.folder, self.space))
 
 
 def create_journal(
-    folder: Path, anatomy: Anatomy, kinds: Sequence[FaultKind] = ()
+    folder: Path, anatomy: Anatomy, kinds: Sequence[FaultKind] = (), *, calibrated: bool
 ) -> FolderJournal:
     """Makes the folder of a new run.
 
@@ -89,9 +91,12 @@ def create_journal(
         folder: New or empty folder.
         anatomy: Parts of the robot.
         kinds: Third-party kinds that the diagnoses may name, in addition to built-in kinds.
+        calibrated: Whether the self-model is fitted to the trials before the failure: whether
+            ``recover`` gets ``calibrate``. A report of an unfinished run repeats the fit.
 
     Raises:
         InputError: The folder is not empty, or cannot be made.
+        LogWriteError: The disk is full, or failed.
     """
     try:
         holds = sorted(entry.name for entry in folder.iterdir()) if folder.exists() else []
@@ -108,16 +113,44 @@ def create_journal(
         raise InputError(
             f"{folder} cannot be made: {error.strerror}; choose another folder"
         ) from error
+    replace_file(folder / OPTIONS, result_bytes({"calibrated": calibrated}))
     return FolderJournal(folder, HypothesisSpace(anatomy, tuple(kinds)))
 
 
-def _trial_order(path: Path) -> tuple[int, str]:
-    """Sort key of a log: the number before the first dash, as an integer: 100 follows 99."""
+def is_calibrated(folder: Path) -> bool:
+    """Returns whether the self-model of a run is fitted to the trials before the failure.
+
+    A run of an earlier version did not record that: it counts as one with the default.
+
+    Raises:
+        InputError: The file of the options is damaged, or was altered.
+    """
+    path = folder / OPTIONS
+    if not path.exists():
+        return True
+    what, remedy = "the options of a run", "move it away, and the run counts as calibrated"
+    calibrated = read_result(path, what, remedy).content.get("calibrated")
+    if not isinstance(calibrated, bool):
+        raise InputError(f"{path}: expected {what}, true or false as calibrated; {remedy}")
+    return calibrated
+
+
+def trial_order(path: Path) -> tuple[int, str]:
+    """Returns the sort key of a log: the number before the first dash; 100 follows 99."""
     digits = path.stem.partition("-")[0]
     return (int(digits) if digits.isdecimal() else 0, path.name)
 
 
-def _read_diagnoses(folder: Path, space: HypothesisSpace) -> tuple[Diagnosis, ...]:
+def read_diagnoses(folder: Path, space: HypothesisSpace) -> tuple[Diagnosis, ...]:
+    """Returns the diagnoses in the folder of a run; none if the run has none yet.
+
+    Args:
+        folder: The folder.
+        space: Hypotheses that the diagnoses may name.
+
+    Raises:
+        CorruptError: The file is damaged.
+    """
     path = folder / DIAGNOSES
     if not path.exists():
         return ()

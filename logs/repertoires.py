@@ -83,14 +83,29 @@ def load_repertoire(path: Path, robot: Modelled | None = None) -> Repertoire:
         InputError: The file is no repertoire, is damaged, or is of another model.
     """
     repertoire = parse_repertoire(read_file(path, "a repertoire file", MAX_BYTES), str(path))
-    if robot is not None and repertoire.origin.model != model_digest(robot):
+    if robot is not None:
+        check_model(repertoire, robot, str(path))
+    return repertoire
+
+
+def check_model(repertoire: Repertoire, robot: Modelled, source: str) -> None:
+    """Checks that a repertoire is of a robot.
+
+    Args:
+        repertoire: The repertoire.
+        robot: The robot.
+        source: Name of the file, for the error message.
+
+    Raises:
+        InputError: The repertoire is of another model.
+    """
+    if repertoire.origin.model != model_digest(robot):
         raise InputError(
-            f"{path}: expected a repertoire of {robot.name} with the model "
+            f"{source}: expected a repertoire of {robot.name} with the model "
             f"{model_digest(robot)[:12]}, got one of {repertoire.origin.robot} with the model "
             f"{repertoire.origin.model[:12]}: make a repertoire of this model with `selfmodel "
             f"repertoire make`"
         )
-    return repertoire
 
 
 def parse_repertoire(data: bytes, source: str) -> Repertoire:

@@ -7,6 +7,8 @@ from pathlib import Path
 
 # dm_control looks for a display as it is imported; nothing here is drawn.
 os.environ["MUJOCO_GL"] = "disable"
+# Of many small matrices: more threads only wait for each other, and for the other worker's.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import pytest
 from hypothesis import settings
@@ -20,6 +22,7 @@ settings.register_profile("fast", deadline=None, max_examples=20)
 
 # A shell's background job ignores Ctrl-C, and hands that on to the commands that are tested.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # ignored under nohup
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.lab_robots.study import folder_of
+from selfmodel.experiments.grid import finished
 from selfmodel.experiments.robots import robot_entry
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
@@ -30,16 +31,14 @@ def main() -> None:
     file = out / "exactness.json"
     found = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
     robots: dict[str, Robot] = {}
-    for part in sorted(folder_of(out, 0.0).glob("runs/*/parts/recovery.json")):
-        run = part.parents[1]
-        if run.name in found or json.loads(part.read_text(encoding="utf-8"))["status"] != "done":
+    for run in finished(folder_of(out, 0.0) / "runs"):
+        if run.key in found:
             continue
-        parameters = json.loads((run / "run.json").read_text(encoding="utf-8"))["parameters"]
-        body = parameters["body"]
+        body = run.parameters["robot"]
         robot = robots.setdefault(body, robot_entry(body).robot())
-        truth = parse(parameters["truth"], robot.anatomy)
-        logs = sorted((run / "recovery" / "trials").glob("*.mcap"))
-        found[run.name] = max(_difference(log, robot, truth) for log in logs)
+        truth = parse(run.parameters["truth"], robot.anatomy)
+        logs = sorted((run.path.parent / "recovery" / "trials").glob("*.mcap"))
+        found[run.key] = max(_difference(log, robot, truth) for log in logs)
         file.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     print(f"{len(found)} runs, largest difference {max(found.values()):.3g} m")
 

@@ -18,10 +18,9 @@ from typing import Any
 from benchmarks.lab_robots.models import MODELS
 from benchmarks.lab_robots.study import GAPS, folder_of
 from selfmodel.experiments.confidence_intervals import proportion
+from selfmodel.experiments.grid import finished
 
 ROWS = Path("docs/lab-robots.csv")
-ROUNDING = 1e-9
-"""Largest difference of simulated and physical displacement that counts as exact, m."""
 
 
 @dataclass(frozen=True)
@@ -91,16 +90,11 @@ def _collected(out: Path) -> list[Row]:
     rows = []
     names = [field.name for field in fields(Row)]
     for gap in GAPS:
-        for part in sorted(folder_of(out, gap).glob("runs/*/parts/recovery.json")):
-            found = json.loads(part.read_text(encoding="utf-8"))
-            if found["status"] != "done":
-                print(
-                    f"failed: {part.parents[1].name} at {gap:g}: {found['error']}", file=sys.stderr
-                )
-                continue
-            result = found["result"][0]
-            difference = exact[part.parents[1].name] if gap == 0 else None
-            values = {**result, "gap": gap, "difference": difference}
+        for error in sorted(folder_of(out, gap).glob("errors/*.txt")):
+            print(f"failed: {error.stem} at {gap:g}: {error.read_text()}", file=sys.stderr)
+        for part in finished(folder_of(out, gap) / "runs"):
+            difference = exact[part.key] if gap == 0 else None
+            values = {**part.result[0], "gap": gap, "difference": difference}
             rows.append(Row(**{name: values[name] for name in names}))
     order = list(MODELS)
     return sorted(rows, key=lambda row: (order.index(row.robot), row.gap, row.case, row.seed))

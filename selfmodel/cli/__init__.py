@@ -22,10 +22,19 @@ COMMANDS = {
     "diagnose": ("selfmodel.cli.diagnose:diagnose", "Rank the hypotheses that explain logs."),
     "replay": ("selfmodel.cli.replay:replay", "Simulate a logged trial again, and compare."),
     "render": ("selfmodel.cli.render:render", "Draw a logged trial beside its simulation."),
-    "ablate": ("selfmodel.cli.ablate:ablate", "Compare comparators on the same trials."),
+    "view": ("selfmodel.cli.view:view", "Open a logged trial and its simulation in Rerun."),
+    "report": ("selfmodel.cli.report:report", "Write a run, logs or a campaign as one HTML page."),
+    "ablate": ("selfmodel.cli.studies.ablate:ablate", "Compare comparators on the same trials."),
     "suite": ("selfmodel.cli.suite:app", "Recover the bodies of dm_control's suite."),
-    "paper": ("selfmodel.cli.paper:paper", "Repeat the paper's experiment on its robots."),
-    "baseline": ("selfmodel.cli.baseline:baseline", "Recover by other methods, and an oracle."),
+    "paper": ("selfmodel.cli.studies.paper:paper", "Repeat the paper's experiment on its robots."),
+    "baseline": (
+        "selfmodel.cli.studies.baseline:baseline",
+        "Recover by other methods, and an oracle.",
+    ),
+    "compare": (
+        "selfmodel.cli.studies.compare:compare",
+        "Compare the methods of a study by pairs.",
+    ),
     "repertoire": ("selfmodel.cli.repertoire:app", "Make a repertoire of a robot's gaits."),
     "logs": ("selfmodel.cli.logs:app", "Inspect, verify, salvage and import trial logs."),
 }

@@ -6,9 +6,9 @@ from typing import Annotated, Any
 
 import typer
 
-from selfmodel.cli.confirmation import confirm_time
-from selfmodel.cli.inputs import check_folder
-from selfmodel.cli.options import (
+from selfmodel.cli.arguments.confirmation import confirm_time
+from selfmodel.cli.arguments.inputs import check_folder
+from selfmodel.cli.arguments.options import (
     DEFAULT_BUDGET,
     FileBudget,
     Json,

@@ -1,5 +1,6 @@
 """``selfmodel recover``: the paper's loop, from a healthy gait to one for the damaged robot."""
 
+from contextlib import nullcontext
 from datetime import datetime
 from functools import partial
 from pathlib import Path
@@ -7,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from selfmodel.cli import inputs
-from selfmodel.cli.options import (
+from selfmodel.cli.arguments import inputs
+from selfmodel.cli.arguments.options import (
     DEFAULT_BUDGET,
     DEFAULT_KIND_NAMES,
     Calibrated,
@@ -32,13 +33,23 @@ from selfmodel.cli.options import (
     Threads,
     Trials,
 )
+from selfmodel.cli.arguments.repair_options import (
+    MaxJointSpeed,
+    MaxJointTorque,
+    MaxSelfCollision,
+    RecoveryScore,
+    Reference,
+    RepairName,
+    RepertoireFile,
+    SearchName,
+)
+from selfmodel.cli.live import both, followed, leave_report
 from selfmodel.cli.output.display import displacement_text, display
 from selfmodel.cli.output.printing import print_json, print_notes
 from selfmodel.cli.output.report import facts, print_report, result_file
-from selfmodel.cli.repair_options import RecoveryScore, Reference, RepairName, SearchName
 from selfmodel.controllers.controller import check_silent_neurons
 from selfmodel.experiments import plugins, robots
-from selfmodel.experiments.arguments import AUTO, comparator_choice
+from selfmodel.experiments.arguments import AUTO, comparator_choice, repertoire_of
 from selfmodel.experiments.chosen_score import choose_score
 from selfmodel.experiments.experiment import Experiment, run
 from selfmodel.faults.hypothesis import INTACT
@@ -46,6 +57,8 @@ from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kinds.neuron import silent_neurons
 from selfmodel.logs.files import replace_file
 from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
+from selfmodel.report.progress import ProgressRecorder
+from selfmodel.report.run_folder import subject_of_run
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import Budget
 from selfmodel.settings import Settings
@@ -69,8 +82,12 @@ def recover(
     neurons: Neurons = None,
     repair: RepairName = plugins.ROBUST,
     search: SearchName = None,
+    repertoire: RepertoireFile = None,
     score: RecoveryScore = None,
     reference: Reference = None,
+    max_joint_speed: MaxJointSpeed = None,
+    max_joint_torque: MaxJointTorque = None,
+    max_self_collision: MaxSelfCollision = None,
     seed: Seed = 0,
     steps: Steps = 1000,
     trials: Trials = 3,
@@ -87,6 +104,14 @@ def recover(
     ] = None,
     threads: Threads = 0,
     budget: FileBudget = DEFAULT_BUDGET,
+    report: Annotated[
+        bool,
+        typer.Option(
+            "--report",
+            help="Serve a report on this computer while the recovery runs, and leave it in the "
+            "folder as report.html.",
+        ),
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Recover a robot from a failure: diagnose it from logged trials, evolve a controller.
@@ -102,7 +127,8 @@ def recover(
     design = plugins.design(controller, made, neurons)
     truth = HypothesisSpace(made.anatomy, considered).parse(damaged)
     check_silent_neurons(design, silent_neurons(truth))
-    plugins.repair(repair, search)  # an unknown name is refused before any work
+    gaits = repertoire_of(repertoire, made, design)
+    plugins.repair(repair, search, gaits)  # an unknown name is refused before any work
     settings = Settings(steps=steps, trials=trials, generations=generations).scaled(population)
     chosen = choose_score(
         score or plugins.DEFAULT_SCORES[repair],
@@ -111,6 +137,9 @@ def recover(
         steps=steps,
         seed=seed,
         reference=reference,
+        max_speed=max_joint_speed,
+        max_torque=max_joint_torque,
+        max_self_collision=max_self_collision,
         budget=limits,
     )
     if chosen.gait is not None:
@@ -139,22 +168,32 @@ def recover(
         physical=entry.physical,
         repair=repair,
         search=search,
+        repertoire=gaits,
     )
-    try:
-        with display(partial(_described, made, chosen.score)) as on_event:
-            outcome = run(experiment, on_event)
-    except KeyboardInterrupt as interruption:
-        interruption.add_note(f"the finished trials are in {experiment.folder}")
-        raise
-    found = facts(experiment, outcome)
-    try:
-        logs = [Path(trial.path) for trial in outcome.recovery.trials]
-        replace_file(experiment.folder / "result.json", result_file(experiment, found, logs))
-    finally:  # the result is printed even if the disk is full
-        if as_json:
-            print_json(found)
-        else:
-            print_report(found, experiment.folder)
+    options = ("--comparator", comparator, "--kinds", kinds, "--budget", budget)
+    with followed(experiment.folder, made.name, options) if report else nullcontext() as live:
+        try:
+            with display(partial(_described, made, chosen.score)) as on_event:
+                progress = ProgressRecorder(both(on_event, live) if live else on_event)
+                outcome = run(experiment, progress)
+        except KeyboardInterrupt as interruption:
+            interruption.add_note(f"the finished trials are in {experiment.folder}")
+            raise
+        found = facts(experiment, outcome)
+        try:
+            progress.write(experiment.folder)
+            logs = [Path(trial.path) for trial in outcome.recovery.trials]
+            replace_file(experiment.folder / "result.json", result_file(experiment, found, logs))
+        finally:  # the result is printed even if the disk is full
+            if as_json:
+                print_json(found)
+            else:
+                print_report(found, experiment.folder)
+        if live:
+            subject = subject_of_run(
+                experiment.folder, experiment.threads, limits, comparator, considered
+            )
+            leave_report(live, experiment.folder, subject)
 
 
 def _described(robot: Robot, score: Score, trial: Trial) -> str:

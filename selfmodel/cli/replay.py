@@ -7,8 +7,7 @@ from typing import Annotated, Any
 import mujoco
 import typer
 
-from selfmodel.cli.confirmation import confirm_time
-from selfmodel.cli.options import (
+from selfmodel.cli.arguments.options import (
     DEFAULT_BUDGET,
     FileBudget,
     HypothesisText,
@@ -23,10 +22,8 @@ from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.replay_figure import check_figure, draw
 from selfmodel.cli.output.tables import show
+from selfmodel.cli.replayed_log import replayed_log
 from selfmodel.errors import InputError
-from selfmodel.experiments import plugins, trial_logs
-from selfmodel.experiments.expected_time import replay_seconds
-from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.logs import TrialLog
 from selfmodel.sandbox.budget import Budget
 from selfmodel.simulation.simulator import Simulator
@@ -71,13 +68,11 @@ def replay(
     if out is not None:
         check_figure(out)
     allowed = Budget.parse(budget)
-    (log,) = trial_logs.logs([file], allowed)
-    robot = trial_logs.robot_of_logs([log], model, allowed)
-    assumed = HypothesisSpace(robot.anatomy, plugins.kinds(kinds)).parse(hypothesis)
+    given = replayed_log(file, hypothesis, kinds=kinds, model=model, budget=allowed, yes=yes)
+    log, robot, assumed = given.log, given.robot, given.hypothesis
     logged = log.software.get("mujoco", "unknown")
     exact = logged == mujoco.__version__ and not log.imported
     tolerance = 0.0 if exact else TOLERANCE
-    confirm_time(replay_seconds(robot, log.trial, allowed), allowed, yes=yes)
     simulator = Simulator(robot, thread_count(threads), budget=allowed)
     found = simulate(log.trial, assumed, simulator, tolerance)
     if not found.observed:

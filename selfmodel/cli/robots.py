@@ -4,7 +4,7 @@ from typing import Annotated, Any
 
 import typer
 
-from selfmodel.cli.options import DEFAULT_BUDGET, FileBudget, Json, ModelSettings
+from selfmodel.cli.arguments.options import DEFAULT_BUDGET, FileBudget, Json, ModelSettings
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.robot_parts import parts, print_parts
 from selfmodel.cli.output.tables import folding, print_tables

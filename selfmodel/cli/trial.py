@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from selfmodel.cli import inputs
-from selfmodel.cli.options import (
+from selfmodel.cli.arguments import inputs
+from selfmodel.cli.arguments.options import (
     DEFAULT_BUDGET,
     ControllerSource,
     Damage,

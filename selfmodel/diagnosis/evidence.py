@@ -158,6 +158,16 @@ class Evidence:
         The result is empty for a comparator whose losses are no sums over signals, and for a
         hypothesis whose simulation diverges.
         """
+        parts = self.pieces_by_signal(hypothesis, trials)
+        return {signal: float(losses.mean()) for signal, losses in parts.items()}
+
+    def pieces_by_signal(
+        self, hypothesis: Hypothesis, trials: Sequence[Trial | TrialPart]
+    ) -> Mapping[str, FloatArray]:
+        """Returns the part of each signal in each loss of a hypothesis, ``(pieces,)`` each.
+
+        The result is empty in the cases of ``losses_by_signal``.
+        """
         found: dict[str, list[FloatArray]] = {}
         for part in map(whole, trials):
             prepared = self._prepare(part.trial)
@@ -169,7 +179,7 @@ class Evidence:
             kept = self._pieces(part)
             for signal, losses in prepared.losses_by_signal(result.behaviour).items():
                 found.setdefault(signal, []).append(losses[0, kept])
-        return {signal: float(np.concatenate(each).mean()) for signal, each in found.items()}
+        return {signal: np.concatenate(each) for signal, each in found.items()}
 
     def losses_by_hinge(
         self, hypotheses: Sequence[Hypothesis], trials: Sequence[Trial | TrialPart]

@@ -77,12 +77,36 @@ def diagnosis_from_dict(values: Mapping[str, Any], parse: Callable[[str], Hypoth
             {str(kind): parse(text) for kind, text in outside.get("others", {}).items()},
         ),
         undetectable=tuple(parse(text) for text in values.get("unseen", ())),
-        reason=str(values.get("reason", "")),
+        reason=str(values.get("reason") or ""),
         detectable=tuple(_detectable(item) for item in values.get("detectable", ())),
         fit=_fit(values["fit"]) if values.get("fit") else None,
         change=_change(values["change"], parse) if values.get("change") else None,
         residual=_residual(values["residual"]) if values.get("residual") else None,
     )
+
+
+def diagnosis_from_output(
+    values: Mapping[str, Any], trials: int, parse: Callable[[str], Hypothesis]
+) -> Diagnosis:
+    """Returns the diagnosis of ``--json`` output: a ranking, and a verdict with alternatives.
+
+    Args:
+        values: JSON values; ``diagnosis`` is the ranking.
+        trials: Number of trials that the diagnosis explains.
+        parse: Reads the notation of a hypothesis.
+
+    Raises:
+        ValueError: A hypothesis, a number or the verdict is invalid.
+        KeyError: A key is missing.
+        TypeError: A value has another type.
+        AttributeError: A hypothesis is not a string.
+        IndexError: No hypothesis is ranked.
+    """
+    ranked = values["diagnosis"]
+    best = parse(ranked[0]["hypothesis"])
+    unseen = [str(Hypothesis((*best.faults, *parse(text).faults))) for text in values["unseen"]]
+    whole = {**values, "trials": trials, "ranked": ranked, "unseen": unseen}
+    return diagnosis_from_dict(whole, parse)
 
 
 def _detectable(item: Mapping[str, Any]) -> DetectableSeverity:

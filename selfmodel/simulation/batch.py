@@ -11,7 +11,6 @@ from mujoco.batch import Batch, SimulationError
 from selfmodel.arrays import BoolArray, IndexArray
 from selfmodel.robot.editing.embodiment import Embodiment
 from selfmodel.robot.mjcf.mujoco_errors import mujoco_errors_as_input_errors
-from selfmodel.robot.mujoco_log import uncounted_warnings
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state.access import observed_fields
 from selfmodel.robot.state.fields import Reader
@@ -64,8 +63,8 @@ class EarlyStop:
 class LiveBatch:
     """Batch that steps only the simulations that were not stopped and have no MuJoCo error.
 
-    It records divergence. MuJoCo's warnings are not counted: a simulation with a warning is
-    recorded as diverged.
+    It records divergence: a simulation with a warning is recorded as diverged, so its users do not
+    count MuJoCo's warnings.
 
     MuJoCo resets a simulation with a warning, which continues to be stepped: its values are
     invalid, but the simulations of a batch are independent.
@@ -113,8 +112,7 @@ class LiveBatch:
     @contextmanager
     def _failures(self) -> Iterator[None]:
         try:
-            with uncounted_warnings():
-                yield
+            yield
         except SimulationError as error:
             self._failed[error.ids] = True
             self._ids = np.flatnonzero(~(self._failed | self._stopped))

@@ -7,8 +7,8 @@ from selfmodel.arrays import FloatArray
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state.access import bind_data, state_writer
 from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.estimation.state_estimation import STATE, estimated_states, known_steps
 from selfmodel.trials.rotation import directions
-from selfmodel.trials.state_estimation import STATE, estimated_states, known_steps
 
 MAX_GROUND_DISTANCE = 10.0
 """Largest distance between a foot and the model's level ground, m."""

@@ -10,6 +10,7 @@ from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.errors import InputError
 from selfmodel.robot.control_delay import MAX_CONTROL_DELAY, added_steps, split_delay
 from selfmodel.robot.editing.embodiment import Embodiment
+from selfmodel.robot.mujoco_log import uncounted_warnings
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state.access import state_writer
 from selfmodel.robot.state.sensing import SensorReader
@@ -20,6 +21,7 @@ from selfmodel.simulation.requests import Segments
 from selfmodel.trials.behaviour import Behaviour
 
 
+@uncounted_warnings()
 def predict(
     robot: Robot,
     embodiments: Sequence[Embodiment],
@@ -58,8 +60,8 @@ def predict(
     Raises:
         InputError: The segments do not include all commands that are in the delay line.
     """
-    lag = robot.control_delay if delay is None else delay
-    delay_steps, part = split_delay(lag, robot.substeps)
+    lag, substeps = robot.control_delay if delay is None else delay, robot.substeps
+    delay_steps, part = split_delay(lag, substeps)
     n, count, horizon = len(embodiments), len(segments.commands), segments.horizon
     simulated, source_of = np.unique(
         np.arange(n) if same_dynamics_as is None else np.asarray(same_dynamics_as),
@@ -111,7 +113,7 @@ def predict(
                     inputs.write_commands(stage, k - 1)
                     alive.step(part)
                 inputs.write_commands(stage, k)
-                alive.step(robot.substeps - part)
+                alive.step(substeps - part)
                 stats.physics_seconds += perf_counter() - clock
     diverged: BoolArray = np.any(alive.diverged()[batch_rows].reshape(n, together), axis=1)
     stats.runs += n

@@ -16,6 +16,7 @@ from selfmodel.physical.measurement_noise import dead_sensors
 from selfmodel.physical.reality_gap import perturbed_models
 from selfmodel.robot.control_delay import added_steps, split_delay
 from selfmodel.robot.editing.embodiment import Embodiment
+from selfmodel.robot.mujoco_log import uncounted_warnings
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state.sensing import SensorReader
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
@@ -224,6 +225,7 @@ class Simulator:
         )
         return flat.grouped(count, len(conditions))
 
+    @uncounted_warnings()
     def _run(
         self,
         embodiments: Sequence[Embodiment],
@@ -235,7 +237,7 @@ class Simulator:
         noise: ReadingNoise | None = None,
         early_stop: EarlyStop | None = None,
     ) -> SimulationResult:
-        robot, n = self.robot, len(embodiments)
+        robot, n, substeps = self.robot, len(embodiments), self.robot.substeps
         batch = new_batch(robot.model, embodiments, self.threads)
         reader = SensorReader(robot.model, robot.anatomy, embodiments)
         controllers = make_batch(
@@ -244,7 +246,7 @@ class Simulator:
             len(robot.anatomy.sensors),
         )
         sensordata, qpos, ctrl = (batch.bind(field) for field in ("sensordata", "qpos", "ctrl"))
-        whole, part = split_delay(robot.control_delay, robot.substeps)
+        whole, part = split_delay(robot.control_delay, substeps)
         added = [
             added_steps(robot.control_delay, float(embodiment.added_delay[0]))
             for embodiment in embodiments
@@ -278,7 +280,7 @@ class Simulator:
                 if part:
                     alive.step(part)
                     motors.release()
-                alive.step(robot.substeps - part)
+                alive.step(substeps - part)
                 self.stats.physics_seconds += perf_counter() - clock
         diverged = alive.diverged()
         self.stats.runs += n

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from selfmodel.logs import read_log
+from selfmodel.logs.journal import is_calibrated
 from tests.helpers.command import SMALL, selfmodel
 
 FEW = (*SMALL, "--kinds", "paper", "--trials", "1", "--out", "run", "--json")
@@ -80,6 +81,8 @@ def test_a_recovery_s_network_has_as_many_neurons_as_are_asked_for(tmp_path: Pat
 
     assert told["neurons"] == 5
     assert told["controller"] == "network"
+    assert told["calibration"] is None
+    assert not is_calibrated(tmp_path / Path(told["trials"][-1]["log"]).parents[1])
     assert log.trial.plan.controller.design.hidden == 5
 
 

@@ -21,7 +21,8 @@ def heavy(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
     kinds = "gravity:GRAVITY,friction,jam"
     arguments = ("--damage", "gravity=3.7+friction=0.4", "--kinds", kinds)
     done = selfmodel(
-        *("recover", "quadruped", *arguments, *SMALL, "--trials", "1", "--out", "run", "--json"),
+        *("recover", "quadruped", *arguments, *SMALL, "--steps", "200", "--trials", "1"),
+        *("--out", "run", "--json"),
         cwd=folder,
         PYTHONPATH=PATH,
     )

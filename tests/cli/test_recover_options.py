@@ -5,6 +5,13 @@ from pathlib import Path
 
 import pytest
 
+from selfmodel.experiments.arguments import load_robot
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.logs.repertoires import save_repertoire
+from selfmodel.recovery.repertoire.evaluation import simulated_evaluation
+from selfmodel.recovery.repertoire.make import make_repertoire
+from selfmodel.robot.designs import network_for
+from selfmodel.simulation.simulator import Simulator
 from tests.helpers.command import SMALL, selfmodel
 
 
@@ -13,7 +20,14 @@ from tests.helpers.command import SMALL, selfmodel
     [
         (("--repair", "papers"), "unknown repair 'papers': did you mean paper"),
         (("--search", "cma"), "unknown search 'cma': did you mean cma-es"),
-        (("--repair", "paper", "--search", "cma-es"), "leave --search out"),
+        (("--repair", "paper", "--search", "cma-es"), "leave --search and --repertoire out"),
+        (("--search", "repertoire"), "got the search repertoire without a repertoire"),
+        (("--repertoire", "none.npz"), "none.npz"),
+        (("--score", "energy", "--max-joint-speed", "9"), "limits of --score upright, got energy"),
+        (("--max-joint-torque", "3", "--reference", "none.csv"), "--reference is a trajectory"),
+        (("--max-joint-torque", "0"), "limits of the joints above 0, got inf rad/s and 0 N m"),
+        (("--max-self-collision", "-0.01"), "a limit of self-collision of 0 m or above, got -0.01"),
+        (("--score", "energy", "--max-self-collision", "0"), "limits of --score upright"),
         (("--score", "speed"), "score 'speed'"),
         (("--score", "math:pi"), "'math:pi' is no score"),
     ],
@@ -32,6 +46,8 @@ def test_a_name_that_is_unknown_is_refused_before_any_work(
     ("options", "score"),
     [
         ((), "upright"),
+        (("--max-joint-speed", "9"), "upright within 9 rad/s"),
+        (("--max-joint-torque", "8"), "upright within 8 N m"),
         (("--repair", "paper"), "displacement"),
         (("--search", "ea", "--score", "energy"), "energy"),
         (("--score", "selfmodel.recovery.scores.energy:ENERGY"), "energy"),
@@ -42,7 +58,8 @@ def test_the_score_is_that_of_the_repair_unless_another_is_given(
 ):
     done = selfmodel(
         *("recover", "quadruped", "--case", "1", *SMALL, "--steps", "60", "--trials", "1"),
-        *("--kinds", "paper", "--gap", "0.05", *options, "--out", "run", "--json"),
+        *("--comparator", "forward-displacement", "--kinds", "paper", "--no-calibrate"),
+        *("--gap", "0.05", *options, "--out", "run", "--json"),
         cwd=tmp_path,
     )
     assert done.returncode == 0, done.stderr
@@ -56,3 +73,61 @@ def test_the_score_is_that_of_the_repair_unless_another_is_given(
     assert recovery["predicted_score"] is not None
     assert recovery["steps"] == 60
     assert found["fell"] == (recovery["fell_at_step"] is not None)
+
+
+@pytest.fixture(scope="module")
+def gaits(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A small repertoire of the quadruped."""
+    robot = load_robot("quadruped")
+    evaluate = simulated_evaluation(Simulator(robot, 1), INTACT, 60)
+    found = make_repertoire(
+        robot, network_for(robot), evaluate, steps=60, seed=0, evaluations=60, levels=3
+    )
+    path = tmp_path_factory.mktemp("repertoire") / "gaits.npz"
+    save_repertoire(path, found)
+    return path
+
+
+def test_a_recovery_begins_from_a_repertoire(tmp_path: Path, gaits: Path):
+    run = (
+        *("recover", "quadruped", "--case", "1", *SMALL, "--steps", "60", "--trials", "1"),
+        *("--comparator", "forward-displacement", "--kinds", "paper", "--json"),
+    )
+    found = [
+        json.loads(selfmodel(*run, *options, "--out", name, cwd=tmp_path).stdout)
+        for name, options in {
+            "named": ("--search", "repertoire", "--repertoire", str(gaits)),
+            "given": ("--repertoire", str(gaits)),
+            "without": (),
+        }.items()
+    ]
+    recovered = [one["trials"][2]["displacement"] for one in found]
+    assert [one["search"] for one in found] == ["repertoire", "repertoire", "cma-es"]
+    assert [one["repertoire"] is None for one in found] == [False, False, True]
+    assert found[0]["repertoire"]["robot"] == "quadruped"
+
+    assert recovered[0] == recovered[1] != recovered[2]
+
+
+@pytest.mark.parametrize(
+    ("robot", "options", "message"),
+    [
+        ("hexapod", (), "expected a repertoire of hexapod"),
+        (
+            "quadruped",
+            ("--controller", "cpg"),
+            "expected gaits of the controllers to evolve, a cpg",
+        ),
+        ("quadruped", ("--search", "ea"), "got the search ea with a repertoire"),
+        ("quadruped", ("--repair", "paper"), "leave --search and --repertoire out"),
+    ],
+)
+def test_a_repertoire_that_the_recovery_cannot_use_is_refused(
+    tmp_path: Path, gaits: Path, robot: str, options: tuple[str, ...], message: str
+):
+    run = ("recover", robot, "--case", "1", "--repertoire", str(gaits), *options, "--out", "run")
+    done = selfmodel(*run, cwd=tmp_path)
+
+    assert done.returncode == 2
+    assert message in " ".join(done.stderr.split())
+    assert not (tmp_path / "run").exists()

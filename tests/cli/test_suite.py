@@ -13,18 +13,15 @@ from selfmodel.cli import app
 from selfmodel.cli.suite import run
 from selfmodel.comparators import DEFAULT
 from selfmodel.errors import InputError
-from selfmodel.experiments.grid import Job, run_grid
+from selfmodel.experiments.study.repair_cost import RepairCost
 from selfmodel.experiments.suite.bodies import DOMAINS, bodies
 from selfmodel.experiments.suite.plan import (
     Study,
+    cells,
     check,
-    gait_jobs,
-    gait_path,
     known_cases,
-    recovery_jobs,
 )
 from selfmodel.experiments.suite.rows import SuiteRow, summarise
-from selfmodel.experiments.suite.work import run_study
 from selfmodel.logs import load_controller, read_gap
 from selfmodel.settings import Settings
 from tests.helpers.command import SMALL, selfmodel
@@ -131,10 +128,14 @@ def test_the_same_command_again_does_nothing_and_says_the_same(
 ):
     folder, told, arguments = study
     logs = {path: path.stat().st_mtime_ns for path in folder.rglob("*.mcap")}
-    again = selfmodel(*arguments, "--json", cwd=folder)
+    again = selfmodel(*arguments, "--json", "--table", "csv", cwd=folder)
 
     assert again.returncode == 0, again.stderr
-    assert json.loads(again.stdout) == told
+    files = told["files"]
+    assert json.loads(again.stdout) == {**told, "files": [*files, "out/tables/summaries.csv"]}
+    with (folder / "out" / "tables" / "summaries.csv").open() as file:
+        shares = [float(row["correct_high"]) for row in csv.DictReader(file)]
+    assert shares == [row["correct"]["high"] for row in told["summaries"]]
     assert {path: path.stat().st_mtime_ns for path in folder.rglob("*.mcap")} == logs
 
 
@@ -174,14 +175,15 @@ def test_a_body_that_is_another_by_now_is_not_run_into_its_study(
     (tmp_path / "biped.xml").write_text(mine)
     (tmp_path / "foot.obj").write_text(CUBE)
     study = replace(STUDY, bodies=["biped.xml"], cases=[5], folder=tmp_path)
-    (before,) = gait_jobs(study)
-    assert gait_jobs(study) == [before]
+    (before,) = cells(study)
+    assert [cell.place for cell in cells(study)] == [before.place]
 
     others = {"biped.toml": "control_timestep = 0.02", "foot.obj": CUBE.replace(".1", ".2")}
     (tmp_path / changed).write_text(others[changed])
-    (after,) = gait_jobs(study)
+    (after,) = cells(study)
 
     assert after.parameters != before.parameters
+    assert after.needs["gait"].place != before.needs["gait"].place
 
 
 @studies
@@ -206,6 +208,8 @@ REFUSED = [
     ({"comparator": "no-such"}, "unknown comparator"),
     ({"controller": "brain"}, "unknown kind of controller"),
     ({"kinds": "brek"}, "unknown kind 'brek'"),
+    ({"repair": "papers"}, "unknown repair 'papers'"),
+    ({"repair": "robust", "search": "repertoire"}, "a study of many has none"),
     ({"gap": 0.7}, "expected a gap from 0 to 0.5"),
     ({"controller": "cpg", "neurons": 4}, "a CPG has no hidden neurons, got --neurons 4"),
     ({"bodies": ["biped.xml", "other/biped.xml"]}, "would have the same file names"),
@@ -224,50 +228,94 @@ def test_what_cannot_be_run_is_refused_before_anything_is(
     check(study)
 
     with pytest.raises(InputError, match=reason):
-        run_study(replace(study, **changed), workers=1, on_progress=lambda _: None)
+        cells(replace(study, **changed))
     assert not (tmp_path / "out").exists()
 
 
 def test_all_cases_are_those_that_the_bodies_have(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     asked: list[Study] = []
-    monkeypatch.setattr(run, "run_study", lambda study, **_: asked.append(study) or ())
+    monkeypatch.setattr(run, "cells", lambda study, _: asked.append(study) or [])
     arguments = ["suite", "run", "--domains", "hopper,swimmer", "--out", str(tmp_path)]
-    told = CliRunner().invoke(app, arguments)
+    told = CliRunner().invoke(app, [*arguments, "--json"])
 
     assert told.exit_code == 0, told.output
+    files = json.loads(told.stdout)["files"]
+    assert files == [str(tmp_path / name) for name in ("results.csv", "results.json")]
     check(asked[0])
     assert asked[0].cases == known_cases(("suite-hopper-hop", "suite-swimmer-swimmer6"))
     assert asked[0].cases
     assert 8 not in asked[0].cases
 
 
+def test_the_repair_is_the_papers_unless_another_is_given_which_has_its_own_score_and_its_cost(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    asked: list[Study] = []
+    monkeypatch.setattr(run, "cells", lambda study, _: asked.append(study) or [])
+    costs = [RepairCost(2, 6, 1_000, 500), RepairCost(0, 0, 0, 0)]
+    monkeypatch.setattr(run, "repair_cost", lambda *_: costs.pop(0))
+    arguments = ["suite", "run", "--domains", "hopper", "--out", str(tmp_path)]
+    plain = CliRunner().invoke(app, arguments)
+    robust = CliRunner().invoke(app, [*arguments, "--repair", "robust", "--search", "ea"])
+
+    again = CliRunner().invoke(app, [*arguments, "--repair", "robust", "--search", "ea"])
+
+    assert (plain.exit_code, robust.exit_code) == (0, 0), robust.output
+    assert [(study.repair, study.search, study.score) for study in asked] == [
+        ("paper", None, None),
+        ("robust", "ea", None),
+        ("robust", "ea", None),
+    ]
+    assert "gaits to evolve: 2, repairs: 6" in robust.stderr
+    assert "gaits to evolve" not in plain.stderr + again.stderr, "nothing is left to evolve"
+
+
+def test_a_recovery_and_its_gait_are_other_cells_with_another_repair(tmp_path: Path):
+    study = replace(STUDY, bodies=["quadruped"], cases=[9], folder=tmp_path, score=None)
+    (paper,), (robust,) = cells(study), cells(replace(study, repair="robust"))
+    (same,) = cells(replace(study, repair="robust", search="cma-es", score="upright"))
+    shared = paper.parameters["shared"]
+
+    assert (shared["repair"], shared["search"], shared["score"]) == ("paper", "ea", "displacement")
+    assert robust.parameters["shared"] == {
+        **shared,
+        "repair": "robust",
+        "search": "cma-es",
+        "score": "upright",
+    }
+    assert robust.place == same.place
+    assert robust.needs["gait"].place == same.needs["gait"].place != paper.needs["gait"].place
+
+
 def test_oscillators_have_no_neurons_that_could_be_silent(tmp_path: Path):
     study = replace(STUDY, bodies=["quadruped"], cases=[9, 10], folder=tmp_path)
-    put_gaits(study)
     oscillating = replace(study, controller="cpg")
 
-    assert [job.parameters["case"] for job in recovery_jobs(study)] == [9, 10]
-    assert [job.parameters["case"] for job in recovery_jobs(oscillating)] == [9]
+    assert [cell.parameters["case"] for cell in cells(study)] == [9, 10]
+    assert [cell.parameters["case"] for cell in cells(oscillating)] == [9]
 
 
 def test_a_share_has_every_nth_gait_and_its_recoveries(tmp_path: Path):
     study = replace(STUDY, bodies=["quadruped"], cases=[9], seeds=range(3), folder=tmp_path)
-    put_gaits(study)
 
-    assert [job.seed for job in gait_jobs(study, (2, 2))] == [1]
-    assert [job.seed for job in recovery_jobs(study, (1, 2))] == [0, 2]
+    assert [cell.seed for cell in cells(study, (2, 2))] == [1]
+    assert [cell.seed for cell in cells(study, (1, 2))] == [0, 2]
+    assert {cell.needs["gait"].seed for cell in cells(study, (1, 2))} == {0, 2}
 
 
-def test_an_option_is_a_parameter_of_a_study_only_if_it_is_not_the_default(tmp_path: Path):
+def test_an_option_of_the_recovery_does_not_change_the_gait_and_one_of_the_gait_does(
+    tmp_path: Path,
+):
     study = replace(STUDY, bodies=["quadruped"], cases=[9], folder=tmp_path)
-    put_gaits(study)
-    (plain,), (other,) = recovery_jobs(study), recovery_jobs(replace(study, gap=0.1, kinds="all"))
-    (gait,), (larger,) = gait_jobs(study), gait_jobs(replace(study, neurons=5))
+    (plain,), (other,) = cells(study), cells(replace(study, gap=0.1, kinds="all"))
+    (larger,) = cells(replace(study, neurons=5))
+    gait = plain.needs["gait"]
 
     shared = plain.parameters["shared"]
-    assert set(shared) == {"selfmodel", "settings", "score", "controller", "comparator"}
     assert other.parameters["shared"] == {**shared, "gap": 0.1, "kinds": "all"}
-    assert larger.parameters == {**gait.parameters, "neurons": 5}
+    assert other.needs["gait"].place == gait.place
+    assert larger.needs["gait"].parameters == {**gait.parameters, "neurons": 5}
+    assert larger.needs["gait"].place != gait.place
 
 
 @studies
@@ -289,37 +337,10 @@ def test_a_study_has_a_gap_a_size_of_network_and_kinds_of_faults(tmp_path: Path)
     told = json.loads(done.stdout)
 
     assert told["failures"] == []
-    (gait,) = (tmp_path / "out" / "gaits").glob("*.npz")
+    (gait,) = (tmp_path / "out" / "gaits").rglob("*.npz")
     assert load_controller(gait).design.hidden == 5
     (log,) = (tmp_path / "out" / "runs").rglob("01-after.mcap")
     assert read_gap(log)["structure"] is not None
-
-
-def put_gaits(study: Study) -> None:
-    """Something in the place of each gait."""
-    for job in gait_jobs(study):
-        path = gait_path(study.folder, job.key)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(b"a gait")
-
-
-@pytest.mark.process
-def test_a_gait_that_was_lost_is_told_of_and_not_passed_over(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
-    monkeypatch.syspath_prepend(str(ROOT))  # the grid's processes find the function there
-    study = replace(STUDY, bodies=["quadruped"], cases=[2], folder=tmp_path)
-    assert recovery_jobs(study) == []
-    run_grid(
-        tmp_path / "gaits", gait_jobs(study), evolve_nothing, workers=1, on_progress=lambda _: None
-    )
-
-    with pytest.raises(InputError, match=r"quadruped-seed000\.npz is missing"):
-        run_study(study, workers=1, on_progress=lambda _: None)
-
-
-def evolve_nothing(_job: Job, _part: str, _run: Path) -> None:
-    """Says that it is done, and keeps no gait."""
 
 
 def test_a_domain_that_nobody_has_is_told_from_the_nearest(tmp_path: Path):

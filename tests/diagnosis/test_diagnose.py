@@ -6,7 +6,6 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from selfmodel.cli.output.ranking import confidence_sentence
 from selfmodel.comparators import (
     COMPARATORS,
     FORWARD_DISPLACEMENT,
@@ -17,6 +16,7 @@ from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.evidence import Evidence
+from selfmodel.diagnosis.sentences import confidence_sentence
 from selfmodel.diagnosis.serialization import (
     confidence_to_dict,
     diagnosis_from_dict,

@@ -10,7 +10,12 @@ import pytest
 from hypothesis import given, strategies as st
 
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, UnsearchedFault
-from selfmodel.diagnosis.serialization import confidence_to_dict, diagnosis_from_dict
+from selfmodel.diagnosis.serialization import (
+    confidence_to_dict,
+    diagnosis_from_dict,
+    diagnosis_from_output,
+    ranking_to_list,
+)
 from selfmodel.diagnosis.verdicts.change_point import Change
 from selfmodel.diagnosis.verdicts.detectable import DetectableSeverity
 from selfmodel.diagnosis.verdicts.fit import Fit
@@ -138,6 +143,15 @@ def test_wrong_values_of_a_file_are_refused(found: Diagnosis, key: str, values: 
 def test_the_command_line_lists_only_the_extra_fault(found: Diagnosis):
     assert confidence_to_dict(found)["unseen"] == ["sensor:back_left_touch"]
     assert found.to_dict()["unseen"] == [f"{BEST}+sensor:back_left_touch"]
+
+
+def test_a_diagnosis_survives_the_output_of_the_command_line(found: Diagnosis):
+    whole = dataclasses.replace(found, change=CHANGE, residual=RESIDUAL, detectable=DETECTABLE)
+    output = {"diagnosis": ranking_to_list(whole.ranked), **confidence_to_dict(whole)}
+
+    again = diagnosis_from_output(json.loads(json.dumps(output)), whole.trials, SPACE.parse)
+
+    assert again == whole
 
 
 def test_a_table_without_pandas_is_refused_with_the_remedy(

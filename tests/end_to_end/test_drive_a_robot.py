@@ -23,7 +23,7 @@ from selfmodel.logs.verify import verify
 from selfmodel.tasks.walking import environment, motion_capture
 from tests.helpers.code_blocks import blocks
 from tests.helpers.command import selfmodel
-from tests.helpers.socket_robot import OBSERVED, STOP, TIMESTEP, slow_quadruped
+from tests.helpers.robots.socket_robot import OBSERVED, STOP, TIMESTEP, slow_quadruped
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "drive_a_robot.py"
@@ -37,7 +37,7 @@ def robot(folder: Path, **failures: float | str) -> Iterator[str]:
         [
             sys.executable,
             "-m",
-            "tests.helpers.socket_robot",
+            "tests.helpers.robots.socket_robot",
             folder / "heard",
             json.dumps(failures),
         ],

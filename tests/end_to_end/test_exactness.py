@@ -21,10 +21,10 @@ from selfmodel.simulation.calibration import calibrate
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import collect
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.helpers.arms import arm_mjcf
 from tests.helpers.drivers import random_motion
 from tests.helpers.exactness import Exactness, exactness, prediction_error, with_options
-from tests.helpers.go1 import go1, trot
+from tests.helpers.robots.arms import arm_mjcf
+from tests.helpers.robots.go1 import go1, trot
 from tests.robot.mjcf.awkward import mjcf
 from tests.robot.mjcf.samples import SAMPLES
 

@@ -11,6 +11,7 @@ import pytest
 
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.comparator_contract import check_comparator
+from selfmodel.logs.journal import is_calibrated
 from tests.helpers.command import SMALL, selfmodel
 from tests.helpers.gaits import batch, changed, gait, logged
 
@@ -30,7 +31,8 @@ def test_a_recovery_in_python_is_drawn_from_its_logs(tmp_path: Path):
 
     assert "(the truth: break:back_left_shoulder)" in told
     assert (tmp_path / "figure.png").read_bytes().startswith(b"\x89PNG")
-    assert len(list((tmp_path / "run" / "trials").glob("*.mcap"))) == 5
+    assert len(list((tmp_path / "run" / "trials").glob("*.mcap"))) == 4
+    assert not is_calibrated(tmp_path / "run"), "a report of the run must not calibrate"
 
 
 def heading_comparator() -> Comparator:
@@ -92,5 +94,5 @@ def test_an_ablation_in_python_goes_on_where_it_was(tmp_path: Path):
     again = run("ablation.py", "folder", cwd=tmp_path)
 
     assert "8 rows, 0 failed: folder/results.csv" in first
-    assert "GridBegins(total=4, finished=4)" in again
+    assert "GridBegins(total=12, finished=12)" in again
     assert len((EXAMPLES / "ablation.py").read_text(encoding="utf-8").splitlines()) < 40

@@ -1,16 +1,23 @@
-"""The benchmark of recoveries: its rows are continued, and its ratios are those of the rows."""
+"""The benchmark of recoveries: its rows are written, and its ratios are those of the rows."""
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from benchmarks.recoveries.cells import Cell, cells, compute, read_rows
-from benchmarks.recoveries.recover import recovered
+from benchmarks.recoveries.cells import cells, read_rows, write_rows
+from benchmarks.recoveries.recover import make_gait, recovered
 from benchmarks.recoveries.table import table
+from selfmodel import load_robot, recover, simulated_robot
+from selfmodel.experiments.grid import processes, run_grid
+from selfmodel.experiments.grid.cell_file import CELL, cell_bytes
+from selfmodel.recovery.scores.fitness import DISPLACEMENT
+from selfmodel.recovery.scores.upright import UPRIGHT
 from selfmodel.settings import Settings
 
+FAULTS = ("intact", "break:front_left_knee")
 SMALL = Settings(steps=60, generations=1, trials=1).scaled(4)
 
 
@@ -46,23 +53,58 @@ def test_ratios_are_to_the_oracle_of_the_same_robot_and_the_gait_before_counts_o
     assert (first[10], second[10], both[10]) == ("0 of 1 |", "1 of 1 |", "1 of 2 |")
 
 
-def test_the_seeds_change_last_and_a_finished_cell_is_not_run_again(tmp_path: Path):
-    wanted = cells(["quadruped", "hexapod"], [1], [0.0], [0, 1])
-    assert [(cell.robot, cell.seed) for cell in wanted[:2]] == [("quadruped", 0), ("hexapod", 0)]
-    path = tmp_path / "rows.jsonl"
-    path.write_text(json.dumps({"robot": "quadruped", "case": 1, "gap": 0.0, "seed": 0}) + "\n")
+def test_the_seeds_change_last():
+    wanted = cells(["quadruped", "hexapod"], [1], [0.0], [0, 1], repair="robust", settings=SMALL)
 
-    assert list(compute(wanted[:1], dict, path, jobs=1)) == []
-    assert len(read_rows(path)) == 1
-    assert read_rows(tmp_path / "none.jsonl") == []
+    assert [(cell.parameters["robot"], cell.seed) for cell in wanted] == [
+        *(("quadruped", 0), ("hexapod", 0), ("quadruped", 1), ("hexapod", 1))
+    ]
+
+
+def test_the_rows_of_finished_cells_are_written(tmp_path: Path):
+    (cell,) = cells(["quadruped"], [1], [0.0], [0], repair="robust", settings=SMALL)
+    folder = tmp_path / cell.place
+    folder.mkdir(parents=True)
+    (folder / CELL).write_bytes(cell_bytes(folder, cell, row(1, 0, [1.0]), 1.0, {}))
+
+    assert read_rows(write_rows(tmp_path)) == [row(1, 0, [1.0])]
 
 
 @pytest.mark.search
 @pytest.mark.parametrize("repair", ["robust", "paper"])
-def test_a_row_has_each_trial_with_its_prediction(repair: str):
-    found = recovered(Cell("quadruped", 1, 0.05, 3), repair=repair, settings=SMALL)
+def test_a_row_has_each_trial_with_its_prediction(repair: str, tmp_path: Path):
+    (cell,) = cells(["quadruped"], [1], [0.05], [3], repair=repair, settings=SMALL)
+    make_gait(cell.needs["gait"], {}, tmp_path)
+    found = recovered(cell, {"gait": tmp_path}, tmp_path)
 
     assert len(found["upright"]) == len(found["predicted"]) == len(found["falls"]) == 3
     assert found["predicted"][1] is None
     assert found["repair"] == repair
     json.dumps(found, allow_nan=False)
+    scores = {"robust": UPRIGHT, "paper": DISPLACEMENT}
+    alone = recover(
+        *(simulated_robot("quadruped", fault, gap=0.05, seed=3) for fault in FAULTS),
+        "quadruped",
+        tmp_path / "run",
+        settings=SMALL,
+        seed=3,
+        threads=1,
+        repair=repair,
+    )
+    assert alone.score == scores[repair]
+    of_trial = partial(UPRIGHT.of_trial, load_robot("quadruped"))
+    before, *_ = map(of_trial, alone.tried, alone.trials)
+    assert round(before, 4) == found["upright"][0]
+
+
+@pytest.mark.process
+@pytest.mark.search
+def test_two_processes_share_a_gait(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[2]))
+    wanted = cells(["quadruped"], [1, 2], [0.1], [0], repair="robust", settings=SMALL)
+    assert run_grid(tmp_path, wanted, workers=processes(2), on_progress=lambda _: None) == ()
+    rows = read_rows(write_rows(tmp_path))
+
+    assert sorted(row["case"] for row in rows) == [1, 2]
+    assert rows[0]["upright"][0] == rows[1]["upright"][0]
+    assert len(list((tmp_path / "gaits").iterdir())) == 1

@@ -74,7 +74,7 @@ def test_a_stop_signal_to_a_study_and_its_workers_leaves_no_process(
         start_new_session=True,
     )
     until = time.monotonic() + 200
-    while not list(tmp_path.glob("run/*/*/parts/*")) + list(tmp_path.glob("run/*/parts/*")):
+    while not list(tmp_path.glob("run/*/*/cell.json")):
         assert process.poll() is None
         assert time.monotonic() < until
         time.sleep(0.1)

@@ -12,7 +12,7 @@ from selfmodel.robot.anatomy.legs import reaches_ground
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import ROBOTS, entry, suite_bodies
-from tests.helpers.bodies import BODIES
+from tests.helpers.robots.bodies import BODIES
 from tests.robot.mjcf.samples import SAMPLES
 
 SUITE = [suite_bodies.name(domain, tasks[0]) for domain, tasks in suite_bodies.DOMAINS.items()]

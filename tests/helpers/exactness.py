@@ -14,7 +14,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.simulation.requests import cut_segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour, collect
-from selfmodel.trials.state_estimation import STATE
+from selfmodel.trials.estimation.state_estimation import STATE
 
 HORIZON = 12
 """Control steps of a segment, as in ``segment-prediction``."""

@@ -14,8 +14,9 @@ from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import ENVIRONMENT, Fault, FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.logs import CorruptError, LogError, SchemaMismatchError, read_truth
-from selfmodel.logs.journal import FolderJournal, create_journal
+from selfmodel.logs.journal import OPTIONS, FolderJournal, create_journal, is_calibrated
 from selfmodel.logs.physical_trial import TrialRunner
+from selfmodel.logs.result_files import result_bytes
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Sample
@@ -45,7 +46,7 @@ Run = Callable[..., Trial]
 
 @pytest.fixture
 def journal(biped: Robot, tmp_path: Path) -> FolderJournal:
-    return create_journal(tmp_path / "run", biped.anatomy)
+    return create_journal(tmp_path / "run", biped.anatomy, calibrated=True)
 
 
 @pytest.fixture
@@ -142,21 +143,51 @@ def test_a_damaged_log_is_not_passed_over(journal: FolderJournal, biped: Robot, 
         journal.read()
 
 
+@pytest.mark.parametrize("calibrated", [True, False])
+def test_the_folder_states_from_the_beginning_whether_the_self_model_is_calibrated(
+    biped: Robot, tmp_path: Path, *, calibrated: bool
+):
+    create_journal(tmp_path / "run", biped.anatomy, calibrated=calibrated)
+
+    assert is_calibrated(tmp_path / "run") is calibrated
+
+
+def test_a_folder_is_not_made_without_that_statement(biped: Robot, tmp_path: Path):
+    with pytest.raises(TypeError, match="calibrated"):
+        create_journal(tmp_path / "run", biped.anatomy)
+
+    assert not (tmp_path / "run").exists()
+
+
+def test_the_folder_of_an_earlier_version_counts_as_calibrated(tmp_path: Path):
+    assert is_calibrated(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "data", [b"", b"[]", result_bytes({"calibrated": "no"}), b'{"calibrated": true, "sha256": "0"}']
+)
+def test_damaged_options_are_refused(tmp_path: Path, data: bytes):
+    (tmp_path / OPTIONS).write_bytes(data)
+
+    with pytest.raises(InputError, match=r"options\.json: expected the options .* move it away"):
+        is_calibrated(tmp_path)
+
+
 @pytest.mark.parametrize("held", ["trials/old.mcap", "diagnoses.json", "notes.txt"])
 def test_a_folder_that_holds_something_is_refused(biped: Robot, tmp_path: Path, held: str):
     (tmp_path / held).parent.mkdir(exist_ok=True)
     (tmp_path / held).write_text("precious")
     with pytest.raises(InputError, match=f"holds another run or other files.*{held[:6]}"):
-        create_journal(tmp_path, biped.anatomy)
+        create_journal(tmp_path, biped.anatomy, calibrated=True)
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == [tmp_path / held]
 
 
 def test_an_empty_folder_will_do_and_a_file_will_not(biped: Robot, tmp_path: Path):
     (tmp_path / "empty").mkdir()
-    create_journal(tmp_path / "empty", biped.anatomy)
+    create_journal(tmp_path / "empty", biped.anatomy, calibrated=True)
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="is a file"):
-        create_journal(tmp_path / "file", biped.anatomy)
+        create_journal(tmp_path / "file", biped.anatomy, calibrated=True)
 
 
 def test_a_run_of_another_robot_is_refused(
@@ -218,7 +249,7 @@ def test_diagnoses_are_json_without_surprises(journal: FolderJournal, biped: Rob
 def test_rivals_of_a_third_party_s_kind_are_read_back(biped: Robot, tmp_path: Path):
     load = FaultKind(name="load", keyword="load", apply=lambda *_: None)
     loaded = canonical([Fault(load, ENVIRONMENT)], biped.anatomy)
-    journal = create_journal(tmp_path / "run", biped.anatomy, [load])
+    journal = create_journal(tmp_path / "run", biped.anatomy, [load], calibrated=True)
     told = dataclasses.replace(diagnosis(biped), indistinguishable=(loaded,))
     journal.add(told)
 

@@ -257,7 +257,7 @@ def test_a_recovery_is_the_same_through_environments(tmp_path: Path):
     settings = replace(Settings(generations=1).scaled(6), steps=80, trials=1)
 
     def recovery(folder: str, healthy: PhysicalRobot, damaged: PhysicalRobot) -> Recovery:
-        journal = create_journal(tmp_path / folder, QUADRUPED.anatomy)
+        journal = create_journal(tmp_path / folder, QUADRUPED.anatomy, calibrated=False)
         return recover(
             healthy=healthy,
             damaged=damaged,

@@ -263,8 +263,9 @@ def test_a_level_out_of_range_is_refused_by_the_command_line(
 @pytest.mark.search
 def test_a_recovery_across_a_gap_is_of_one_robot_whose_trials_all_differ(tmp_path: Path):
     done = selfmodel(
-        "recover", "quadruped", "--damage", "intact", *SMALL, "--trials", "1", "--gap", "0.1",
-        "--structure", "--out", "run", "--json", cwd=tmp_path,
+        "recover", "quadruped", "--damage", "intact", *SMALL, "--steps", "100", "--trials", "1",
+        "--no-calibrate", "--comparator", "forward-displacement", "--kinds", "paper",
+        "--gap", "0.1", "--structure", "--out", "run", "--json", cwd=tmp_path,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)

@@ -13,7 +13,7 @@ from selfmodel.robot.joint_parameters import (
 )
 from selfmodel.robot.parameters import with_model
 from selfmodel.robot.robot import Robot
-from tests.helpers.arms import arm
+from tests.helpers.robots.arms import arm
 
 FIELDS = ("dof_damping", "dof_frictionloss", "dof_armature", "actuator_gainprm", "actuator_biasprm")
 

@@ -25,8 +25,8 @@ from selfmodel.simulation.outcome import SimulationResult, SimulationStats
 from selfmodel.simulation.prediction import predict
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import collect
+from selfmodel.trials.estimation.state_estimation import BASE
 from selfmodel.trials.signals import SIGNALS, Signal
-from selfmodel.trials.state_estimation import BASE
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_motion
 from tests.helpers.hostile import lacking, unstable
@@ -96,7 +96,6 @@ def test_the_errors_told_are_those_of_the_models():
 
     assert fitted().error_before == pytest.approx(prediction_error(QUADRUPED, seen, 1))
     assert fitted().error == pytest.approx(prediction_error(fitted().robot, seen, 1), rel=0.02)
-    assert (fitted().error, fitted().parameters.delay) == (fitted().error, 2)
 
 
 def test_a_model_that_is_exact_is_left_as_it_is_to_the_bit(robot: Robot):

@@ -19,8 +19,8 @@ from selfmodel.simulation.calibration_segments import (
 from selfmodel.simulation.requests import LEAD
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import collect
+from selfmodel.trials.estimation.state_estimation import BASE, ONBOARD, STATE, estimated_states
 from selfmodel.trials.signals import Signal
-from selfmodel.trials.state_estimation import BASE, ONBOARD, STATE, estimated_states
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_motion
 from tests.helpers.hostile import lacking, without_encoders

@@ -23,9 +23,9 @@ from selfmodel.simulation.prediction import predict
 from selfmodel.simulation.requests import END, Segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour, collect
+from selfmodel.trials.estimation.state_estimation import JOINTS, ONBOARD, STATE
 from selfmodel.trials.rotation import rotation_between
 from selfmodel.trials.signals import SIGNALS, Signal
-from selfmodel.trials.state_estimation import JOINTS, ONBOARD, STATE
 from tests.helpers.drivers import random_motion
 from tests.helpers.hostile import exploding
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from selfmodel.cli.options import DEFAULT_BUDGET, FileBudget, Json
+from selfmodel.cli.arguments.options import DEFAULT_BUDGET, FileBudget, Json
 from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.experiments import trial_logs

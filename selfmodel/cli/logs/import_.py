@@ -5,8 +5,8 @@ from typing import Annotated, Any
 
 import typer
 
-from selfmodel.cli.inputs import check_log_name
-from selfmodel.cli.options import DEFAULT_BUDGET, FileBudget, Json
+from selfmodel.cli.arguments.inputs import check_log_name
+from selfmodel.cli.arguments.options import DEFAULT_BUDGET, FileBudget, Json
 from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.tables import show

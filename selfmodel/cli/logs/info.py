@@ -1,16 +1,16 @@
 """``selfmodel logs info``: the contents of logs."""
 
 import math
-from importlib.resources import files as package_files
 from pathlib import Path
 from typing import Any
 
 import typer
 
-from selfmodel.cli.options import DEFAULT_BUDGET, FileBudget, Json, LogFiles
+from selfmodel.cli.arguments.options import DEFAULT_BUDGET, FileBudget, Json, LogFiles
 from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.tables import show
+from selfmodel.cli.viewing.foxglove import layout_path
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError, TrialLog
 from selfmodel.logs.info import Info, has_truth, read_info
@@ -37,11 +37,10 @@ def info(files: LogFiles, *, budget: FileBudget = DEFAULT_BUDGET, as_json: Json 
 
 
 def _viewers() -> tuple[str, ...]:
-    layout = package_files("selfmodel.cli.logs") / "foxglove-layout.json"
     return (
         "To view a log:",
-        f"  Foxglove  Open local file; import the layout {layout}",
-        "  Rerun     rerun FILE.mcap   (pip install rerun-sdk)",
+        f"  Foxglove  Open local file; import the layout {layout_path()}",
+        "  Rerun     selfmodel view FILE.mcap   (pip install 'selfmodel[rerun]')",
     )
 
 

@@ -1,9 +1,11 @@
 """Progress and end of a command that runs a grid: a bar on a terminal, lines elsewhere."""
 
+import math
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from time import monotonic
 
 import typer
 from rich.console import Console
@@ -11,58 +13,83 @@ from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
     Progress,
-    TaskID,
     TextColumn,
     TimeElapsedColumn,
-    TimeRemainingColumn,
 )
 
+from selfmodel.cli.arguments import inputs
 from selfmodel.cli.output.console import text_console
-from selfmodel.cli.output.plain import counted, plain
+from selfmodel.cli.output.plain import plain
 from selfmodel.cli.output.printing import print_notes
-from selfmodel.experiments.grid import GridBegins, PartEnds
+from selfmodel.experiments.grid import (
+    Cell,
+    GridBegins,
+    PartEnds,
+    run_grid,
+)
+from selfmodel.experiments.grid.executors import PROCESSES, choose_workers
+from selfmodel.simulation.threads import thread_count
 
 
 class Watch:
-    """Displays the events of grids and counts the parts of the current one.
+    """Displays the events of a grid and counts its cells.
 
     Args:
         console: Console of the lines.
         progress: Progress bar, if any: then only failures are lines.
 
     Attributes:
-        done: Parts of the current grid that are done or have failed.
-        total: Parts of the current grid.
+        done: Cells that are done or have failed.
+        total: All cells.
     """
 
     def __init__(self, console: Console, progress: Progress | None) -> None:
         self.done = self.total = 0
         self._console = console
         self._progress = progress
-        self._task: TaskID | None = None
+        self._before, self._start = 0, monotonic()
 
     def __call__(self, event: GridBegins | PartEnds) -> None:
         """Displays an event."""
         match event:
             case GridBegins():
                 self.done, self.total = event.finished, event.total
+                self._before, self._start = event.finished, monotonic()
                 if self._progress:
-                    if self._task is not None:
-                        self._progress.remove_task(self._task)
-                    self._task = self._progress.add_task(
-                        "", total=event.total, completed=event.finished
-                    )
+                    self._progress.add_task("", total=event.total, completed=event.finished)
                 elif event.finished:
                     self._print_line(f"{event.finished} of {event.total} were done before")
             case PartEnds():
                 self.done = event.number
-                if self._progress and self._task is not None:
-                    self._progress.update(self._task, completed=event.number)
+                seconds = monotonic() - self._start
+                speed = pace(event.number - self._before, event.total - event.number, seconds)
+                if self._progress:
+                    task = self._progress.task_ids[0]
+                    self._progress.update(task, completed=event.number, description=speed)
                 if event.error is not None or not self._progress:
-                    self._print_line(_line(event))
+                    self._print_line("; ".join(filter(None, (_line(event), speed))))
 
     def _print_line(self, line: str) -> None:
         self._console.print(plain(line), soft_wrap=True)
+
+
+def pace(done: int, left: int, seconds: float) -> str:
+    """Returns the rate of cells and the time left as text; nothing at the end.
+
+    Args:
+        done: Cells that ended since the start.
+        left: Cells that have not ended.
+        seconds: Time since the start, s.
+
+    Examples:
+        >>> pace(10, 35, 600.0)
+        '60 an hour, 0 h 35 min left'
+    """
+    if not (done and left and seconds > 0):
+        return ""
+    rate = done / seconds
+    minutes = math.ceil(left / rate / 60)
+    return f"{3600 * rate:.0f} an hour, {minutes // 60} h {minutes % 60:02d} min left"
 
 
 @contextmanager
@@ -76,8 +103,7 @@ def grid_display() -> Iterator[Watch]:
         BarColumn(bar_width=None),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
+        TextColumn("{task.description}"),
         console=console,
         expand=True,
     )
@@ -90,38 +116,36 @@ def _line(event: PartEnds) -> str:
     return f"[{event.number}/{event.total}] {event.key} {event.part}: {what}"
 
 
-def run_shown(run: Callable[[Watch], Sequence[PartEnds]], out: Path) -> Sequence[PartEnds]:
-    """Runs a grid with a progress display; returns the failed parts.
+def run_shown(
+    cells: Sequence[Cell], out: Path, *, executor: str, options: str, workers: int
+) -> Sequence[PartEnds]:
+    """Computes the cells of a study with a progress display; returns the failed ones.
 
     Ctrl-C and the other stop signals end the command with a line on how to continue.
 
     Args:
-        run: Runs the grid; calls its argument with each event.
-        out: Folder of the grid.
+        cells: The cells.
+        out: Folder of the study.
+        executor: Value of ``--executor``.
+        options: Value of ``--executor-option``.
+        workers: Value of ``--workers``.
+
+    Raises:
+        InputError: The executor or an option is unknown, or the folder contains another study.
     """
+    given = inputs.assignments("--executor-option", options)
+    # The workers of a cluster have another current folder.
+    folder = out if executor == PROCESSES else out.resolve()
     with grid_display() as on_event:
         try:
-            return run(on_event)
+            opened = choose_workers(executor, given, thread_count(workers), folder)
+            return run_grid(folder, cells, workers=opened, on_progress=on_event)
         except KeyboardInterrupt as interruption:
             interruption.add_note(
                 f"{on_event.done} of {on_event.total} are done and kept in {out}; the same command "
                 f"continues with the rest"
             )
             raise
-
-
-def note_unverified(count: int, out: Path) -> None:
-    """Prints a line if a table has parts without digests.
-
-    Args:
-        count: Number of the parts.
-        out: Folder of the grid.
-    """
-    if count:
-        print_notes(
-            f"note: version 0.1 wrote {counted(count, 'part')} in {out}, without digests: their "
-            f"content was not verified"
-        )
 
 
 def as_objects(failed: Sequence[PartEnds]) -> list[dict[str, str | None]]:

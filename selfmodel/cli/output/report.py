@@ -9,12 +9,15 @@ from typing import Any
 
 from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_lines
-from selfmodel.cli.output.ranking import confidence_sentence, ranking_table, right_or_wrong
+from selfmodel.cli.output.ranking import ranking_table
 from selfmodel.cli.output.tables import folding, print_tables
+from selfmodel.diagnosis.sentences import confidence_sentence, right_or_wrong
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
+from selfmodel.experiments import plugins
 from selfmodel.experiments.experiment import Experiment, Outcome
 from selfmodel.files import file_digest
 from selfmodel.logs.result_files import result_bytes
+from selfmodel.recovery.repertoire.model_digest import self_model_digest
 from selfmodel.recovery.scores.fitness import DISPLACEMENT
 from selfmodel.robot.designs import network_for
 
@@ -108,10 +111,11 @@ def result_file(experiment: Experiment, found: dict[str, Any], logs: Sequence[Pa
 
 def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
     """Returns the outcome as the JSON values that ``recover --json`` prints."""
-    recovery, stats = outcome.recovery, outcome.stats
+    recovery, stats, gaits = outcome.recovery, outcome.stats, experiment.repertoire
     design = experiment.design or network_for(experiment.robot)
     return {
         "robot": experiment.robot.name,
+        "model": self_model_digest(experiment.robot),
         "case": experiment.case,
         "truth": str(experiment.truth),
         "comparator": recovery.comparator.comparator.name,
@@ -121,6 +125,8 @@ def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
         "structure": experiment.structure,
         "next_trial": experiment.next_trial,
         "repair": experiment.repair,
+        "search": plugins.search_name(experiment.repair, experiment.search, gaits),
+        "repertoire": dataclasses.asdict(gaits.origin) if gaits else None,
         "controller": design.name,
         "neurons": design.hidden,
         "seed": experiment.seed,

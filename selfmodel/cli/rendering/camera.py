@@ -11,7 +11,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.cli.rendering.captions import captioned
 from selfmodel.cli.rendering.film import Film
 from selfmodel.cli.rendering.view import ELEVATION, azimuth, gaze, size
-from selfmodel.cli.rendering.visible import DEFAULT_RGBA, VISUAL_GROUPS, opacity, visible_geoms
+from selfmodel.robot.visible_geoms import DEFAULT_RGBA, VISUAL_GROUPS, opacity, visible_geoms
 
 WIDTH, HEIGHT = 480, 360
 """Size of a motion's picture, pixels."""

@@ -8,23 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.progress import track
 
-from selfmodel.cli.confirmation import confirm_time
 from selfmodel.cli.output.console import text_console
 from selfmodel.cli.output.plain import counted, plain
 from selfmodel.cli.output.printing import print_notes
 from selfmodel.cli.rendering import camera, video
 from selfmodel.cli.rendering.film import Film, evenly, film_of
 from selfmodel.cli.rendering.filmstrip import stick_frames, strip
-from selfmodel.cli.rendering.poses import POSE
+from selfmodel.cli.replayed_log import replayed_log
 from selfmodel.errors import InputError, WorkError
-from selfmodel.experiments import plugins, trial_logs
-from selfmodel.experiments.expected_time import replay_seconds
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.logs import TrialLog
 from selfmodel.logs.errors import LogWriteError
 from selfmodel.logs.files import replace_file
 from selfmodel.robot.robot import Robot
+from selfmodel.robot.state.poses import POSE
 from selfmodel.sandbox.budget import Budget
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.threads import thread_count
@@ -63,11 +60,9 @@ def draw_trial(
         InputError: The log, the hypothesis or the model cannot be used.
         WorkError: The file could not be written.
     """
-    (log,) = trial_logs.logs([file], budget)
-    robot = trial_logs.robot_of_logs([log], model, budget)
-    assumed = HypothesisSpace(robot.anatomy, plugins.kinds(kinds)).parse(hypothesis)
-    confirm_time(replay_seconds(robot, log.trial, budget), budget, yes=yes)
-    film, facts = _filmed(log, robot, assumed, pictures, thread_count(threads))
+    given = replayed_log(file, hypothesis, kinds=kinds, model=model, budget=budget, yes=yes)
+    robot = given.robot
+    film, facts = _filmed(given.log, robot, given.hypothesis, pictures, thread_count(threads))
     print_notes(*(f"note: {note}" for note in facts["notes"]))
     data = _drawn(film, out.suffix.lower().removeprefix("."), pictures, sticks=sticks)
     try:

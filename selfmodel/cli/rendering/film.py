@@ -7,13 +7,12 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
-from selfmodel.cli.rendering.poses import poses_of
+from selfmodel.faults.affected_bodies import detached_bodies, jammed_bodies
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.faults.kinds.broken import BROKEN
-from selfmodel.faults.kinds.jammed import JAMMED, JAMMED_AT_ANGLE
 from selfmodel.robot.base.known_base import with_known_base
 from selfmodel.robot.robot import Robot
+from selfmodel.robot.state.poses import poses_of
 from selfmodel.trials.behaviour import Behaviour
 
 
@@ -92,8 +91,8 @@ def film_of(
     return Film(
         model=model,
         root=int(model.body(robot.root).id),
-        detached=_detached(robot, model, hypothesis),
-        jammed=_jammed(robot, model, hypothesis),
+        detached=detached_bodies(robot.anatomy, model, hypothesis),
+        jammed=jammed_bodies(robot.anatomy, model, hypothesis),
         time=time[steps],
         shots=tuple(shots),
         missing=tuple(missing),
@@ -109,25 +108,3 @@ def evenly(time: FloatArray, pictures: int) -> FloatArray:
         pictures: Number of times, at most the number of steps.
     """
     return np.asarray(time[np.unique(np.linspace(0, len(time) - 1, pictures).astype(int))])
-
-
-def _detached(robot: Robot, model: mujoco.MjModel, hypothesis: Hypothesis) -> frozenset[int]:
-    """Returns the ids of the bodies that a hypothesis detaches."""
-    names = (
-        name
-        for fault in hypothesis.faults
-        if fault.kind is BROKEN
-        for name in robot.anatomy.joint(fault.part).bodies
-    )
-    return frozenset(int(model.body(name).id) for name in names)
-
-
-def _jammed(robot: Robot, model: mujoco.MjModel, hypothesis: Hypothesis) -> frozenset[int]:
-    """Returns the ids of the bodies at the joints that a hypothesis jams."""
-    hinges = (
-        hinge
-        for fault in hypothesis.faults
-        if fault.kind in (JAMMED, JAMMED_AT_ANGLE)
-        for hinge in robot.anatomy.joint(fault.part).hinges
-    )
-    return frozenset(int(model.joint(hinge).bodyid[0]) for hinge in hinges)

@@ -10,7 +10,7 @@ from matplotlib.collections import LineCollection
 from selfmodel.arrays import FloatArray
 from selfmodel.cli.rendering.film import Film
 from selfmodel.cli.rendering.view import axes as axes_of_view
-from selfmodel.cli.rendering.visible import stick_geoms
+from selfmodel.robot.visible_geoms import stick_geoms
 
 LONG = (mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_CYLINDER)
 FLAT = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)

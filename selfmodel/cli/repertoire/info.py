@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from selfmodel.cli.options import Json
+from selfmodel.cli.arguments.options import Json
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.logs.repertoires import load_repertoire
 from selfmodel.recovery.repertoire.repertoire import Repertoire

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from selfmodel.cli.options import Json
+from selfmodel.cli.arguments.options import Json
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.tables import show
 from selfmodel.experiments.robots import robot_entry

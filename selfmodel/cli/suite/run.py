@@ -4,14 +4,16 @@ from typing import Annotated
 
 import typer
 
-from selfmodel.cli import inputs
-from selfmodel.cli.options import (
+from selfmodel.cli.arguments import inputs
+from selfmodel.cli.arguments.options import (
     CONTROLLER,
     PAPER_KIND_NAMES,
     STUDY,
     Cases,
     ComparatorName,
     ControllerKind,
+    ExecutorName,
+    ExecutorOptions,
     FirstSeed,
     GapLevel,
     Generations,
@@ -26,19 +28,25 @@ from selfmodel.cli.options import (
     Trials,
     Workers,
 )
+from selfmodel.cli.arguments.repair_options import RepairName, StudyScore, StudySearch
+from selfmodel.cli.arguments.table_options import TableFormat
 from selfmodel.cli.output import grid_display
-from selfmodel.cli.output.printing import print_json, print_lines
+from selfmodel.cli.output.printing import print_json, print_lines, print_notes
 from selfmodel.cli.output.tables import show
-from selfmodel.cli.repair_options import ScoreName
 from selfmodel.comparators import DEFAULT
+from selfmodel.experiments.comparison.files import write_tables
+from selfmodel.experiments.comparison.table_formats import Table, check_format
+from selfmodel.experiments.comparison.tables import table_of_records
+from selfmodel.experiments.grid.checks import read_study
+from selfmodel.experiments.grid.executors import PROCESSES
+from selfmodel.experiments.plugins import PAPER
+from selfmodel.experiments.study.repair_cost import repair_cost
 from selfmodel.experiments.suite.bodies import DOMAINS, bodies, tasks_of
-from selfmodel.experiments.suite.plan import Study, known_cases
+from selfmodel.experiments.suite.plan import Study, cells, known_cases
 from selfmodel.experiments.suite.results import write_results
 from selfmodel.experiments.suite.rows import Summary
-from selfmodel.experiments.suite.work import run_study
 from selfmodel.faults.registry import kind_names
 from selfmodel.settings import Settings
-from selfmodel.simulation.threads import thread_count
 
 COLUMNS = (
     *("robot", "case", "truth", "right", "before", "after", "recovered", "recovered ÷ before"),
@@ -72,7 +80,9 @@ def run(
     only: Only = "1/1",
     gap: GapLevel = 0.0,
     structure: Structural = False,
-    score: ScoreName = "displacement",
+    repair: RepairName = PAPER,
+    search: StudySearch = None,
+    score: StudyScore = None,
     controller: ControllerKind = "network",
     neurons: Neurons = None,
     comparator: ComparatorName = DEFAULT.name,
@@ -92,12 +102,17 @@ def run(
     generations: Generations = 30,
     trials: Trials = 3,
     workers: Workers = 0,
+    executor: ExecutorName = PROCESSES,
+    executor_option: ExecutorOptions = "",
+    table: TableFormat = None,
     as_json: Json = False,
 ) -> None:
     """Fail and recover bodies of the suite, selfmodel's and your own: bodies x cases x seeds.
 
     An interrupted study is continued by the same command.
     """
+    if table is not None:
+        check_format(table)
     domain_names = inputs.texts("--domains", domains, DOMAINS)
     wanted = None if tasks is None else inputs.texts("--tasks", tasks, tasks_of(domain_names))
     chosen = bodies(domain_names, wanted)
@@ -116,28 +131,39 @@ def run(
         gap=gap,
         structure=structure,
         neurons=neurons,
+        repair=repair,
+        search=search,
     )
     share = inputs.share("--only", only)
+    planned = cells(study, share)
+    if repair != PAPER:
+        cost = repair_cost(planned, study.settings, repair, trials, read_study(out))
+        if cost.steps:
+            print_notes(f"note: {cost}")
     failed = grid_display.run_shown(
-        lambda on_progress: run_study(
-            study, workers=thread_count(workers), on_progress=on_progress, only=share
-        ),
-        out,
+        planned, out, executor=executor, options=executor_option, workers=workers
     )
     results = write_results(out)
-    grid_display.note_unverified(results.unverified, out)
+    found_table = _table(results.summaries)
+    tables = write_tables(out, [found_table], table)
+    files = [str(path) for path in (*results.files, *tables)]
     if as_json:
-        found = {**results.as_dict(), "failures": grid_display.as_objects(failed)}
-        print_json(found, indent=1)
+        failures = grid_display.as_objects(failed)
+        print_json({**results.as_dict(), "failures": failures, "files": files}, indent=1)
     else:
-        _print(results.summaries)
-        print_lines(*map(str, results.files))
+        _print(found_table)
+        print_lines(*files)
     grid_display.end(failed)
 
 
-def _print(summaries: tuple[Summary, ...]) -> None:
-    if summaries:
-        show(COLUMNS, [_texts(summary) for summary in summaries], texts=3)
+def _table(summaries: tuple[Summary, ...]) -> Table:
+    rows = [_texts(summary) for summary in summaries]
+    return table_of_records("summaries", summaries, COLUMNS, rows, texts=3)
+
+
+def _print(table: Table) -> None:
+    if table.rows:
+        show(table.columns, table.rows, texts=table.texts)
         print_lines("Medians over the runs; right with its 95 % interval, %.")
 
 

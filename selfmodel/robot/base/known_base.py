@@ -9,9 +9,9 @@ from selfmodel.arrays import FloatArray
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state.access import current_value, signal_fields
 from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.estimation.velocity_estimation import with_joint_velocities
 from selfmodel.trials.signals import Signal
 from selfmodel.trials.trial import Trial
-from selfmodel.trials.velocity_estimation import with_joint_velocities
 
 BASE_SIGNALS: tuple[Signal, ...] = (
     "base_position",

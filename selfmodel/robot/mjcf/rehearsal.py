@@ -42,7 +42,6 @@ class ModelCost:
     Attributes:
         model_bytes: Size of the compiled model, bytes. Each embodiment has a copy.
         data_bytes: Size of MuJoCo's data for one thread, bytes.
-        peak_bytes: Largest address space during compilation and steps, bytes; 0 where unknown.
         compile_seconds: Time of a compilation with the search for the robot's parts, s.
         step_seconds: Time of a physics step, the shortest of the first: other work on the machine
             delays some of them, s.
@@ -51,7 +50,6 @@ class ModelCost:
 
     model_bytes: int
     data_bytes: int
-    peak_bytes: int
     compile_seconds: float
     step_seconds: float
     failure: str
@@ -91,7 +89,7 @@ def _rehearsed(
             f"{ceil(budget.file_seconds)} s: to go on, raise the time with --budget time=..., from "
             f"{budget.time:g} s"
         )
-    return ModelCost(peak_bytes=found.peak, **found.facts)
+    return ModelCost(**found.facts)
 
 
 def physics_timestep(mjcf: str, budget: Budget = DEFAULT_BUDGET) -> float:

@@ -19,8 +19,8 @@ from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration_segments import CalibrationSegments
 from selfmodel.simulation.floating.predictions import Predictions
 from selfmodel.simulation.losses import is_better
+from selfmodel.trials.estimation.state_estimation import JOINTS
 from selfmodel.trials.signals import Signal
-from selfmodel.trials.state_estimation import JOINTS
 
 MAX_RATIO = 1.0
 """Largest root mean square error of a joint relative to that of the prediction of no motion."""

@@ -149,22 +149,6 @@ class Experiment:
             losses = own
         return chosen
 
-    def fit_of(self, name: str) -> JointFit:
-        """Returns the fit of a set to all segments, without a test that it is better.
-
-        Its ``held_out_error`` is the error of the fit.
-
-        Args:
-            name: Name of a set of ``SETS``, not the nominal one.
-        """
-        everything = np.ones(self._segments, dtype=bool)
-        point = self._with_best_delay(Basis.of(self._robot, SETS[1]), self._start(), everything)
-        for each in SETS[1 : SETS.index(name) + 1]:
-            basis = Basis.of(self._robot, each)
-            point = self._solved(basis, point, everything, ITERATIONS)
-            point = self._with_near_delay(basis, point, everything)
-        return self._fit(name, point, basis, self._errors([point])[0])
-
     def _fit(self, name: str, point: Point, basis: Basis | None, held_out: FloatArray) -> JointFit:
         errors = self._errors([point])[0]
         deviations = self._zero() if basis is None else self._deviations(basis, point)

@@ -14,17 +14,17 @@ import numpy as np
 
 from selfmodel.cli.rendering import camera
 from selfmodel.cli.rendering.film import Film, film_of
-from selfmodel.cli.rendering.poses import POSE
 from selfmodel.experiments.robots import robot_entry
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.robot.robot import Robot
+from selfmodel.robot.state.poses import POSE
 from selfmodel.sandbox.budget import Budget
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
 from tests.helpers.drivers import random_controllers
-from tests.helpers.menagerie import menagerie
+from tests.helpers.robots.menagerie import menagerie
 
-FRAMES = 3
+FRAMES = 2
 STEPS = 31
 LARGE_RINGS = 170
 """Detail of meshes that are too large for a log: 2.9 MB each."""

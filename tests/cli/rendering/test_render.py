@@ -20,7 +20,6 @@ from selfmodel.cli.rendering import camera, gl, video, view
 from selfmodel.cli.rendering.diagnosed import diagnosed
 from selfmodel.cli.rendering.film import Film, evenly, film_of
 from selfmodel.cli.rendering.filmstrip import stick_frames, strip
-from selfmodel.cli.rendering.poses import POSE
 from selfmodel.cli.rendering.sticks import draw, draw_ground, lines_of, plane_of
 from selfmodel.errors import InputError, WorkError
 from selfmodel.faults.hypothesis import INTACT
@@ -30,6 +29,7 @@ from selfmodel.logs.result_files import result_bytes
 from selfmodel.logs.writing.writer import write_trial
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot
+from selfmodel.robot.state.poses import POSE
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour

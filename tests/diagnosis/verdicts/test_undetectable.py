@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pytest
 
-from selfmodel.cli.output.ranking import confidence_sentence
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
 from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
+from selfmodel.diagnosis.sentences import confidence_sentence
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
 from selfmodel.diagnosis.verdicts.undetectable import undetectable_faults
 from selfmodel.faults.hypothesis import INTACT, Hypothesis

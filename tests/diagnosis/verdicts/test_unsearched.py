@@ -6,12 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 import pytest
 
-from selfmodel.cli.output.ranking import confidence_sentence
 from selfmodel.comparators import SEGMENT_PREDICTION, SENSOR_SERIES
 from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis, UnsearchedFault
 from selfmodel.diagnosis.loss_functions import LossFunctions
+from selfmodel.diagnosis.sentences import confidence_sentence
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
 from selfmodel.diagnosis.verdicts.significance import NEGLIGIBLE_LOSS
 from selfmodel.diagnosis.verdicts.unsearched import best_unsearched_fault

@@ -16,8 +16,8 @@ from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour, collect
 from selfmodel.trials.signals import SIGNALS
 from tests.faults.test_registry import BARE
-from tests.helpers.arms import quadruped_on_a_stand
 from tests.helpers.drivers import random_motion
+from tests.helpers.robots.arms import quadruped_on_a_stand
 
 STEPS = 60
 OFFSET = 0.1

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from selfmodel.cli import inputs, main
+from selfmodel.cli import main
+from selfmodel.cli.arguments import inputs
 from selfmodel.comparators import COMPARATORS
 from selfmodel.experiments.suite.bodies import bodies
 from selfmodel.faults.registry import ALL_KINDS

@@ -1,4 +1,4 @@
-"""Folders of studies: definitions and parts of an ablation and of a suite, as JSON.
+"""Folders of studies: cells of an ablation and of a suite, as JSON.
 
 A file with another content and its old digest must be refused, or read as it was; with a right
 digest it may be refused, or read.
@@ -16,11 +16,10 @@ from selfmodel.experiments.ablation.plan import Ablation
 from selfmodel.experiments.ablation.results import as_dict, collect
 from selfmodel.experiments.ablation.rows import AblationRow
 from selfmodel.experiments.ablation.scores import summarise
-from selfmodel.experiments.grid import Job, PartResult, finished
-from selfmodel.experiments.grid.definition import check_definition, write_definition
-from selfmodel.experiments.grid.part_runner import run_part
-from selfmodel.experiments.grid.parts import unfinished
-from selfmodel.experiments.study_files import as_csv
+from selfmodel.experiments.grid import Cell
+from selfmodel.experiments.grid.cell_file import CELL, cell_bytes
+from selfmodel.experiments.grid.checks import read_study
+from selfmodel.experiments.study.files import as_csv
 from selfmodel.experiments.suite import results as suite_results
 from selfmodel.experiments.suite.rows import SuiteRow
 from selfmodel.logs.result_files import result_bytes, verified
@@ -53,28 +52,22 @@ SUITE_ROW = SuiteRow(
 
 def prepare(folder: Path) -> Make:
     """Returns the maker of folders."""
-    (cell,) = plan.cells(ABLATION)
-    job = plan.job(ABLATION, cell, ["0" * 64])
+    (planned,) = plan.cells(ABLATION)
+    cell = dataclasses.replace(planned, needs={})  # whose cells are of the same form
     seeds = {}
     for name, row in (("ablation", ABLATION_ROW), ("suite", SUITE_ROW)):
-        grid = folder / name / "runs"
-        write_definition(grid / job.key, job.definition)
-        rows = [dataclasses.asdict(row)]
-        run_part(grid, lambda *_, rows=rows: PartResult(rows), (job, PART))
-        seeds[name] = {
-            f"{STUDY}/{path.relative_to(folder / name).as_posix()}": path.read_bytes()
-            for path in sorted((folder / name).rglob("*.json"))
-        }
+        path = folder / name / cell.place
+        path.mkdir(parents=True)
+        seeds[name] = cell_bytes(path, cell, [dataclasses.asdict(row)], 1.5, {})
 
     def make(rng: np.random.Generator) -> Case:
         name = "ablation" if rng.random() < 0.6 else "suite"
-        files = dict(seeds[name])
-        chosen = str(rng.choice(sorted(files)))
         sealed = bool(rng.random() < 0.7)
         mutate = _sealed if sealed else jsons.mutated
-        files[chosen], what = mutate(files[chosen], rng)
+        data, what = mutate(seeds[name], rng)
         check = _check_ablation if name == "ablation" else _check_suite
-        return Case(f"{chosen}: {what}", files, partial(check, job, sealed=sealed))
+        files = {f"{STUDY}/{cell.place}/{CELL}": data}
+        return Case(f"{name}: {what}", files, partial(check, cell, sealed=sealed))
 
     return make
 
@@ -82,7 +75,7 @@ def prepare(folder: Path) -> Make:
 def _sealed(data: bytes, rng: np.random.Generator) -> tuple[bytes, str]:
     """Returns a result file with another content and a right digest."""
     content = dict(verified(json.loads(data)).content)
-    within = RESULT if RESULT in content and rng.random() < 0.6 else None
+    within = RESULT if rng.random() < 0.6 else None
     held = content if within is None else content[within]
     changed, what = jsons.mutated(json.dumps(held).encode(), rng)
     try:
@@ -93,20 +86,18 @@ def _sealed(data: bytes, rng: np.random.Generator) -> tuple[bytes, str]:
     return made, f"sealed {what}"
 
 
-def _check_ablation(job: Job, *, sealed: bool) -> str:
+def _check_ablation(cell: Cell, *, sealed: bool) -> str:
     plan.check(ABLATION)
-    run = Path(STUDY) / "runs" / job.key
-    check_definition(run, job.definition)
-    left = unfinished(run, job.definition, [PART])
+    found = read_study(Path(STUDY))
     rows = collect(Path(STUDY))
     json.dumps(as_dict(rows, summarise(rows)), allow_nan=False)
     as_csv(AblationRow, rows)
     _check_rows(rows, (ABLATION_ROW,), sealed=sealed)
-    return f"{len(rows)} rows, {len(left)} parts left"
+    return f"{len(rows)} rows, {len({cell.place} - found.keys())} cells left"
 
 
-def _check_suite(job: Job, *, sealed: bool) -> str:
-    unfinished(Path(STUDY) / "runs" / job.key, job.definition, [PART])
+def _check_suite(cell: Cell, *, sealed: bool) -> str:
+    assert cell.place in read_study(Path(STUDY))
     found = suite_results.write_results(Path(STUDY))
     for path in found.files:
         path.unlink()
@@ -115,9 +106,8 @@ def _check_suite(job: Job, *, sealed: bool) -> str:
 
 
 def _check_rows(rows: tuple[object, ...], written: tuple[object, ...], *, sealed: bool) -> None:
-    """Checks that rows without the seal are those that were written, but for files of 0.1."""
-    verified_parts = all(part.made_with is not None for part in finished(Path(STUDY) / "runs"))
-    if not sealed and verified_parts and rows != written:
+    """Checks that rows without the seal are those that were written."""
+    if not sealed and rows != written:
         raise AssertionError("a row has changed")
 
 

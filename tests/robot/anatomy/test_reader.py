@@ -12,7 +12,7 @@ from selfmodel.faults.registry import KINDS
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.signals import SIGNALS
-from tests.helpers.bodies import BODIES, EVERY_BODY, swung
+from tests.helpers.robots.bodies import BODIES, EVERY_BODY, swung
 
 MJCF = """
 <mujoco>

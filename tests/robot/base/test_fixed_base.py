@@ -14,8 +14,8 @@ from selfmodel.robot.state.access import bind_data, current_value, signal_fields
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import collect
 from selfmodel.trials.signals import SIGNALS
-from tests.helpers.arms import arm, arm_mjcf, quadruped_on_a_stand, robot_of
 from tests.helpers.drivers import random_cpgs
+from tests.helpers.robots.arms import arm, arm_mjcf, quadruped_on_a_stand, robot_of
 
 POSE = ("base_position", "base_orientation")
 VELOCITY = ("base_linear_velocity", "base_angular_velocity")

@@ -13,8 +13,8 @@ from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks.quadruped import QUADRUPED
 from selfmodel.trials.behaviour import Behaviour, collect
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.helpers.arms import arm
 from tests.helpers.drivers import random_cpgs
+from tests.helpers.robots.arms import arm
 
 
 def trial_of(robot: Robot, steps: int = 200) -> Trial:

@@ -13,7 +13,7 @@ from selfmodel.robot.mjcf.load import robot_from
 from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
-from tests.helpers.go1 import go1, trot
+from tests.helpers.robots.go1 import go1, trot
 from tests.robot.mjcf.awkward import mjcf
 
 WARM_START = int(mujoco.mjtDisableBit.mjDSBL_WARMSTART)

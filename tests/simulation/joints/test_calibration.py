@@ -18,7 +18,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import Calibration, calibrate
 from selfmodel.trials.behaviour import collect
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.helpers.arms import robot_of
+from tests.helpers.robots.arms import robot_of
 
 ARM = """
 <mujoco model="arm">

@@ -9,7 +9,7 @@ from selfmodel.robot.mjcf.document import files
 from selfmodel.robot.mjcf.document.files import Folder, robot_folder, root_around
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings, read_settings
-from tests.helpers.menagerie import menagerie
+from tests.helpers.robots.menagerie import menagerie
 from tests.robot.mjcf.awkward import CUBE, MESHED, mjcf
 
 LIMIT = 1000

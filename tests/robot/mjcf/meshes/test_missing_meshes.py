@@ -13,7 +13,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.signals import SIGNALS
 from tests.helpers.drivers import random_controllers
-from tests.helpers.menagerie import menagerie
+from tests.helpers.robots.menagerie import menagerie
 
 
 def motion(robot: Robot) -> np.ndarray:

@@ -17,7 +17,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.signals import SIGNALS
 from tests.helpers.drivers import random_controllers
-from tests.helpers.menagerie import menagerie, stl
+from tests.helpers.robots.menagerie import menagerie, stl
 
 RINGS = 24
 """Meshes of 58 kB each."""

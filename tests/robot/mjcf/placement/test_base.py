@@ -7,7 +7,7 @@ import pytest
 from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.placement.base import STAND_CLEARANCE
 from selfmodel.robot.mjcf.settings import checked_settings
-from tests.helpers.arms import PEDESTAL, arm, arm_mjcf, robot_of
+from tests.helpers.robots.arms import PEDESTAL, arm, arm_mjcf, robot_of
 from tests.robot.mjcf.awkward import BALL, GROUND, LEGS, mjcf
 
 TWO_ARMS = '<body name="left" pos="0 1 0">{arm}</body><body name="table"><geom size=".1"/></body>'

@@ -1,0 +1,151 @@
+"""Option values as objects: cases, stages, lists, shares of a study, names of files."""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from selfmodel.errors import InputError, unknown_name
+from selfmodel.trials.trial import STAGES, Stage, stage_of
+
+
+def case_notation(cases: Mapping[int, str], case: int | None, damage: str | None) -> str:
+    """Returns the notation of a failure that is given by its case number or by its notation.
+
+    Args:
+        cases: Notation per case number of Table I.
+        case: Value of ``--case``.
+        damage: Value of ``--damage``.
+
+    Raises:
+        InputError: Neither or both are given, or there is no case of that number.
+    """
+    if (case is None) == (damage is None):
+        given = "neither" if case is None else "both"
+        numbers, example = ", ".join(map(str, cases)), next(iter(cases.values()))
+        raise InputError(
+            f"expected either --case N or --damage NOTATION, got {given}: cases are {numbers}, a "
+            f"notation is like {example}"
+        )
+    if damage is not None:
+        return damage
+    if case is None or case not in cases:
+        raise unknown_name("case of Table I", str(case), map(str, cases))
+    return cases[case]
+
+
+def stage(name: str) -> Stage:
+    """Returns the stage of that name.
+
+    Raises:
+        InputError: There is no such stage; the message contains the nearest names.
+    """
+    found = stage_of(name)
+    if found is None:
+        raise unknown_name("stage", name, STAGES)
+    return found
+
+
+def texts(option: str, given: str, every: Iterable[str] | None = None) -> tuple[str, ...]:
+    """Returns the distinct texts of a list with commas.
+
+    Args:
+        option: Name of the option, such as ``--robots``, for the message.
+        given: Value of the option.
+        every: Texts meant by ``all``; None if ``all`` has no meaning.
+
+    Raises:
+        InputError: The list or an item of it is empty.
+    """
+    if every is not None and given.strip() == "all":
+        return tuple(every)
+    found = [text.strip() for text in given.split(",")]
+    if not all(found):
+        raise InputError(f"{option} needs a list with commas between its items, got {given!r}")
+    return tuple(dict.fromkeys(found))
+
+
+def whole_numbers(option: str, given: str, every: Iterable[int]) -> tuple[int, ...]:
+    """Returns the distinct whole numbers of a list with commas; see ``texts``.
+
+    Raises:
+        InputError: An item is not a whole number.
+    """
+    try:
+        found = [int(text) for text in texts(option, given, map(str, every))]
+    except ValueError as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(
+            f"{option} needs whole numbers with commas between them, or 'all', got {given!r}"
+        ) from None
+    return tuple(dict.fromkeys(found))
+
+
+def numbers(option: str, given: str) -> tuple[float, ...]:
+    """Returns the distinct numbers of a list with commas; see ``texts``.
+
+    Raises:
+        InputError: An item is not a number.
+    """
+    try:
+        return tuple(dict.fromkeys(float(text) + 0.0 for text in texts(option, given)))
+    except ValueError as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(
+            f"{option} needs numbers with commas between them, such as 0,0.05, got {given!r}"
+        ) from None
+
+
+def share(option: str, given: str) -> tuple[int, int]:
+    """Returns ``(i, n)`` of the text ``i/n``: every n-th run, from the i-th.
+
+    Raises:
+        InputError: The text has another form, or i is not between 1 and n.
+    """
+    first, slash, count = given.partition("/")
+    short = len(given) <= 20
+    if not (
+        slash
+        and short
+        and first.isdecimal()
+        and count.isdecimal()
+        and 1 <= int(first) <= int(count)
+    ):
+        raise InputError(
+            f"{option} needs i/n, the i-th of every n runs with i from 1 to n, such as 2/8, "
+            f"got {given!r}"
+        )
+    return int(first), int(count)
+
+
+def assignments(option: str, given: str) -> dict[str, str]:
+    """Returns the names and values of a list ``A=B,C=D``; none of an empty text.
+
+    Raises:
+        InputError: An item has no ``=``, or a name is given twice.
+    """
+    items = [text.partition("=") for text in texts(option, given)] if given.strip() else []
+    found = {name.strip(): value.strip() for name, equals, value in items if equals}
+    if len(found) < len(items):
+        raise InputError(f"{option} needs distinct names with values, A=B,C=D, got {given!r}")
+    return found
+
+
+def check_folder(path: Path) -> None:
+    """Checks that the folder of a file to be written exists.
+
+    Raises:
+        InputError: The folder is missing.
+    """
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: there is no folder {path.parent}: make it, or choose another")
+
+
+def check_log_name(path: Path) -> None:
+    """Checks the name of a log to be written.
+
+    Raises:
+        InputError: The name does not end in ``.mcap``.
+    """
+    if path.suffix != ".mcap":
+        raise InputError(f"--out needs a name that ends in .mcap, got {str(path)!r}")

@@ -1,0 +1,145 @@
+"""Diagnosis of the logs that a command was given, with its progress and notes."""
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from selfmodel.cli.arguments.confirmation import confirm_time
+from selfmodel.cli.output.display import display
+from selfmodel.cli.output.plain import counted
+from selfmodel.cli.output.printing import print_notes
+from selfmodel.controllers.playback import Playback
+from selfmodel.diagnosis.comparator_choice import ComparatorChoice
+from selfmodel.diagnosis.diagnosis import Diagnosis
+from selfmodel.experiments import trial_logs
+from selfmodel.experiments.expected_time import diagnosis_seconds
+from selfmodel.experiments.log_diagnosis import LogDiagnosis, by_stage, set_up_diagnosis
+from selfmodel.faults.kind import FaultKind
+from selfmodel.logs import TrialLog
+from selfmodel.recovery.sequential_diagnosis import diagnose_trials
+from selfmodel.robot.robot import Robot
+from selfmodel.sandbox.budget import Budget
+from selfmodel.settings import Settings
+
+
+@dataclass(frozen=True, eq=False)
+class DiagnosedLogs:
+    """A diagnosis of logs, and what it was made of.
+
+    Attributes:
+        explained: Logs of the trials to explain, in order.
+        robot: The nominal robot.
+        inputs: Trials, comparator, calibration and search.
+        diagnosis: The diagnosis.
+    """
+
+    explained: tuple[TrialLog, ...]
+    robot: Robot
+    inputs: LogDiagnosis
+    diagnosis: Diagnosis
+
+    @property
+    def played_back(self) -> tuple[TrialLog, ...]:
+        """Logs without a controller."""
+        return tuple(log for log in self.explained if _is_played_back(log))
+
+
+def diagnose_logs(
+    files: Sequence[Path],
+    *,
+    robot: str | None,
+    choose_comparator: ComparatorChoice,
+    kinds: Sequence[FaultKind],
+    calibrate: bool,
+    population: int | None,
+    generations: int | None,
+    seed: int | None,
+    threads: int,
+    budget: Budget,
+    yes: bool,
+) -> DiagnosedLogs:
+    """Returns the diagnosis of logs; prints notes and progress on standard error.
+
+    Args:
+        files: The logs, in the order in which the trials were run.
+        robot: Self-model instead of that in the logs, as in ``--robot``.
+        choose_comparator: Chooses the comparator.
+        kinds: Fault kinds to search.
+        calibrate: Whether the self-model is fitted to the trials before the failure.
+        population: Genomes in a generation; None for the number in the first log.
+        generations: Generations; None for the number in the first log.
+        seed: Seed of all random numbers; None for that of the first log.
+        threads: Threads of the physics; 0 for all processors.
+        budget: Memory and time that the logs may take.
+        yes: Whether a longer time is allowed.
+
+    Raises:
+        InputError: A log cannot be used, or no comparator can judge all trials.
+        BudgetError: The expected time is above the budget.
+    """
+    logs = trial_logs.logs(files, budget)
+    model = trial_logs.robot_of_logs(logs, robot, budget)
+    failed, healthy = by_stage([log.trial for log in logs])
+    used = [log for log in logs if log.trial in failed]
+    set_up = partial(
+        set_up_diagnosis,
+        failed,
+        healthy,
+        robot=model,
+        choose_comparator=choose_comparator,
+        kinds=kinds,
+        settings=_settings(used[0].settings, population, generations),
+        seed=seed,
+        threads=threads,
+        budget=budget,
+    )
+    expected = diagnosis_seconds(
+        model, set_up(calibrate=False), calibrate=calibrate, threads=threads, budget=budget
+    )
+    confirm_time(expected, budget, yes=yes)
+    found = set_up(calibrate=calibrate)
+    print_notes(*(f"note: {note}" for note in _notes(used)))
+    with display() as on_event:
+        on_event(found.comparator)
+        if found.calibration is not None:
+            on_event(found.calibration)
+        diagnosis = diagnose_trials(found.damaged, found.search, found.seed, on_event)
+    return DiagnosedLogs(tuple(used), model, found, diagnosis)
+
+
+def _settings(logged: Settings, population: int | None, generations: int | None) -> Settings:
+    """Returns the settings of a log with the options that were given."""
+    if generations is not None:
+        logged = dataclasses.replace(logged, generations=generations)
+    return logged if population is None else logged.scaled(population)
+
+
+def _is_played_back(log: TrialLog) -> bool:
+    return isinstance(log.trial.plan.controller, Playback)
+
+
+def _notes(logs: list[TrialLog]) -> list[str]:
+    """Returns the notes on limits of the logs that affect the ranking."""
+    first = logs[0]
+    notes = [
+        f"{log.trial.path} has no controller: its commands are played back, so a sensor fault "
+        f"does not change the motion"
+        for log in logs
+        if _is_played_back(log)
+    ]
+    notes += [
+        f"{log.trial.path}: {log.timing.late.sum()} of "
+        f"{counted(log.trial.behaviour.steps, 'step')} were late; comparators of short segments "
+        f"leave late steps out, comparators of whole trials do not"
+        for log in logs
+        if log.timing is not None and log.timing.late.any()
+    ]
+    if any(log.settings != first.settings for log in logs):
+        notes.append(f"the logs have different settings: those of {first.trial.path} are used")
+    if any(log.trial.plan.seed != first.trial.plan.seed for log in logs):
+        notes.append(
+            f"the logs have different seeds: without --seed, that of {first.trial.path} is used"
+        )
+    return notes

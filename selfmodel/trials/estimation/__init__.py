@@ -1,0 +1,1 @@
+"""Estimates from logged joint signals: noise of encoders, smoothed positions, velocities."""

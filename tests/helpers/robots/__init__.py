@@ -1,0 +1,1 @@
+"""Robots of the tests: models, and physical robots that stand for real ones."""

@@ -1,0 +1,189 @@
+"""Promises of the estimated state: exact where there is no noise, closer to the truth where is."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from selfmodel.controllers.command_source import CommandSource
+from selfmodel.controllers.playback import played_back
+from selfmodel.faults.notation import parse
+from selfmodel.robot.robot import Robot
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.tasks import ROBOTS, entry
+from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.estimation.state_estimation import (
+    IMU,
+    JOINTS,
+    STATE,
+    estimated_states,
+    known_steps,
+)
+from selfmodel.trials.signals import SIGNALS, Signal
+from tests.helpers.drivers import random_controllers, random_motion
+
+QUADRUPED = ROBOTS["quadruped"].robot()
+REACH = {"joint_positions": 3, "base_position": 6}
+"""Steps to either side that an average takes in."""
+
+
+def runs(
+    robot: Robot, text: str, drivers: Sequence[CommandSource], steps: int = 300
+) -> list[Behaviour]:
+    hypothesis = parse(text, robot.anatomy)
+    pairs = [(hypothesis, driver) for driver in drivers]
+    batch = Simulator(robot, 1).run(pairs, steps, SIGNALS).behaviour
+    return [
+        Behaviour(batch.names, batch.time, {signal: batch[signal][i] for signal in SIGNALS})
+        for i in range(len(drivers))
+    ]
+
+
+def smooth(robot: Robot, count: int, steps: int = 300) -> list[CommandSource]:
+    """Drivers that move every joint once a second."""
+    motors = robot.anatomy.motors
+    return [played_back(motors, random_motion(robot, steps, seed)) for seed in range(count)]
+
+
+def changed(run: Behaviour, **signals: np.ndarray) -> Behaviour:
+    return Behaviour(run.names, run.time, {**run.signals, **signals})
+
+
+(RUN,) = runs(QUADRUPED, "intact", smooth(QUADRUPED, 1))
+
+
+@pytest.mark.parametrize("text", ["intact", "break:{joint}", "jam:{joint}=0.2"])
+def test_without_noise_the_state_is_what_was_logged_to_the_bit(robot: Robot, text: str):
+    joint = robot.anatomy.joints[0].name
+    for run in runs(robot, text.format(joint=joint), smooth(robot, 12)):
+        assert set(estimated_states(run)) == set(STATE)
+        assert is_as_logged(run)
+
+
+def test_without_noise_a_jerky_run_is_what_was_logged_too():
+    drivers = random_controllers(QUADRUPED, 12)
+
+    assert all(is_as_logged(run) for run in runs(QUADRUPED, "intact", drivers))
+
+
+@pytest.mark.parametrize("name", ["suite-cheetah-run", "suite-swimmer-swimmer6"])
+def test_without_noise_a_robot_that_trembles_at_every_step_is_as_logged(name: str):
+    robot = entry(name).robot()
+    to_and_fro = np.where(np.arange(300)[:, np.newaxis] % 2, 1.0, -1.0)
+    motors = robot.anatomy.motors
+    (run,) = runs(robot, "intact", [played_back(motors, to_and_fro * np.ones(len(motors)))])
+
+    assert is_as_logged(run)
+
+
+def is_as_logged(run: Behaviour) -> bool:
+    states = estimated_states(run)
+    return all(states[signal].tobytes() == run[signal].tobytes() for signal in STATE)
+
+
+@given(seed=st.integers(0, 2**32), level=st.floats(0.02, 0.3))
+@settings(max_examples=50, deadline=None)
+def test_with_noise_positions_are_nearer_to_the_truth_than_what_was_logged(seed: int, level: float):
+    rng = np.random.default_rng(seed)
+
+    def noisy(signal: Signal, scale: float) -> np.ndarray:
+        return RUN[signal] + level * scale * rng.standard_normal(RUN[signal].shape)
+
+    run = changed(
+        RUN,
+        joint_positions=noisy("joint_positions", 0.5),
+        joint_velocities=noisy("joint_velocities", 2.0),
+        base_position=noisy("base_position", 0.1),
+        base_linear_velocity=noisy("base_linear_velocity", 0.5),
+    )
+    states = estimated_states(run)
+    for signal in REACH:
+        error = np.std(states[signal] - RUN[signal])
+
+        assert error < 0.8 * np.std(run[signal] - RUN[signal]), signal
+    for signal in set(STATE) - set(REACH):
+        assert states[signal].tobytes() == run[signal].tobytes(), signal
+
+
+@given(
+    seed=st.integers(0, 2**32),
+    lost=st.lists(st.integers(0, RUN.steps - 1), max_size=5),
+    of=st.sampled_from(["base_position", "base_linear_velocity"]),
+)
+@settings(max_examples=50, deadline=None)
+def test_a_state_is_unknown_where_what_it_is_made_of_was_not_observed(
+    seed: int, lost: list[int], of: Signal
+):
+    rng = np.random.default_rng(seed)
+    position = RUN["base_position"] + 0.01 * rng.standard_normal(RUN["base_position"].shape)
+    run = changed(RUN, base_position=position)
+    values = run[of].copy()
+    values[lost] = np.nan
+    state = estimated_states(changed(run, **{of: values}))["base_position"]
+    near = np.zeros(RUN.steps, dtype=bool)
+    for step in lost:
+        near[max(step - 6, 0) : step + 7] = True
+
+    assert np.isnan(state[near]).all()
+    assert np.isfinite(state[~near]).all()
+
+
+def test_what_was_never_observed_stays_unknown():
+    unknown = np.full_like(RUN["base_position"], np.nan)
+    run = changed(RUN, base_position=unknown, base_linear_velocity=unknown)
+    states = estimated_states(run)
+
+    assert np.isnan(states["base_position"]).all()
+    assert states["joint_positions"].tobytes() == RUN["joint_positions"].tobytes()
+
+
+def test_only_what_is_asked_for_is_estimated():
+    assert set(estimated_states(RUN, JOINTS + IMU)) == set(JOINTS + IMU)
+
+
+def test_a_trial_of_one_step_is_its_own_state():
+    run = Behaviour(RUN.names, RUN.time[:1], {signal: RUN[signal][:1] for signal in SIGNALS})
+
+    assert all(estimated_states(run)[s].tobytes() == run[s].tobytes() for s in STATE)
+
+
+@pytest.mark.parametrize("hinge", [0, 5])
+def test_a_lost_encoder_leaves_the_estimates_of_the_others(hinge: int):
+    (run,) = runs(QUADRUPED, "intact", smooth(QUADRUPED, 1))
+    noisy = run["joint_positions"] + np.random.default_rng(0).normal(0, 0.01, (300, 8))
+    signals = {**run.signals, "joint_positions": noisy}
+    complete = estimated_states(Behaviour(run.names, run.time, signals), JOINTS)
+    lost = {signal: signals[signal].copy() for signal in JOINTS}
+    for values in lost.values():
+        values[:, hinge] = np.nan
+    found = estimated_states(Behaviour(run.names, run.time, {**signals, **lost}), JOINTS)
+
+    others = np.arange(8) != hinge
+    assert np.any(complete["joint_positions"] != noisy)
+    for signal in JOINTS:
+        np.testing.assert_array_equal(found[signal][:, others], complete[signal][:, others])
+        assert np.isnan(found[signal][:, hinge]).all()
+
+
+def test_a_position_without_a_velocity_is_the_logged_one():
+    (run,) = runs(QUADRUPED, "intact", smooth(QUADRUPED, 1))
+    noisy = run["joint_positions"] + np.random.default_rng(0).normal(0, 0.01, (300, 8))
+    velocities = run["joint_velocities"].copy()
+    velocities[:, 3] = np.nan
+    signals = {**run.signals, "joint_positions": noisy, "joint_velocities": velocities}
+    found = estimated_states(Behaviour(run.names, run.time, signals), JOINTS)
+
+    np.testing.assert_array_equal(found["joint_positions"][:, 3], noisy[:, 3])
+    assert np.any(found["joint_positions"][:, 2] != noisy[:, 2])
+
+
+@given(columns=st.sets(st.integers(0, 7)), step=st.integers(0, 299))
+def test_a_step_is_known_if_some_hinge_is(columns: set[int], step: int):
+    angles, base = np.zeros((300, 8)), np.zeros((300, 3))
+    angles[step, sorted(columns)] = np.nan
+    known = known_steps({"joint_positions": angles, "base_position": base})
+    assert known.sum() == 300 - (len(columns) == 8)
+
+    base[step, 0] = np.nan
+    assert not known_steps({"joint_positions": angles, "base_position": base})[step]
