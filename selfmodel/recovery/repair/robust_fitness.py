@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from selfmodel.arrays import BoolArray, FloatArray
+from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.controllers.controller import Controller
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.recovery.scores.fitness import Score
@@ -47,8 +47,9 @@ class RobustFitness:
     ) -> FloatArray:
         """Returns scores under one condition, ``(controllers,)``, at 70 % of the cost.
 
-        Controllers that are behind in their group are stopped early, and have the score up to then.
-        A search that recombines the better half of each group needs no more.
+        Controllers that are behind in their group are stopped early, and have the score up to then,
+        but one below those of the group that went on: a score may fall with time. A search that
+        recombines the better half of each group needs no more.
 
         Args:
             controllers: At least one controller per group, group by group.
@@ -60,6 +61,7 @@ class RobustFitness:
         shares = {round(time * steps): share for time, share in RACE}
         size = len(controllers) // groups
         at_stop = np.full(len(controllers), np.nan)
+        lasted = np.full(len(controllers), steps)
 
         def behind(behaviour: Behaviour, diverged: BoolArray) -> BoolArray:
             scores = self.score.of(self.simulator.robot, conditions[0].hypothesis, behaviour)
@@ -71,12 +73,14 @@ class RobustFitness:
             first = math.ceil(shares[behaviour.steps] * size)
             np.put_along_axis(stopped, order[:, :first], values=False, axis=1)
             new = stopped.ravel() & np.isnan(at_stop) & ~diverged
-            at_stop[new] = scores[new]
+            at_stop[new], lasted[new] = scores[new], behaviour.steps
             return stopped.ravel()
 
         stop = EarlyStop(tuple(shares), behind)
         scores = self._scores(controllers, conditions, steps, stop)[:, 0]
-        return np.where(np.isneginf(scores) | np.isnan(at_stop), scores, at_stop)
+        scores = np.where(np.isneginf(scores) | np.isnan(at_stop), scores, at_stop)
+        own = (part.reshape(groups, size) for part in (scores, lasted))
+        return np.concatenate([_below_leaders(*group) for group in zip(*own, strict=True)])
 
     def __call__(
         self, controllers: Sequence[Controller], count: int, steps: int, rng: np.random.Generator
@@ -111,6 +115,22 @@ class RobustFitness:
                 behaviour = Behaviour(simulated.names, simulated.time, signals)
                 scores[rows, column] = self.score.of(robot, condition.hypothesis, behaviour)
         return scores
+
+
+def _below_leaders(scores: FloatArray, lasted: IndexArray) -> FloatArray:
+    """Returns scores of which each is below all finite ones of rollouts that lasted longer.
+
+    Args:
+        scores: ``(n,)``; negative infinity for a diverged rollout.
+        lasted: Control steps after which each rollout was stopped, ``(n,)``.
+    """
+    limited = scores.copy()
+    for end in np.unique(lasted)[-2::-1]:
+        longer = limited[(lasted > end) & np.isfinite(limited)]
+        if len(longer):
+            rows = lasted == end
+            limited[rows] = np.minimum(limited[rows], np.nextafter(longer.min(), -np.inf))
+    return limited
 
 
 def robust(scores: FloatArray) -> FloatArray:
