@@ -165,6 +165,8 @@ def make_folder(path: Path) -> None:
         LogWriteError: The folder cannot be made.
     """
     try:
+        with suppress(FileNotFoundError):  # another process removed an empty parent meanwhile
+            path.mkdir(parents=True, exist_ok=True)
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise not_written(path, error) from error

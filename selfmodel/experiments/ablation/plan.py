@@ -12,7 +12,7 @@ from selfmodel.errors import InputError, unknown_name
 from selfmodel.experiments import plugins, robots
 from selfmodel.experiments.ablation import bank
 from selfmodel.experiments.chosen_score import check_score
-from selfmodel.experiments.grid import Cell, check_shared
+from selfmodel.experiments.grid import Cell, check_runs
 from selfmodel.experiments.study.files import check_keys, key_of
 from selfmodel.experiments.study.gaits import gait_cell
 from selfmodel.experiments.study.planned_robots import planned
@@ -111,7 +111,7 @@ def check(ablation: Ablation) -> None:
     """Checks the definition of an ablation, before anything is run.
 
     Raises:
-        InputError: The definition is invalid, or its folder contains another ablation.
+        InputError: The definition is invalid.
     """
     for name in ("robots", "comparators", "gaps", "seeds"):
         if not getattr(ablation, name):
@@ -124,7 +124,6 @@ def check(ablation: Ablation) -> None:
             raise InputError(f"expected a gap from 0 to {MAX_GAP_LEVEL}, such as 0.05, got {gap}")
     _check_trials(ablation)
     _check_evolved(ablation)
-    check_shared(ablation.folder, _shared(ablation), "an ablation")
 
 
 def _check_trials(ablation: Ablation) -> None:
@@ -212,6 +211,7 @@ def cells(ablation: Ablation, only: tuple[int, int] = (1, 1)) -> list[Cell]:
             Cell(function, key, parameters, run.seed, comparator, needs=needs)
             for comparator in ablation.comparators
         ]
+    check_runs(ablation.folder, found, "an ablation")
     return found
 
 
@@ -272,6 +272,7 @@ def _shared(ablation: Ablation) -> dict[str, Any]:
         "kinds": ablation.kinds,
         "structure": ablation.structure,
         "next_trial": ablation.next_trial,
+        "bank": ablation.bank is not None,
         "score": score_name(ablation.repair, ablation.score),
         **repair_parameters(ablation.repair, ablation.search),
     }

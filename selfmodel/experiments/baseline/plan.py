@@ -10,7 +10,7 @@ from typing import Any
 
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.experiments import robots
-from selfmodel.experiments.grid import Cell, check_shared
+from selfmodel.experiments.grid import Cell, check_runs
 from selfmodel.experiments.study.files import check_keys, key_of
 from selfmodel.experiments.study.planned_robots import planned
 from selfmodel.physical.reality_gap import MAX_GAP_LEVEL
@@ -64,7 +64,7 @@ def check(study: BaselineStudy) -> None:
     """Checks the definition of a study, before anything is run.
 
     Raises:
-        InputError: The definition is invalid, or its folder contains another study.
+        InputError: The definition is invalid.
     """
     check_keys(study.robots)
     for method in study.methods:
@@ -78,7 +78,6 @@ def check(study: BaselineStudy) -> None:
     for gap in study.gaps:
         if not 0 <= gap <= MAX_GAP_LEVEL:
             raise InputError(f"expected a gap from 0 to {MAX_GAP_LEVEL}, such as 0.1, got {gap}")
-    check_shared(study.folder, _shared(study), "a study of baselines")
 
 
 def cells(study: BaselineStudy, only: tuple[int, int] = (1, 1)) -> list[Cell]:
@@ -118,6 +117,7 @@ def cells(study: BaselineStudy, only: tuple[int, int] = (1, 1)) -> list[Cell]:
             )
             for method in study.methods
         ]
+    check_runs(study.folder, found, "a study of baselines")
     return found
 
 

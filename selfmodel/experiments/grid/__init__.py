@@ -2,7 +2,7 @@
 
 from selfmodel.experiments.grid.cell import Cell, Work
 from selfmodel.experiments.grid.cell_file import FinishedPart, finished
-from selfmodel.experiments.grid.checks import check_shared, difference
+from selfmodel.experiments.grid.checks import check_runs, difference
 from selfmodel.experiments.grid.grid import GridBegins, PartEnds, run_grid
 from selfmodel.experiments.grid.process_workers import processes
 from selfmodel.experiments.grid.workers import OpenWorkers, Workers
@@ -15,7 +15,7 @@ __all__ = [
     "PartEnds",
     "Work",
     "Workers",
-    "check_shared",
+    "check_runs",
     "difference",
     "finished",
     "processes",

@@ -94,6 +94,8 @@ def run_cell(folder: Path, cell: Cell, place: str, versions: Mapping[str, str]) 
         error = _compute(folder, cell, place)
         seconds = time.perf_counter() - start
         return CellAnswer(Outcome.FAILED if error else Outcome.DONE, seconds, error)
+    except InputError as cause:  # the finished cell was damaged or altered meanwhile
+        return CellAnswer(Outcome.FAILED, time.perf_counter() - start, str(cause))
     except OSError as cause:
         return CellAnswer(Outcome.NOT_WRITTEN, time.perf_counter() - start, str(cause))
 
@@ -115,13 +117,14 @@ def _compute(folder: Path, cell: Cell, place: str) -> str | None:
     """Computes a cell and returns the reason of its failure.
 
     Raises:
+        InputError: The finished cell is damaged or altered.
         OSError: The disk is full or not writable.
     """
     if _is_complete(folder / place):
         return None
     unfinished = folder / UNFINISHED / f"{place}.{uuid.uuid4().hex[:8]}"
-    make_folder(unfinished)
     try:
+        make_folder(unfinished)
         made = _perform(folder, cell, unfinished)
         if isinstance(made, bytes):
             replace_file(unfinished / CELL, made)
@@ -130,10 +133,14 @@ def _compute(folder: Path, cell: Cell, place: str) -> str | None:
             for left in unfinished.parent.glob(f"{Path(place).name}.*"):  # of killed workers
                 shutil.rmtree(left, ignore_errors=True)
             return None
-        if _is_complete(folder / place):  # another worker finished it, and removed what is left
+        if _is_complete(folder / place):
             return None
         path = write_error(folder, place, made.text)
         return f"{made.error}; its traceback is in {path}" if made.unexpected else made.error
+    except OSError:
+        if _is_complete(folder / place):  # another worker finished it, and removed what is left
+            return None
+        raise
     finally:
         shutil.rmtree(unfinished, ignore_errors=True)
 

@@ -1,11 +1,12 @@
 """Checks of the folder of a study before anything is computed, and differences of JSON values."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from selfmodel.errors import InputError
+from selfmodel.experiments.grid.cell import Cell
 from selfmodel.experiments.grid.cell_file import (
     CELL,
     FinishedPart,
@@ -20,22 +21,38 @@ MAX_CLAUSE = 300
 """Maximum characters of a difference in a message: values in a file may have megabytes."""
 
 
-def check_shared(folder: Path, shared: Mapping[str, Any], study: str) -> None:
-    """Checks that all runs in the folder of a study have the same shared parameters.
+def check_runs(folder: Path, cells: Sequence[Cell], study: str) -> None:
+    """Checks that the runs in the folder of a study, with cells to compute, make one table.
+
+    All have the same parameter ``shared``, those of a robot have the same ``model``, and no run has
+    been made with other inputs, such as another gait.
 
     Args:
         folder: Folder of the study; its runs are in ``runs``.
-        shared: Required value of the parameter ``shared`` of every run.
+        cells: Cells of runs.
         study: Name of the study with its article, for the message.
 
     Raises:
-        InputError: A run has other shared parameters; the message contains the difference.
+        InputError: A run has other inputs; the message contains the difference.
     """
-    for run in finished(folder / "runs"):
-        where = difference(run.parameters.get("shared"), shared)
+    places = {(cell.key, cell.part): cell.place for cell in cells}
+    models = {cell.parameters.get("robot"): cell.parameters.get("model") for cell in cells}
+    for run in finished(folder / "runs") if cells else ():
+        there = run.parameters
+        model = models.get(there.get("robot"), there.get("model"))
+        where = difference(there.get("shared"), cells[0].parameters.get("shared")) or difference(
+            there.get("model"), model, f"the model of {there.get('robot')}"
+        )
         if where:
             raise InputError(
                 f"{folder} contains {study} with other settings ({where}): choose another folder"
+            )
+        name = run.path.parent.name
+        place = Path(places.get((run.key, run.part), name)).name
+        if run.made_with == result_files.versions() and place != name:
+            raise InputError(
+                f"{folder} contains {run.key}, {run.part}, made with other inputs, such as another "
+                f"gait: choose another folder, or delete {run.path.parent}"
             )
 
 

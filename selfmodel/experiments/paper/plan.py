@@ -9,7 +9,7 @@ from pathlib import Path
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.experiments.arguments import AUTO, comparator_choice
-from selfmodel.experiments.grid import Cell, check_shared
+from selfmodel.experiments.grid import Cell, check_runs
 from selfmodel.experiments.paper.reported import FAILURES
 from selfmodel.experiments.study.gaits import gait_cell
 from selfmodel.experiments.study.planned_robots import planned
@@ -52,7 +52,7 @@ def check(study: PaperStudy) -> None:
     """Checks the definition of an experiment, before anything is run.
 
     Raises:
-        InputError: The definition is invalid, or its folder contains another experiment.
+        InputError: The definition is invalid.
     """
     for robot in study.robots:
         if robot not in ROBOTS:
@@ -64,8 +64,6 @@ def check(study: PaperStudy) -> None:
         if comparator == ON_ROBOT:
             raise InputError(f"{ON_ROBOT} is no comparator: it is run in addition to any of them")
         comparator_choice(comparator)
-    shared = {"settings": dataclasses.asdict(study.settings)}
-    check_shared(study.folder, shared, "the paper's experiment")
 
 
 def cells(study: PaperStudy) -> list[Cell]:
@@ -93,4 +91,5 @@ def cells(study: PaperStudy) -> list[Cell]:
                     (EVOLVE, ON_ROBOT),
                 )
             ]
+    check_runs(study.folder, found, "the paper's experiment")
     return found

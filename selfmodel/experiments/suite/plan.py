@@ -11,7 +11,7 @@ from selfmodel.errors import InputError, unknown_name
 from selfmodel.experiments import plugins, robots
 from selfmodel.experiments.arguments import comparator_choice
 from selfmodel.experiments.chosen_score import check_score
-from selfmodel.experiments.grid import Cell, check_shared
+from selfmodel.experiments.grid import Cell, check_runs
 from selfmodel.experiments.study.files import check_keys, key_of
 from selfmodel.experiments.study.gaits import gait_cell
 from selfmodel.experiments.study.planned_robots import planned
@@ -74,7 +74,7 @@ def check(study: Study) -> None:
     """Checks the definition of a study, before anything is run.
 
     Raises:
-        InputError: The definition is invalid, or its folder contains another study.
+        InputError: The definition is invalid.
     """
     comparator_choice(study.comparator)
     plugins.kinds(study.kinds)
@@ -91,7 +91,6 @@ def check(study: Study) -> None:
     for case in study.cases:
         if case not in known:
             raise unknown_name("case of these bodies", str(case), map(str, known))
-    check_shared(study.folder, _shared(study), "a study")
 
 
 def cells(study: Study, only: tuple[int, int] = (1, 1)) -> list[Cell]:
@@ -139,6 +138,7 @@ def cells(study: Study, only: tuple[int, int] = (1, 1)) -> list[Cell]:
             for case in study.cases
             if case in entry.cases and _applies(study, entry, case)
         ]
+    check_runs(study.folder, found, "a study")
     return found
 
 

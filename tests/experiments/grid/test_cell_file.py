@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 from selfmodel.errors import InputError
-from selfmodel.experiments.grid import Cell, check_shared, finished, processes, run_grid
+from selfmodel.experiments.grid import Cell, check_runs, finished, processes, run_grid
 from selfmodel.experiments.grid.cell_file import CELL, cell_bytes
 from selfmodel.experiments.study.files import as_rows
 from selfmodel.logs import result_files
@@ -223,7 +223,7 @@ def test_a_folder_of_0_1_is_refused_with_the_reason(tmp_path: Path):
     readers = (
         lambda: [*finished(tmp_path / "runs")],
         lambda: resume(tmp_path, cell(0)),
-        lambda: check_shared(tmp_path, {}, "a study"),
+        lambda: check_runs(tmp_path, [cell(0)], "a study"),
     )
     for read in readers:
         with pytest.raises(InputError, match=r"run-00/run\.json is of a study of an earlier"):
@@ -231,10 +231,29 @@ def test_a_folder_of_0_1_is_refused_with_the_reason(tmp_path: Path):
     assert [path.name for path in tmp_path.rglob("*")] == ["runs", "run-00", "run.json"]
 
 
-def test_other_shared_parameters_are_told(study: Path):
-    check_shared(study, {"size": 2}, "a study")
-    with pytest.raises(InputError, match=r"contains a study with other settings \(size is 2 there"):
-        check_shared(study, {"size": 3}, "a study")
+def robot_cell(seed: int, *, model: str = "a", gait: str = "trot", size: int = 2) -> Cell:
+    """A cell of a robot, which needs a gait."""
+    needs = {"gait": Cell("tests:never", "gait", {"gait": gait}, 0, kind="gaits")}
+    parameters = {"robot": "legs.xml", "model": model, "shared": {"size": size}}
+    return Cell("tests:never", f"run-{seed}", parameters, seed, needs=needs)
+
+
+@pytest.mark.parametrize(
+    ("other", "message"),
+    [
+        (robot_cell(1, size=3), r"contains a study with other settings \(size is 2 there"),
+        (robot_cell(1, model="b"), r'other settings \(the model of legs\.xml is "a" there'),
+        (robot_cell(0, gait="walk"), r"contains run-0, result, made with other inputs, such as an"),
+    ],
+    ids=["settings", "model", "gait"],
+)
+def test_runs_with_other_inputs_are_not_added_to_a_study(tmp_path: Path, other: Cell, message: str):
+    put(tmp_path, robot_cell(0))
+    check_runs(tmp_path, [robot_cell(0), robot_cell(1)], "a study")
+    check_runs(tmp_path, [], "a study")
+
+    with pytest.raises(InputError, match=message):
+        check_runs(tmp_path, [other], "a study")
 
 
 @pytest.mark.parametrize(

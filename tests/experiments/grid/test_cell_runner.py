@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 
 from selfmodel.experiments.grid import Cell, PartEnds, finished, processes, run_grid
+from selfmodel.experiments.grid.cell_runner import CellAnswer, Outcome, run_cell
+from selfmodel.logs import result_files
 from tests.experiments.kill_study import STUDIES, files_of, rows_of
 from tests.helpers.command import selfmodel_process
 
@@ -147,3 +149,36 @@ def test_a_study_on_a_full_disk_is_continued_to_the_same_table(
     assert resumed.returncode == 0, resumed.stderr
     assert rows_of(disk) == rows_of(tmp_path)
     assert files_of(disk / "out") == files_of(tmp_path / "out")
+
+
+def meanwhile(cell: Cell, _needs: dict[str, Path], folder: Path) -> int:
+    """Ends after another worker has finished, or damaged, the same cell."""
+    study = folder.parents[2]
+    if cell.parameters["damaged"]:
+        (study / cell.place).mkdir(parents=True)
+        (study / cell.place / "cell.json").write_text("{")
+    elif not (study / "began").exists():
+        (study / "began").touch()
+        assert answer(study, cell).outcome is Outcome.DONE
+    return cell.seed
+
+
+def answer(study: Path, cell: Cell) -> CellAnswer:
+    return run_cell(study, cell, cell.place, result_files.versions())
+
+
+def computed_twice(*, damaged: bool) -> Cell:
+    function = "tests.experiments.grid.test_cell_runner:meanwhile"
+    return Cell(function, "run", {"damaged": damaged}, 3)
+
+
+def test_a_cell_that_another_worker_finished_first_is_done(tmp_path: Path):
+    assert answer(tmp_path, computed_twice(damaged=False)).outcome is Outcome.DONE
+    assert [each.result for each in finished(tmp_path / "runs")] == [3]
+
+
+def test_a_cell_that_was_damaged_meanwhile_fails_with_the_name_of_its_file(tmp_path: Path):
+    found = answer(tmp_path, computed_twice(damaged=True))
+
+    assert found.outcome is Outcome.FAILED
+    assert "cell.json" in str(found.error)
