@@ -23,6 +23,9 @@ def kill_on_the_way(
 ) -> dict[str, object]:
     """Runs a study to its end with kills on the way, and returns what was done twice.
 
+    A driver ends with another status than 0 if it was killed, or if its scheduler was; after the
+    kill of a worker, any other status is unexpected.
+
     Args:
         size: Size of the study.
         folder: New folder; the study is in its folder ``out``.
@@ -31,12 +34,14 @@ def kill_on_the_way(
         seed: Seed of the executors, victims and moments.
     """
     rng, kills = np.random.default_rng(seed), Counter[str]()
+    unexpected: list[str] = []
     folder.mkdir(parents=True)
     out, errors = folder / "out", folder / "stderr"
     with cluster(folder / "dask") as own, _begun(out / "unfinished") as begun:
         while sum(kills.values()) < count:
             name = str(rng.choice(NAMES))
             driver = start(command(size, out, *options(name, own)), errors)
+            victim, expected = "", {0}
             while sum(kills.values()) < count and driver.poll() is None:
                 time.sleep(rng.uniform(*pause))
                 victim = str(rng.choice(VICTIMS[: 3 if name == "dask" else 2]))
@@ -44,16 +49,26 @@ def kill_on_the_way(
                     kills[f"{name} {victim}"] += 1
                     print(f"{sum(kills.values())}: {name}, {victim}", flush=True)
                     if victim != "worker":
+                        expected = {0, -signal.SIGKILL} if victim == "driver" else {0, 1}
                         driver.wait()
                 if name == "dask" and driver.poll() is None:
                     own.revive()
-            if driver.wait() == 0:
+            status = driver.wait()
+            if status not in expected:
+                end = errors.read_text().strip().splitlines()[-1:]
+                unexpected.append(f"{name}, after {victim or 'no kill'}: {status}, {end}")
+            if status == 0:
                 break
         last = start(command(size, out, "--workers", "2"), errors)
         if last.wait():
             raise SystemExit(f"the study did not end: {errors}")
     twice = sum(times - 1 for times in begun.values())
-    return {"kills": dict(kills), "cells": len(begun), "computed_twice": twice}
+    return {
+        "kills": dict(kills),
+        "cells": len(begun),
+        "computed_twice": twice,
+        "unexpected_ends": unexpected,
+    }
 
 
 @contextmanager

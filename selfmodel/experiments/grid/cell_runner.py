@@ -124,25 +124,35 @@ def _compute(folder: Path, cell: Cell, place: str) -> str | None:
         return None
     unfinished = folder / UNFINISHED / f"{place}.{uuid.uuid4().hex[:8]}"
     try:
-        make_folder(unfinished)
-        made = _perform(folder, cell, unfinished)
-        if isinstance(made, bytes):
-            replace_file(unfinished / CELL, made)
-            _publish(unfinished, folder / place)
-            error_path(folder, place).unlink(missing_ok=True)  # of an earlier failure
-            for left in unfinished.parent.glob(f"{Path(place).name}.*"):  # of killed workers
-                shutil.rmtree(left, ignore_errors=True)
-            return None
-        if _is_complete(folder / place):
-            return None
-        path = write_error(folder, place, made.text)
-        return f"{made.error}; its traceback is in {path}" if made.unexpected else made.error
+        return _compute_in(unfinished, folder, cell, place)
     except OSError:
         if _is_complete(folder / place):  # another worker finished it, and removed what is left
             return None
         raise
     finally:
         shutil.rmtree(unfinished, ignore_errors=True)
+
+
+def _compute_in(unfinished: Path, folder: Path, cell: Cell, place: str) -> str | None:
+    """Computes a cell in a new folder, moves that to its place, and returns any failure.
+
+    Raises:
+        InputError: The finished cell is damaged or altered.
+        OSError: The disk is full or not writable.
+    """
+    make_folder(unfinished)
+    made = _perform(folder, cell, unfinished)
+    if isinstance(made, bytes):
+        replace_file(unfinished / CELL, made)
+        _publish(unfinished, folder / place)
+        error_path(folder, place).unlink(missing_ok=True)  # of an earlier failure
+        for left in unfinished.parent.glob(f"{Path(place).name}.*"):  # of killed workers
+            shutil.rmtree(left, ignore_errors=True)
+        return None
+    if _is_complete(folder / place):
+        return None
+    path = write_error(folder, place, made.text)
+    return f"{made.error}; its traceback is in {path}" if made.unexpected else made.error
 
 
 @dataclass(frozen=True)
