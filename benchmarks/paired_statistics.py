@@ -8,7 +8,7 @@ docs/results/statistics.md.
 """
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +25,7 @@ from selfmodel.experiments.statistics import (
     paired_interval,
     paired_proportion_interval,
 )
+from selfmodel.experiments.statistics.outcome import Measure
 
 SHARED = 0.3
 """Share of the variance of one run, apart from its seed's, that two methods have in common."""
@@ -60,15 +61,21 @@ PAIRS = (
 )
 
 
-def main() -> None:
-    """Prints the tables."""
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Prints the tables.
+
+    Args:
+        arguments: Options of the command line; None for those of this process.
+    """
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--studies", type=int, default=1000, help="simulated studies per row")
-    studies = parser.parse_args().studies
+    studies = parser.parse_args(arguments).studies
+    if studies < 1:
+        parser.error(f"argument --studies: expected 1 or more, got {studies}")
     coverage_of_proportions(studies, np.random.default_rng(1))
     coverage_of_numbers(studies, np.random.default_rng(2))
     family_errors(max(1, studies // 2), np.random.default_rng(3))
-    power(studies, np.random.default_rng(4))
+    power(max(1, studies // 5), np.random.default_rng(4))
 
 
 def coverage_of_proportions(studies: int, rng: np.random.Generator) -> None:
@@ -148,7 +155,7 @@ def coverage_of_numbers(studies: int, rng: np.random.Generator) -> None:
                 run = np.sqrt(1 - dependence) * rng.standard_normal((2, seeds, 4))
                 values = medians[:, None] * np.exp(scale * (of_seed + run))
                 pairs.append(_contains(paired_interval, values, float(truth[0] - truth[1]), rng))
-                (mean,) = marginal_means(_outcomes(values[:1]))
+                (mean,) = marginal_means(_outcomes(values[:1], "number"))
                 means.append(mean.mean.low <= truth[0] <= mean.mean.high)
             print(f"| {seeds} | {dependence:g} | {_share(pairs)} | {_share(means)} |")
 
@@ -164,7 +171,7 @@ def family_errors(studies: int, rng: np.random.Generator) -> None:
             errors = np.zeros((studies, 4), dtype=bool)
             for study in range(studies):
                 equal = right([np.array(UNEQUAL)] * METHODS, seeds, dependence, rng)
-                found = compare(_outcomes(equal))
+                found = compare(_outcomes(equal, "share"))
                 errors[study] = (
                     any(one.p_runs < 0.05 for one in found),
                     any(p < 0.05 for p in holm([one.p_runs for one in found])),
@@ -187,17 +194,18 @@ def power(studies: int, rng: np.random.Generator) -> None:
         for dependence in DEPENDENCES:
             shares = []
             for seeds in (4, 8, 12, 24):
-                found = [
-                    compare(_outcomes(right([good, good - difference], seeds, dependence, rng)))[0]
-                    for _ in range(studies // 5)
-                ]
+                simulated = (
+                    right([good, good - difference], seeds, dependence, rng) for _ in range(studies)
+                )
+                found = [compare(_outcomes(one, "share"))[0] for one in simulated]
                 shares.append([max(one.p_runs, one.p_seeds) < 0.05 / pairs for one in found])
             print(f"| {difference:g} | {dependence:g} | {' | '.join(map(_share, shares))} |")
 
 
-def _outcomes(values: FloatArray) -> list[Outcome]:
+def _outcomes(values: FloatArray, measure: Measure) -> list[Outcome]:
+    """Returns the outcomes of simulated values, ``(methods, seeds, cases)``."""
     return [
-        Outcome(("simulated",), f"method {method}", (f"case {case}",), seed, float(value), "share")
+        Outcome(("simulated",), f"method {method}", (f"case {case}",), seed, float(value), measure)
         for (method, seed, case), value in np.ndenumerate(values)
     ]
 

@@ -8,6 +8,11 @@ export function text(value) {
   return String(Number(value.toPrecision(6)));
 }
 
+/** All digits of a number that `text` shortens; undefined for other values. */
+export function allDigits(value) {
+  return typeof value === "number" && text(value) !== String(value) ? String(value) : undefined;
+}
+
 /** A number with three significant digits, for labels. */
 export function short(value) {
   return value === null || value === undefined ? "–" : String(Number(value.toPrecision(3)));

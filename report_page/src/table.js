@@ -1,6 +1,6 @@
 // A table that the reader can sort by the heading of a column.
 import { h, prose } from "./dom.js";
-import { text } from "./numbers.js";
+import { allDigits, text } from "./numbers.js";
 
 /** Rows that are shown at first: a browser takes seconds for thousands. */
 const FIRST_ROWS = 500;
@@ -70,6 +70,7 @@ function line(row, numeric, unprinted) {
           scope: i === 0 ? "row" : undefined,
           class: numeric[i] ? "number" : String(value ?? "").length > 16 ? "long" : undefined,
           "data-value": typeof value === "number" ? value : undefined,
+          title: allDigits(value),
         },
         prose(text(value)),
       ),

@@ -6,26 +6,20 @@ The reader is narrow on purpose: it takes every table (``*.csv``, ``*.jsonl``, a
 """
 
 import base64
-import csv
-import io
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from selfmodel.errors import InputError
 from selfmodel.experiments.confidence_intervals import proportion
 from selfmodel.files import check_regular, read_file
-from selfmodel.logs.result_files import parse_json
 from selfmodel.report.charts import Cell, Estimate, IntervalChart, Picture, Table
 from selfmodel.report.document import Report, Section
+from selfmodel.report.recorded.tables import other_lists, read_table, table_files
 
 MEDIA_TYPES = {".png": "image/png", ".svg": "image/svg+xml"}
 
 FIGURES = "figures"
-
-MAX_FILE_BYTES = 8_000_000
-"""Largest table that is read, bytes."""
 
 MAX_FIGURE_BYTES = 8_000_000
 """Largest size of all figures together, bytes; those beyond are named instead."""
@@ -36,15 +30,12 @@ CORRECT = "correct"
 FACTORS = ("comparator", "method", "robot", "case", "gap", "trials")
 """Columns by which the share of right diagnoses is shown."""
 
-MAX_INTEGER = 2**53
-"""Largest integer of a CSV file that is a number in the page: JavaScript rounds larger ones."""
-
 Records = Sequence[Mapping[str, Cell]]
 
 
 def is_campaign(folder: Path) -> bool:
     """Returns whether a folder has tables of results."""
-    return any(_table_files(folder))
+    return any(table_files(folder))
 
 
 def report_of_campaign(folder: Path) -> Report:
@@ -56,7 +47,7 @@ def report_of_campaign(folder: Path) -> Report:
     Raises:
         InputError: The folder has no table, or a file cannot be read.
     """
-    tables = {path.name: _records(path) for path in _table_files(folder)}
+    tables = {path.name: read_table(path) for path in table_files(folder)}
     tables = {name: records for name, records in tables.items() if records}
     if not tables:
         raise InputError(
@@ -71,7 +62,9 @@ def report_of_campaign(folder: Path) -> Report:
             "tables",
             "Tables",
             ("A heading sorts its table by that column.",),
-            tuple(_table(name, records) for name, records in {**_lists(folder), **tables}.items()),
+            tuple(
+                _table(name, records) for name, records in {**other_lists(folder), **tables}.items()
+            ),
         ),
         _figures(folder),
     ]
@@ -81,10 +74,6 @@ def report_of_campaign(folder: Path) -> Report:
         verdict=(),
         sections=tuple(section for section in found if section is not None),
     )
-
-
-def _table_files(folder: Path) -> list[Path]:
-    return [path for kind in ("*.csv", "*.jsonl") for path in sorted(folder.glob(kind))]
 
 
 def _headline(tables: Mapping[str, Records], rows: Records) -> str:
@@ -143,77 +132,6 @@ def _numbers_first(name: str) -> tuple[float, str]:
     except ValueError:
         return math.inf, name
     return (math.inf if math.isnan(value) else value), name
-
-
-def _records(path: Path) -> list[dict[str, Cell]]:
-    data = read_file(path, "a table of results", MAX_FILE_BYTES)
-    try:
-        text = data.decode("utf-8-sig")  # spreadsheets begin a CSV file with a byte order mark
-        if path.suffix == ".csv":
-            reader = csv.DictReader(io.StringIO(text))
-            return [{key: _cell(value) for key, value in row.items() if key} for row in reader]
-        found = [parse_json(line.encode()) for line in text.split("\n") if line.strip()]
-        return [_flat(item) for item in found if isinstance(item, dict)]
-    except (ValueError, RecursionError, csv.Error) as error:
-        raise InputError(
-            f"{path}: expected a table of results: {error}; move it away, and the report is made "
-            f"without it"
-        ) from error
-
-
-def _lists(folder: Path) -> dict[str, list[dict[str, Cell]]]:
-    """Returns the lists of ``results.json`` that are in no other table, such as summaries."""
-    path = folder / "results.json"
-    if not path.exists():
-        return {}
-    known = {path.stem for path in _table_files(folder)} | {"rows"}
-    try:
-        values: Any = parse_json(read_file(path, "the results of a study", MAX_FILE_BYTES))
-        lists = {
-            name: [_flat(item) for item in items if isinstance(item, dict)]
-            for name, items in (values.items() if isinstance(values, dict) else ())
-            if isinstance(items, list) and name not in known
-        }
-        return {name: records for name, records in lists.items() if any(records)}
-    except (ValueError, RecursionError) as error:
-        raise InputError(
-            f"{path}: expected the results of a study: {error}; move it away, and the report is "
-            f"made without it"
-        ) from error
-
-
-def _flat(item: Mapping[str, Any], prefix: str = "") -> dict[str, Cell]:
-    """Returns the values of a JSON object, those of inner objects under joined names."""
-    found: dict[str, Cell] = {}
-    for key, value in item.items():
-        if isinstance(value, dict):
-            found |= _flat(value, f"{prefix}{key} ")
-        elif isinstance(value, list):
-            found[f"{prefix}{key}"] = ", ".join(map(str, value))
-        else:
-            found[f"{prefix}{key}"] = value
-    return found
-
-
-def _cell(text: str | None) -> Cell:
-    """Returns a cell of a CSV file: a number, a truth value, a text, or None if it is empty."""
-    if not text:
-        return None
-    if text in ("true", "false", "True", "False"):  # pandas writes the latter
-        return text.lower() == "true"
-    if not text.isascii() or "_" in text:  # Python reads 1_000 as a number; it is a name
-        return text
-    for kind in (int, float):
-        try:
-            value = kind(text)
-        except ValueError:
-            continue
-        if isinstance(value, float) and math.isnan(value):
-            return None
-        # What the page cannot hold stays a text: infinity, and integers that it would round.
-        held = abs(value) <= MAX_INTEGER if kind is int else math.isfinite(value)
-        return value if held else text
-    return text
 
 
 def _table(name: str, records: Records) -> Table:

@@ -122,18 +122,6 @@ def test_rows_without_a_judgement_or_a_factor_are_left_out_of_the_shares(tmp_pat
     assert [one.label for one in chart.estimates] == ["a (n = 1)", "b (n = 1)"]
 
 
-def test_a_cell_that_the_page_cannot_hold_as_a_number_stays_a_text(tmp_path: Path):
-    long = "1" + 400 * "0"
-    rows = ("seed,gap,correct", f"{long},{long},True", "1_000,1e999,False", "7,nan,True")
-    (tmp_path / "results.csv").write_text("\n".join(rows), encoding="utf-8-sig")
-
-    (table,) = items(tmp_path, Table)
-
-    assert table.columns == ("seed", "gap", "correct")
-    assert table.rows == ((long, long, True), ("1_000", "1e999", False), (7, None, True))
-    assert report_of_campaign(tmp_path).headline.startswith("2 of 3 diagnoses are right")
-
-
 def test_a_line_of_json_may_hold_a_separator_of_lines_in_a_text(tmp_path: Path):
     (tmp_path / "cells.jsonl").write_text('{"a": "x\u2028y"}\n', encoding="utf-8")
 

@@ -84,19 +84,23 @@ def seed_test(differences: Sequence[float], seeds: Sequence[int]) -> float:
         seeds: Seed of each run.
 
     Returns:
-        p; 1 with fewer than two seeds, or if no run differs.
+        p; 1 with fewer than two seeds, or if the mean of the means is 0.
 
     Raises:
         ValueError: A difference is NaN or infinite.
     """
     values, groups = finite("differences", differences), np.array(seeds)
     means = np.array([values[groups == seed].mean() for seed in np.unique(groups)])
-    if len(means) < 2 or not values.any():
+    if len(means) < 2:
+        return 1.0
+    mean = abs(float(means.mean()))
+    # Means that are 0 apart from roundings do not differ, also if they have no error.
+    if mean <= 1e-12 * float(np.abs(values).max()):
         return 1.0
     error = float(means.std(ddof=1)) / math.sqrt(len(means))
-    if error <= 1e-12 * abs(float(means.mean())):
+    if error <= 1e-12 * mean:
         return 0.0
-    return float(2 * stats.t.sf(abs(float(means.mean())) / error, len(means) - 1))
+    return float(2 * stats.t.sf(mean / error, len(means) - 1))
 
 
 @cache

@@ -7,6 +7,7 @@ no page of the web can read it by a name that resolves to this computer (DNS reb
 
 import json
 import secrets
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -96,10 +97,9 @@ def serving(shown: Shown) -> Iterator[str]:
     """
     token = secrets.token_urlsafe(24)
     try:
-        server = ThreadingHTTPServer((HOST, 0), _handler(shown, token))
+        server = _Server((HOST, 0), _handler(shown, token))
     except OSError as error:
         raise WorkError(f"no report can be served on {HOST}: {error.strerror}") from error
-    server.daemon_threads = True
     thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.1})
     thread.daemon = True
     thread.start()
@@ -109,6 +109,19 @@ def serving(shown: Shown) -> Iterator[str]:
         server.shutdown()
         server.server_close()
         thread.join()
+
+
+class _Server(ThreadingHTTPServer):
+    daemon_threads = True
+
+    def handle_error(self, request: Any, client_address: Any) -> None:  # noqa: ANN401  # as in the base
+        """Prints the error of a request, unless the browser has closed the connection.
+
+        A tab that is closed or reloaded during a transfer is no error, and the terminal shows the
+        recovery.
+        """
+        if not isinstance(sys.exc_info()[1], ConnectionError):
+            super().handle_error(request, client_address)
 
 
 def _handler(shown: Shown, token: str) -> type[BaseHTTPRequestHandler]:

@@ -1,1 +1,1 @@
-"""What a diagnosis was made with, as files of earlier commands name it."""
+"""Files of earlier commands: what a diagnosis was made with, and the tables of campaigns."""

@@ -70,6 +70,19 @@ def test_seeds_that_agree_leave_the_decision_to_the_test_over_runs():
     assert seed_test([1.0, 1.0], [5, 5]) == 1  # one seed
 
 
+def test_methods_that_win_as_often_in_every_seed_do_not_differ():
+    # In each seed, the first alone is right in one case, and the second alone in another.
+    assert seed_test([1.0, -1.0] * 4, [0, 0, 1, 1, 2, 2, 3, 3]) == 1
+    assert seed_test([1.0, -1.0, 0.0, 0.0], [0, 0, 1, 1]) == 1
+
+
+def test_means_that_are_zero_but_for_roundings_do_not_differ():
+    differences = [0.1, 0.2, -0.3]
+
+    assert sum(differences) != 0
+    assert seed_test(differences * 4, [seed for seed in range(4) for _ in differences]) == 1
+
+
 def test_many_differences_are_flipped_at_random_with_the_same_result_in_every_call():
     differences = list(np.random.default_rng(1).normal(0.6, 1.0, 30))
     found = [sign_flip_test(differences, np.random.default_rng(0)) for _ in range(2)]

@@ -1,5 +1,8 @@
 import http.client
 import json
+import socket
+import struct
+import threading
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
@@ -33,6 +36,28 @@ def status_of(address: str, path: str, host: str | None = None) -> int:
 def read(url: str) -> bytes:
     with urllib.request.urlopen(url, timeout=10) as answer:  # noqa: S310  # this computer
         return answer.read()
+
+
+def reset(address: str, request: str, read_bytes: int) -> None:
+    """Sends a request, reads the beginning of the answer, and resets the connection.
+
+    Returns when the server has ended the request.
+    """
+    before = set(threading.enumerate())
+    url = urlsplit(address)
+    with socket.create_connection((url.hostname, url.port), timeout=10) as client:
+        client.sendall(request.format(path=url.path, host=url.netloc).encode())
+        if read_bytes:
+            assert client.recv(read_bytes)
+        end = monotonic() + 10
+        while not set(threading.enumerate()) - before and monotonic() < end:
+            sleep(0.01)
+        requests = set(threading.enumerate()) - before
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    for thread in requests:
+        thread.join(10)
+    assert requests
+    assert not any(thread.is_alive() for thread in requests)
 
 
 def test_the_page_is_served_with_its_number(address: str):
@@ -100,3 +125,44 @@ def test_a_page_is_read_only_once_all_of_it_was_sent(shown: Shown):
     assert shown.read_version == -1
     shown.sent(answer[2])
     assert shown.read_version == shown.version
+
+
+@pytest.mark.parametrize(
+    ("request_text", "read_bytes"),
+    [("GET {path} HTTP/1.1\r\nHost: {host}\r\n\r\n", 100), ("GET {path}", 0)],
+    ids=["in the answer", "in the request"],
+)
+def test_a_connection_that_the_browser_resets_prints_nothing(
+    address: str,
+    shown: Shown,
+    request_text: str,
+    read_bytes: int,
+    capsys: pytest.CaptureFixture[str],
+):
+    shown.show(b"<body>" + bytes(50_000_000))  # more than the buffers of a connection hold
+
+    reset(address, request_text, read_bytes)
+
+    assert capsys.readouterr() == ("", "")
+    assert shown.read_version == -1
+    shown.show(b"<body>")
+    assert read(address) == b'<body data-version="3">'
+
+
+def test_another_error_of_a_request_is_printed(
+    address: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    def failing(_shown: Shown, _name: str) -> None:
+        raise ValueError("no page")
+
+    monkeypatch.setattr(Shown, "answer", failing)
+
+    with pytest.raises(http.client.RemoteDisconnected):
+        read(address)
+
+    end = monotonic() + 10
+    printed = ""
+    while "ValueError: no page" not in printed and monotonic() < end:
+        sleep(0.01)
+        printed += capsys.readouterr().err
+    assert "ValueError: no page" in printed
