@@ -27,12 +27,6 @@ MAX_INTEGER = 2**53 - 1
 LEADING_ZERO = re.compile(r"\s*[+-]?0[0-9]")
 """Beginning of a text such as 007, which is a name and not the number 7."""
 
-VERSION = re.compile(r"[0-9]+(\.(0|[1-9][0-9]*))*")
-"""Version such as 3.9: whole numbers between points."""
-
-LOST_ZERO = re.compile(r"[0-9]+\.[1-9][0-9]*0")
-"""Version such as 3.10, which is another one as the number 3.1."""
-
 
 def table_files(folder: Path) -> list[Path]:
     """Returns the tables in a folder: CSV files, then those with a JSON object per line."""
@@ -117,17 +111,11 @@ def _typed(rows: Sequence[Mapping[str, str | None]]) -> list[dict[str, Cell]]:
 def _is_numeric(name: str, cells: Sequence[str]) -> bool:
     """Returns whether each filled cell of a column is a number that keeps all of its digits.
 
-    A cell does not keep them if it has a leading zero, such as 007, or is an integer beyond
-    ``MAX_INTEGER``; nor if the column is of versions, by its name, or because each cell can be one
-    and a cell such as 3.10 ends in a zero. A column of 0.05 and 1.10 has numbers, because 0.05 is
-    no version.
+    A cell does not keep them if it has a leading zero, such as 007, is an integer beyond
+    ``MAX_INTEGER``, or is a version, by the name of its column: 3.10 is not 3.1.
     """
-    filled = [cell for cell in cells if cell]
-    is_of_versions = "version" in name.lower() or (
-        any(map(LOST_ZERO.fullmatch, filled)) and all(map(VERSION.fullmatch, filled))
-    )
-    return not is_of_versions and all(
-        _number(cell) is not None and not LEADING_ZERO.match(cell) for cell in filled
+    return "version" not in name.lower() and all(
+        _number(cell) is not None and not LEADING_ZERO.match(cell) for cell in cells if cell
     )
 
 

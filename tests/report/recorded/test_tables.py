@@ -20,7 +20,6 @@ def column(tmp_path: Path, name: str, *cells: str) -> list[Cell]:
         ("007", "12"),
         ("0012e3", "1.5"),
         ("-01", "2"),
-        ("3.9", "3.10", "3.11"),
         ("3.10", "3.11.2"),
         ("12345e6", "a1b2c3d"),
         ("1_000", "7"),
@@ -36,7 +35,7 @@ def test_a_column_whose_numbers_would_lose_digits_stays_as_it_is_in_the_file(
 
 
 def test_a_column_named_version_stays_as_it_is_in_the_file(tmp_path: Path):
-    assert column(tmp_path, "MuJoCo version", "3.0", "3.1") == ["3.0", "3.1"]
+    assert column(tmp_path, "MuJoCo version", "3.9", "3.10") == ["3.9", "3.10"]
 
 
 @pytest.mark.parametrize(
