@@ -118,7 +118,7 @@ class RobustFitness:
 
 
 def _below_leaders(scores: FloatArray, lasted: IndexArray) -> FloatArray:
-    """Returns scores of which each is below all finite ones of rollouts that lasted longer.
+    """Returns scores, limited to less than all finite ones of rollouts that lasted longer.
 
     Args:
         scores: ``(n,)``; negative infinity for a diverged rollout.
