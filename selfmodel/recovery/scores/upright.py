@@ -57,6 +57,7 @@ UPRIGHT = Score(
     _displacement_until_a_fall,
     unit="m",
     grows_with_time=True,
+    needs_free_base=True,
 )
 """Forward displacement up to the last step before the robot falls, m.
 
