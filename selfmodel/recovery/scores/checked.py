@@ -18,7 +18,7 @@ LARGEST = 1e10
 
 
 def checked(score: Score, name: str) -> Score:
-    """Returns a score of which each call is checked.
+    """Returns a score whose signals and values are checked.
 
     Args:
         score: Score from a plug-in.
