@@ -91,6 +91,11 @@ class Evolution:
         self.evaluations += len(fitness)
         self._asked = self._children()
 
+    @property
+    def survivors(self) -> tuple[FloatArray, FloatArray]:
+        """The genomes that survive, ``(n, length)``, best first, and their fitness, ``(n,)``."""
+        return self._genomes, self._fitness
+
     def stop(self) -> dict[str, int]:
         """Returns the stop reason, such as ``{"generations": 30}``; empty while the search runs."""
         if self.generation >= self.generations:

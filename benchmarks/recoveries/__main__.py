@@ -44,7 +44,7 @@ def _run(options: argparse.Namespace) -> None:
         settings=settings.scaled(options.population),
     )
     failed = run_grid(options.folder, wanted, workers=processes(options.jobs), on_progress=print)
-    print(write_rows(options.folder))
+    print(write_rows(options.folder, wanted))
     if failed:
         raise SystemExit("\n".join(f"{end.key} failed: {end.error}" for end in failed))
 

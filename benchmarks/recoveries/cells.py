@@ -66,10 +66,21 @@ def cells(
     ]
 
 
-def write_rows(folder: Path) -> Path:
-    """Writes the rows of all finished cells, ``results.jsonl``, and returns the file."""
+def write_rows(folder: Path, wanted: Sequence[Cell]) -> Path:
+    """Writes the rows of the finished cells of a study, ``results.jsonl``, and returns the file.
+
+    Args:
+        folder: Folder of the study. It may have cells of another repair or budget, whose rows are
+            left out: only the repair is a column of a row.
+        wanted: Cells of the study.
+    """
     path = folder / "results.jsonl"
-    rows = (json.dumps(part.result, allow_nan=False) for part in finished(folder / "runs"))
+    places = {cell.place for cell in wanted}
+    rows = (
+        json.dumps(part.result, allow_nan=False)
+        for part in finished(folder / "runs")
+        if part.path.parent.relative_to(folder).as_posix() in places
+    )
     path.write_text("".join(f"{row}\n" for row in rows), encoding="utf-8")
     return path
 

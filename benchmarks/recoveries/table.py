@@ -26,7 +26,8 @@ oracle | observed ÷ predicted | fell |
 def table(rows: Sequence[dict[str, Any]], oracles: Sequence[dict[str, Any]]) -> str:
     """Returns a Markdown table, a line per robot, case and gap, and one per robot and gap.
 
-    A ratio is a median, with its 95 % bootstrap interval and the lowest tenth.
+    Rows of several repairs are in lines of their own, with the repair after the robot. A ratio is a
+    median, with its 95 % bootstrap interval and the lowest tenth.
 
     Args:
         rows: Rows of recoveries.
@@ -35,14 +36,20 @@ def table(rows: Sequence[dict[str, Any]], oracles: Sequence[dict[str, Any]]) -> 
     """
     best = {_cell(row): mean(row["upright"]) for row in oracles if row["method"] == ORACLE}
     lines = [HEADER]
-    for robot, gap in sorted({(row["robot"], row["gap"]) for row in rows}):
-        own = [row for row in rows if (row["robot"], row["gap"]) == (robot, gap)]
+    several = len({row["repair"] for row in rows}) > 1
+    for robot, gap, repair in sorted({_group(row) for row in rows}):
+        own = [row for row in rows if _group(row) == (robot, gap, repair)]
+        name = f"{robot}, {repair}" if several else robot
         lines += [
-            _line(robot, case, gap, [row for row in own if row["case"] == case], best)
+            _line(name, case, gap, [row for row in own if row["case"] == case], best)
             for case in sorted({row["case"] for row in own})
         ]
-        lines.append(_line(robot, "all", gap, own, best))
+        lines.append(_line(name, "all", gap, own, best))
     return "\n".join(lines)
+
+
+def _group(row: dict[str, Any]) -> tuple[str, float, str]:
+    return (row["robot"], row["gap"], row["repair"])
 
 
 def _line(

@@ -172,13 +172,10 @@ def recover(
     )
     options = ("--comparator", comparator, "--kinds", kinds, "--budget", budget)
     with followed(experiment.folder, made.name, options) if report else nullcontext() as live:
-        try:
-            with display(partial(_described, made, chosen.score)) as on_event:
-                progress = ProgressRecorder(both(on_event, live) if live else on_event)
+        with display(partial(_described, made, chosen.score)) as on_event:
+            progress = ProgressRecorder(both(on_event, live) if live else on_event)
+            with progress.kept_on_failure(experiment.folder):
                 outcome = run(experiment, progress)
-        except KeyboardInterrupt as interruption:
-            interruption.add_note(f"the finished trials are in {experiment.folder}")
-            raise
         found = facts(experiment, outcome)
         try:
             progress.write(experiment.folder)

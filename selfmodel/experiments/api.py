@@ -100,7 +100,7 @@ def evolve_controller(
     """
     check_seed(seed)
     robot = robot_of(robot)
-    check_motion(score.name, robot)
+    check_motion(score, robot)
     chosen = _design(design, robot)
     search = RepairSearch(Simulator(robot, threads), settings or Settings(), chosen, score=score)
     return search.best(hypothesis_of(hypothesis, robot), seeds, repair_stream(seed, 0), on_event)
@@ -376,7 +376,7 @@ def recover(
     check_seed(seed)
     robot, count = robot_of(robot), thread_count(threads)
     score = score or (UPRIGHT if repair == plugins.ROBUST else DISPLACEMENT)
-    check_motion(score.name, robot)
+    check_motion(score, robot)
     chosen, searched = settings or Settings(), kinds_of(kinds)
     drawn = _design(design, robot)
     make_repair = plugins.repair(repair, search, repertoire_of(repertoire, robot, drawn))

@@ -14,8 +14,7 @@ from selfmodel.experiments.references import (
     read_reference,
     simulated_reference,
 )
-from selfmodel.recovery.scores.energy import ENERGY
-from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
+from selfmodel.recovery.scores.fitness import Score
 from selfmodel.recovery.scores.joint_limits import upright_within
 from selfmodel.recovery.scores.tracking import TRACKING, tracking
 from selfmodel.recovery.scores.upright import UPRIGHT
@@ -55,7 +54,8 @@ def choose_score(
     """Returns the score of that name for a robot.
 
     Args:
-        name: ``displacement``, ``upright``, ``return`` or ``tracking``.
+        name: ``displacement``, ``upright``, ``energy``, ``return`` or ``tracking``; the name of an
+            entry point in the group ``selfmodel.scores``, or ``package.module:object``.
         entry: The robot.
         design: Design of the controllers.
         steps: Control steps of a trial.
@@ -103,14 +103,22 @@ def _limited(name: str, given: Sequence[float | None]) -> Score:
             f"--max-joint-speed, --max-joint-torque and --max-self-collision are limits of "
             f"--score {UPRIGHT.name}, got {name}"
         )
-    speed, torque, depth = (math.inf if limit is None else limit for limit in given)
-    if not (speed > 0 and torque > 0):
+    speed, torque, depth = given
+    for option, limit, unit, quantity in (
+        ("--max-joint-speed", speed, "rad/s", "speed"),
+        ("--max-joint-torque", torque, "N m", "torque"),
+    ):
+        if limit is not None and not limit > 0:
+            raise InputError(
+                f"expected {option} above 0 {unit}, got {limit:g}: give the largest {quantity} of "
+                f"a joint, or leave the option out"
+            )
+    if depth is not None and not depth >= 0:
         raise InputError(
-            f"expected limits of the joints above 0, got {speed:g} rad/s and {torque:g} N m"
+            f"expected --max-self-collision of 0 m or above, got {depth:g}: give the largest depth "
+            f"to which two bodies may penetrate each other, or leave the option out"
         )
-    if not depth >= 0:
-        raise InputError(f"expected a limit of self-collision of 0 m or above, got {depth:g}")
-    return upright_within(speed, torque, depth)
+    return upright_within(*(math.inf if limit is None else limit for limit in given))
 
 
 def check_score(name: str, entry: Entry) -> None:
@@ -124,25 +132,24 @@ def check_score(name: str, entry: Entry) -> None:
         InputError: The name is unknown, the robot has no task with rewards, or the score is a
             displacement and the base is fixed.
     """
-    robot = entry.robot()
-    check_motion(name, robot)
     if name != TRACKING:
-        plugins.score(name, robot.name, entry)
+        robot = entry.robot()
+        check_motion(plugins.score(name, robot.name, entry), robot)
 
 
-def check_motion(name: str, robot: Robot) -> None:
+def check_motion(score: Score, robot: Robot) -> None:
     """Checks that the base of a robot moves if its score is a displacement.
 
     Args:
-        name: Name of the score.
+        score: The score.
         robot: The robot.
 
     Raises:
         InputError: The score is a displacement and the base is fixed.
     """
-    if robot.has_fixed_base and name in (DISPLACEMENT.name, UPRIGHT.name, ENERGY.name):
+    if robot.has_fixed_base and score.needs_free_base:
         raise InputError(
-            f"the base of {robot.name} is fixed, so its {name} is always 0: give --score "
-            f"{TRACKING}, with --reference FILE for a joint trajectory to follow, or with "
-            f"--controller cpg alone for the motion of a random CPG"
+            f"the base of {robot.name} is fixed, and the score {score.name} is a displacement of "
+            f"the base: give --score {TRACKING}, with --reference FILE for a joint trajectory to "
+            f"follow, or with --controller cpg alone for the motion of a random CPG"
         )

@@ -26,6 +26,7 @@ from selfmodel.recovery.repair.paper_repair import RepairSearch
 from selfmodel.recovery.repair.repertoire_search import FromRepertoire
 from selfmodel.recovery.repair.robust_repair import RobustRepair
 from selfmodel.recovery.repertoire.repertoire import Repertoire
+from selfmodel.recovery.scores.checked import checked
 from selfmodel.recovery.scores.energy import ENERGY
 from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.scores.tracking import TRACKING
@@ -236,8 +237,9 @@ def score(name: str, robot: str, entry: Entry) -> Score:
         entry: The robot's entry.
 
     Raises:
-        InputError: The name is unknown, the object is no score, or the robot has no task with
-            rewards.
+        InputError: The name is unknown, the object is no score or names unknown signals, or the
+            robot has no task with rewards. The function of a plug-in's score raises it if it
+            returns other than one number per run.
     """
     by_name = {score.name: score for score in (DISPLACEMENT, UPRIGHT, ENERGY)}
     if name in by_name:
@@ -248,7 +250,7 @@ def score(name: str, robot: str, entry: Entry) -> Score:
             raise InputError(
                 f"{name!r} is no score: expected a selfmodel.recovery.Score, got {found!r}"
             )
-        return found
+        return checked(found, name)
     if entry.episode_return is None:
         raise InputError(
             f"{robot} has no task of dm_control, so no rewards: give --score {DISPLACEMENT.name}"

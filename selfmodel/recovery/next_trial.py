@@ -55,12 +55,12 @@ NextTrial = Callable[[Situation], Controller]
 def by_repair(situation: Situation) -> Controller:
     """Returns the best candidate of the repair that was not tried yet.
 
-    If all candidates were tried, as may happen with the paper's repair, the best one is returned.
+    If all candidates were tried, a mutant of the best one is returned.
     """
-    candidates = situation.repaired()
+    found = [candidate.controller for candidate in situation.repaired()]
     tried = situation.known.controllers
-    untried = [candidate for candidate in candidates if candidate.controller not in tried]
-    return (untried or candidates)[0].controller
+    untried = [controller for controller in found if controller not in tried]
+    return (untried or _untried_offspring(found[:1], tried, situation.settings, situation.rng))[0]
 
 
 def by_disagreement(situation: Situation) -> Controller:
@@ -98,7 +98,7 @@ def discriminating_controller(
 
     Args:
         diagnosis: Last diagnosis.
-        known: Controllers of earlier trials, newest first; the newest is not tried again.
+        known: Controllers of earlier trials, newest first; none is tried again.
         simulator: Self-model.
         settings: The paper's numbers.
         rng: Random number generator of all random choices.
@@ -109,7 +109,7 @@ def discriminating_controller(
         best = disagreement.most_discriminative_first(pool)[: settings.survivors]
         children = offspring(best, settings, rng)
         distinct = dict.fromkeys([*best, *children])
-        pool = [controller for controller in distinct if controller != known[0]]
+        pool = [controller for controller in distinct if controller not in known]
     return disagreement.most_discriminative(pool)
 
 
@@ -135,21 +135,38 @@ def candidates_to_separate(diagnosis: Diagnosis) -> tuple[Hypothesis, ...]:
 def candidates(
     known: Sequence[Controller], settings: Settings, rng: np.random.Generator
 ) -> list[Controller]:
-    """Returns the distinct controllers to choose from, those of earlier trials first.
+    """Returns the distinct controllers to choose from, none of which was tried.
 
     Args:
-        known: Controllers of earlier trials, newest first. Candidates are the controllers of the
-            newest controller's design, except the newest, and one population of their offspring.
+        known: Controllers of earlier trials, newest first. Candidates are one population of
+            offspring of those of the newest controller's design.
         settings: Numbers of the EA.
         rng: Random number generator of all random choices.
     """
     newest = known[0]
     same_design = [controller for controller in known if controller.design == newest.design]
-    bred = offspring(same_design, settings, rng)
-    distinct = dict.fromkeys([*same_design, *bred])
-    found = [controller for controller in distinct if controller != newest]
+    return _untried_offspring(same_design, known, settings, rng)
+
+
+def _untried_offspring(
+    parents: Sequence[Controller],
+    tried: Sequence[Controller],
+    settings: Settings,
+    rng: np.random.Generator,
+) -> list[Controller]:
+    """Returns the distinct children that were not tried; a random controller if there is none.
+
+    Args:
+        parents: At least one controller, all of one design.
+        tried: Controllers of earlier trials.
+        settings: Numbers of the EA.
+        rng: Random number generator of all random choices.
+    """
+    distinct = dict.fromkeys(offspring(parents, settings, rng))
+    found = [controller for controller in distinct if controller not in tried]
     if not found:  # every child equals its parent, as without mutation
-        found = [Controller(newest.design, draw_genomes(rng, newest.genome.shape))]
+        design, genome = parents[0].design, parents[0].genome
+        found = [Controller(design, draw_genomes(rng, genome.shape))]
     return found
 
 

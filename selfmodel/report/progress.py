@@ -1,18 +1,20 @@
 """Progress of the searches of a recovery: recorded as it happens, kept in the run's folder."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from selfmodel.errors import InputError
+from selfmodel.errors import InputError, WorkError
 from selfmodel.evolution import Generation
 from selfmodel.files import read_file
 from selfmodel.logs.files import replace_file
 from selfmodel.logs.result_files import MAX_BYTES, parse_json
 from selfmodel.recovery.events import Event, SearchBegins
 from selfmodel.report.subject import Search
+from selfmodel.trials.trial import Trial
 
 SEARCHES = "searches.json"
 """File of the progress of all searches, in the folder of a run."""
@@ -25,10 +27,12 @@ class ProgressRecorder:
     Attributes:
         on_event: Callback that every event is handed to.
         begun: Each search that began, with its generations.
+        finished: Names of the trials that ended.
     """
 
     on_event: Callable[[Event], None]
     begun: list[tuple[SearchBegins, list[Generation]]] = field(default_factory=list)
+    finished: list[str] = field(default_factory=list)
 
     def __call__(self, event: Event) -> None:
         """Records an event."""
@@ -36,6 +40,8 @@ class ProgressRecorder:
             self.begun.append((event, []))
         elif isinstance(event, Generation) and self.begun:
             self.begun[-1][1].append(event)
+        elif isinstance(event, Trial):
+            self.finished.append(event.plan.name)
         self.on_event(event)
 
     @property
@@ -50,6 +56,24 @@ class ProgressRecorder:
             )
             for begun, generations in self.begun
         )
+
+    @contextmanager
+    def kept_on_failure(self, folder: Path) -> Iterator[None]:
+        """Writes the progress if an error ends the recovery, with a note where its trials are.
+
+        Args:
+            folder: Folder of the run. An error before any search, such as that the folder has other
+                files, leaves it as it is.
+        """
+        try:
+            yield
+        except BaseException as error:
+            if self.finished:
+                error.add_note(f"the finished trials are in {folder}")
+            if self.begun:
+                with suppress(OSError, WorkError):  # the first error is the one to report
+                    self.write(folder)
+            raise
 
     def write(self, folder: Path) -> None:
         """Writes the progress into the folder of a run.

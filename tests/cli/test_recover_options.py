@@ -25,8 +25,12 @@ from tests.helpers.command import SMALL, selfmodel
         (("--repertoire", "none.npz"), "none.npz"),
         (("--score", "energy", "--max-joint-speed", "9"), "limits of --score upright, got energy"),
         (("--max-joint-torque", "3", "--reference", "none.csv"), "--reference is a trajectory"),
-        (("--max-joint-torque", "0"), "limits of the joints above 0, got inf rad/s and 0 N m"),
-        (("--max-self-collision", "-0.01"), "a limit of self-collision of 0 m or above, got -0.01"),
+        (("--max-joint-torque", "0"), "expected --max-joint-torque above 0 N m, got 0: give the"),
+        (("--max-joint-speed", "-1"), "expected --max-joint-speed above 0 rad/s, got -1: give the"),
+        (
+            ("--max-self-collision", "-0.01"),
+            "--max-self-collision of 0 m or above, got -0.01: give",
+        ),
         (("--score", "energy", "--max-self-collision", "0"), "limits of --score upright"),
         (("--score", "speed"), "score 'speed'"),
         (("--score", "math:pi"), "'math:pi' is no score"),
@@ -73,6 +77,33 @@ def test_the_score_is_that_of_the_repair_unless_another_is_given(
     assert recovery["predicted_score"] is not None
     assert recovery["steps"] == 60
     assert found["fell"] == (recovery["fell_at_step"] is not None)
+
+
+def test_an_error_after_a_trial_names_the_folder_of_the_finished_trials(tmp_path: Path):
+    text = """
+from dataclasses import replace
+from selfmodel.recovery import DISPLACEMENT
+
+def of(robot, hypothesis, behaviour):
+    values = DISPLACEMENT.of(robot, hypothesis, behaviour)
+    return values if hypothesis.faults == () else values * float("nan")
+
+HEALTHY_ONLY = replace(DISPLACEMENT, name="healthy-only", of=of)
+"""
+    (tmp_path / "my_scores.py").write_text(text)
+    done = selfmodel(
+        *("recover", "quadruped", "--case", "1", *SMALL, "--steps", "60", "--trials", "1"),
+        *("--comparator", "forward-displacement", "--kinds", "paper", "--no-calibrate"),
+        *("--repair", "paper", "--score", "my_scores:HEALTHY_ONLY", "--out", "run"),
+        cwd=tmp_path,
+    )
+    told = " ".join(done.stderr.split())
+
+    assert done.returncode == 2, told
+    assert "the score 'my_scores:HEALTHY_ONLY': expected one number for each of" in told
+    assert told.endswith("; the finished trials are in run")
+    assert (tmp_path / "run" / "trials" / "01-after.mcap").exists()
+    assert json.loads((tmp_path / "run" / "searches.json").read_text())
 
 
 @pytest.fixture(scope="module")

@@ -1,5 +1,6 @@
 """The benchmark of recoveries: its rows are written, and its ratios are those of the rows."""
 
+import dataclasses
 import json
 from functools import partial
 from pathlib import Path
@@ -11,7 +12,7 @@ from benchmarks.recoveries.cells import cells, read_rows, write_rows
 from benchmarks.recoveries.recover import make_gait, recovered
 from benchmarks.recoveries.table import table
 from selfmodel import load_robot, recover, simulated_robot
-from selfmodel.experiments.grid import processes, run_grid
+from selfmodel.experiments.grid import Cell, processes, run_grid
 from selfmodel.experiments.grid.cell_file import CELL, cell_bytes
 from selfmodel.recovery.scores.fitness import DISPLACEMENT
 from selfmodel.recovery.scores.upright import UPRIGHT
@@ -27,6 +28,7 @@ def row(case: int, seed: int, upright: list[float], **other: object) -> dict[str
         "case": case,
         "gap": 0.1,
         "seed": seed,
+        "repair": "robust",
         "correct": True,
         "upright": upright,
         "predicted": [9.0, None, 4.0, 5.0],
@@ -61,13 +63,43 @@ def test_the_seeds_change_last():
     ]
 
 
-def test_the_rows_of_finished_cells_are_written(tmp_path: Path):
-    (cell,) = cells(["quadruped"], [1], [0.0], [0], repair="robust", settings=SMALL)
-    folder = tmp_path / cell.place
+def finish(study: Path, cell: Cell, result: dict[str, Any]) -> None:
+    """Writes a cell as finished."""
+    folder = study / cell.place
     folder.mkdir(parents=True)
-    (folder / CELL).write_bytes(cell_bytes(folder, cell, row(1, 0, [1.0]), 1.0, {}))
+    (folder / CELL).write_bytes(cell_bytes(folder, cell, result, 1.0, {}))
 
-    assert read_rows(write_rows(tmp_path)) == [row(1, 0, [1.0])]
+
+def test_the_rows_of_finished_cells_are_written(tmp_path: Path):
+    wanted = cells(["quadruped"], [1, 2], [0.0], [0], repair="robust", settings=SMALL)
+    finish(tmp_path, wanted[0], row(1, 0, [1.0]))
+
+    assert read_rows(write_rows(tmp_path, wanted)) == [row(1, 0, [1.0])]
+
+
+def test_rows_of_another_repair_or_budget_in_the_folder_are_left_out(tmp_path: Path):
+    larger = dataclasses.replace(SMALL, generations=2)
+    studies = [
+        cells(["quadruped"], [1], [0.0], [0], repair=repair, settings=settings)
+        for repair, settings in (("robust", SMALL), ("paper", SMALL), ("robust", larger))
+    ]
+    for number, (cell,) in enumerate(studies):
+        finish(tmp_path, cell, row(1, 0, [float(number)]))
+
+    for number, wanted in enumerate(studies):
+        assert read_rows(write_rows(tmp_path, wanted)) == [row(1, 0, [float(number)])]
+
+
+def test_a_table_of_several_repairs_has_lines_of_each():
+    rows = [row(1, 0, [8.0, 1, 3, 6]), row(1, 0, [4.0, 1, 2, 3], repair="paper")]
+    lines = [line.split(" | ") for line in table(rows, []).splitlines()[2:]]
+
+    assert [(line[0], line[1], line[3], line[5]) for line in lines] == [
+        ("| quadruped, paper", "1", "1", "4.0"),
+        ("| quadruped, paper", "all", "1", "4.0"),
+        ("| quadruped, robust", "1", "1", "8.0"),
+        ("| quadruped, robust", "all", "1", "8.0"),
+    ]
 
 
 @pytest.mark.search
@@ -103,7 +135,7 @@ def test_two_processes_share_a_gait(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.syspath_prepend(str(Path(__file__).parents[2]))
     wanted = cells(["quadruped"], [1, 2], [0.1], [0], repair="robust", settings=SMALL)
     assert run_grid(tmp_path, wanted, workers=processes(2), on_progress=lambda _: None) == ()
-    rows = read_rows(write_rows(tmp_path))
+    rows = read_rows(write_rows(tmp_path, wanted))
 
     assert sorted(row["case"] for row in rows) == [1, 2]
     assert rows[0]["upright"][0] == rows[1]["upright"][0]

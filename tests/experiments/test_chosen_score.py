@@ -1,13 +1,17 @@
 """Promises of the choice of a score: what a robot cannot have is refused with the remedy."""
 
+import dataclasses
 from pathlib import Path
 
 import pytest
 
 import selfmodel
 from selfmodel.errors import InputError
-from selfmodel.experiments.chosen_score import ChosenScore, choose_score
+from selfmodel.experiments.chosen_score import ChosenScore, check_motion, choose_score
 from selfmodel.faults.hypothesis import INTACT
+from selfmodel.recovery.scores.energy import ENERGY
+from selfmodel.recovery.scores.fitness import Score
+from selfmodel.recovery.scores.joint_limits import upright_within
 from selfmodel.recovery.scores.upright import UPRIGHT
 from selfmodel.robot.designs import cpg_for, network_for
 from selfmodel.robot.robot import Robot
@@ -21,7 +25,7 @@ def chosen(name: str, robot: Robot, reference: Path | None = None, seed: int = 0
     return choose_score(name, entry, cpg_for(robot), steps=30, seed=seed, reference=reference)
 
 
-@pytest.mark.parametrize("name", ["displacement", "upright"])
+@pytest.mark.parametrize("name", ["displacement", "upright", "energy"])
 def test_a_fixed_base_has_no_displacement(name: str):
     with pytest.raises(InputError, match=r"base of robot is fixed.*give --score tracking"):
         chosen(name, arm())
@@ -74,3 +78,26 @@ def test_the_public_functions_refuse_the_displacement_of_a_fixed_base(tmp_path: 
     physical = selfmodel.simulated_robot(arm())
     with pytest.raises(InputError, match="give --score tracking"):
         selfmodel.recover(physical, physical, arm(), tmp_path / "run")
+
+
+@pytest.mark.parametrize(
+    "score",
+    [
+        *(upright_within(5), upright_within(max_torque=2), upright_within(max_self_collision=0.01)),
+        *(ENERGY, dataclasses.replace(UPRIGHT, name="mine")),
+    ],
+)
+def test_a_score_in_python_is_refused_by_what_it_needs_and_not_by_its_name(
+    score: Score, tmp_path: Path
+):
+    physical = selfmodel.simulated_robot(arm())
+    with pytest.raises(InputError, match=rf"the score {score.name} is a displacement of the base"):
+        selfmodel.recover(physical, physical, arm(), tmp_path / "run", score=score)
+    with pytest.raises(InputError, match="give --score tracking"):
+        selfmodel.evolve_controller(arm(), score=score)
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_score_of_another_quantity_is_for_a_fixed_base_whatever_its_name():
+    mine = dataclasses.replace(UPRIGHT, needs_free_base=False)
+    check_motion(mine, arm())

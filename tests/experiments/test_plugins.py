@@ -7,6 +7,11 @@ import pytest
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.errors import InputError
 from selfmodel.experiments import plugins
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.robot.robot import Robot
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.tasks import Entry
+from tests.helpers.drivers import random_controllers
 
 MODULE = """
 from dataclasses import replace
@@ -98,3 +103,24 @@ def test_a_plug_in_of_version_0_1_is_refused_with_the_place_of_the_new_names(
 
     with pytest.raises(InputError, match=r"written for selfmodel 0\.1, whose modules have moved"):
         plugins.comparator("old_plug_in:OBJECT")
+
+
+def test_a_score_of_a_plug_in_is_checked_by_the_name_that_was_given(
+    tmp_path: Path, quadruped: Robot
+):
+    text = """
+from dataclasses import replace
+from selfmodel.recovery import DISPLACEMENT
+MINE = replace(DISPLACEMENT, name="mine", of=lambda *_: [float("nan")])
+WRONG = replace(DISPLACEMENT, record=("base_pos",))
+"""
+    (tmp_path / "score_module.py").write_text(text)
+    entry = Entry(robot=lambda: quadruped)
+    found = plugins.score("score_module:MINE", "quadruped", entry)
+    runs = [(INTACT, driver) for driver in random_controllers(quadruped, 1)]
+    run = Simulator(quadruped, 1).run(runs, 3, found.record)
+
+    with pytest.raises(InputError, match="score 'score_module:MINE': expected one number"):
+        found.of(quadruped, INTACT, run.behaviour)
+    with pytest.raises(InputError, match="score 'score_module:WRONG' has record="):
+        plugins.score("score_module:WRONG", "quadruped", entry)

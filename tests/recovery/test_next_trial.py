@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
+from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, Verdict
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
@@ -114,23 +115,22 @@ def test_a_hypothesis_that_diverges_is_not_in_the_running(quadruped: Robot):
     known=st.integers(1, 4),
     mutation=st.sampled_from([0.0, 0.01, 1.0]),
 )
-def test_the_controller_that_was_run_last_is_no_candidate_and_the_others_are(
+def test_a_controller_that_was_tried_is_no_candidate(
     quadruped: Robot, seed: int, known: int, mutation: float
 ):
     tried = random_controllers(quadruped, known, seed % 97)
     numbers = dataclasses.replace(SMALL, mutation=mutation, crossovers=0)
     pool = candidates(tried, numbers, np.random.default_rng(seed))
 
-    assert tried[0] not in pool
-    assert pool[: known - 1] == tried[1:]
-    assert 1 <= len(pool) == len(set(pool)) <= max(1, known - 1 + numbers.population)
+    assert not set(pool) & set(tried)
+    assert 1 <= len(pool) == len(set(pool)) <= numbers.population
 
 
 def test_offspring_is_bred_of_every_controller_that_was_tried(quadruped: Robot):
     tried = random_controllers(quadruped, 3)
     numbers = dataclasses.replace(SMALL, mutation=0.05, crossovers=0)
     pool = candidates(tried, numbers, np.random.default_rng(0))
-    kin = [[np.mean(child.genome == parent.genome) > 0.8 for parent in tried] for child in pool[2:]]
+    kin = [[np.mean(child.genome == parent.genome) > 0.8 for parent in tried] for child in pool]
 
     assert np.all(np.sum(kin, axis=1) == 1)
     assert np.all(np.any(kin, axis=0))
@@ -150,6 +150,53 @@ def test_what_is_asked_is_bred_to_ask_more(quadruped: Robot):
     less, more = runs.behaviour["sensors"][..., column].mean(axis=1)
     assert more > less
     assert bred not in first
+
+
+def test_the_controller_that_disagrees_most_is_not_tried_a_second_time(quadruped: Robot):
+    simulator = Simulator(quadruped, 2)
+    touch = parse("sensor:front_left_touch", quadruped.anatomy)
+    found = diagnosis("intact", robot=quadruped, verdict="explained")
+    found = dataclasses.replace(found, undetectable=(touch,))
+    newest, *older = random_controllers(quadruped, 2)
+    for _ in range(3):  # without mutation, offspring of the best one remains the best one
+        numbers = dataclasses.replace(SMALL, mutation=0.001, crossovers=0)
+        stream = np.random.default_rng(1)
+        best = discriminating_controller(found, [newest, *older], simulator, numbers, stream)
+        assert best not in [newest, *older]
+        older.append(best)
+
+
+def situation_of(
+    robot: Robot, tried: Sequence[Controller], found: Sequence[Controller]
+) -> Situation:
+    """A situation after trials of some controllers, in which the repair finds others."""
+    empty = Behaviour(robot.anatomy.names, np.zeros(1), {})
+    trials = [
+        Trial(TrialPlan(f"{i:02d}-after", "after", one, 1, 0), robot.name, empty, f"{i:02d}-after")
+        for i, one in enumerate(tried)
+    ]
+    return Situation(
+        known=Database(tuple(trials)),
+        trials_left=1,
+        simulator=Simulator(robot, 1),
+        settings=SMALL,
+        rng=np.random.default_rng(0),
+        repaired=lambda: [CandidateController(one, np.zeros(1)) for one in found],
+        on_event=lambda _event: None,
+    )
+
+
+def test_a_repair_that_was_tried_is_followed_by_the_next_best(quadruped: Robot):
+    first, second, third = random_controllers(quadruped, 3)
+    assert by_repair(situation_of(quadruped, [first], [first, second, third])) == second
+    assert by_repair(situation_of(quadruped, [second, first], [first, second, third])) == third
+
+
+def test_if_all_repairs_were_tried_a_mutant_of_the_best_is_next(quadruped: Robot):
+    first, second = random_controllers(quadruped, 2)
+    chosen = by_repair(situation_of(quadruped, [first, second], [second, first]))
+    alike = np.mean(chosen.genome == second.genome)
+    assert 0.5 < alike < 1
 
 
 class CountingSimulator(Simulator):

@@ -57,9 +57,14 @@ class RepairSearch:
         rng: np.random.Generator,
         on_generation: GenerationCallback,
     ) -> tuple[CandidateController, ...]:
-        """Returns the best controller for the first hypothesis; see ``Repair``."""
-        best, fitness = self._evolved(hypotheses[0], seeds, rng, on_generation)
-        return (CandidateController(best, np.array([fitness])),)
+        """Returns the surviving controllers for the first hypothesis, best first; see ``Repair``.
+
+        Those after the best one are for a next trial if the best one was tried: it may be a seed.
+        """
+        genomes, fitness = self._evolved(hypotheses[0], seeds, rng, on_generation).survivors
+        finite = zip(genomes[fitness > -np.inf], fitness[fitness > -np.inf], strict=True)
+        found = {Controller(self._design, genome): value for genome, value in finite}
+        return tuple(CandidateController(one, np.array([value])) for one, value in found.items())
 
     def best(
         self,
@@ -80,7 +85,8 @@ class RepairSearch:
         Raises:
             WorkError: The simulation diverged with every controller.
         """
-        return self._evolved(hypothesis, seeds, rng, on_generation)[0]
+        search = self._evolved(hypothesis, seeds, rng, on_generation)
+        return Controller(self._design, search.best)
 
     def _evolved(
         self,
@@ -88,7 +94,8 @@ class RepairSearch:
         seeds: Sequence[Controller],
         rng: np.random.Generator,
         on_generation: GenerationCallback,
-    ) -> tuple[Controller, float]:
+    ) -> Evolution:
+        """Returns the search after its last generation."""
         design = self._design
 
         def fitness(genomes: FloatArray) -> FloatArray:
@@ -110,7 +117,7 @@ class RepairSearch:
                 f"with {search.evaluations} controllers: check the model, such as its physics time "
                 f"step, masses and motors"
             )
-        return Controller(design, search.best), search.best_fitness
+        return search
 
     def _simulate(self, runs: list[Run]) -> FloatArray:
         """Fitness of rollouts with one hypothesis; negative infinity for a diverged rollout."""

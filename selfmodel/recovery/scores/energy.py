@@ -41,6 +41,7 @@ ENERGY = Score(
     ("base_position", "base_orientation", "joint_efforts", "joint_velocities"),
     _score,
     unit="m",
+    needs_free_base=True,
 )
 """Displacement up to the first fall, m, less ``WORK_WEIGHT`` times the work over the weight, m.
 

@@ -24,7 +24,8 @@ def first_falls(behaviour: Behaviour, normals: FloatArray, standing_height: floa
     """Returns the first step at which the robot has fallen, or the number of steps without a fall.
 
     At that step the base is low or tilted, and so it is in more than half of the measurements of
-    the next ``FALLEN_TIME``, or of the rest of the run if that is shorter.
+    the next ``FALLEN_TIME``; if the run ends before, of its last ``FALLEN_TIME``; if the run is
+    shorter than that, of the run.
 
     Args:
         behaviour: Position and orientation of the base, ``(..., steps, width)`` each; NaN where not
@@ -48,12 +49,14 @@ def first_lasting(state: BoolArray, other: BoolArray, steps: int) -> IndexArray:
     """Returns the first step of a state that lasts, or the number of steps without one, ``(...)``.
 
     Args:
-        state: Steps of the state, ``(..., steps)``; it lasts if it is more frequent in the next
-            steps than the other.
+        state: Steps of the state, ``(..., steps)``; it lasts if it is more frequent than the other
+            in the window of the step.
         other: Steps of the other state; a step of neither is not known.
-        steps: Number of the next steps, with the step itself.
+        steps: Length of a window, which begins at the step itself. The end of the run cuts no
+            window: near it, the window is that of the last ``steps``, or the whole of a run that is
+            shorter.
     """
-    lasting = state & (_ahead(state, steps) > _ahead(other, steps))
+    lasting = state & (_in_window(state, steps) > _in_window(other, steps))
     first: IndexArray = np.where(lasting.any(axis=-1), lasting.argmax(axis=-1), state.shape[-1])
     return first
 
@@ -79,13 +82,15 @@ def _timestep(behaviour: Behaviour) -> float:
     return float(behaviour.time[1] - behaviour.time[0]) if behaviour.steps > 1 else math.inf
 
 
-def _ahead(state: BoolArray, steps: int) -> IndexArray:
-    """Returns the number of the next steps, from each one on, in which a state holds.
+def _in_window(state: BoolArray, steps: int) -> IndexArray:
+    """Returns the number of steps of a state in the window of each step.
 
     Args:
         state: ``(..., steps)``.
-        steps: Number of steps to count; fewer at the end.
+        steps: Length of a window; see ``first_lasting``.
     """
     total: IndexArray = np.cumsum(state, axis=-1)
-    last = np.minimum(np.arange(state.shape[-1]) + steps - 1, state.shape[-1] - 1)
-    return np.asarray(total[..., last] - total + state)
+    run = state.shape[-1]
+    first = np.minimum(np.arange(run), max(run - steps, 0))
+    last = np.minimum(first + steps, run) - 1
+    return np.asarray(total[..., last] - total[..., first] + state[..., first])

@@ -26,6 +26,8 @@ class Score:
         unit: Unit of the score; "" for none.
         grows_with_time: Whether rollouts of half the steps rank controllers approximately as whole
             ones do, so that a search may begin with them.
+        needs_free_base: Whether the score is a displacement of the base, which a fixed base does
+            not have.
     """
 
     name: str
@@ -33,6 +35,7 @@ class Score:
     of: Callable[[Robot, Hypothesis, Behaviour], FloatArray]
     unit: str = ""
     grows_with_time: bool = False
+    needs_free_base: bool = False
 
     def of_trial(self, robot: Robot, hypothesis: Hypothesis, trial: Trial) -> float:
         """Returns the score of a physical trial; NaN where its signals were not observed.
@@ -53,6 +56,11 @@ def _displacement(_robot: Robot, _hypothesis: Hypothesis, behaviour: Behaviour) 
 
 
 DISPLACEMENT = Score(
-    "displacement", ("base_position",), _displacement, unit="m", grows_with_time=True
+    "displacement",
+    ("base_position",),
+    _displacement,
+    unit="m",
+    grows_with_time=True,
+    needs_free_base=True,
 )
 """Forward displacement, m. Source: the paper, section III."""

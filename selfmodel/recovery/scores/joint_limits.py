@@ -79,7 +79,7 @@ def upright_within(
     name = " ".join([UPRIGHT.name, *(["within", " and ".join(limits)] if limits else [])])
     record = (*UPRIGHT.record, "joint_velocities", "joint_efforts")
     signals = (*record, "joint_positions") if compares_bodies else record
-    return Score(name, signals, of, unit="m", grows_with_time=True)
+    return Score(name, signals, of, unit="m", grows_with_time=True, needs_free_base=True)
 
 
 def _depths(robot: Robot, hypothesis: Hypothesis, behaviour: Behaviour) -> FloatArray:

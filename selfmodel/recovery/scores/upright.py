@@ -57,11 +57,12 @@ UPRIGHT = Score(
     _displacement_until_a_fall,
     unit="m",
     grows_with_time=True,
+    needs_free_base=True,
 )
 """Forward displacement up to the last step before the robot falls, m.
 
-A robot has fallen at the first step from which its base is, for most of ``FALLEN_TIME`` or of the
-rest of the run, tilted by more than ``FALLEN_TILT`` from its initial orientation, or lower than
-``FALLEN_HEIGHT`` of its standing height. What follows a fall counts nothing: a controller that tips
-the robot over and crawls on its back earns what it walked before.
+A robot has fallen at the first step from which its base is, for most of ``FALLEN_TIME`` (near the
+end, of the last ``FALLEN_TIME`` of the run), tilted by more than ``FALLEN_TILT`` from its initial
+orientation, or lower than ``FALLEN_HEIGHT`` of its standing height. What follows a fall counts
+nothing: a controller that tips the robot over and crawls on its back earns what it walked before.
 """

@@ -20,9 +20,9 @@ def test_a_run_without_a_fall_has_its_whole_displacement(quadruped: Robot):
 
 
 def test_what_follows_a_fall_does_not_count_as_upright(quadruped: Robot):
-    found = measured(quadruped, falls_after=6)
+    found = measured(quadruped, falls_after=5)
 
-    assert found == Measured(pytest.approx(1), pytest.approx(0.5), True, 11)
+    assert found == Measured(pytest.approx(1), pytest.approx(0.4), True, 11)
 
 
 def test_a_run_that_ends_early_counts_as_far_as_it_went(quadruped: Robot):

@@ -10,6 +10,7 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.recovery.repair.paper_repair import RepairSearch
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
+from selfmodel.simulation.conditions import Uncertainty
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import forward_displacement
 from tests.helpers.drivers import random_controllers
@@ -28,6 +29,26 @@ def test_a_repair_starts_from_the_controllers_it_is_given(quadruped: Robot):
     behaviour = simulator.run(runs, SMALL.steps, ["base_position"]).behaviour
 
     assert best == seeds[int(np.argmax(forward_displacement(behaviour)))]
+
+
+def test_its_candidates_are_the_survivors_with_their_fitness_best_first(quadruped: Robot):
+    seeds = random_controllers(quadruped, 20, seed=3)
+    simulator = Simulator(quadruped, 2)
+    numbers = dataclasses.replace(SMALL, generations=2, mutation=0.01)
+    given = seeds, np.random.default_rng(0), lambda _: None
+    found = RepairSearch(simulator, numbers)([INTACT], assumed, *given)
+    again = seeds, np.random.default_rng(0), lambda _: None
+    assert found[0].controller == RepairSearch(simulator, numbers).best(INTACT, *again)
+
+    runs = [(INTACT, one.controller) for one in found]
+    fitness = forward_displacement(simulator.run(runs, 200, ["base_position"]).behaviour)
+    assert [one.predicted for one in found] == fitness.tolist() == sorted(fitness)[::-1]
+    assert 1 < len({one.controller for one in found}) == len(found) <= numbers.survivors
+
+
+def assumed() -> Uncertainty:
+    """The uncertainty of a repair that asks for none."""
+    raise AssertionError("the paper's repair simulates the self-model alone")
 
 
 def test_a_repair_that_no_simulation_survives_is_an_error(quadruped: Robot):

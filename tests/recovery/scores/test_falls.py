@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, strategies as st
 from scipy.spatial.transform import Rotation
 
-from selfmodel.recovery.scores.falls import FALLEN_HEIGHT, first_falls
+from selfmodel.recovery.scores.falls import FALLEN_HEIGHT, FALLEN_TIME, first_falls
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import Names
 
@@ -23,7 +23,7 @@ def test_a_base_has_fallen_when_it_leans_by_more_than_sixty_degrees_whatever_its
     x, y, z, w = turned.as_quat()
     orientation = np.array([[1, 0, 0, 0], [w, x, y, z]])
     signals = {"base_position": np.full((2, 3), HEIGHT), "base_orientation": orientation}
-    falls = first_falls(Behaviour(NAMES, np.array([0, 0.01]), signals), UP, HEIGHT)
+    falls = first_falls(Behaviour(NAMES, np.array([0, FALLEN_TIME]), signals), UP, HEIGHT)
 
     if abs(lean - np.pi / 3) > 1e-6:
         assert falls == (1 if lean > np.pi / 3 else 2)
@@ -34,7 +34,7 @@ def test_a_base_that_begins_on_the_ground_has_no_height_to_fall_from(height: flo
     signals = {"base_position": np.full((2, 3), height), "base_orientation": np.eye(4)[[0, 0]]}
     signals["base_position"][1] -= 0.01
 
-    assert first_falls(Behaviour(NAMES, np.array([0, 0.01]), signals), UP, height) == 2
+    assert first_falls(Behaviour(NAMES, np.array([0, FALLEN_TIME]), signals), UP, height) == 2
 
 
 @given(start=st.integers(0, 2**31), lean=st.floats(0, np.pi))
@@ -43,7 +43,7 @@ def test_a_base_leans_from_where_it_started(start: int, lean: float):
     about = Rotation.from_rotvec(lean * np.array([0.6, 0.8, 0]))
     turns = Rotation.concatenate([lying, about * lying]).as_quat(scalar_first=True)
     signals = {"base_position": np.full((2, 3), HEIGHT), "base_orientation": turns}
-    falls = first_falls(Behaviour(NAMES, np.array([0, 0.01]), signals), UP, HEIGHT)
+    falls = first_falls(Behaviour(NAMES, np.array([0, FALLEN_TIME]), signals), UP, HEIGHT)
 
     if abs(lean - np.pi / 3) > 1e-6:
         assert falls == (1 if lean > np.pi / 3 else 2)
@@ -57,7 +57,7 @@ def test_a_base_has_fallen_when_it_is_near_the_ground_however_far_up_or_down_a_s
     normal = np.array([-np.sin(slope), 0, np.cos(slope)])
     position = np.array([HEIGHT * normal, way * along + height * normal])
     signals = {"base_position": position, "base_orientation": np.tile([1.0, 0, 0, 0], (2, 1))}
-    falls = first_falls(Behaviour(NAMES, np.array([0, 0.01]), signals), normal, HEIGHT)
+    falls = first_falls(Behaviour(NAMES, np.array([0, FALLEN_TIME]), signals), normal, HEIGHT)
 
     if abs(height - FALLEN_HEIGHT * HEIGHT) > 1e-6:
         assert falls == (1 if height < FALLEN_HEIGHT * HEIGHT else 2)
@@ -85,8 +85,11 @@ LOW, UPSIDE_DOWN = 0.4 * HEIGHT, [0.0, 1.0, 0, 0]
         ([(10, 23)], 10),  # 0.13 s of 0.25 s
         ([(10, 20), (23, 28)], 10),
         ([(10, 14), (50, 90)], 50),
-        ([(97, 100)], 97),  # the run ends in it
-        ([(95, 96), (99, 100)], 99),
+        ([(87, 100)], 87),  # the run ends in it: 0.13 s of its last 0.25 s
+        ([(88, 100)], 100),
+        ([(80, 86), (93, 100)], 80),
+        ([(99, 100)], 100),  # the last measurement alone
+        ([(95, 96), (99, 100)], 100),
     ],
 )
 def test_a_base_has_fallen_that_is_low_in_most_of_a_quarter_of_a_second(
@@ -101,6 +104,14 @@ def test_a_base_has_fallen_that_is_low_in_most_of_a_quarter_of_a_second(
         time = begin + np.arange(100) / 100
         falls = first_falls(Behaviour(NAMES, time, signals), UP, HEIGHT)
         assert falls.tolist() == [100, fall]
+
+
+@pytest.mark.parametrize(("low", "fall"), [(1, 8), (4, 8), (5, 3), (8, 0)])
+def test_a_run_shorter_than_a_quarter_of_a_second_is_judged_as_a_whole(low: int, fall: int):
+    position = np.full((8, 3), HEIGHT)
+    position[8 - low :] = LOW
+    signals = {"base_position": position, "base_orientation": np.tile([1.0, 0, 0, 0], (8, 1))}
+    assert first_falls(Behaviour(NAMES, np.arange(8) / 100, signals), UP, HEIGHT) == fall
 
 
 @pytest.mark.parametrize("turns", [0.7, 2.5, 3.0, 4.0])  # per second
