@@ -20,9 +20,9 @@ from selfmodel.experiments.grid.cell_file import (
     FinishedPart,
     cell_bytes,
     has_files,
-    listed,
     read_cell,
 )
+from selfmodel.experiments.grid.checks import refused_versions
 from selfmodel.logs import result_files
 from selfmodel.logs.atomic import sync_folder
 from selfmodel.logs.errors import is_full
@@ -84,10 +84,7 @@ def run_cell(folder: Path, cell: Cell, place: str, versions: Mapping[str, str]) 
     """
     own = result_files.versions()
     if own != versions:
-        refusal = (
-            f"the worker on {socket.gethostname()} has {listed(own)}, this command has "
-            f"{listed(versions)}: a study is of one version of each; install the same there"
-        )
+        refusal = refused_versions(f"the worker on {socket.gethostname()}", own, versions)
         return CellAnswer(Outcome.REFUSED, 0.0, refusal)
     start = time.perf_counter()
     try:

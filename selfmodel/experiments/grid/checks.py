@@ -79,6 +79,20 @@ def read_study(folder: Path) -> dict[str, FinishedPart]:
     return found
 
 
+def refused_versions(worker: str, own: Mapping[str, str], versions: Mapping[str, str]) -> str:
+    """Returns the refusal of a worker that has other versions than the command.
+
+    Args:
+        worker: The worker with its article and host.
+        own: Its version by package.
+        versions: Those of the command.
+    """
+    return (
+        f"{worker} has {listed(own)}, this command has {listed(versions)}: a study is of one "
+        f"version of each; install the same there"
+    )
+
+
 def difference(there: Any, requested: Any, name: str = "") -> str | None:  # noqa: ANN401  # JSON
     """Returns the first difference of two JSON values as a clause; None if they are equal."""
     if isinstance(there, dict) and isinstance(requested, dict):

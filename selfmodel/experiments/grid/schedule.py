@@ -28,6 +28,7 @@ def compute(
         workers: The workers.
 
     Raises:
+        InputError: A worker has other versions than the command, or none.
         WorkError: The executor takes no more cells.
     """
     order = {place: number for number, place in enumerate(cells)}
@@ -48,7 +49,7 @@ def compute(
             running[_submitted(submit, cells[place])] = place
         for future in wait(running, return_when=FIRST_COMPLETED).done:
             place = running.pop(future)
-            answer = _answer(future, workers.exits)
+            answer = _answer(future, workers)
             exits[place] += answer is None
             left = workers.attempts - exits[place]
             if answer is None and left == 1 and workers.last_alone:
@@ -91,12 +92,11 @@ def _submitted(submit: Submit, cell: Cell) -> "Future[CellAnswer]":
         ) from error
 
 
-def _answer(
-    future: "Future[CellAnswer]", exits: tuple[type[BaseException], ...]
-) -> CellAnswer | None:
+def _answer(future: "Future[CellAnswer]", workers: Workers) -> CellAnswer | None:
     """Returns the answer of a worker; None if the worker exited.
 
     Raises:
+        InputError: A worker has other versions than the command, or none.
         WorkError: The executor has ended.
     """
     if future.cancelled():
@@ -107,9 +107,16 @@ def _answer(
     error = future.exception()
     if error is None:
         return future.result()
-    if isinstance(error, exits):
+    if isinstance(error, workers.exits):
         return None
+    workers.check()
     line = " ".join(f"{type(error).__name__}: {error}".split())
+    if isinstance(error, ImportError):  # those of a cell itself are in its answer
+        refusal = (
+            f"a worker cannot import what computes a cell ({line[:1000]}): install the same "
+            f"versions of selfmodel, MuJoCo and numpy there as here"
+        )
+        return CellAnswer(Outcome.REFUSED, 0.0, refusal)
     return CellAnswer(Outcome.LOST, 0.0, f"the executor failed to compute it: {line[:1000]}")
 
 

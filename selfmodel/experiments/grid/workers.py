@@ -1,8 +1,13 @@
 """Workers of a study: an executor, and the number of cells that it has at a time."""
 
+from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, Executor
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+
+
+def _no_check() -> None:
+    """Checks nothing: the workers have the installation of the command, or report theirs."""
 
 
 @dataclass(frozen=True)
@@ -18,6 +23,8 @@ class Workers:
             the cell.
         last_alone: Whether the last attempt has no other cell beside it: where a worker has several
             cells, all of them are lost with it.
+        check: Called after a call that failed; raises ``InputError`` if a worker has other versions
+            than the command, or none.
     """
 
     executor: Executor
@@ -25,6 +32,7 @@ class Workers:
     exits: tuple[type[BaseException], ...] = (BrokenExecutor,)
     attempts: int = 3
     last_alone: bool = False
+    check: Callable[[], None] = _no_check
 
 
 OpenWorkers = AbstractContextManager[Workers]

@@ -1,12 +1,13 @@
 """Promises of the order of cells: needs first, lost workers tried again, nothing twice."""
 
+import dataclasses
 import threading
 from concurrent.futures import BrokenExecutor, Future
 
 import pytest
 from hypothesis import given, strategies as st
 
-from selfmodel.errors import WorkError
+from selfmodel.errors import InputError, WorkError
 from selfmodel.experiments.grid.cell import Cell, with_needs
 from selfmodel.experiments.grid.cell_runner import CellAnswer, Outcome
 from selfmodel.experiments.grid.process_workers import ProcessWorkers
@@ -89,6 +90,26 @@ def test_a_cell_whose_worker_exits_is_tried_again_a_few_times(exits: int):
     else:
         assert ends[0].outcome is Outcome.LOST
         assert "in 3 attempts: its process ended with status 9" in str(ends[0].error)
+
+
+def test_a_worker_that_cannot_import_the_call_is_refused():
+    error = ModuleNotFoundError("No module named 'selfmodel'")
+
+    ((_, answer),) = compute(with_needs([cell(0)]), lambda _: answered(error), workers(1))
+
+    assert answer.outcome is Outcome.REFUSED
+    assert "cannot import what computes a cell (ModuleNotFoundError" in str(answer.error)
+
+
+def test_a_failed_call_has_the_workers_checked():
+    def check() -> None:
+        raise InputError("the worker at host has selfmodel 0.0.1")
+
+    checked = dataclasses.replace(workers(1), check=check)
+    ends = compute(with_needs([cell(0)]), lambda _: answered(AttributeError("run_cell")), checked)
+
+    with pytest.raises(InputError, match=r"at host has selfmodel 0\.0\.1"):
+        next(ends)
 
 
 def test_where_workers_share_cells_the_last_attempt_has_no_other_beside_it():

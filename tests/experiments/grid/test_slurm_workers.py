@@ -1,15 +1,18 @@
 """Promises of jobs as workers, by submitit's local executor: the same results, errors in words."""
 
 import dataclasses
+import errno
 import shutil
+from concurrent.futures import BrokenExecutor
 from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from selfmodel.errors import InputError
 from selfmodel.experiments.grid import finished, processes, run_grid
-from selfmodel.experiments.grid.slurm_workers import parameter, slurm
+from selfmodel.experiments.grid.slurm_workers import _JobExecutor, parameter, slurm
 from selfmodel.experiments.grid.workers import OpenWorkers
 from tests.helpers.grids import calls, cells
 
@@ -70,6 +73,68 @@ def test_options_are_those_of_sbatch_and_of_submitit():
     assert parameter("mem_gb", "4") == ("mem_gb", 4)
     with pytest.raises(InputError, match="expected timeout=HH:MM:SS, such as"):
         parameter("timeout", "4h")
+
+
+def test_numbers_of_options_are_checked():
+    assert parameter("mem_gb", "1.5") == ("mem_gb", 1.5)
+    assert parameter("timeout_min", "240") == ("timeout_min", 240)
+    for value in ("4GB", "0", "nan", "inf"):
+        with pytest.raises(InputError, match=rf"expected mem_gb as a number of GB.*got {value}"):
+            parameter("mem_gb", value)
+    with pytest.raises(InputError, match=r"expected timeout_min as a positive .*minutes.*got x"):
+        parameter("timeout_min", "x")
+    with pytest.raises(InputError, match=r"expected nodes as a positive whole number.*got 1\.5"):
+        parameter("nodes", "1.5")
+
+
+class FailingJob:
+    """Job whose first checks fail, as on a network file system."""
+
+    job_id = "7"
+    paths = SimpleNamespace(stderr="7.err")
+
+    def __init__(self, failures: int) -> None:
+        self.failures = failures
+        self.cancelled = False
+
+    def done(self) -> bool:
+        """Fails, or has ended."""
+        self.failures -= 1
+        if self.failures >= 0:
+            raise OSError(errno.ESTALE, "Stale file handle")
+        return True
+
+    def result(self) -> str:
+        """Returns the answer."""
+        return "answer"
+
+    def cancel(self, *, check: bool) -> None:
+        """Notes the call."""
+        assert not check
+        self.cancelled = True
+
+
+def test_a_job_that_cannot_be_checked_for_a_moment_still_gives_its_answer(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    monkeypatch.setattr("selfmodel.experiments.grid.slurm_workers.POLL_SECONDS", 0.01)
+    jobs = [FailingJob(failures=5), FailingJob(failures=0)]
+    waiting = list(jobs)
+    with _JobExecutor(SimpleNamespace(submit=lambda *_: waiting.pop(0))) as executor:
+        futures = [executor.submit(print) for _ in jobs]
+        assert [future.result(timeout=60) for future in futures] == ["answer", "answer"]
+
+
+def test_a_job_that_can_never_be_checked_is_lost_and_cancelled(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("selfmodel.experiments.grid.slurm_workers.POLL_SECONDS", 0.01)
+    monkeypatch.setattr("selfmodel.experiments.grid.slurm_workers.MAX_FAILED_CHECKS", 3)
+    job = FailingJob(failures=10**9)
+    with _JobExecutor(SimpleNamespace(submit=lambda *_: job)) as executor:
+        error = executor.submit(print).exception(timeout=60)
+
+    assert isinstance(error, BrokenExecutor)
+    assert "job 7 could not be checked 3 times in a row: OSError: [Errno 116] Stale" in str(error)
+    assert job.cancelled
 
 
 def test_an_unknown_option_is_one_sentence(tmp_path: Path):
