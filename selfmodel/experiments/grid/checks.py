@@ -1,7 +1,7 @@
 """Checks of the folder of a study before anything is computed, and differences of JSON values."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 

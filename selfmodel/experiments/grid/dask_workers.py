@@ -1,20 +1,16 @@
 """Workers of a Dask cluster, by the address of its scheduler; needs the extra ``dask``."""
 
 import logging
-import pickle
-from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from importlib.metadata import version
-from typing import Any, TypeVar
+from typing import Any
 
 from selfmodel.errors import InputError
 from selfmodel.experiments.grid.checks import refused_versions
 from selfmodel.experiments.grid.workers import Workers
 from selfmodel.logs import result_files
-
-Answer = TypeVar("Answer")
 
 CONNECT_SECONDS = 30
 """Longest wait for the scheduler."""
@@ -58,7 +54,7 @@ def dask(address: str) -> Iterator[Workers]:
         check = partial(_check_versions, client)
         check()
         # A pure call of the same arguments would be answered with the error of the last one.
-        executor = _PickledCalls(client.get_executor(pure=False))
+        executor = client.get_executor(pure=False)
         # Dask itself tries a cell on four workers (distributed.scheduler.allowed-failures).
         yield Workers(
             executor, AT_ONCE, exits=(KilledWorker,), attempts=2, last_alone=True, check=check
@@ -113,43 +109,3 @@ def _check_versions(client: Any) -> None:  # noqa: ANN401  # of an extra
     for worker, own in found.items():
         if any(versions[package] != there for package, there in own.items()):
             raise InputError(refused_versions(f"the Dask worker at {worker}", own, versions))
-
-
-class _PickledCalls(Executor):
-    """Executor of Dask whose calls are unpickled in the task.
-
-    A worker that cannot unpickle the message of a task, such as one without selfmodel, loses its
-    connection and the task without an error; in the task the error is that of the call. The
-    scheduler needs no selfmodel.
-
-    Args:
-        executor: Executor of Dask's client.
-    """
-
-    def __init__(self, executor: Executor) -> None:
-        self._executor = executor
-
-    def submit(
-        self,
-        fn: Callable[..., Answer],
-        /,
-        *args: Any,  # noqa: ANN401  # of any function
-        **kwargs: Any,  # noqa: ANN401
-    ) -> "Future[Answer]":
-        """Calls a function in a worker."""
-        call = pickle.dumps(_Call(partial(fn, *args, **kwargs)))
-        return self._executor.submit(pickle.loads, call)
-
-
-class _Call:
-    """Call whose unpickling returns its answer: a task of the standard library alone.
-
-    Args:
-        function: The call.
-    """
-
-    def __init__(self, function: Callable[[], Any]) -> None:
-        self._function = function
-
-    def __reduce__(self) -> tuple[Callable[[], Any], tuple[()]]:
-        return self._function, ()

@@ -12,6 +12,10 @@ from selfmodel.experiments.grid.workers import Workers
 
 Submit = Callable[[Cell], "Future[CellAnswer]"]
 
+CHECK_SECONDS = 30.0
+"""Wall time without an answer after which the workers are checked: one that cannot read a call,
+such as one without selfmodel that joined a cluster later, may give no answer at all, s."""
+
 
 def compute(
     cells: Mapping[str, Cell], submit: Submit, workers: Workers
@@ -47,7 +51,7 @@ def compute(
         while ready and len(running) < workers.at_once:
             _, place = heapq.heappop(ready)
             running[_submitted(submit, cells[place])] = place
-        for future in wait(running, return_when=FIRST_COMPLETED).done:
+        for future in _ended(running, workers):
             place = running.pop(future)
             answer = _answer(future, workers)
             exits[place] += answer is None
@@ -90,6 +94,20 @@ def _submitted(submit: Submit, cell: Cell) -> "Future[CellAnswer]":
             f"the executor takes no more cells ({error}): finished cells are kept; the same "
             f"command continues"
         ) from error
+
+
+def _ended(
+    running: Mapping["Future[CellAnswer]", str], workers: Workers
+) -> "set[Future[CellAnswer]]":
+    """Returns the calls that have ended; none after ``CHECK_SECONDS``, with the workers checked.
+
+    Raises:
+        InputError: A worker has other versions than the command, or none.
+    """
+    done = wait(running, CHECK_SECONDS, FIRST_COMPLETED).done
+    if not done:
+        workers.check()
+    return done
 
 
 def _answer(future: "Future[CellAnswer]", workers: Workers) -> CellAnswer | None:

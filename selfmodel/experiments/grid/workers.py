@@ -23,8 +23,8 @@ class Workers:
             the cell.
         last_alone: Whether the last attempt has no other cell beside it: where a worker has several
             cells, all of them are lost with it.
-        check: Called after a call that failed; raises ``InputError`` if a worker has other versions
-            than the command, or none.
+        check: Called after a call that failed, and while none answers; raises ``InputError`` if a
+            worker has other versions than the command, or none.
     """
 
     executor: Executor

@@ -6,7 +6,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Controller
 from selfmodel.errors import TrialError
 from selfmodel.physical.interface import PhysicalRobot
-from selfmodel.recovery.scores.falls import first_falls
+from selfmodel.recovery.scores.falls import first_falls, held_at_the_end
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Sample, collect
 
@@ -59,7 +59,8 @@ def measure(track: Track, controller: Controller) -> Measured:
         if not samples:
             raise
     logged = collect(track.robot.anatomy.names, samples)
-    fall = int(first_falls(logged, track.normal, track.robot.standing_height))
+    judged = held_at_the_end(logged) if logged.steps < track.steps else logged
+    fall = min(int(first_falls(judged, track.normal, track.robot.standing_height)), logged.steps)
     x = logged["base_position"][:, 0]
     return Measured(
         displacement=float(x[-1] - x[0]),

@@ -45,6 +45,24 @@ def first_falls(behaviour: Behaviour, normals: FloatArray, standing_height: floa
     return first_lasting(down, up, steps_of(FALLEN_TIME, behaviour))
 
 
+def held_at_the_end(behaviour: Behaviour) -> Behaviour:
+    """Returns the signals of a run that ended early as if the last ones remained.
+
+    A robot that is stopped as it falls has few measurements of the fall.
+
+    Args:
+        behaviour: One run, ``(steps, width)`` each.
+    """
+    more = steps_of(FALLEN_TIME, behaviour)
+    step = behaviour.time[-1] - behaviour.time[-2] if behaviour.steps > 1 else FALLEN_TIME
+    signals = {
+        name: np.pad(values, ((0, more), (0, 0)), mode="edge")
+        for name, values in behaviour.signals.items()
+    }
+    later = behaviour.time[-1] + step * np.arange(1, more + 1)
+    return Behaviour(behaviour.names, np.concatenate([behaviour.time, later]), signals)
+
+
 def first_lasting(state: BoolArray, other: BoolArray, steps: int) -> IndexArray:
     """Returns the first step of a state that lasts, or the number of steps without one, ``(...)``.
 

@@ -5,7 +5,7 @@ import numpy as np
 from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.recovery.scores.falls import first_falls
+from selfmodel.recovery.scores.falls import first_falls, held_at_the_end
 from selfmodel.recovery.scores.fitness import Score
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Behaviour
@@ -29,7 +29,8 @@ def falls_of(robot: Robot, hypothesis: Hypothesis, behaviour: Behaviour) -> Inde
 def fall_of(robot: Robot, hypothesis: Hypothesis, trial: Trial) -> int | None:
     """Returns the step at which the robot fell in a trial; None if it did not, or cannot fall.
 
-    A fixed base cannot fall, and a base that was not observed is not known to have fallen.
+    A fixed base cannot fall, and a base that was not observed is not known to have fallen. A trial
+    that ended early may have ended by a fall: its last pose counts as if it remained.
 
     Args:
         robot: The healthy robot.
@@ -38,8 +39,10 @@ def fall_of(robot: Robot, hypothesis: Hypothesis, trial: Trial) -> int | None:
     """
     if robot.has_fixed_base:
         return None
-    fall = int(falls_of(robot, hypothesis, trial.behaviour))
-    return fall if fall < trial.behaviour.steps else None
+    logged = trial.behaviour
+    judged = held_at_the_end(logged) if logged.steps < trial.plan.steps else logged
+    fall = int(falls_of(robot, hypothesis, judged))
+    return fall if fall < logged.steps else None
 
 
 def _displacement_until_a_fall(

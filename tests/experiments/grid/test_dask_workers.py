@@ -4,7 +4,6 @@ import shutil
 import socket
 import subprocess
 from collections.abc import Callable, Iterator
-from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -102,17 +101,6 @@ def test_a_worker_with_another_selfmodel_or_none_is_refused_by_name(
 
     with pytest.raises(InputError, match=rf"the Dask worker at {worker} has selfmodel {named}, "):
         run(tmp_path / "study", cells(tmp_path, 1), dask(cluster))
-
-
-@pytest.mark.process
-def test_a_worker_that_loses_selfmodel_after_the_connection_is_refused_by_name(
-    cluster: str, tmp_path: Path
-):
-    """As one that joins later."""
-    with dask(cluster) as workers:
-        worker = install(cluster, {"selfmodel": None})
-        with pytest.raises(InputError, match=rf"at {worker} has selfmodel \(not installed\), "):
-            run(tmp_path / "study", cells(tmp_path, 20), nullcontext(workers))
 
 
 @pytest.fixture

@@ -101,12 +101,18 @@ def test_a_worker_that_cannot_import_the_call_is_refused():
     assert "cannot import what computes a cell (ModuleNotFoundError" in str(answer.error)
 
 
-def test_a_failed_call_has_the_workers_checked():
+@pytest.mark.parametrize(
+    "call",
+    [answered(AttributeError("run_cell")), Future()],
+    ids=["a failed call", "a call without an answer"],
+)
+def test_the_workers_are_checked_after(call: "Future[CellAnswer]", monkeypatch: pytest.MonkeyPatch):
     def check() -> None:
         raise InputError("the worker at host has selfmodel 0.0.1")
 
+    monkeypatch.setattr("selfmodel.experiments.grid.schedule.CHECK_SECONDS", 0.1)
     checked = dataclasses.replace(workers(1), check=check)
-    ends = compute(with_needs([cell(0)]), lambda _: answered(AttributeError("run_cell")), checked)
+    ends = compute(with_needs([cell(0)]), lambda _: call, checked)
 
     with pytest.raises(InputError, match=r"at host has selfmodel 0\.0\.1"):
         next(ends)

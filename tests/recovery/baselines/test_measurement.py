@@ -31,6 +31,12 @@ def test_a_run_that_ends_early_counts_as_far_as_it_went(quadruped: Robot):
     )
 
 
+def test_a_run_that_is_stopped_as_the_robot_falls_has_a_fall(quadruped: Robot):
+    found = measured(quadruped, falls_after=5, ends_after=6)
+
+    assert found == Measured(pytest.approx(0.5), pytest.approx(0.4), True, 6)
+
+
 def test_a_run_without_any_sample_is_an_error(quadruped: Robot):
     with pytest.raises(TrialError, match="the robot failed"):
         measured(quadruped, ends_after=0)

@@ -8,10 +8,11 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.recovery.scores.falls import FALLEN_TIME
 from selfmodel.recovery.scores.fitness import DISPLACEMENT
-from selfmodel.recovery.scores.upright import UPRIGHT, falls_of
+from selfmodel.recovery.scores.upright import UPRIGHT, fall_of, falls_of
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_controllers, random_cpgs
 from tests.helpers.robots.arms import arm
 
@@ -85,6 +86,21 @@ def test_the_score_of_a_run_does_not_depend_on_its_batch(quadruped: Robot):
         for k in range(len(runs))
     ]
     assert UPRIGHT.of(quadruped, INTACT, behaviour).tolist() == alone
+
+
+@pytest.mark.parametrize(("planned", "fall"), [(60, 39), (40, None)])
+def test_the_last_pose_of_a_trial_that_ended_early_counts_as_if_it_remained(
+    quadruped: Robot, planned: int, fall: int | None
+):
+    (driver,) = random_controllers(quadruped, 1)
+    batch = walked(quadruped, [0.0] * 40, [0.0] * 39 + [np.pi], [quadruped.standing_height] * 40)
+    signals = {name: values[0] for name, values in batch.signals.items()}
+    behaviour = Behaviour(batch.names, np.arange(40) * 0.01, signals)
+    trial = Trial(
+        TrialPlan("single", "single", driver, planned, 0), quadruped.name, behaviour, "a log"
+    )
+
+    assert fall_of(quadruped, INTACT, trial) == fall
 
 
 def test_a_fixed_base_does_not_fall():
