@@ -47,9 +47,9 @@ class RobustFitness:
     ) -> FloatArray:
         """Returns scores under one condition, ``(controllers,)``, at 70 % of the cost.
 
-        Controllers that are behind in their group are stopped early, and have the score up to then,
-        but one below those of the group that went on: a score may fall with time. A search that
-        recombines the better half of each group needs no more.
+        Controllers that are behind in their group are stopped early, and have the score up to then.
+        A score that grows with time would be larger; any other is limited to less than those of the
+        group that went on. A search that recombines the better half of each group needs no more.
 
         Args:
             controllers: At least one controller per group, group by group.
@@ -79,6 +79,8 @@ class RobustFitness:
         stop = EarlyStop(tuple(shares), behind)
         scores = self._scores(controllers, conditions, steps, stop)[:, 0]
         scores = np.where(np.isneginf(scores) | np.isnan(at_stop), scores, at_stop)
+        if self.score.grows_with_time:
+            return scores
         own = (part.reshape(groups, size) for part in (scores, lasted))
         return np.concatenate([_below_leaders(*group) for group in zip(*own, strict=True)])
 
