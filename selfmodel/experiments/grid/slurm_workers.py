@@ -160,6 +160,6 @@ def _set(future: "Future[Any]", job: Any) -> None:  # noqa: ANN401  # submitit's
     """Gives a future the answer of a job that ended."""
     try:
         future.set_result(job.result())
-    except Exception:  # noqa: BLE001  # submitit has errors of its own
+    except Exception:  # noqa: BLE001  # an error of the job, or of submitit, would end the thread
         output = job.paths.stderr
         future.set_exception(BrokenExecutor(f"job {job.job_id} ended without an answer: {output}"))
