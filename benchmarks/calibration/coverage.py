@@ -44,6 +44,12 @@ def main() -> None:
     parser.add_argument("--bank", type=Path, default=Path("benchmarks/bank"))
     parser.add_argument("--robots", default=",".join(ROBOTS))
     parser.add_argument("--spreads", default="0.05,0.1")
+    parser.add_argument(
+        "--contacts",
+        type=float,
+        default=0.0,
+        help="standard deviation of the logarithms of stiffness and damping of contacts",
+    )
     parser.add_argument("--count", type=int, default=24, help="robots of each kind and spread")
     parser.add_argument("--out", type=Path, default=RESULTS)
     options = parser.parse_args()
@@ -53,18 +59,24 @@ def main() -> None:
         gaits = [commands_of(robot, options.bank, number, STEPS) for number in range(GAITS + 1)]
         for spread in map(float, options.spreads.split(",")):
             for seed in range(FIRST_SEED, FIRST_SEED + options.count):
-                rows.append(measured(robot, gaits, spread, seed))
+                rows.append(measured(robot, gaits, spread, seed, options.contacts))
                 print(json.dumps(rows[-1]), flush=True)
     options.out.write_text(json.dumps({"rows": rows}, indent=1) + "\n", encoding="utf-8")
     print(table(rows))
 
 
-def measured(robot: Robot, gaits: Sequence[np.ndarray], spread: float, seed: int) -> Facts:
+def measured(
+    robot: Robot, gaits: Sequence[np.ndarray], spread: float, seed: int, contacts: float
+) -> Facts:
     """Returns the facts of one physical robot; every second one has a friction of 0.8."""
     rng = np.random.default_rng([seed, round(1000 * spread)])
     truth = drawn(robot.model, spread, rng)
     if seed % 2:
         truth = replace(truth, friction=FRICTION)
+    if contacts:
+        other_draws = np.random.default_rng([seed, round(1000 * spread), 1])
+        stiffness, damping = np.exp(contacts * other_draws.standard_normal(2)).tolist()
+        truth = replace(truth, contacts=(stiffness, damping))
     seen, unseen = seed // 2 % GAITS, seed // 2 % GAITS + 1
     trial, other = (logged(robot, truth, gaits[gait], rng, "trial") for gait in (seen, unseen))
     start = process_time()
@@ -77,6 +89,8 @@ def measured(robot: Robot, gaits: Sequence[np.ndarray], spread: float, seed: int
         "spread": spread,
         "seed": seed,
         "chosen": found.chosen,
+        "contacts_true": truth.contacts,
+        "contacts": (found.parameters.contact_stiffness, found.parameters.contact_damping),
         "delay_right": found.parameters.delay == truth.delay,
         "over_deviations": (np.abs(off) / found.deviations).tolist(),
         "determined": [row["determined"] for row in found.rows()],
@@ -91,12 +105,13 @@ def measured(robot: Robot, gaits: Sequence[np.ndarray], spread: float, seed: int
 def table(rows: Sequence[Facts]) -> str:
     """Returns the rates for each kind of robot and spread, as Markdown."""
     header = (
-        "| robot | spread | robots | factors kept | delay right | within 68 % | within 95 % "
+        "| robot | spread | robots | contacts changed | factors kept | delay right | within 68 % "
+        "| within 95 % "
         "| determined factors within 68 % | within 95 % "
         "| friction of 0.8: undetermined or within 95 % | harm | harm against the delay alone "
         "| alarms | seconds |"
     )
-    lines = [header, "|---" * 14 + "|"]
+    lines = [header, "|---" * 15 + "|"]
     for robot, spread in dict.fromkeys((row["robot"], row["spread"]) for row in rows):
         own = [row for row in rows if (row["robot"], row["spread"]) == (robot, spread)]
         over = np.array([row["over_deviations"] for row in own])
@@ -111,6 +126,7 @@ def table(rows: Sequence[Facts]) -> str:
             robot,
             f"{spread:g}",
             str(len(own)),
+            str(sum(tuple(row["contacts"]) != (1.0, 1.0) for row in own)),
             str(sum(row["chosen"] == "factors" for row in own)),
             str(sum(row["delay_right"] for row in own)),
             *_shares(over),

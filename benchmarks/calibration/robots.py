@@ -14,6 +14,7 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.experiments.ablation.bank import gait
 from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.robot.editing.contacts import scale_contacts
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import collect
 from selfmodel.trials.trial import Trial
@@ -45,6 +46,7 @@ class Truth:
         gains: Factor of the torque of each motor, ``(motors,)``.
         delay: Control delay, control steps.
         noise: Noise of the log, in units of ``NOISE``.
+        contacts: Factors of the stiffness and of the damping of contacts.
     """
 
     masses: FloatArray
@@ -53,6 +55,7 @@ class Truth:
     gains: FloatArray
     delay: int
     noise: float
+    contacts: tuple[float, float] = (1.0, 1.0)
 
     def factors(self, model: mujoco.MjModel, root: str) -> FloatArray:
         """Returns the factors in the order of ``Parameters.factors``.
@@ -96,6 +99,7 @@ def logged(
     model.geom_friction[:, 0] *= truth.friction
     model.pair_friction[:, :2] *= truth.friction
     model.dof_damping *= truth.damping
+    scale_contacts(model, *truth.contacts)
     model.actuator_gainprm *= truth.gains[:, np.newaxis]
     model.actuator_biasprm *= truth.gains[:, np.newaxis]
     data = mujoco.MjData(model)

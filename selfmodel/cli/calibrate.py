@@ -1,5 +1,6 @@
 """``selfmodel calibrate``: the self-model fitted to logs of the healthy robot."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any
@@ -77,6 +78,8 @@ def calibrate(
         "parameters": fit.rows(),
         "delay": fit.parameters.delay,
         "delay_before": before.control_delay,
+        "contact_stiffness": fit.parameters.contact_stiffness,
+        "contact_damping": fit.parameters.contact_damping,
         "error_before": fit.error_before,
         "error": fit.error,
         "as_it_was": fit.robot is before,
@@ -91,7 +94,7 @@ def calibrate(
     if as_json:
         print_json(result)
     else:
-        _print(result)
+        _print(result, fit.contacts)
 
 
 def _refuse_assets(robot: Robot, where: str) -> None:
@@ -103,9 +106,9 @@ def _refuse_assets(robot: Robot, where: str) -> None:
         )
 
 
-def _print(result: dict[str, Any]) -> None:
+def _print(result: dict[str, Any], contacts: Sequence[str]) -> None:
     if result["joints"] is None:
-        _print_factors(result)
+        _print_factors(result, contacts)
     else:
         _print_joints(result["joints"])
     print_lines(
@@ -141,7 +144,7 @@ def _print_joints(fit: dict[str, Any]) -> None:
         )
 
 
-def _print_factors(result: dict[str, Any]) -> None:
+def _print_factors(result: dict[str, Any], contacts: Sequence[str]) -> None:
     rows = [
         (
             one["name"],
@@ -153,6 +156,7 @@ def _print_factors(result: dict[str, Any]) -> None:
     ]
     show(("factor of", "before", "fitted", "uncertainty"), rows)
     print_lines(f"delay, control steps: {result['delay']} ({result['delay_before']} before)")
+    print_lines(*contacts)
     print_lines(
         f"error of predicted motion: {result['error']:.3f} ({result['error_before']:.3f} before), "
         f"the root mean square over predictions of 10 steps, each signal in its own scale"
@@ -166,7 +170,7 @@ def _print_factors(result: dict[str, Any]) -> None:
         )
     elif result["set"] != FACTORS:
         print_lines(
-            "No factors predict left-out segments significantly better: only the delay is changed."
+            "No factors predict left-out segments significantly better: they are unchanged."
         )
     else:
         print_lines(

@@ -8,6 +8,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.robot.control_delay import CONTROL_DELAY
+from selfmodel.robot.editing.contacts import scale_contacts
 from selfmodel.robot.editing.scaling import scale_model
 from selfmodel.robot.robot import Robot
 
@@ -23,6 +24,8 @@ class Parameters:
         damping: Factor of the damping of all joints.
         motor_gains: Factor of the torque per motor, in the model's order.
         delay: Control delay, in control steps; a multiple of a physics step.
+        contact_stiffness: Factor of the stiffness of all contacts.
+        contact_damping: Factor of their damping.
     """
 
     root_mass: float
@@ -31,6 +34,8 @@ class Parameters:
     damping: float
     motor_gains: tuple[float, ...]
     delay: float = 0
+    contact_stiffness: float = 1.0
+    contact_damping: float = 1.0
 
     @property
     def factors(self) -> FloatArray:
@@ -75,7 +80,7 @@ def model_with_parameters(
     masses = np.full(model.nbody, parameters.limb_mass)
     masses[0] = 1.0
     masses[model.body(robot.root).id] = parameters.root_mass
-    return scale_model(
+    scaled = scale_model(
         model,
         mass=masses,
         inertia=masses,
@@ -83,6 +88,8 @@ def model_with_parameters(
         damping=parameters.damping,
         motor_gains=np.array(parameters.motor_gains),
     )
+    scale_contacts(scaled, parameters.contact_stiffness, parameters.contact_damping)
+    return scaled
 
 
 def with_parameters(robot: Robot, parameters: Parameters) -> Robot:
@@ -99,8 +106,8 @@ def with_model(robot: Robot, model: mujoco.MjModel, delay: float) -> Robot:
 
     Args:
         robot: The robot.
-        model: A copy of the robot's model with other masses, friction or motor gains, or other
-            damping, dry friction and armature of joints.
+        model: A copy of the robot's model with other masses, friction, contacts or motor gains,
+            or other damping, dry friction and armature of joints.
         delay: Control delay, in control steps.
     """
     spec = robot.specification()
@@ -116,8 +123,10 @@ def with_model(robot: Robot, model: mujoco.MjModel, delay: float) -> Robot:
         body.ipos, body.iquat = model.body_ipos[body.id], model.body_iquat[body.id]
     for geom in spec.geoms:
         geom.friction = model.geom_friction[geom.id]
+        geom.solref = model.geom_solref[geom.id]
     for pair in spec.pairs:
         pair.friction = model.pair_friction[pair.id]
+        pair.solref = model.pair_solref[pair.id]
     for joint in spec.joints:
         dof = model.jnt_dofadr[joint.id]
         joint.damping = [model.dof_damping[dof], *model.dof_dampingpoly[dof]]

@@ -2,8 +2,9 @@
 
 The fit is a box-constrained nonlinear least squares over short predictions from logged states
 (``mujoco.minimize``), with a Gaussian prior for parameters that the trials do not determine. The
-control delay, an integer, is found by exhaustive search. Both are kept only if they predict
-segments that were left out of the fit significantly better; see ``floating.fit``.
+control delay, an integer, and the stiffness and damping of contacts are found by exhaustive search.
+Each is kept only if it predicts segments that were left out of the fit significantly better; see
+``floating.fit``.
 
 The joints of a robot with a fixed base are fitted one by one; see ``joints.calibration``.
 """
@@ -65,8 +66,8 @@ class Calibration:
             units of ``CALIBRATION_ERROR_SCALES``.
         error: Root mean square error with the fitted parameters, in the same units.
         joints: Fit of the joints of a robot with a fixed base; None for other robots.
-        chosen: The chosen set of parameters: ``nominal`` (none), ``delay`` or ``factors``; of a
-            robot with a fixed base, the name of its set.
+        chosen: The chosen set of parameters: ``nominal`` (none), ``delay``, ``contacts`` or
+            ``factors``; of a robot with a fixed base, the name of its set.
         determined: Whether the trials determine each factor; empty if none was fitted.
         held_out_gain: Relative reduction of the loss in segments that were left out of the fit.
         suspicion: Probable error in the recording of the trials; None without one.
@@ -88,6 +89,7 @@ class Calibration:
             f"<Calibration of {self.robot.name}: control delay {self.parameters.delay}",
             f"  error {self.error_before:.3g} before, {self.error:.3g} after",
         ]
+        lines += [f"  {line}" for line in self.contacts]
         lines += [
             f"  {row['factor']:6.3f} (log deviation {row['deviation']:.3f})  {row['name']}"
             + ("" if row["determined"] else f", {UNDETERMINED}")
@@ -117,6 +119,14 @@ class Calibration:
             InputError: pandas is not installed.
         """
         return data_frame(self.rows())
+
+    @property
+    def contacts(self) -> tuple[str, ...]:
+        """A line on the contacts, if the fit changed them."""
+        stiffness, damping = self.parameters.contact_stiffness, self.parameters.contact_damping
+        if (stiffness, damping) == (1.0, 1.0):
+            return ()
+        return (f"contacts: stiffness x {stiffness:g}, damping x {damping:g}",)
 
     @property
     def undetermined(self) -> tuple[str, ...]:

@@ -20,7 +20,15 @@ from selfmodel.robot.robot import Robot
 
 FIELDS = (
     *("body_mass", "body_inertia", "body_ipos", "body_iquat", "body_subtreemass"),
-    *("geom_friction", "pair_friction", "dof_damping", "dof_dampingpoly", "dof_invweight0"),
+    *(
+        "geom_friction",
+        "pair_friction",
+        "geom_solref",
+        "pair_solref",
+        "dof_damping",
+        "dof_dampingpoly",
+        "dof_invweight0",
+    ),
     *("actuator_gainprm", "actuator_biasprm", "actuator_forcerange", "actuator_gear"),
 )
 
@@ -78,7 +86,7 @@ WAYS = {
 
 def some(robot: Robot, delay: int = 2) -> Parameters:
     motors = tuple(np.linspace(0.5, 1.5, robot.model.nu).tolist())
-    return Parameters(1.3, 0.7, 1.2, 0.8, motors, delay)
+    return Parameters(1.3, 0.7, 1.2, 0.8, motors, delay, 1.5, 0.6)
 
 
 def assert_alike(one: mujoco.MjModel, other: mujoco.MjModel) -> None:

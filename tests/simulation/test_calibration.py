@@ -115,6 +115,39 @@ def test_the_number_of_threads_does_not_matter():
     assert again.deviations.tobytes() == fitted().deviations.tobytes()
 
 
+def noisy(robot: Robot, real: Robot, seed: int) -> Trial:
+    """A trial of a real robot with the noise and the delay of a gap, and no other difference."""
+    gap = draw_gap(QUADRUPED, 0.05, np.random.default_rng(seed))
+    return trial(robot, SimulatedRobot(real, gap=gap), seed, steps=1000)
+
+
+@pytest.mark.search
+def test_contacts_that_differ_are_found_under_noise():
+    real = with_parameters(
+        QUADRUPED,
+        dataclasses.replace(nominal(QUADRUPED), contact_stiffness=2.0, contact_damping=0.25),
+    )
+    found = calibrate(QUADRUPED, [noisy(QUADRUPED, real, 3)], threads=2)
+
+    assert found.parameters.contact_stiffness in {1.0, 2.0, 4.0}
+    assert found.parameters.contact_damping in {0.125, 0.25, 0.5}
+    assert found.contacts
+    assert found.contacts[0] in repr(found)
+    np.testing.assert_allclose(
+        found.robot.model.geom("torso").solref,
+        [-5000 * found.parameters.contact_stiffness, -300 * found.parameters.contact_damping],
+    )
+
+
+@pytest.mark.search
+def test_contacts_that_do_not_differ_remain_as_they_are_under_noise():
+    for seed in range(3):
+        found = calibrate(QUADRUPED, [noisy(QUADRUPED, QUADRUPED, seed)], threads=2)
+
+        assert (found.parameters.contact_stiffness, found.parameters.contact_damping) == (1, 1)
+        assert found.contacts == ()
+
+
 @pytest.mark.search
 def test_under_noise_factors_stay_near_nominal_and_within_bounds():
     gap = draw_gap(QUADRUPED, 0.1, np.random.default_rng(1))

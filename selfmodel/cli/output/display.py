@@ -82,6 +82,8 @@ class _Lines:
                     f"calibration: error {event.error_before:.3f} before, {event.error:.3f} after; "
                     f"delay {counted(event.parameters.delay, 'step')}{_undetermined(event)}"
                 )
+                for line in event.contacts:
+                    self._print_line(f"calibration: {line}")
                 if event.suspicion is not None:
                     self._print_line(f"warning: {event.suspicion}")
             case DiscriminatingTrial():

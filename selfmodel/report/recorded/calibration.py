@@ -43,6 +43,9 @@ def recorded_calibration(
         damping=float(values["damping"]),
         motor_gains=gains,
         delay=float(values["delay"]),
+        # A calibration of version 0.1 has none.
+        contact_stiffness=float(values.get("contact_stiffness", 1.0)),
+        contact_damping=float(values.get("contact_damping", 1.0)),
     )
     chosen, deviations = str(values["set"]), np.array(values["deviations"], dtype=float)
     determined = tuple(map(bool, values["determined"]))

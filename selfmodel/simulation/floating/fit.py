@@ -1,12 +1,13 @@
 """Least-squares fit of the parameters of a robot with a floating base, and its test.
 
-The sets of parameters are nested: none, the control delay, the delay with all factors. A set is
-chosen only if it predicts segments that were left out of its fit significantly better than the set
-chosen before.
+The sets of parameters are nested: none, the control delay, the stiffness and damping of contacts,
+all factors. A set is chosen only if it predicts segments that were left out of its fit
+significantly better than the set chosen before.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from itertools import product
 
 import mujoco.minimize
 import numpy as np
@@ -19,7 +20,7 @@ from selfmodel.simulation.floating.uncertainty import consistent_information
 from selfmodel.simulation.losses import damped, is_better, root_mean_square
 from selfmodel.simulation.outcome import SimulationStats
 
-NOMINAL, DELAY, FACTORS = "nominal", "delay", "factors"
+NOMINAL, DELAY, CONTACTS, FACTORS = "nominal", "delay", "contacts", "factors"
 """Names of the nested sets of parameters."""
 
 PRIOR_DEVIATION = 0.15
@@ -44,6 +45,11 @@ changes the time at which a foot makes contact."""
 CANDIDATE_DELAYS = range(MAX_CONTROL_DELAY + 1)
 """Control delays of the exhaustive search, control steps."""
 
+CANDIDATE_STIFFNESSES = (0.25, 0.5, 1.0, 2.0, 4.0)
+CANDIDATE_DAMPINGS = (0.125, 0.25, 0.5, 1.0, 2.0)
+"""Factors of the stiffness and the damping of contacts in the exhaustive search. Slopes are
+dominated by noise, because both change the times of contacts."""
+
 MAX_ITERATIONS = 3
 """Largest number of iterations of the least-squares solver."""
 
@@ -53,6 +59,9 @@ FOLDS = 4
 MIN_Z = 1.645
 """Standard errors by which a larger set must predict segments better that it was not fitted to: a
 one-sided level of 5 %."""
+
+CONTACTS_MIN_Z = 3.0
+"""As ``MIN_Z``, for the contacts: the best of 25 candidates gains by chance, too."""
 
 INDEPENDENT_ERRORS = 100
 """Independent errors of one unit that all errors together count as in the posterior deviations:
@@ -99,8 +108,10 @@ def simulated_models(factors: int) -> int:
         factors: Number of factors.
     """
     slopes = 2 * factors
-    # Errors before and after, each delay, then slopes and a new point per iteration.
-    return 3 + len(CANDIDATE_DELAYS) + MAX_ITERATIONS * (slopes + 1) + slopes + FOLDS
+    contacts = len(CANDIDATE_STIFFNESSES) * len(CANDIDATE_DAMPINGS)
+    searched = len(CANDIDATE_DELAYS) + contacts
+    # Errors before and after, each candidate, then slopes and a new point per iteration.
+    return 3 + searched + MAX_ITERATIONS * (slopes + 1) + slopes + FOLDS
 
 
 def chosen_fit(predictions: Predictions, before: FloatArray, stats: SimulationStats) -> Fit:
@@ -120,68 +131,91 @@ def chosen_fit(predictions: Predictions, before: FloatArray, stats: SimulationSt
     chosen = Fit(NOMINAL, start, unfitted, before, float(losses.mean()), float(losses.mean()))
 
     delays = {
-        steps: before
+        replace(start, delay=steps): before
         if steps == start.delay
         else predictions.errors([replace(start, delay=steps)])[:, 0]
         for steps in CANDIDATE_DELAYS
     }
-    delay, held_out = _best_delay(predictions, delays, folds)
+    found, held_out = _best(predictions, delays, folds)
+    best = found
     if is_better(held_out, losses, MIN_Z):
-        losses, delayed = held_out, replace(start, delay=delay)
-        chosen = replace(
-            chosen,
-            name=DELAY,
-            parameters=delayed,
-            errors=delays[delay],
-            held_out_loss=float(losses.mean()),
-        )
+        losses = held_out
+        chosen = _with(chosen, DELAY, found, delays[found], held_out)
 
-    x = _solved(predictions, size, delay)
-    parameters = from_factors(np.exp(x), delay)
+    contacts = _contacts(predictions, found, delays[found])
+    found, held_out = _best(predictions, contacts, folds)
+    if is_better(held_out, losses, CONTACTS_MIN_Z):
+        losses, best = held_out, found
+        chosen = _with(chosen, CONTACTS, found, contacts[found], held_out)
+
+    x = _solved(predictions, size, best)
+    parameters = _scaled(best, x)
     errors = predictions.errors([parameters], stats)[:, 0]
     if root_mean_square(damped(errors)) >= root_mean_square(damped(chosen.errors)):
         return chosen
     # Independent segments: long simulations are chaotic, so their derivatives are meaningless.
-    slopes = _Slopes.of(predictions.with_estimated_states(parameters), x, errors, delay)
+    slopes = _Slopes.of(predictions.with_estimated_states(parameters), x, errors, best)
     points = [slopes.without(folds[predictions.segment_of_error] == own) for own in range(FOLDS)]
-    every = predictions.errors([from_factors(np.exp(point), delay) for point in points])
+    every = predictions.errors([_scaled(best, point) for point in points])
     held_out = np.stack([predictions.losses(column) for column in every.T])[
         folds, np.arange(len(folds))
     ]
     if not is_better(held_out, losses, MIN_Z):
         return chosen
-    return replace(
-        chosen,
-        name=FACTORS,
-        parameters=parameters,
-        deviations=slopes.deviations(),
-        errors=errors,
-        held_out_loss=float(held_out.mean()),
-    )
+    fitted = _with(chosen, FACTORS, parameters, errors, held_out)
+    return replace(fitted, deviations=slopes.deviations())
 
 
-def _best_delay(
-    predictions: Predictions, delays: dict[int, FloatArray], folds: IndexArray
-) -> tuple[int, FloatArray]:
-    """Returns the best delay, and the losses of segments by the best delay without their part."""
-    losses = {steps: predictions.losses(errors) for steps, errors in delays.items()}
-    best = min(delays, key=lambda steps: float(np.sum(damped(delays[steps]) ** 2)))
+def _with(
+    fit: Fit, name: str, parameters: Parameters, errors: FloatArray, held_out: FloatArray
+) -> Fit:
+    loss = float(held_out.mean())
+    return replace(fit, name=name, parameters=parameters, errors=errors, held_out_loss=loss)
+
+
+def _contacts(
+    predictions: Predictions, start: Parameters, errors: FloatArray
+) -> dict[Parameters, FloatArray]:
+    """Returns the errors with each candidate of stiffness and damping, given those of the start."""
+    candidates = [
+        replace(start, contact_stiffness=stiffness, contact_damping=damping)
+        for stiffness, damping in product(CANDIDATE_STIFFNESSES, CANDIDATE_DAMPINGS)
+    ]
+    new = [candidate for candidate in candidates if candidate != start]
+    return {start: errors, **dict(zip(new, predictions.errors(new).T, strict=True))}
+
+
+def _best(
+    predictions: Predictions, candidates: Mapping[Parameters, FloatArray], folds: IndexArray
+) -> tuple[Parameters, FloatArray]:
+    """Returns the best candidate, and the losses of segments by the best one without their part."""
+    losses = {own: predictions.losses(errors) for own, errors in candidates.items()}
+    best = min(candidates, key=lambda own: float(np.sum(damped(candidates[own]) ** 2)))
     held_out = np.empty(len(folds))
-    for own in range(FOLDS):
-        out = folds == own
-        without = min(losses, key=lambda steps: float(losses[steps][~out].sum()))
+    for part in range(FOLDS):
+        out = folds == part
+        without = min(losses, key=lambda own: float(losses[own][~out].sum()))
         held_out[out] = losses[without][out]
     return best, held_out
+
+
+def _scaled(start: Parameters, logarithms: FloatArray) -> Parameters:
+    """Returns parameters with other factors, and the delay and the contacts of the start."""
+    return replace(
+        from_factors(np.exp(logarithms), start.delay),
+        contact_stiffness=start.contact_stiffness,
+        contact_damping=start.contact_damping,
+    )
 
 
 Residual = Callable[[FloatArray], FloatArray]
 """Function from logarithms of factors, ``(factors, m)``, to residuals, ``(residuals, m)``."""
 
 
-def _solved(predictions: Predictions, size: int, delay: int) -> FloatArray:
+def _solved(predictions: Predictions, size: int, start: Parameters) -> FloatArray:
     """Returns the logarithms of the fitted factors, ``(factors,)``."""
     zero = np.zeros((size, 1))
-    residual = _residual(predictions, delay)
+    residual = _residual(predictions, start)
     fitted, _ = mujoco.minimize.least_squares(
         zero,
         residual,
@@ -194,12 +228,12 @@ def _solved(predictions: Predictions, size: int, delay: int) -> FloatArray:
     return np.asarray(fitted.ravel())
 
 
-def _residual(predictions: Predictions, delay: int) -> Residual:
+def _residual(predictions: Predictions, start: Parameters) -> Residual:
     """Returns the residuals of the data, then those of the prior."""
 
     def residual(logarithms: FloatArray) -> FloatArray:
         logarithms = np.reshape(logarithms, (len(logarithms), -1))
-        models = [from_factors(np.exp(row), delay) for row in logarithms.T]
+        models = [_scaled(start, row) for row in logarithms.T]
         errors = predictions.errors(models)
         weight = np.sqrt(len(errors)) * PRIOR_WEIGHT / prior_deviations(len(logarithms))
         return np.concatenate([damped(errors), weight[:, np.newaxis] * logarithms])
@@ -231,11 +265,11 @@ class _Slopes:
 
     @classmethod
     def of(
-        cls, predictions: Predictions, x: FloatArray, errors: FloatArray, delay: int
+        cls, predictions: Predictions, x: FloatArray, errors: FloatArray, start: Parameters
     ) -> "_Slopes":
         steps = DIFFERENCE_STEP * np.eye(len(x))
         points = np.concatenate([x + steps, x - steps])
-        models = [from_factors(np.exp(point), delay) for point in points]
+        models = [_scaled(start, point) for point in points]
         residuals = damped(errors)
         moved = damped(predictions.errors(models)) - residuals[:, np.newaxis]
         ahead, behind = np.split(moved / DIFFERENCE_STEP, 2, axis=1)
