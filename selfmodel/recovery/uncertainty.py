@@ -41,6 +41,10 @@ BODIES = 0.1
 """Standard deviation of the logarithm of the factor of a single body's mass, and of its inertia: a
 calibration fits only those that the bodies share, and a robot of unequal legs walks in curves."""
 
+CONTACTS = 0.5
+"""Standard deviation of the logarithms of the stiffness and of the damping of contacts, where a
+calibration changed them: its candidates are a factor of 2 apart."""
+
 ASSUMED_DELAYS = (0, 1, 2)
 """Control delays in addition to the model's before the first trial, control steps."""
 
@@ -114,7 +118,9 @@ def estimated_uncertainty(
     if calibration.error_before < EXACT_ERROR:
         return found
     deviations = CALIBRATED * calibration.deviations
-    return replace(found, models=LogNormal(deviations, np.full(robot.model.nbody, BODIES)))
+    bodies = np.full(robot.model.nbody, BODIES)
+    contacts = CONTACTS if calibration.contacts else 0.0
+    return replace(found, models=LogNormal(deviations, bodies, contacts))
 
 
 def _touch(anatomy: Anatomy) -> BoolArray:

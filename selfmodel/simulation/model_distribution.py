@@ -1,13 +1,14 @@
 """Distributions of the parameters of a robot's model around those of its self-model."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray
+from selfmodel.robot.editing.contacts import scale_contacts
 from selfmodel.robot.parameters import from_factors, model_with_parameters
 from selfmodel.robot.robot import Robot
 
@@ -20,16 +21,20 @@ class ModelDraw:
         factors: Logarithms of the factors of ``Parameters.factors``, ``(4 + motors,)``.
         masses: Logarithms of a further factor of the mass of each body, ``(bodies,)``.
         inertias: Logarithms of a further factor of the inertia of each body, ``(bodies,)``.
+        contacts: Logarithms of the factors of the stiffness and of the damping of contacts,
+            ``(2,)``.
     """
 
     factors: FloatArray
     masses: FloatArray
     inertias: FloatArray
+    contacts: FloatArray = field(default_factory=lambda: np.zeros(2))
 
     @property
     def differs(self) -> bool:
         """Whether a parameter differs from the self-model's."""
-        return any(logs.any() for logs in (self.factors, self.masses, self.inertias))
+        logs = (self.factors, self.masses, self.inertias, self.contacts)
+        return any(own.any() for own in logs)
 
     def applied_to(self, robot: Robot, model: mujoco.MjModel) -> mujoco.MjModel:
         """Returns a copy of a model with these parameters.
@@ -42,6 +47,7 @@ class ModelDraw:
         scaled = model_with_parameters(robot, parameters, model)
         scaled.body_mass *= np.exp(self.masses)
         scaled.body_inertia *= np.exp(self.inertias)[:, np.newaxis]
+        scale_contacts(scaled, *np.exp(self.contacts).tolist())
         mujoco.mj_setConst(scaled, mujoco.MjData(scaled))
         return scaled
 
@@ -68,15 +74,18 @@ class LogNormal:
             ``(4 + motors,)``.
         bodies: Standard deviation of the logarithm of the further factor of the mass, and of that
             of the inertia, of each body, ``(bodies,)``.
+        contacts: Standard deviation of the logarithm of the factors of the stiffness and of the
+            damping of contacts.
     """
 
     factors: FloatArray
     bodies: FloatArray
+    contacts: float = 0.0
 
     @property
     def is_exact(self) -> bool:
         """Whether all draws are the self-model."""
-        return not (self.factors.any() or self.bodies.any())
+        return not (self.factors.any() or self.bodies.any() or self.contacts)
 
     def draw(self, rng: np.random.Generator) -> ModelDraw:
         """Returns random parameters."""
@@ -84,6 +93,8 @@ class LogNormal:
             self.factors * rng.standard_normal(len(self.factors)),
             self.bodies * rng.standard_normal(len(self.bodies)),
             self.bodies * rng.standard_normal(len(self.bodies)),
+            # Contacts that are known take no random numbers.
+            self.contacts * (rng.standard_normal(2) if self.contacts else np.zeros(2)),
         )
 
 

@@ -86,6 +86,8 @@ def test_a_calibration_is_readable_serialisable_and_a_table(fit: Calibration):
         "damping": 1.0,
         "motor_gains": [1.0] * 8,
         "delay": 2,
+        "contact_stiffness": 1.0,
+        "contact_damping": 1.0,
         "deviations": [0.15] * 12,
         "error_before": 0.75,
         "error": 0.5,

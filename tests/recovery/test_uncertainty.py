@@ -9,12 +9,14 @@ import pytest
 import selfmodel
 from selfmodel.recovery.uncertainty import (
     BODIES,
+    CONTACTS,
     assumed_uncertainty,
     estimated_uncertainty,
     noise_of_gap,
 )
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import Calibration, calibrate
+from selfmodel.simulation.model_distribution import LogNormal
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Trial
 from tests.helpers.drivers import random_controllers
@@ -49,6 +51,21 @@ def test_the_noise_of_the_readings_is_that_of_the_physical_robot(
     assert 0.2 * level / 2 < found.start.angles < 0.2 * level * 2.2
     np.testing.assert_allclose(found.models.factors, 0.65 * calibration.deviations)
     assert found.models.bodies.max() == BODIES
+
+
+def test_contacts_are_uncertain_where_the_calibration_changed_them(
+    quadruped: Robot, tmp_path: Path
+):
+    trial = healthy_trial(quadruped, 0.05, tmp_path)
+    simulator, same = fitted(quadruped, trial)
+    parameters = dataclasses.replace(same.parameters, contact_damping=0.5)
+    changed = dataclasses.replace(same, parameters=parameters)
+
+    assert same.contacts == ()
+    for calibration, expected in ((same, 0.0), (changed, CONTACTS)):
+        models = estimated_uncertainty(simulator, [trial], calibration).models
+        assert isinstance(models, LogNormal)
+        assert models.contacts == expected
 
 
 def test_a_robot_that_equals_its_model_has_no_uncertainty(quadruped: Robot, tmp_path: Path):

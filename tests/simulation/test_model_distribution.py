@@ -7,6 +7,34 @@ from selfmodel.robot.robot import Robot
 from selfmodel.simulation.model_distribution import LogNormal, ModelDraw, Weighted, exact
 
 
+def test_known_contacts_take_no_random_numbers(quadruped: Robot):
+    factors, bodies = np.full(4 + quadruped.model.nu, 0.1), np.full(quadruped.model.nbody, 0.1)
+    one, other = np.random.default_rng(0), np.random.default_rng(0)
+    known, unknown = LogNormal(factors, bodies), LogNormal(factors, bodies, 0.5)
+    first = known.draw(one), unknown.draw(other)
+
+    np.testing.assert_array_equal(first[0].inertias, first[1].inertias)
+    assert not first[0].contacts.any()
+    assert first[1].contacts.all()
+    assert known.draw(one).factors.tolist() != unknown.draw(other).factors.tolist()
+
+
+def test_contacts_have_the_given_deviation_and_change_the_model(quadruped: Robot):
+    unknown = LogNormal(np.zeros(4 + quadruped.model.nu), np.zeros(quadruped.model.nbody), 0.5)
+    rng = np.random.default_rng(0)
+    drawn = [unknown.draw(rng) for _ in range(400)]
+    contacts = np.array([own.contacts for own in drawn])
+
+    assert not unknown.is_exact
+    assert all(own.differs for own in drawn)
+    np.testing.assert_allclose(contacts.mean(axis=0), 0, atol=0.1)
+    np.testing.assert_allclose(contacts.std(axis=0), 0.5, rtol=0.2)
+    soft = next(own for own in drawn if (own.contacts < 0).all())
+    scaled = soft.applied_to(quadruped, quadruped.model)
+    torso = quadruped.model.geom("torso").solref
+    np.testing.assert_allclose(scaled.geom("torso").solref, torso * np.exp(soft.contacts))
+
+
 def draws_of(deviation: float, robot: Robot, count: int = 400) -> list[ModelDraw]:
     factors = np.full(4 + robot.model.nu, deviation)
     unknown = LogNormal(factors, np.full(robot.model.nbody, 2 * deviation))
