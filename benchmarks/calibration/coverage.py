@@ -76,7 +76,8 @@ def measured(
     if contacts:
         other_draws = np.random.default_rng([seed, round(1000 * spread), 1])
         stiffness, damping = np.exp(contacts * other_draws.standard_normal(2)).tolist()
-        truth = replace(truth, contacts=(stiffness, damping))
+        # A physics step integrates no more damping than these robots have.
+        truth = replace(truth, contacts=(stiffness, min(damping, 1.0)))
     seen, unseen = seed // 2 % GAITS, seed // 2 % GAITS + 1
     trial, other = (logged(robot, truth, gaits[gait], rng, "trial") for gait in (seen, unseen))
     start = process_time()
