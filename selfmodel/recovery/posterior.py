@@ -31,6 +31,9 @@ MODELS = 128
 COST = 1 / 12
 """Rollouts of a trial, one per model, relative to the evaluations of the paper's repair EA."""
 
+BATCH = 24
+"""Largest number of models that are simulated together: as fast as all, in a fifth of the memory."""
+
 REPEATS = 16
 """Rollouts of one model, which measure how far noise alone moves the path."""
 
@@ -172,7 +175,8 @@ def _paths(
 
     The path of a simulation that diverged is NaN. The models of a batch take bounded memory.
     """
-    size = max(1, simulator.budget.models_bytes // int(simulator.robot.model.nbuffer))
+    affordable = simulator.budget.models_bytes // int(simulator.robot.model.nbuffer)
+    size = max(1, min(BATCH, affordable))
     paths = []
     for first in range(0, len(conditions), size):
         outcome = simulator.run_under(
