@@ -32,7 +32,8 @@ COST = 1 / 12
 """Rollouts of a trial, one per model, relative to the evaluations of the paper's repair EA."""
 
 BATCH = 24
-"""Largest number of models that are simulated together: as fast as all, in a fifth of the memory."""
+"""Largest number of models that are simulated together: as fast as all, in a fifth of the memory
+(quadruped)."""
 
 REPEATS = 16
 """Rollouts of one model, which measure how far noise alone moves the path."""

@@ -1,6 +1,7 @@
 """``selfmodel calibrate``: the model that it writes, and the inputs that it refuses."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -33,8 +34,9 @@ def write(
     stage: Stage = "single",
     level: float = 0.0,
     lost: tuple[Signal, ...] = (),
+    physical: Robot | None = None,
 ) -> Path:
-    """Logs a trial in which every joint moves."""
+    """Logs a trial in which every joint moves; the physical robot is as its model by default."""
     driver = played_back(robot.anatomy.motors, random_motion(robot, STEPS))
     gap = draw_gap(robot, level, np.random.default_rng(2))
     samples = (
@@ -45,7 +47,7 @@ def write(
                 for signal, row in sample.values.items()
             },
         )
-        for sample in SimulatedRobot(robot, gap=gap).run(driver, STEPS)
+        for sample in SimulatedRobot(physical or robot, gap=gap).run(driver, STEPS)
     )
     return write_trial(
         path, robot, TrialPlan(path.stem, stage, driver, STEPS, 0), samples, TrialHeader(SETTINGS)
@@ -63,6 +65,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write(made / "unseen-after.mcap", quadruped, stage="after", level=0.1, lost=BASE)
     write(made / "numb.mcap", quadruped, stage="before", lost=("joint_velocities",))
     write(made / "exact.mcap", quadruped)
+    contacts = replace(nominal(quadruped), contact_stiffness=2.0, contact_damping=0.25)
+    write(made / "hard.mcap", quadruped, physical=with_parameters(quadruped, contacts))
     write(made / "other.mcap", ROBOTS["hexapod"].robot())
     (made / "taken.xml").write_text("mine", encoding="utf-8")
     return made
@@ -122,6 +126,18 @@ def test_a_table_says_each_factor_and_how_sure_it_is(folder: Path):
     assert "not determined by these trials" in done.stdout
     assert "delay, control steps: 0 (0 before)" in done.stdout
     assert "it is written unchanged" in done.stdout
+
+
+@pytest.mark.search
+def test_contacts_that_were_changed_are_printed_and_in_the_model(folder: Path):
+    done = selfmodel("calibrate", "hard.mcap", "-o", "hard.xml", cwd=folder)
+    as_json = selfmodel("calibrate", "hard.mcap", "-o", "hard-2.xml", "--json", cwd=folder)
+
+    assert (done.returncode, as_json.returncode) == (0, 0), done.stderr
+    assert "contacts: stiffness x 2, damping x 0.25" in done.stdout
+    found = json.loads(as_json.stdout)
+    assert (found["contact_stiffness"], found["contact_damping"]) == (2.0, 0.25)
+    assert 'solref="-10000 -75"' in (folder / "hard.xml").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

@@ -50,6 +50,9 @@ def test_the_result_has_the_values_of_the_file(run: Path):
         lambda values: values["calibration"].pop("friction"),
         lambda values: values["calibration"].update(motor_gains=[1.0]),
         lambda values: values["calibration"].update(deviations=[[1.0]]),
+        lambda values: values["calibration"].update(contact_damping=0),
+        lambda values: values["calibration"].update(contact_stiffness=-1.0),
+        lambda values: values["calibration"].update(contact_stiffness="hard"),
     ],
 )
 def test_a_result_without_what_a_report_needs_is_named(
@@ -59,6 +62,19 @@ def test_a_result_without_what_a_report_needs_is_named(
 
     with pytest.raises(InputError, match=r"result\.json: expected the result .*; move it away"):
         subject_of_run(folder, threads=1)
+
+
+def test_the_contacts_of_a_calibration_are_those_of_the_file(run: Path, tmp_path: Path):
+    hard = changed(
+        run, tmp_path / "hard", lambda values: values["calibration"].update(contact_stiffness=2.0)
+    )
+    old = changed(
+        run, tmp_path / "old", lambda values: values["calibration"].pop("contact_stiffness")
+    )
+    fits = [subject_of_run(folder, threads=1).calibration for folder in (hard, old)]
+
+    assert [fit and fit.parameters.contact_stiffness for fit in fits] == [2.0, 1.0]
+    assert [fit and fit.contacts for fit in fits] == [("contacts: stiffness x 2, damping x 1",), ()]
 
 
 @pytest.mark.parametrize("key", ["comparator", "kinds"])

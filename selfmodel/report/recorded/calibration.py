@@ -36,6 +36,12 @@ def recorded_calibration(
     if "joints" in values:
         return fitted(robot, healthy, threads)
     gains = tuple(map(float, values["motor_gains"]))
+    # A calibration of version 0.1 has no contacts.
+    stiffness, damping = (
+        float(values.get(f"contact_{name}", 1.0)) for name in ("stiffness", "damping")
+    )
+    if not (0 < stiffness < np.inf and 0 < damping < np.inf):
+        raise ValueError("the factors of its contacts are not finite numbers above 0")
     parameters = Parameters(
         root_mass=float(values["root_mass"]),
         limb_mass=float(values["limb_mass"]),
@@ -43,9 +49,8 @@ def recorded_calibration(
         damping=float(values["damping"]),
         motor_gains=gains,
         delay=float(values["delay"]),
-        # A calibration of version 0.1 has none.
-        contact_stiffness=float(values.get("contact_stiffness", 1.0)),
-        contact_damping=float(values.get("contact_damping", 1.0)),
+        contact_stiffness=stiffness,
+        contact_damping=damping,
     )
     chosen, deviations = str(values["set"]), np.array(values["deviations"], dtype=float)
     determined = tuple(map(bool, values["determined"]))
