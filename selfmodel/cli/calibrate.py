@@ -48,7 +48,7 @@ def calibrate(
     yes: Yes = False,
     as_json: Json = False,
 ) -> None:
-    """Fit masses, friction, damping, motors and delay of the self-model to logged trials.
+    """Fit masses, friction, damping, motors, delay and contacts of the self-model to trials.
 
     Of a robot with a fixed base, gain, damping, dry friction and armature of each joint are fitted.
 

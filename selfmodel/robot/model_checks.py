@@ -29,7 +29,8 @@ MAX_NUMBER = float(mujoco.mjMAXVAL)
 _OPTIONS = ("timestep", "gravity", "wind", "magnetic", "density", "viscosity")
 _NUMBERS = (
     *("qpos0", "body_pos", "body_quat", "body_ipos", "body_mass", "body_inertia"),
-    *("geom_pos", "geom_size", "geom_friction", "jnt_pos", "jnt_range", "jnt_stiffness"),
+    *("geom_pos", "geom_size", "geom_friction", "geom_solref", "pair_solref"),
+    *("jnt_pos", "jnt_range", "jnt_stiffness"),
     *("dof_armature", "dof_damping", "dof_frictionloss", "tendon_stiffness", "tendon_damping"),
     *("actuator_gear", "actuator_gainprm", "actuator_biasprm", "actuator_dynprm"),
 )

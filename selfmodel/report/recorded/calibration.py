@@ -40,8 +40,8 @@ def recorded_calibration(
     stiffness, damping = (
         float(values.get(f"contact_{name}", 1.0)) for name in ("stiffness", "damping")
     )
-    if not (0 < stiffness < np.inf and 0 < damping < np.inf):
-        raise ValueError("the factors of its contacts are not finite numbers above 0")
+    if not (0.01 <= stiffness <= 100 and 0.01 <= damping <= 100):
+        raise ValueError("the factors of its contacts are not between 0.01 and 100")
     parameters = Parameters(
         root_mass=float(values["root_mass"]),
         limb_mass=float(values["limb_mass"]),

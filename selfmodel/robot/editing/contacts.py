@@ -9,9 +9,10 @@ from selfmodel.arrays import FloatArray
 def scale_contacts(model: mujoco.MjModel, stiffness: float, damping: float) -> None:
     """Scales the stiffness and the damping of the contacts of a compiled model, in place.
 
-    Both are per unit of mass. Where the model states them directly, neither is raised above the
-    largest that a physics step of length h integrates: 1 / h^2 and 1 / h; where it states a time
-    constant, MuJoCo limits the constant itself. Factors of 1 change nothing, to the bit.
+    Both are per unit of mass. Neither is raised above the largest that a physics step of length h
+    integrates: the stiffness above 1 / h^2, a stated damping above 1 / h, and that of a time
+    constant above 1 / h, as MuJoCo limits it. Contacts whose two parameters have different signs,
+    which MuJoCo replaces, and factors of 1 change nothing, to the bit.
 
     Source: MuJoCo's documentation, Modeling, Solver parameters, ``solref``.
 
@@ -20,18 +21,33 @@ def scale_contacts(model: mujoco.MjModel, stiffness: float, damping: float) -> N
         stiffness: Factor of the stiffness.
         damping: Factor of the damping.
     """
+    if (stiffness, damping) == (1.0, 1.0):
+        return
+    step = model.opt.timestep
+    limited = not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_REFSAFE
     for solref in (model.geom_solref, model.pair_solref):
-        solref[:] = _scaled(solref, stiffness, damping, model.opt.timestep)
+        constants, stated = (solref > 0).all(axis=1), (solref < 0).all(axis=1)
+        least = 2 * step if limited else 0.0
+        solref[constants] = _constants(solref[constants], stiffness, damping, step, least)
+        solref[stated] = _stated(solref[stated], stiffness, damping, step)
 
 
-def _scaled(solref: FloatArray, stiffness: float, damping: float, timestep: float) -> FloatArray:
-    """Returns reference parameters with scaled stiffness and damping, ``(n, 2)``.
+def _constants(
+    solref: FloatArray, stiffness: float, damping: float, step: float, least: float
+) -> FloatArray:
+    """Returns scaled time constants t and ratios r, ``(n, 2)``.
 
-    A positive row is a time constant t and a ratio r: the stiffness is 1 / (t r)^2, the damping
-    2 / t. A negative row is the stiffness and the damping, with the opposite sign.
+    The stiffness is 1 / (t r)^2, the damping 2 / t, with the t that MuJoCo uses: ``least`` or more.
     """
-    positive = solref[:, :1] > 0
-    ratios = solref * (1 / damping, damping / np.sqrt(stiffness))
-    stated = -solref
-    limits = np.maximum(stated, (1 / timestep**2, 1 / timestep))
-    return np.where(positive, ratios, -np.minimum(stated * (stiffness, damping), limits))
+    constant = np.maximum(solref[:, 0], least)
+    product = constant * solref[:, 1]
+    scaled = np.maximum(constant / damping, least)
+    products = np.maximum(product / np.sqrt(stiffness), np.minimum(product, step))
+    return np.column_stack([scaled, products / scaled])
+
+
+def _stated(solref: FloatArray, stiffness: float, damping: float, step: float) -> FloatArray:
+    """Returns scaled stiffnesses and dampings, ``(n, 2)``; both have the opposite sign."""
+    own = -solref
+    limits = np.maximum(own, (1 / step**2, 1 / step))
+    return np.asarray(-np.minimum(own * (stiffness, damping), limits))

@@ -55,6 +55,41 @@ def test_the_force_of_an_impact_grows_with_the_damping_alone(solref: str):
     assert damped - rest == pytest.approx((before - rest) / 2, rel=1e-3)
 
 
+def reference(model: mujoco.MjModel) -> np.ndarray:
+    """Returns the stiffness and the damping that MuJoCo's contact has."""
+    data = mujoco.MjData(model)
+    data.qpos[2] = 0.099
+    mujoco.mj_forward(model, data)
+    return data.efc_KBIP[0, :2].copy()
+
+
+@pytest.mark.parametrize("timestep", [0.002, 0.005, 0.01])
+@pytest.mark.parametrize("solref", ["0.02 1", "0.01 1", "0.005 1", "0.001 0.5", "0.04 0.3"])
+@pytest.mark.parametrize("factors", [(1, 0.5), (4, 1), (0.25, 0.5), (1, 2), (2, 0.25), (4, 2)])
+def test_a_time_constant_that_mujoco_limits_has_the_scaled_stiffness_and_damping(
+    solref: str, timestep: float, factors: tuple[float, float]
+):
+    model = ball(solref, timestep)
+    stiffness, damping = reference(model)
+    width = 0.9
+    scale_contacts(model, *factors)
+    found = reference(model)
+
+    largest = np.maximum(stiffness, (1 / width / timestep) ** 2)
+    assert found[0] == pytest.approx(min(factors[0] * stiffness, largest))
+    assert found[1] == pytest.approx(min(factors[1] * damping, 1 / (width * timestep)))
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_contacts_that_mujoco_replaces_remain_as_they_are():
+    for solref in ("0.02 -1", "-5000 300", "0 1"):
+        model = ball(solref)
+        before = model.geom("ball").solref.copy()
+        scale_contacts(model, 2.0, 0.5)
+
+        assert model.geom("ball").solref.tobytes() == before.tobytes()
+
+
 @given(
     stiffness=st.floats(0.2, 5),
     damping=st.floats(0.2, 5),
