@@ -49,10 +49,11 @@ def reset(address: str, request: str, read_bytes: int) -> None:
         client.sendall(request.format(path=url.path, host=url.netloc).encode())
         if read_bytes:
             assert client.recv(read_bytes)
-        end = monotonic() + 10
-        while not set(threading.enumerate()) - before and monotonic() < end:
+        end, requests = monotonic() + 10, set[threading.Thread]()
+        while not requests and monotonic() < end:
             sleep(0.01)
-        requests = set(threading.enumerate()) - before
+            # A thread that has yet to start is listed, and cannot be joined.
+            requests = {own for own in threading.enumerate() if own.is_alive()} - before
         client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
     for thread in requests:
         thread.join(10)
