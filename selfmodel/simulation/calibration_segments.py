@@ -44,11 +44,13 @@ class CalibrationSegments:
         judged: Mask of the steps whose prediction has an error, ``(segments, horizon)``: the state
             after the step is known, and so are the commands that led there. Single hinges may be
             unknown; see ``compared``.
+        steps: Number of different steps of the trial in all segments, which may overlap.
     """
 
     segments: Segments
     observed: Mapping[Signal, FloatArray]
     judged: BoolArray
+    steps: int
 
     def compared(self, signal: Signal) -> BoolArray:
         """Returns a mask of the errors of one signal, ``(segments, horizon, columns)``.
@@ -152,6 +154,7 @@ def _with_observed(
         segments=cut_segments(behaviour, states, starts, HORIZON, record=tuple(states)),
         observed={signal: values[after] for signal, values in states.items()},
         judged=steady[:, LEAD:] & _known(states)[after],
+        steps=len(np.unique(after)),
     )
 
 

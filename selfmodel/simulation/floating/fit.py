@@ -61,7 +61,8 @@ MIN_Z = 1.645
 one-sided level of 5 %."""
 
 CONTACTS_MIN_Z = 3.0
-"""As ``MIN_Z``, for the contacts: the best of 25 candidates gains by chance, too."""
+"""As ``MIN_Z``, for the contacts: the best of 25 candidates gains by chance, too.
+Times the square root of the overlap: segments of a short trial share steps."""
 
 INDEPENDENT_ERRORS = 100
 """Independent errors of one unit that all errors together count as in the posterior deviations:
@@ -144,7 +145,7 @@ def chosen_fit(predictions: Predictions, before: FloatArray, stats: SimulationSt
 
     contacts = _contacts(predictions, found, delays[found])
     found, held_out = _best(predictions, contacts, folds)
-    if is_better(held_out, losses, CONTACTS_MIN_Z):
+    if is_better(held_out, losses, CONTACTS_MIN_Z * np.sqrt(predictions.overlap)):
         losses, best = held_out, found
         chosen = _with(chosen, CONTACTS, found, contacts[found], held_out)
 

@@ -64,6 +64,11 @@ class Predictions:
         """Number of segments of all trials."""
         return sum(len(own.judged) for own in self.data)
 
+    @property
+    def overlap(self) -> float:
+        """Number of segments that contain a step, on average over the steps; at least 1."""
+        return sum(own.judged.size for own in self.data) / sum(own.steps for own in self.data)
+
     def folds(self, count: int) -> IndexArray:
         """Returns the part of each segment, ``(segments,)``: each trial cut in time."""
         parts = [np.arange(len(own.judged)) * count // len(own.judged) for own in self.data]
