@@ -43,7 +43,7 @@ calibration fits only those that the bodies share, and a robot of unequal legs w
 
 CONTACTS = 0.5
 """Standard deviation of the logarithms of the stiffness and of the damping of contacts, where a
-calibration changed them: its candidates are a factor of 2 apart."""
+calibration changed them, this one or an earlier one: its candidates are a factor of 2 apart."""
 
 ASSUMED_DELAYS = (0, 1, 2)
 """Control delays in addition to the model's before the first trial, control steps."""
@@ -119,7 +119,7 @@ def estimated_uncertainty(
         return found
     deviations = CALIBRATED * calibration.deviations
     bodies = np.full(robot.model.nbody, BODIES)
-    contacts = CONTACTS if calibration.contacts else 0.0
+    contacts = CONTACTS if robot.has_fitted_contacts else 0.0
     return replace(found, models=LogNormal(deviations, bodies, contacts))
 
 

@@ -10,6 +10,8 @@ the log contains the number of hidden neurons.
 import math
 from typing import TYPE_CHECKING
 
+from selfmodel.robot.custom_numerics import CONTROL_DELAY, custom_numeric
+
 # Comparators import the limit, and need no MuJoCo.
 if TYPE_CHECKING:
     from mujoco import MjModel
@@ -17,9 +19,6 @@ if TYPE_CHECKING:
 MAX_CONTROL_DELAY = 5
 """Largest control delay, in control steps: segments contain that many commands before their
 start."""
-
-CONTROL_DELAY = "selfmodel_control_delay"
-"""Name of the custom numeric that contains the control delay, in control steps; 0 by default."""
 
 _TOLERANCE = 1e-4
 """Rounding error of a control delay in an MJCF of six digits, in physics steps."""
@@ -39,7 +38,7 @@ def control_delay(model: "MjModel", substeps: int) -> float:
         ValueError: The custom numeric is not from 0 to ``MAX_CONTROL_DELAY``, not a whole number of
             physics steps, or not a whole number of control steps in a model with activations.
     """
-    delay = float(model.numeric(CONTROL_DELAY).data[0]) if has_control_delay(model) else 0.0
+    delay = custom_numeric(model, CONTROL_DELAY) or 0.0
     allowed = 1 if model.na else substeps
     if not 0 <= delay <= MAX_CONTROL_DELAY or abs(delay * allowed - round(delay * allowed)) > (
         _TOLERANCE
@@ -80,8 +79,3 @@ def added_steps(delay: float, added: float) -> int:
             most ``MAX_CONTROL_DELAY``.
     """
     return min(round(added), math.floor(MAX_CONTROL_DELAY - delay))
-
-
-def has_control_delay(model: "MjModel") -> bool:
-    """Returns whether a model contains the custom numeric of the control delay."""
-    return CONTROL_DELAY in (model.numeric(i).name for i in range(model.nnumeric))

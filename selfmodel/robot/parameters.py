@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.robot.control_delay import CONTROL_DELAY
+from selfmodel.robot.custom_numerics import CONTROL_DELAY, FITTED_CONTACTS
 from selfmodel.robot.editing.contacts import scale_contacts
 from selfmodel.robot.editing.scaling import scale_model
 from selfmodel.robot.robot import Robot
@@ -36,6 +36,11 @@ class Parameters:
     delay: float = 0
     contact_stiffness: float = 1.0
     contact_damping: float = 1.0
+
+    @property
+    def has_other_contacts(self) -> bool:
+        """Whether contacts differ from the robot's own."""
+        return (self.contact_stiffness, self.contact_damping) != (1.0, 1.0)
 
     @property
     def factors(self) -> FloatArray:
@@ -96,9 +101,14 @@ def with_parameters(robot: Robot, parameters: Parameters) -> Robot:
     """Returns a robot whose MJCF has scaled parameters and their control delay.
 
     MuJoCo writes numbers of six digits into an MJCF, so the model of the robot equals that of
-    ``model_with_parameters`` to one part in a million.
+    ``model_with_parameters`` to one part in a million. Other contacts are marked as fitted.
     """
-    return with_model(robot, model_with_parameters(robot, parameters), parameters.delay)
+    fitted = with_model(robot, model_with_parameters(robot, parameters), parameters.delay)
+    if robot.has_fitted_contacts or not parameters.has_other_contacts:
+        return fitted
+    spec = fitted.specification()
+    spec.add_numeric(name=FITTED_CONTACTS, data=[1.0])
+    return dataclasses.replace(fitted, mjcf=spec.to_xml())
 
 
 def with_model(robot: Robot, model: mujoco.MjModel, delay: float) -> Robot:

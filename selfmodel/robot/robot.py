@@ -10,7 +10,8 @@ from selfmodel.robot.anatomy.anatomy import Anatomy
 from selfmodel.robot.anatomy.reader import driven_joints, read_anatomy
 from selfmodel.robot.base.fixed_base import reference_pose
 from selfmodel.robot.base.root_body import find_root_body
-from selfmodel.robot.control_delay import control_delay, has_control_delay
+from selfmodel.robot.control_delay import control_delay
+from selfmodel.robot.custom_numerics import CONTROL_DELAY, FITTED_CONTACTS, custom_numeric
 from selfmodel.robot.model_checks import check_model
 from selfmodel.robot.mujoco_log import configure
 
@@ -79,7 +80,12 @@ class Robot:
     @property
     def is_calibrated(self) -> bool:
         """Whether the model is the result of a calibration, which adds a control delay."""
-        return has_control_delay(self.model)
+        return custom_numeric(self.model, CONTROL_DELAY) is not None
+
+    @property
+    def has_fitted_contacts(self) -> bool:
+        """Whether a calibration changed the contacts of the model."""
+        return custom_numeric(self.model, FITTED_CONTACTS) is not None
 
     @property
     def standing_height(self) -> float:

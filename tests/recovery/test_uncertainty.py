@@ -1,6 +1,6 @@
 """Promises of the uncertainty of a self-model: what healthy trials tell about noise."""
 
-import dataclasses
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +14,7 @@ from selfmodel.recovery.uncertainty import (
     estimated_uncertainty,
     noise_of_gap,
 )
+from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import Calibration, calibrate
 from selfmodel.simulation.model_distribution import LogNormal
@@ -56,16 +57,17 @@ def test_the_noise_of_the_readings_is_that_of_the_physical_robot(
 def test_contacts_are_uncertain_where_the_calibration_changed_them(
     quadruped: Robot, tmp_path: Path
 ):
+    """A later calibration of a model with fitted contacts does not make them certain."""
     trial = healthy_trial(quadruped, 0.05, tmp_path)
-    simulator, same = fitted(quadruped, trial)
-    parameters = dataclasses.replace(same.parameters, contact_damping=0.5)
-    changed = dataclasses.replace(same, parameters=parameters)
+    _, calibration = fitted(quadruped, trial)
+    other = with_parameters(quadruped, replace(nominal(quadruped), contact_damping=0.5))
+    later = with_parameters(other, replace(nominal(other), delay=1))
 
-    assert same.contacts == ()
-    for calibration, expected in ((same, 0.0), (changed, CONTACTS)):
-        models = estimated_uncertainty(simulator, [trial], calibration).models
-        assert isinstance(models, LogNormal)
-        assert models.contacts == expected
+    assert calibration.contacts == ()
+    for robot, expected in ((calibration.robot, 0.0), (other, CONTACTS), (later, CONTACTS)):
+        found = estimated_uncertainty(Simulator(robot, 1), [trial], calibration)
+        assert isinstance(found.models, LogNormal)
+        assert found.models.contacts == expected
 
 
 def test_a_robot_that_equals_its_model_has_no_uncertainty(quadruped: Robot, tmp_path: Path):
@@ -87,9 +89,7 @@ def test_a_base_that_was_not_observed_tilts_by_half_of_the_joints_deviation(
         signal: np.full_like(values, np.nan) if signal.startswith("base") else values
         for signal, values in trial.behaviour.signals.items()
     }
-    blind = dataclasses.replace(
-        trial, behaviour=dataclasses.replace(trial.behaviour, signals=signals)
-    )
+    blind = replace(trial, behaviour=replace(trial.behaviour, signals=signals))
     found = estimated_uncertainty(Simulator(quadruped, 1), [blind], None)
 
     assert found.start.tilt == found.start.angles / 2 > 0

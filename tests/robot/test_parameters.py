@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from selfmodel.robot.control_delay import CONTROL_DELAY
+from selfmodel.robot.custom_numerics import CONTROL_DELAY, FITTED_CONTACTS
 from selfmodel.robot.parameters import (
     Parameters,
     factor_names,
@@ -20,15 +20,8 @@ from selfmodel.robot.robot import Robot
 
 FIELDS = (
     *("body_mass", "body_inertia", "body_ipos", "body_iquat", "body_subtreemass"),
-    *(
-        "geom_friction",
-        "pair_friction",
-        "geom_solref",
-        "pair_solref",
-        "dof_damping",
-        "dof_dampingpoly",
-        "dof_invweight0",
-    ),
+    *("geom_friction", "pair_friction", "geom_solref", "pair_solref"),
+    *("dof_damping", "dof_dampingpoly", "dof_invweight0"),
     *("actuator_gainprm", "actuator_biasprm", "actuator_forcerange", "actuator_gear"),
 )
 
@@ -183,3 +176,15 @@ def test_an_invalid_delay_is_refused(quadruped: Robot, said: str):
 
     with pytest.raises(ValueError, match="must be a multiple of 1/2 from 0 to 5"):
         Robot(quadruped.name, mjcf, quadruped.control_timestep)
+
+
+def test_fitted_contacts_are_marked_once_and_remain_marked(quadruped: Robot):
+    softer = dataclasses.replace(nominal(quadruped), contact_stiffness=0.5)
+    fitted = with_parameters(quadruped, softer)
+    again = with_parameters(fitted, softer)
+    late = dataclasses.replace(nominal(quadruped), delay=1)
+
+    assert not with_parameters(quadruped, late).has_fitted_contacts
+    assert fitted.has_fitted_contacts
+    assert again.has_fitted_contacts
+    assert again.mjcf.count(FITTED_CONTACTS) == 1

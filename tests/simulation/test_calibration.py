@@ -2,12 +2,15 @@
 
 import dataclasses
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from selfmodel.controllers.playback import played_back
 from selfmodel.errors import InputError
+from selfmodel.logs.reader import read_log
+from selfmodel.logs.robots import robot_of
 from selfmodel.physical.reality_gap import draw_gap
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.parameters import Parameters, factor_names, nominal, with_parameters
@@ -32,6 +35,7 @@ from tests.helpers.drivers import random_motion
 from tests.helpers.hostile import lacking, unstable
 
 STEPS = 400
+LOGS_OF_0_1 = Path(__file__).parents[1] / "data" / "logs-0.1"
 QUADRUPED = ROBOTS["quadruped"].robot()
 PRIOR = prior_deviations(len(factor_names(QUADRUPED)))
 TRUE = Parameters(1.25, 0.9, 0.8, 1.3, (1.2, 1.0, 0.85, 1.0, 1.0, 0.8, 1.0, 1.15), delay=2)
@@ -321,3 +325,10 @@ def test_the_estimated_steps_are_within_a_factor_of_two(monkeypatch: pytest.Monk
     calibrate(QUADRUPED, two, threads=1)
 
     assert 0.5 < estimate / steps < 2
+
+
+def test_contacts_are_not_fitted_to_the_few_steps_of_a_short_log():
+    """Its 40 segments of 10 steps share 60 steps, and seem to agree on other contacts."""
+    log = read_log(LOGS_OF_0_1 / "calibrated" / "before.mcap")
+
+    assert calibrate(robot_of(log), [log.trial], threads=1).contacts == ()
