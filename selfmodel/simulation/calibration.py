@@ -14,6 +14,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
@@ -155,9 +156,10 @@ class Calibration:
 def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibration:
     """Fits the continuous parameters of a robot to trials of the healthy robot.
 
-    The result does not depend on the number of threads. The factors, and the delay, are kept only
-    if they predict segments that were left out of the fit significantly better. A model that
-    neither improves, or that predicts the trials exactly, is returned unchanged, to the bit.
+    The result does not depend on the number of threads, of MuJoCo or of the linear algebra, which
+    rounds sums over many errors differently with several threads. The factors, and the delay, are
+    kept only if they predict segments that were left out of the fit significantly better. A model
+    that neither improves, or that predicts the trials exactly, is returned unchanged, to the bit.
 
     If the base's position and linear velocity were rarely observed together in a trial, the trial
     is assumed to begin in the model's initial pose, and the state of the base is predicted from
@@ -180,34 +182,10 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
     """
     if not trials:
         raise InputError("expected at least one trial of the healthy robot, got none")
-    if robot.has_fixed_base:
-        return _with_fitted_joints(robot, trials, threads)
-    predictions = _predictions(robot, trials, threads)
-    stats = SimulationStats()
-    before = predictions.errors([nominal(robot)], stats)[:, 0]
-    error_before = root_mean_square(before)
-    if error_before < EXACT_ERROR:
-        deviations = prior_deviations(len(factor_names(robot)))
-        return Calibration(
-            robot, nominal(robot), deviations, error_before, error_before, chosen=NOMINAL
-        )
-    fit = chosen_fit(predictions, before, stats)
-    if stats.diverged == stats.runs:
-        raise InputError(
-            f"{', '.join(trial.path for trial in trials)}: no simulation of the healthy robot "
-            f"remained finite, before and after the fit: check the model and the units of the log"
-        )
-    return Calibration(
-        robot=robot if fit.name == NOMINAL else with_parameters(robot, fit.parameters),
-        parameters=fit.parameters,
-        deviations=fit.deviations,
-        error_before=error_before,
-        error=root_mean_square(fit.errors),
-        chosen=fit.name,
-        determined=_determined(fit),
-        held_out_gain=1 - fit.held_out_loss / fit.held_out_loss_before,
-        suspicion=suspicion(predictions, fit.parameters, fit.errors),
-    )
+    with threadpool_limits(1, "blas"):
+        if robot.has_fixed_base:
+            return _with_fitted_joints(robot, trials, threads)
+        return _with_fitted_parameters(robot, trials, threads)
 
 
 def simulated_steps(robot: Robot, trials: Sequence[Trial]) -> int:
@@ -253,6 +231,35 @@ def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> flo
 
 def _predictions(robot: Robot, trials: Sequence[Trial], threads: int) -> Predictions:
     return Predictions(robot, [calibration_segments_of(trial) for trial in trials], threads)
+
+
+def _with_fitted_parameters(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibration:
+    predictions = _predictions(robot, trials, threads)
+    stats = SimulationStats()
+    before = predictions.errors([nominal(robot)], stats)[:, 0]
+    error_before = root_mean_square(before)
+    if error_before < EXACT_ERROR:
+        deviations = prior_deviations(len(factor_names(robot)))
+        return Calibration(
+            robot, nominal(robot), deviations, error_before, error_before, chosen=NOMINAL
+        )
+    fit = chosen_fit(predictions, before, stats)
+    if stats.diverged == stats.runs:
+        raise InputError(
+            f"{', '.join(trial.path for trial in trials)}: no simulation of the healthy robot "
+            f"remained finite, before and after the fit: check the model and the units of the log"
+        )
+    return Calibration(
+        robot=robot if fit.name == NOMINAL else with_parameters(robot, fit.parameters),
+        parameters=fit.parameters,
+        deviations=fit.deviations,
+        error_before=error_before,
+        error=root_mean_square(fit.errors),
+        chosen=fit.name,
+        determined=_determined(fit),
+        held_out_gain=1 - fit.held_out_loss / fit.held_out_loss_before,
+        suspicion=suspicion(predictions, fit.parameters, fit.errors),
+    )
 
 
 def _determined(fit: Fit) -> tuple[bool, ...]:

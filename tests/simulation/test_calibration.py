@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_limits
 
 from selfmodel.controllers.playback import played_back
 from selfmodel.errors import InputError
@@ -23,7 +24,7 @@ from selfmodel.simulation.calibration import (
     prediction_error,
 )
 from selfmodel.simulation.floating import fit, predictions
-from selfmodel.simulation.floating.fit import MAX_LOG_FACTOR, prior_deviations
+from selfmodel.simulation.floating.fit import FACTORS, MAX_LOG_FACTOR, prior_deviations
 from selfmodel.simulation.outcome import SimulationResult, SimulationStats
 from selfmodel.simulation.prediction import predict
 from selfmodel.tasks import ROBOTS
@@ -117,6 +118,21 @@ def test_the_number_of_threads_does_not_matter():
     assert again.robot.mjcf == fitted().robot.mjcf
     assert again.parameters == fitted().parameters
     assert again.deviations.tobytes() == fitted().deviations.tobytes()
+
+
+@pytest.mark.search
+def test_threads_of_the_linear_algebra_do_not_matter():
+    healthy = noisy(QUADRUPED, with_parameters(QUADRUPED, TRUE), 1)
+
+    def calibrated(threads: int) -> Calibration:
+        with threadpool_limits(threads, "blas"):
+            return calibrate(QUADRUPED, [healthy], threads=1)
+
+    one, two = calibrated(1), calibrated(2)
+
+    assert one.chosen == FACTORS
+    assert two.robot.mjcf == one.robot.mjcf
+    assert two.deviations.tobytes() == one.deviations.tobytes()
 
 
 def noisy(robot: Robot, real: Robot, seed: int) -> Trial:
