@@ -156,9 +156,7 @@ class Walk(base.Task):
         delay = int(self._robot.control_delay)
         delay += added_steps(delay, float(embodiment.added_delay[0]))
         if self._gap is not None:
-            self._measurement = NoisyMeasurement(
-                self._gap.level, self._robot.anatomy, embodiment, rng
-            )
+            self._measurement = NoisyMeasurement(self._gap.level, self._robot, embodiment, rng)
             delay += self._gap.delay
         self._delayed = deque(np.zeros((delay, embodiment.model.nu)))
 

@@ -7,7 +7,9 @@ import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.robot.anatomy.reader import joint_limits
 from selfmodel.robot.editing.embodiment import WELD_ARMATURE, Embodiment
+from selfmodel.robot.robot import Robot
 from selfmodel.trials.signal_scales import MEASUREMENT_FULL_SCALES
 from selfmodel.trials.signals import Signal
 
@@ -44,20 +46,21 @@ class NoisyMeasurement:
 
     Args:
         level: Standard deviation of the noise, as a fraction of the full scale.
-        anatomy: Parts of the robot.
+        robot: The healthy robot.
         embodiment: Model of the robot with its faults.
         rng: Random numbers of the noise.
     """
 
     def __init__(
-        self, level: float, anatomy: Anatomy, embodiment: Embodiment, rng: np.random.Generator
+        self, level: float, robot: Robot, embodiment: Embodiment, rng: np.random.Generator
     ) -> None:
         self._level, self._rng = level, rng
-        self._dead = dead_sensors(anatomy, embodiment)
-        self._touch = np.array([sensor.kind == "touch" for sensor in anatomy.sensors])
-        ranges = [embodiment.model.joint(hinge).range for hinge in anatomy.hinges]
-        # The range of a hinge without limits is pi to either side.
-        self._half_ranges = np.array([(high - low) / 2 or np.pi for low, high in ranges])
+        self._dead = dead_sensors(robot.anatomy, embodiment)
+        self._touch = np.array([sensor.kind == "touch" for sensor in robot.anatomy.sensors])
+        hinges = [robot.model.joint(name).id for name in robot.anatomy.hinges]
+        # MuJoCo leaves the range of an unlimited hinge in degrees, if the MJCF is in degrees.
+        ranges = [joint_limits(robot.model, hinge) for hinge in hinges]
+        self._half_ranges = np.array([(high - low) / 2 for low, high in ranges])
 
     def corrupt_readings(self, readings: FloatArray) -> None:
         """Adds noise to the readings."""

@@ -93,7 +93,7 @@ class SimulatedRobot:
         delay += added_steps(delay, float(embodiment.added_delay[0]))
         substeps = round(robot.control_timestep / float(model.opt.timestep))
         if self._gap is not None:
-            measurement = NoisyMeasurement(self._gap.level, robot.anatomy, embodiment, rng)
+            measurement = NoisyMeasurement(self._gap.level, robot, embodiment, rng)
             delay += self._gap.delay
             randomize_initial_pose(robot, model, data, start_spread(self._gap.level), rng)
             place_debris(model, data, self._limbs)

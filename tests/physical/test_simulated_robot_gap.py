@@ -4,6 +4,7 @@ import dataclasses
 import json
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -91,7 +92,7 @@ def test_readings_have_the_noise_of_the_level(quadruped: Robot):
     level, steps = 0.1, 4000
     noise = NoisyMeasurement(
         level,
-        quadruped.anatomy,
+        quadruped,
         build(quadruped, parse("intact", quadruped.anatomy)),
         np.random.default_rng(0),
     )
@@ -107,11 +108,27 @@ def test_readings_have_the_noise_of_the_level(quadruped: Robot):
     np.testing.assert_allclose(error[:, 4:].mean(axis=0), 0, atol=5 * level / np.sqrt(steps))
 
 
+def test_the_encoder_of_a_hinge_without_limits_has_the_noise_of_a_full_turn(quadruped: Robot):
+    """MuJoCo does not convert the range of such a hinge from degrees: 60 would be 60 rad."""
+    spec = quadruped.specification()
+    spec.joint("front_left_knee").limited = mujoco.mjtLimited.mjLIMITED_FALSE
+    spec.joint("front_left_knee").range = [-60.0, 60.0]
+    free = dataclasses.replace(quadruped, mjcf=spec.to_xml())
+    noise = NoisyMeasurement(
+        0.1, free, build(free, parse("intact", free.anatomy)), np.random.default_rng(0)
+    )
+    rows = [noise.measure("joint_positions", np.zeros(8)) for _ in range(4000)]
+    scales = np.std(rows, axis=0)[free.anatomy.hinges.index("front_left_knee")]
+
+    assert free.model.joint("front_left_knee").range.tolist() == [-60.0, 60.0]
+    assert scales == pytest.approx(0.1 * np.pi, rel=0.06)
+
+
 def test_logged_signals_have_noise_of_their_full_scale(quadruped: Robot):
     level, draws = 0.1, 4000
     noise = NoisyMeasurement(
         level,
-        quadruped.anatomy,
+        quadruped,
         build(quadruped, parse("intact", quadruped.anatomy)),
         np.random.default_rng(0),
     )

@@ -78,7 +78,7 @@ def _joint(
             [names[b] for b in groups if b != body and b in subtree]
             + [sensor.name for sensor in sensors if sensor.body in bodies]
         ),
-        limits=tuple(_limits(model, j) for j in group),
+        limits=tuple(joint_limits(model, j) for j in group),
         motors_lost_if_broken=frozenset(
             model.actuator(m).name for m in moved if motor_bodies(model, m) & subtree
         ),
@@ -88,7 +88,8 @@ def _joint(
     )
 
 
-def _limits(model: mujoco.MjModel, hinge: int) -> tuple[float, float]:
+def joint_limits(model: mujoco.MjModel, hinge: int) -> tuple[float, float]:
+    """Returns the lower and upper angle of a hinge, rad; -pi and pi if it has no limits."""
     if not model.jnt_limited[hinge]:
         return -math.pi, math.pi
     low, high = model.jnt_range[hinge]
@@ -132,7 +133,7 @@ def _sensors(model: mujoco.MjModel, hinges: list[int]) -> tuple[Sensor, ...]:
             body = model.body(model.site_bodyid[target]).name
             touch.append(Sensor(name, "touch", body, "", 1.0, 0.0))
         elif model.sensor_type[s] == _ANGLE and target in hinges:
-            low, high = _limits(model, target)
+            low, high = joint_limits(model, target)
             body = model.body(model.jnt_bodyid[target]).name
             hinge = model.joint(target).name
             angle.append(Sensor(name, "angle", body, hinge, (high - low) / 2, (low + high) / 2))
