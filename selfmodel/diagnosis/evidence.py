@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
+from selfmodel.controllers.command_source import CommandSource
 from selfmodel.diagnosis.comparator import (
     Comparator,
     HingewiseTrial,
@@ -31,12 +32,8 @@ from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.trial import Trial
 from selfmodel.trials.trial_part import TrialPart, whole
 
-TrialKey = tuple[str, int]
-"""Path of a trial's log and number of steps: the opening of a trial has the same path."""
-
-
-def _key(trial: Trial) -> TrialKey:
-    return trial.path, trial.behaviour.steps
+TrialContent = tuple[str, CommandSource]
+"""See ``Trial.content``."""
 
 
 class Evidence:
@@ -55,9 +52,9 @@ class Evidence:
     def __init__(self, simulator: Simulator, comparator: Comparator) -> None:
         self._simulator = simulator
         self._comparator = as_comparator(comparator, getattr(comparator, "name", repr(comparator)))
-        self._prepared: dict[TrialKey, PreparedTrial] = {}
-        self._losses: dict[TrialKey, Cache[Hypothesis]] = {}
-        self._hinge_losses: dict[TrialKey, Cache[Hypothesis]] = {}
+        self._prepared: dict[TrialContent, PreparedTrial] = {}
+        self._losses: dict[TrialContent, Cache[Hypothesis]] = {}
+        self._hinge_losses: dict[TrialContent, Cache[Hypothesis]] = {}
 
     def is_piecewise(self, trials: Sequence[Trial]) -> bool:
         """Returns whether the distances are means of losses, so that paired tests are possible.
@@ -195,14 +192,14 @@ class Evidence:
         """
         found = []
         for part in map(whole, trials):
-            cache = self._hinge_losses.setdefault(_key(part.trial), Cache())
+            cache = self._hinge_losses.setdefault(part.trial.content, Cache())
             compute = partial(self._compute_by_hinge, part.trial)
             rows = np.array(cache.get_or_compute(hypotheses, compute))
             found.append(rows[:, self._pieces(part)])
         return np.concatenate(found, axis=1)
 
     def _prepare(self, trial: Trial) -> PreparedTrial:
-        key = _key(trial)
+        key = trial.content
         if key not in self._prepared:
             self._prepared[key] = prepared_trial(self._comparator, self._simulator.robot, trial)
         return self._prepared[key]
@@ -226,7 +223,7 @@ class Evidence:
         return np.asarray((times[:, 0] >= part.begin) & (times[:, 1] <= part.end))
 
     def _rows(self, hypotheses: Sequence[Hypothesis], trial: Trial) -> list[FloatArray]:
-        cache = self._losses.setdefault(_key(trial), Cache())
+        cache = self._losses.setdefault(trial.content, Cache())
         return cache.get_or_compute(hypotheses, partial(self._compute, trial))
 
     def _compute(self, trial: Trial, hypotheses: list[Hypothesis]) -> FloatArray:
@@ -248,7 +245,7 @@ class Evidence:
             # The same simulations have the losses that are asked for next.
             losses = self._losses_of(prepared, trial, batch, result)
             total = dict(zip(batch, losses, strict=True))
-            cache = self._losses.setdefault(_key(trial), Cache())
+            cache = self._losses.setdefault(trial.content, Cache())
             cache.get_or_compute(batch, partial(_rows_of, total))
         return np.concatenate(rows)
 

@@ -25,19 +25,17 @@ def observed_as(trial: Trial, others: Sequence[Trial]) -> Trial:
     Returns:
         The trial itself if the others lack nothing; otherwise a trial with NaN in these columns.
     """
-    signals, lost = dict(trial.behaviour.signals), []
+    signals, is_lacking = dict(trial.behaviour.signals), False
     for signal in SIGNALS:
         missing = np.zeros(signals[signal].shape[1], dtype=bool)
         for other in others:
             missing |= ~np.isfinite(other.behaviour[signal]).any(axis=0)
-        here = np.flatnonzero(missing & np.isfinite(signals[signal]).any(axis=0)).tolist()
-        if here:
-            signals[signal] = signals[signal].copy()
-            signals[signal][:, here] = np.nan
-            lost.append(f"{signal} {here}")
-    if not lost:
+        lost = missing & np.isfinite(signals[signal]).any(axis=0)
+        if lost.any():
+            is_lacking = True
+            signals[signal] = np.where(lost, np.nan, signals[signal])
+    if not is_lacking:
         return trial
-    behaviour = dataclasses.replace(trial.behaviour, signals=signals)
-    # Losses are looked up by the path of a trial.
-    path = f"{trial.path} without {', '.join(lost)}"
-    return dataclasses.replace(trial, behaviour=behaviour, path=path)
+    return dataclasses.replace(
+        trial, behaviour=dataclasses.replace(trial.behaviour, signals=signals)
+    )

@@ -3,6 +3,7 @@
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from numpy.typing import ArrayLike
@@ -196,7 +197,7 @@ class Trial:
                 f"{error}: begin the arrays at the first row with all commands"
             ) from error
         plan = TrialPlan(name, checked_stage(stage), controller or played, behaviour.steps, seed=0)
-        return cls(plan, robot.name, behaviour, f"{name} ({_digest(behaviour)})")
+        return cls(plan, robot.name, behaviour, f"{name} ({_digest(behaviour)[:16]})")
 
     def to_pandas(self) -> Any:  # noqa: ANN401  # pandas is optional
         """Returns the signals as a ``pandas.DataFrame``, with the columns of ``logs export``.
@@ -216,10 +217,16 @@ class Trial:
         """Forward displacement, m."""
         return float(forward_displacement(self.behaviour))
 
+    @cached_property
+    def content(self) -> tuple[str, CommandSource]:
+        """What was run and observed, for look-ups: trials of equal content are the same trial."""
+        return _digest(self.behaviour), self.plan.controller
+
 
 def _digest(behaviour: Behaviour) -> str:
-    """Digest of the signals: losses are looked up by the path of a trial."""
+    """SHA-256 of the times, the late steps and the signals of a behaviour."""
+    late = () if behaviour.late is None else (behaviour.late,)
     digest = hashlib.sha256()
-    for values in behaviour.signals.values():
+    for values in (behaviour.time, *late, *behaviour.signals.values()):
         digest.update(values.tobytes())
-    return digest.hexdigest()[:16]
+    return digest.hexdigest()

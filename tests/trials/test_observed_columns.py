@@ -14,13 +14,12 @@ def trial(robot: Robot, *unknown: int) -> Trial:
     return Trial.from_arrays(robot, angles, np.zeros((20, len(robot.anatomy.motors))))
 
 
-def test_a_lost_encoder_is_left_out_of_the_reference_and_of_its_path(quadruped: Robot):
+def test_a_lost_encoder_is_left_out_of_the_reference(quadruped: Robot):
     healthy = trial(quadruped)
     found = observed_as(healthy, [trial(quadruped, 2)])
 
     known = np.isfinite(found.behaviour["joint_positions"]).all(axis=0)
     assert np.flatnonzero(~known).tolist() == [2]
-    assert found.path != healthy.path
     assert np.isfinite(healthy.behaviour["joint_positions"]).all()
 
 

@@ -1,5 +1,6 @@
 """Promises of a trial of arrays: every shape is checked, and it is worth as much as a log."""
 
+import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +55,22 @@ def test_trials_of_other_numbers_have_other_paths(biped: Robot):  # noqa: F811
     paths = [Trial.from_arrays(biped, **given).path for given in (first, first, second)]
 
     assert paths[0] == paths[1] != paths[2]
+
+
+def test_a_trial_is_known_by_what_was_run_and_observed_and_not_by_its_path(biped: Robot):  # noqa: F811
+    one = Trial.from_arrays(biped, **arrays(biped))
+    signals = dict(one.behaviour.signals)
+    signals["base_position"] = signals["base_position"] + 5.0
+    moved = dataclasses.replace(one.behaviour, signals=signals)
+    later = dataclasses.replace(one.behaviour, time=one.behaviour.time + 1)
+    silent = dataclasses.replace(
+        one.plan,
+        controller=Playback(biped.anatomy.motors, np.zeros((1, len(biped.anatomy.motors)))),
+    )
+
+    assert dataclasses.replace(one, path="elsewhere.mcap").content == one.content
+    for other in ({"behaviour": moved}, {"behaviour": later}, {"plan": silent}):
+        assert dataclasses.replace(one, **other).content != one.content
 
 
 @pytest.mark.parametrize(
