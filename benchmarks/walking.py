@@ -19,7 +19,7 @@ from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.logs import load_controller
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state.sensing import SensorReader
+from selfmodel.robot.sensing import SensorReader
 from selfmodel.tasks import ROBOTS
 
 

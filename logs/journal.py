@@ -17,7 +17,7 @@ from selfmodel.logs.files import replace_file
 from selfmodel.logs.reader import read_log
 from selfmodel.logs.result_files import MAX_BYTES, parse_json, read_result, result_bytes
 from selfmodel.recovery.database import Database
-from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.robot.anatomy import Anatomy
 
 TRIALS = "trials"
 DIAGNOSES = "diagnoses.json"

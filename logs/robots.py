@@ -6,10 +6,9 @@ from selfmodel.errors import InputError, WorkError
 from selfmodel.logs.errors import GOOD, SchemaMismatchError
 from selfmodel.logs.reader import TrialLog
 from selfmodel.robot.mjcf.adaptation import MAX_SUBSTEPS
-from selfmodel.robot.mjcf.mujoco_errors import MUJOCO_ERRORS
 from selfmodel.robot.mjcf.rehearsal import rehearse
 from selfmodel.robot.mjcf.untrusted import checked_model
-from selfmodel.robot.mujoco_log import uncounted_warnings
+from selfmodel.robot.mujoco_errors import MUJOCO_ERRORS, uncounted_warnings
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget, BudgetError
 from selfmodel.trials.signals import Names

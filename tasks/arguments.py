@@ -6,7 +6,7 @@ from typing import Any
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.notation import parse
-from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.robot.anatomy import Anatomy
 
 NAMES = ("hypothesis", "time_limit", "random", "gap", "start_noise")
 """Arguments of every task."""

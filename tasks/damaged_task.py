@@ -7,8 +7,8 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.physical.initial_pose import randomize_joint_angles, start_spread
-from selfmodel.robot.anatomy.anatomy import Anatomy
-from selfmodel.robot.editing.embodiment import Embodiment
+from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.embodiment import Embodiment
 from selfmodel.tasks.randomness import next_seed
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.table_one import cases_of
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery.scores.fitness import Score
-from selfmodel.robot.anatomy.legs import reaches_ground
+from selfmodel.robot.legs import reaches_ground
 from selfmodel.robot.robot import Robot
 
 if TYPE_CHECKING:

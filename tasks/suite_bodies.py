@@ -13,8 +13,8 @@ from selfmodel.robot.mjcf.adaptation import adapt_text
 from selfmodel.robot.mjcf.document.document import read_document
 from selfmodel.robot.mjcf.document.files import InMemory
 from selfmodel.robot.mjcf.load import robot_from
-from selfmodel.robot.mjcf.mujoco_errors import loading_a_model
 from selfmodel.robot.mjcf.settings import MjcfSettings
+from selfmodel.robot.mujoco_errors import loading_a_model
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks.entry import Entry
 from selfmodel.tasks.suite_environment import SuiteRobot, episode_return

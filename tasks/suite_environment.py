@@ -17,11 +17,11 @@ from selfmodel.physical.environment_robot import EnvironmentRobot
 from selfmodel.physical.simulated_robot import OWN_SEED
 from selfmodel.recovery.scores.fitness import Score
 from selfmodel.robot.control_delay import added_steps
-from selfmodel.robot.editing.embodiment import Embodiment
-from selfmodel.robot.mjcf.mujoco_errors import loading_a_model
+from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.mujoco_errors import loading_a_model
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state.access import current_value, observed_fields, signal_fields, state_writer
-from selfmodel.robot.state.sensing import SensorReader
+from selfmodel.robot.sensing import SensorReader
+from selfmodel.robot.state import current_value, observed_fields, signal_fields, state_writer
 from selfmodel.simulation.activations import activations_since_rest
 from selfmodel.trials.behaviour import Behaviour, Sample
 from selfmodel.trials.signals import SIGNALS, Signal

@@ -12,10 +12,10 @@ from selfmodel.faults.build import apply_faults
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.kinds.neuron import SILENT_NEURON
 from selfmodel.physical.reality_gap import draw_gap_of, perturbed_model
-from selfmodel.robot.anatomy.anatomy import Anatomy
-from selfmodel.robot.anatomy.reader import read_anatomy
+from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.anatomy_reader import read_anatomy
 from selfmodel.robot.control_delay import added_steps
-from selfmodel.robot.mjcf.mujoco_errors import loading_a_model, mujoco_errors_as_input_errors
+from selfmodel.robot.mujoco_errors import loading_a_model, mujoco_errors_as_input_errors
 from selfmodel.tasks import suite_bodies
 from selfmodel.tasks.arguments import check_number, check_time_limit, parsed
 from selfmodel.tasks.randomness import Seed, construction_numbers, episode_numbers

@@ -19,12 +19,11 @@ from selfmodel.physical.initial_pose import randomize_initial_pose, start_spread
 from selfmodel.physical.measurement_noise import ExactMeasurement, Measurement, NoisyMeasurement
 from selfmodel.physical.reality_gap import RealityGap, draw_gap
 from selfmodel.physical.simulated_robot import physical_embodiment
-from selfmodel.robot.control_delay import added_steps, split_delay
-from selfmodel.robot.custom_numerics import CONTROL_DELAY
-from selfmodel.robot.editing.embodiment import Embodiment
+from selfmodel.robot.control_delay import CONTROL_DELAY, added_steps, split_delay
+from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state.access import current_value, observed_fields
-from selfmodel.robot.state.sensing import SensorReader
+from selfmodel.robot.sensing import SensorReader
+from selfmodel.robot.state import current_value, observed_fields
 from selfmodel.tasks.arguments import check_number, check_time_limit, parsed
 from selfmodel.tasks.randomness import Seed, construction_numbers, episode_numbers, next_seed
 from selfmodel.tasks.start_noise import start_level

@@ -18,7 +18,7 @@ from absl import logging
 from selfmodel.arrays import FloatArray
 from selfmodel.robot.parameters import Parameters, factor_names, from_factors, model_with_parameters
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state.access import signal_fields, state_writer
+from selfmodel.robot.state import signal_fields, state_writer
 from selfmodel.simulation.calibration_segments import HORIZON, MAX_SEGMENTS
 from selfmodel.simulation.floating.fit import CANDIDATE_DELAYS, MAX_LOG_FACTOR
 from selfmodel.simulation.requests import LEAD

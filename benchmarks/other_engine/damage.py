@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.robot.anatomy.anatomy import Anatomy, Joint
+from selfmodel.robot.anatomy import Anatomy, Joint
 
 KINDS = ("break", "jam", "sensor")
 

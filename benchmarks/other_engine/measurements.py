@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 from benchmarks.other_engine.bullet import Bullet
 from benchmarks.other_engine.damage import Damage
 from benchmarks.other_engine.reality import Reality
-from selfmodel.robot.anatomy.anatomy import Sensor
+from selfmodel.robot.anatomy import Sensor
 from selfmodel.robot.robot import Robot
 
 

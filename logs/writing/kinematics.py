@@ -6,7 +6,7 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.logs.messages.topics import WORLD
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state.access import bind_data, state_writer
+from selfmodel.robot.state import bind_data, state_writer
 from selfmodel.trials.rotation import product
 
 _POSITION_XYZW = [0, 1, 2, 4, 5, 6, 3]

@@ -32,7 +32,7 @@ from selfmodel.cli.viewing.rerun_view import (
 )
 from selfmodel.errors import InputError
 from selfmodel.logs.files import refuse_existing
-from selfmodel.robot.state.poses import POSE
+from selfmodel.robot.state import POSE
 from selfmodel.sandbox.budget import Budget
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.threads import thread_count

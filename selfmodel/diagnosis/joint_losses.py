@@ -9,7 +9,7 @@ from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.diagnosis.verdicts.change_point import MIN_PIECES
 from selfmodel.diagnosis.verdicts.significance import MIN_Z, excess_over_healthy, paired_z
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
-from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.robot.anatomy import Anatomy
 
 HingeLosses = Callable[[Sequence[Hypothesis]], FloatArray]
 """Returns the losses of each hinge, ``(n, pieces, hinges)``; NaN without evidence on the hinge."""

@@ -6,8 +6,8 @@ import numpy as np
 
 from selfmodel.diagnosis.comparator import Comparator, PreparedTrial, TrialRefusedError
 from selfmodel.errors import InputError
-from selfmodel.robot.base.known_base import BASE_SIGNALS, completed_trial
 from selfmodel.robot.robot import Robot
+from selfmodel.robot.state import BASE_SIGNALS, completed_trial
 from selfmodel.simulation.requests import Request, Segments, recordable
 from selfmodel.trials.magnitudes import check_magnitudes
 from selfmodel.trials.signals import Signal

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.kinds.broken import BROKEN
 from selfmodel.faults.kinds.jammed import JAMMED, JAMMED_AT_ANGLE
-from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.robot.anatomy import Anatomy
 
 if TYPE_CHECKING:
     from mujoco import MjModel

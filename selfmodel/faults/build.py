@@ -6,9 +6,9 @@ import mujoco
 from mujoco import MjModel, MjSpec
 
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.robot.anatomy.anatomy import Anatomy
-from selfmodel.robot.editing.embodiment import Embodiment
-from selfmodel.robot.mjcf.mujoco_errors import mujoco_errors_as_input_errors
+from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.mujoco_errors import mujoco_errors_as_input_errors
 from selfmodel.robot.robot import Robot
 
 SpecEdit = Callable[[MjSpec], None]

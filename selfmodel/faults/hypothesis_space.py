@@ -13,7 +13,7 @@ from selfmodel.faults import notation
 from selfmodel.faults.hypothesis import Hypothesis, canonical
 from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.faults.registry import notation_kinds
-from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.robot.anatomy import Anatomy
 
 GENE_VALUES = 4
 """Values per gene, each in [0, 1): active from 0.5 on, kind, part, severity."""

@@ -6,13 +6,13 @@ from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
 from selfmodel.arrays import BoolArray, FloatArray
-from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.robot.anatomy import Anatomy
 from selfmodel.trials.behaviour import Behaviour
 
 if TYPE_CHECKING:
     from mujoco import MjSpec
 
-    from selfmodel.robot.editing.embodiment import Embodiment
+    from selfmodel.robot.embodiment import Embodiment
 
 Values = TypeVar("Values")
 

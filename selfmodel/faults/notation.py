@@ -10,7 +10,7 @@ from selfmodel.errors import InputError, unknown_name
 from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
 from selfmodel.faults.kind import ENVIRONMENT, Fault, FaultKind
 from selfmodel.faults.registry import KINDS
-from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.robot.anatomy import Anatomy
 
 MAX_LENGTH = 20_000
 """Maximum length of a notation, characters: some 500 faults."""

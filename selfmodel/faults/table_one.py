@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from selfmodel.robot.anatomy.anatomy import Anatomy, Joint, Sensor
+from selfmodel.robot.anatomy import Anatomy, Joint, Sensor
 
 
 @dataclass(frozen=True)

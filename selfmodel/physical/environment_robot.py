@@ -18,7 +18,7 @@ from selfmodel.physical.safety_limits import Limit
 from selfmodel.physical.step_timing import TIMESTAMP, StepTimer
 from selfmodel.physical.stop_signals import HeldIterator, release_stop_signals
 from selfmodel.physical.watchdog import HangError, Watchdog
-from selfmodel.robot.anatomy.actuator_ranges import command_ranges
+from selfmodel.robot.actuators import command_ranges
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Sample
 from selfmodel.trials.signals import SIGNALS, Names, Signal

@@ -6,10 +6,10 @@ import mujoco
 import numpy as np
 
 from selfmodel.physical.measurement_noise import rotated_by_vector
-from selfmodel.robot.anatomy.anatomy import Anatomy
-from selfmodel.robot.editing.embodiment import WELD_ARMATURE
+from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.embodiment import WELD_ARMATURE
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state.access import bind_data, current_value, signal_fields, state_writer
+from selfmodel.robot.state import bind_data, current_value, signal_fields, state_writer
 
 ANGLE_DEVIATION = 0.2
 """Standard deviation of the initial joint angles, rad, at a gap level of 1."""

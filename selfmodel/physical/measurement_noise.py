@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
-from selfmodel.robot.anatomy.anatomy import Anatomy
-from selfmodel.robot.anatomy.reader import joint_limits
-from selfmodel.robot.editing.embodiment import WELD_ARMATURE, Embodiment
+from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.anatomy_reader import joint_limits
+from selfmodel.robot.embodiment import WELD_ARMATURE, Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.signal_scales import MEASUREMENT_FULL_SCALES
 from selfmodel.trials.signals import Signal

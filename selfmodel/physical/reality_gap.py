@@ -13,9 +13,9 @@ from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
 from selfmodel.faults.build import compile_model
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.robot.anatomy.anatomy import Anatomy
-from selfmodel.robot.editing.scaling import scale_model
+from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.robot import Robot
+from selfmodel.robot.scaling import scale_model
 
 MAX_GAP_LEVEL = 0.5
 """Largest level: above it, a third of the factors would be at their minimum or implausible."""

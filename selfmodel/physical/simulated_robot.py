@@ -17,13 +17,12 @@ from selfmodel.physical.initial_pose import randomize_initial_pose, start_spread
 from selfmodel.physical.measurement_noise import ExactMeasurement, Measurement, NoisyMeasurement
 from selfmodel.physical.reality_gap import RealityGap, perturbed_model
 from selfmodel.physical.structural_mismatch import StructuralMismatch, add_structural_mismatch
-from selfmodel.robot.base.known_base import BASE_SIGNALS
 from selfmodel.robot.control_delay import added_steps, split_delay
-from selfmodel.robot.editing.embodiment import Embodiment
-from selfmodel.robot.mjcf.mujoco_errors import mujoco_errors_as_input_errors
+from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.mujoco_errors import mujoco_errors_as_input_errors
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state.access import bind_data, observed_fields
-from selfmodel.robot.state.sensing import SensorReader
+from selfmodel.robot.sensing import SensorReader
+from selfmodel.robot.state import BASE_SIGNALS, bind_data, observed_fields
 from selfmodel.trials.behaviour import Sample
 from selfmodel.trials.signals import SIGNALS
 

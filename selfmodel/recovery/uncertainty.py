@@ -8,7 +8,7 @@ import numpy as np
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.physical.initial_pose import StartSpread, start_spread
-from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import EXACT_ERROR, Calibration
 from selfmodel.simulation.conditions import Uncertainty

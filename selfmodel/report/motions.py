@@ -13,9 +13,8 @@ from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.report.encoding import quantised
 from selfmodel.report.scene import bodies_of
-from selfmodel.robot.base.known_base import with_known_base
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state.poses import poses_of
+from selfmodel.robot.state import poses_of, with_known_base
 from selfmodel.trials.behaviour import Behaviour
 
 MAX_POSES = 400_000

@@ -10,11 +10,11 @@ the log contains the number of hidden neurons.
 import math
 from typing import TYPE_CHECKING
 
-from selfmodel.robot.custom_numerics import CONTROL_DELAY, custom_numeric
-
-# Comparators import the limit, and need no MuJoCo.
 if TYPE_CHECKING:
     from mujoco import MjModel
+
+
+# Comparators import the limit, and need no MuJoCo.
 
 MAX_CONTROL_DELAY = 5
 """Largest control delay, in control steps: segments contain that many commands before their
@@ -79,3 +79,19 @@ def added_steps(delay: float, added: float) -> int:
             most ``MAX_CONTROL_DELAY``.
     """
     return min(round(added), math.floor(MAX_CONTROL_DELAY - delay))
+
+
+# Comparators import the limit of the control delay, and need no MuJoCo.
+
+CONTROL_DELAY = "selfmodel_control_delay"
+"""Name of the custom numeric that contains the control delay, in control steps; 0 by default."""
+
+FITTED_CONTACTS = "selfmodel_fitted_contacts"
+"""Name of the custom numeric of a model with contacts that a calibration changed."""
+
+
+def custom_numeric(model: "MjModel", name: str) -> float | None:
+    """Returns the first value of a custom numeric; None if the model does not contain it."""
+    if name not in (model.numeric(i).name for i in range(model.nnumeric)):
+        return None
+    return float(model.numeric(name).data[0])

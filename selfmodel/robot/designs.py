@@ -7,7 +7,7 @@ from selfmodel.controllers.controller import Design
 from selfmodel.controllers.cpg import Cpg
 from selfmodel.controllers.network import HIDDEN_NEURONS, MAX_HIDDEN_NEURONS, Network
 from selfmodel.errors import InputError
-from selfmodel.robot.anatomy.actuator_ranges import command_ranges
+from selfmodel.robot.actuators import command_ranges
 from selfmodel.robot.robot import Robot
 
 

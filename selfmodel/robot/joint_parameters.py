@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray, IndexArray
-from selfmodel.robot.anatomy.transmission import motor_joints
+from selfmodel.robot.actuators import motor_joints
 from selfmodel.robot.robot import Robot
 
 QUANTITIES = ("gain", "damping", "dry friction", "armature")

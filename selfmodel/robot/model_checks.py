@@ -3,8 +3,8 @@
 import mujoco
 import numpy as np
 
-from selfmodel.robot.anatomy.transmission import SUPPORTED_TRANSMISSIONS
-from selfmodel.robot.base.root_body import joints_of_body
+from selfmodel.robot.actuators import SUPPORTED_TRANSMISSIONS
+from selfmodel.robot.anatomy_reader import joints_of_body
 
 _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 _UNSUPPORTED_JOINTS = {

@@ -7,10 +7,9 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.robot.custom_numerics import CONTROL_DELAY, FITTED_CONTACTS
-from selfmodel.robot.editing.contacts import scale_contacts
-from selfmodel.robot.editing.scaling import scale_model
+from selfmodel.robot.control_delay import CONTROL_DELAY, FITTED_CONTACTS
 from selfmodel.robot.robot import Robot
+from selfmodel.robot.scaling import scale_contacts, scale_model
 
 
 @dataclass(frozen=True)

@@ -6,14 +6,17 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 
-from selfmodel.robot.anatomy.anatomy import Anatomy
-from selfmodel.robot.anatomy.reader import driven_joints, read_anatomy
-from selfmodel.robot.base.fixed_base import reference_pose
-from selfmodel.robot.base.root_body import find_root_body
-from selfmodel.robot.control_delay import control_delay
-from selfmodel.robot.custom_numerics import CONTROL_DELAY, FITTED_CONTACTS, custom_numeric
+from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.anatomy_reader import driven_joints, find_root_body, read_anatomy
+from selfmodel.robot.base import reference_pose
+from selfmodel.robot.control_delay import (
+    CONTROL_DELAY,
+    FITTED_CONTACTS,
+    control_delay,
+    custom_numeric,
+)
 from selfmodel.robot.model_checks import check_model
-from selfmodel.robot.mujoco_log import configure
+from selfmodel.robot.mujoco_errors import configure
 
 configure()
 

@@ -9,11 +9,11 @@ import numpy as np
 from mujoco.batch import Batch, SimulationError
 
 from selfmodel.arrays import BoolArray, IndexArray
-from selfmodel.robot.editing.embodiment import Embodiment
-from selfmodel.robot.mjcf.mujoco_errors import mujoco_errors_as_input_errors
+from selfmodel.robot.base import Reader
+from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.mujoco_errors import mujoco_errors_as_input_errors
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state.access import observed_fields
-from selfmodel.robot.state.fields import Reader
+from selfmodel.robot.state import observed_fields
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import Signal
 

@@ -18,9 +18,9 @@ from threadpoolctl import threadpool_limits
 
 from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
-from selfmodel.robot.base.known_base import trial_with_known_base
 from selfmodel.robot.parameters import Parameters, factor_names, nominal, with_parameters
 from selfmodel.robot.robot import Robot
+from selfmodel.robot.state import trial_with_known_base
 from selfmodel.simulation.calibration_segments import calibration_segments_of
 from selfmodel.simulation.floating.fit import (
     FACTORS,

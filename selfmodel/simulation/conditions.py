@@ -16,7 +16,7 @@ from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.physical.initial_pose import StartSpread, randomize_initial_pose
-from selfmodel.robot.editing.embodiment import Embodiment
+from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.model_distribution import ModelDistribution, ModelDraw
 

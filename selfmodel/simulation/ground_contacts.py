@@ -5,7 +5,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state.access import bind_data, state_writer
+from selfmodel.robot.state import bind_data, state_writer
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.estimation.state_estimation import STATE, estimated_states, known_steps
 from selfmodel.trials.rotation import directions

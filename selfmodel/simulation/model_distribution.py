@@ -8,9 +8,9 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.robot.editing.contacts import scale_contacts
 from selfmodel.robot.parameters import from_factors, model_with_parameters
 from selfmodel.robot.robot import Robot
+from selfmodel.robot.scaling import scale_contacts
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,11 +9,11 @@ import numpy as np
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.errors import InputError
 from selfmodel.robot.control_delay import MAX_CONTROL_DELAY, added_steps, split_delay
-from selfmodel.robot.editing.embodiment import Embodiment
-from selfmodel.robot.mujoco_log import uncounted_warnings
+from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.mujoco_errors import uncounted_warnings
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state.access import state_writer
-from selfmodel.robot.state.sensing import SensorReader
+from selfmodel.robot.sensing import SensorReader
+from selfmodel.robot.state import state_writer
 from selfmodel.simulation.activations import initial_activations
 from selfmodel.simulation.batch import LiveBatch, live_signals, new_batch
 from selfmodel.simulation.outcome import SimulationResult, SimulationStats

@@ -15,10 +15,10 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.physical.measurement_noise import dead_sensors
 from selfmodel.physical.reality_gap import perturbed_models
 from selfmodel.robot.control_delay import added_steps, split_delay
-from selfmodel.robot.editing.embodiment import Embodiment
-from selfmodel.robot.mujoco_log import uncounted_warnings
+from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.mujoco_errors import uncounted_warnings
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state.sensing import SensorReader
+from selfmodel.robot.sensing import SensorReader
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.simulation.batch import EarlyStop, LiveBatch, live_signals, new_batch
 from selfmodel.simulation.conditions import (

@@ -12,7 +12,7 @@ import pytest
 
 from selfmodel.faults.build import build
 from selfmodel.faults.notation import parse
-from selfmodel.robot.anatomy.anatomy import Joint
+from selfmodel.robot.anatomy import Joint
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import ROBOTS
 from tests.helpers.drivers import random_motion

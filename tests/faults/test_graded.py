@@ -19,7 +19,7 @@ from selfmodel.faults.kinds.terrain import (
 )
 from selfmodel.faults.notation import parse
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state.sensing import SensorReader
+from selfmodel.robot.sensing import SensorReader
 from selfmodel.simulation.simulator import Simulator
 from tests.faults.test_build import assert_same_paths, follow
 from tests.helpers.drivers import random_controllers, random_motion

@@ -26,8 +26,8 @@ from selfmodel.faults.registry import (
     kind_names,
     notation_kinds,
 )
-from selfmodel.robot.anatomy.anatomy import Anatomy
-from selfmodel.robot.editing.embodiment import Embodiment
+from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from tests.helpers.drivers import random_motion

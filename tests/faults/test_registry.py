@@ -19,8 +19,8 @@ from selfmodel.faults.registry import (
 )
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.recovery.sequential_diagnosis import diagnose_trials
-from selfmodel.robot.anatomy.anatomy import Anatomy
-from selfmodel.robot.editing.embodiment import Embodiment
+from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator

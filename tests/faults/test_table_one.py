@@ -8,7 +8,7 @@ import pytest
 
 from selfmodel.faults.notation import parse
 from selfmodel.faults.table_one import cases_of
-from selfmodel.robot.anatomy.legs import reaches_ground
+from selfmodel.robot.legs import reaches_ground
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import ROBOTS, entry, suite_bodies

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from selfmodel.faults.hypothesis import Hypothesis, canonical
 from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.faults.registry import KINDS, PAPER_KINDS
-from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.robot.anatomy import Anatomy
 
 
 def faults(anatomy: Anatomy, *, graded: bool) -> st.SearchStrategy[Fault]:

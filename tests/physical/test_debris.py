@@ -9,7 +9,7 @@ from selfmodel.physical.debris import place_debris
 from selfmodel.physical.reality_gap import DEBRIS_PREFIX, draw_gap
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state.access import signal_fields
+from selfmodel.robot.state import signal_fields
 from selfmodel.tasks import ROBOTS
 from tests.helpers.drivers import random_controllers
 

@@ -15,7 +15,7 @@ from selfmodel.physical.initial_pose import (
     start_spread,
 )
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state.access import signal_fields
+from selfmodel.robot.state import signal_fields
 from selfmodel.tasks import ROBOTS
 
 QUADRUPED = ROBOTS["quadruped"].robot()

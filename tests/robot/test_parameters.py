@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from selfmodel.robot.custom_numerics import CONTROL_DELAY, FITTED_CONTACTS
+from selfmodel.robot.control_delay import CONTROL_DELAY, FITTED_CONTACTS
 from selfmodel.robot.parameters import (
     Parameters,
     factor_names,

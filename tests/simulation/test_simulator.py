@@ -8,7 +8,7 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state.sensing import SensorReader
+from selfmodel.robot.sensing import SensorReader
 from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.trials.behaviour import collect
 from selfmodel.trials.signals import SIGNALS

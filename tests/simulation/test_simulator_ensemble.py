@@ -11,7 +11,7 @@ from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import ALL_KINDS
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state.sensing import SensorNoise
+from selfmodel.robot.sensing import SensorNoise
 from selfmodel.simulation.requests import Ensemble
 from selfmodel.simulation.simulator import Simulator
 from tests.helpers.drivers import random_controllers

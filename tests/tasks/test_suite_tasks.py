@@ -9,7 +9,7 @@ from dm_control.rl import control
 from selfmodel import tasks
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.robot.mjcf.mujoco_errors import loading_a_model
+from selfmodel.robot.mujoco_errors import loading_a_model
 from selfmodel.tasks import entry, suite_bodies, suite_tasks
 from tests.helpers.opengl import drawing, draws
 

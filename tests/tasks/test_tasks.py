@@ -19,8 +19,8 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import KINDS
-from selfmodel.robot.anatomy.anatomy import Anatomy
-from selfmodel.robot.editing.embodiment import Embodiment
+from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.embodiment import Embodiment
 from selfmodel.tasks import ALL_TASKS, ROBOTS, SUITE, TASKS_BY_DOMAIN
 from tests.helpers.opengl import drawing, draws
 

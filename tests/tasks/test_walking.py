@@ -10,7 +10,7 @@ import selfmodel
 from selfmodel import tasks
 from selfmodel.errors import InputError
 from selfmodel.physical.reality_gap import DEBRIS_PREFIX
-from selfmodel.robot.custom_numerics import CONTROL_DELAY
+from selfmodel.robot.control_delay import CONTROL_DELAY
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import walking
 

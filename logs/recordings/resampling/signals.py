@@ -19,7 +19,7 @@ from selfmodel.logs.recordings.resampling.resample import (
 from selfmodel.logs.recordings.resampling.start_frame import heading_removal, rotate_world
 from selfmodel.logs.recordings.resampling.tracks import Tracks
 from selfmodel.logs.recordings.series import IntArray
-from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.rotation import rotated
 from selfmodel.trials.signals import Signal

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_notes
 
-MUJOCO_LOG = "selfmodel.robot.mujoco_log"
+MUJOCO_LOG = "selfmodel.robot.mujoco_errors"
 """Module that counts MuJoCo's warnings; it is not imported by a command without MuJoCo."""
 
 

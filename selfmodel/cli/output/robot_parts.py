@@ -6,11 +6,8 @@ import mujoco
 
 from selfmodel.cli.output.tables import folding, print_tables
 from selfmodel.faults.registry import ALL_KINDS
-from selfmodel.robot.anatomy.actuator_ranges import command_ranges
-from selfmodel.robot.anatomy.transmission import motor_joints
-from selfmodel.robot.base.base import read_base
-from selfmodel.robot.base.fixed_base import FixedBase
-from selfmodel.robot.base.free_base import FreeBase
+from selfmodel.robot.actuators import command_ranges, motor_joints
+from selfmodel.robot.base import FixedBase, FreeBase, read_base
 from selfmodel.robot.robot import Robot
 
 

@@ -21,7 +21,7 @@ from selfmodel.logs import TrialLog
 from selfmodel.logs.errors import LogWriteError
 from selfmodel.logs.files import replace_file
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state.poses import POSE
+from selfmodel.robot.state import POSE
 from selfmodel.sandbox.budget import Budget
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.threads import thread_count

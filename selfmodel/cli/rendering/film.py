@@ -10,9 +10,8 @@ from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.faults.affected_bodies import detached_bodies, jammed_bodies
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.robot.base.known_base import with_known_base
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state.poses import poses_of
+from selfmodel.robot.state import poses_of, with_known_base
 from selfmodel.trials.behaviour import Behaviour
 
 

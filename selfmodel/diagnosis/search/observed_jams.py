@@ -7,7 +7,7 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.faults.kind import Fault
 from selfmodel.faults.kinds.jammed import JAMMED_AT_ANGLE
-from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.robot.anatomy import Anatomy
 from selfmodel.simulation.requests import END
 from selfmodel.trials.trial import Trial
 

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.robot.anatomy import Anatomy
 from selfmodel.trials.estimation.encoder_noise import PLAY, encoder_noise
 from selfmodel.trials.trial import Trial
 

@@ -4,10 +4,10 @@ from typing import TYPE_CHECKING
 
 from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.faults.kinds.motor import WEAK_MOTOR
-from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.robot.anatomy import Anatomy
 
 if TYPE_CHECKING:
-    from selfmodel.robot.editing.embodiment import Embodiment
+    from selfmodel.robot.embodiment import Embodiment
 
 
 def _apply(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:

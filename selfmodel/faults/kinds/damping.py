@@ -10,10 +10,10 @@ joint, absorb its damping.
 from typing import TYPE_CHECKING
 
 from selfmodel.faults.kind import Fault, FaultKind, joints, uniform_bounds, uniform_levels
-from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.robot.anatomy import Anatomy
 
 if TYPE_CHECKING:
-    from selfmodel.robot.editing.embodiment import Embodiment
+    from selfmodel.robot.embodiment import Embodiment
 
 
 def _apply(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:

@@ -10,10 +10,10 @@ part, because all motors share the delay. No fault absorbs it.
 from typing import TYPE_CHECKING
 
 from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
-from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.robot.anatomy import Anatomy
 
 if TYPE_CHECKING:
-    from selfmodel.robot.editing.embodiment import Embodiment
+    from selfmodel.robot.embodiment import Embodiment
 
 
 def _apply(embodiment: "Embodiment", _anatomy: Anatomy, fault: Fault) -> None:

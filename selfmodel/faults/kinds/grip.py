@@ -9,10 +9,10 @@ before the foot absorbs the fault.
 from typing import TYPE_CHECKING
 
 from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
-from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.robot.anatomy import Anatomy
 
 if TYPE_CHECKING:
-    from selfmodel.robot.editing.embodiment import Embodiment
+    from selfmodel.robot.embodiment import Embodiment
 
 
 def _last_joints(anatomy: Anatomy) -> tuple[str, ...]:

@@ -11,10 +11,10 @@ from selfmodel.faults.kinds.damping import DAMPED_JOINT
 from selfmodel.faults.kinds.joint_friction import JOINT_FRICTION
 from selfmodel.faults.kinds.motor import WEAK_MOTOR
 from selfmodel.faults.kinds.sensor import FAILED_SENSOR, SENSOR_GAIN
-from selfmodel.robot.anatomy.anatomy import Anatomy, Joint
+from selfmodel.robot.anatomy import Anatomy, Joint
 
 if TYPE_CHECKING:
-    from selfmodel.robot.editing.embodiment import Embodiment
+    from selfmodel.robot.embodiment import Embodiment
 
 ANGLE_LEVELS = 12
 """Levels of the angle, evenly spaced inside the joint's range: 0.09 rad apart for 60 degrees."""

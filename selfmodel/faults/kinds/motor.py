@@ -9,10 +9,10 @@ from selfmodel.faults.kind import (
     uniform_bounds,
     uniform_levels,
 )
-from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.robot.anatomy import Anatomy
 
 if TYPE_CHECKING:
-    from selfmodel.robot.editing.embodiment import Embodiment
+    from selfmodel.robot.embodiment import Embodiment
 
 
 def _apply(embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:

@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING
 from selfmodel.controllers.network import MAX_HIDDEN_NEURONS
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.kind import Fault, FaultKind
-from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.robot.anatomy import Anatomy
 
 if TYPE_CHECKING:
-    from selfmodel.robot.editing.embodiment import Embodiment
+    from selfmodel.robot.embodiment import Embodiment
 
 
 def _parts(_anatomy: Anatomy) -> tuple[str, ...]:

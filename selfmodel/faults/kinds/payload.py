@@ -17,10 +17,10 @@ from selfmodel.faults.kind import (
     uniform_bounds,
     uniform_levels,
 )
-from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.robot.anatomy import Anatomy
 
 if TYPE_CHECKING:
-    from selfmodel.robot.editing.embodiment import Embodiment
+    from selfmodel.robot.embodiment import Embodiment
 
 PLACES = {ENVIRONMENT: 0.0, "front": 1.0, "back": -1.0}
 """Places of a payload by part: forward from the centre of mass, 1 at the end of the body."""

@@ -8,13 +8,13 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
 from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
-from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.robot.anatomy import Anatomy
 from selfmodel.trials.rotation import rotated
 
 if TYPE_CHECKING:
     from mujoco import MjSpec
 
-    from selfmodel.robot.editing.embodiment import Embodiment
+    from selfmodel.robot.embodiment import Embodiment
 
 HALF_EXTENT = (15.0, 8.0)
 """Half the extent of the field along x and y, m, centred on the initial position."""

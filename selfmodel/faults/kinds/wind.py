@@ -3,10 +3,10 @@
 from typing import TYPE_CHECKING
 
 from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
-from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.robot.anatomy import Anatomy
 
 if TYPE_CHECKING:
-    from selfmodel.robot.editing.embodiment import Embodiment
+    from selfmodel.robot.embodiment import Embodiment
 
 AIR_DENSITY = 1.2
 """Density of air at 20 degrees Celsius, kg/m^3; MuJoCo's default medium is a vacuum."""

@@ -10,7 +10,7 @@ from selfmodel.controllers.controller import Controller
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.recovery.scores.upright import falls_of
-from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.robot.anatomy import Anatomy
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import forward_displacement
 from selfmodel.trials.signals import Signal

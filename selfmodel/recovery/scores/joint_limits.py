@@ -11,8 +11,8 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.recovery.scores.falls import first_lasting, steps_of
 from selfmodel.recovery.scores.fitness import Score
 from selfmodel.recovery.scores.upright import UPRIGHT, falls_of
-from selfmodel.robot.anatomy.self_collision import penetration_depths
 from selfmodel.robot.robot import Robot
+from selfmodel.robot.self_collision import penetration_depths
 from selfmodel.trials.behaviour import Behaviour
 
 COLLISION_TIME = 0.05

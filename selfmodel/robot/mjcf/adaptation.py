@@ -24,7 +24,6 @@ from selfmodel.robot.mjcf.meshes.visuals import drop_textures, reduce_meshes
 from selfmodel.robot.mjcf.motors.command_ranges import add_command_ranges
 from selfmodel.robot.mjcf.motors.reach import limit_reach
 from selfmodel.robot.mjcf.motors.servos import add_servos
-from selfmodel.robot.mjcf.mujoco_errors import compile_model, mujoco_errors_as_input_errors
 from selfmodel.robot.mjcf.placement.base import carry_hinges, fix_base, free_base
 from selfmodel.robot.mjcf.placement.forward import turn_forward
 from selfmodel.robot.mjcf.placement.ground import add_ground
@@ -35,6 +34,7 @@ from selfmodel.robot.mjcf.sensors import add_sensors
 from selfmodel.robot.mjcf.settings import MAX_CONTROL_TIMESTEP, MjcfSettings, checked_settings
 from selfmodel.robot.mjcf.untrusted import checked_model
 from selfmodel.robot.mjcf.usability import check_usable
+from selfmodel.robot.mujoco_errors import compile_model, mujoco_errors_as_input_errors
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.urdf.conversion import convert
 from selfmodel.robot.urdf.reading import read_urdf

@@ -10,8 +10,8 @@ from time import perf_counter
 import mujoco
 
 from selfmodel.errors import InputError
-from selfmodel.robot.mjcf.mujoco_errors import compile_model, mujoco_errors_as_input_errors
 from selfmodel.robot.model_checks import MAX_NUMBER
+from selfmodel.robot.mujoco_errors import compile_model, mujoco_errors_as_input_errors
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget, BudgetError, memory_error
 from selfmodel.sandbox.isolation import Isolated, run_isolated

@@ -8,8 +8,8 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.errors import unknown_name
-from selfmodel.robot.anatomy.contacts import contacts_enabled, ground_contact_geoms
-from selfmodel.robot.anatomy.reader import driven_joints
+from selfmodel.robot.anatomy_reader import driven_joints
+from selfmodel.robot.contacts import contacts_enabled, ground_contact_geoms
 from selfmodel.robot.mjcf.document.document import Document
 from selfmodel.robot.mjcf.document.expand import format_numbers
 from selfmodel.robot.mjcf.document.names import UniqueNames

@@ -4,11 +4,10 @@ import mujoco
 import numpy as np
 
 from selfmodel.errors import InputError
-from selfmodel.robot.anatomy.reader import driven_joints
-from selfmodel.robot.anatomy.transmission import motor_joints
-from selfmodel.robot.base.root_body import find_root_body, joints_of_body
-from selfmodel.robot.mjcf.mujoco_errors import loading_a_model
+from selfmodel.robot.actuators import motor_joints
+from selfmodel.robot.anatomy_reader import driven_joints, find_root_body, joints_of_body
 from selfmodel.robot.model_checks import check_model
+from selfmodel.robot.mujoco_errors import loading_a_model
 
 _PROBE_SECONDS = 0.2
 _MAX_PROBE_STEPS = 200

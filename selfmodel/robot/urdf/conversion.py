@@ -8,8 +8,8 @@ from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.document.document import Document
 from selfmodel.robot.mjcf.document.expand import format_numbers
 from selfmodel.robot.mjcf.joint_values import check_patterns
-from selfmodel.robot.mjcf.mujoco_errors import compile_model, loading_a_model
 from selfmodel.robot.mjcf.settings import MjcfSettings
+from selfmodel.robot.mujoco_errors import compile_model, loading_a_model
 from selfmodel.robot.urdf.bodies import meshes, world_elements
 from selfmodel.robot.urdf.inertia import is_rigid
 from selfmodel.robot.urdf.reading import number

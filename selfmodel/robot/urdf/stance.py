@@ -7,7 +7,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
-from selfmodel.robot.anatomy.contacts import ground_contact_geoms
+from selfmodel.robot.contacts import ground_contact_geoms
 from selfmodel.robot.mjcf.joint_values import JointValues, value_of
 from selfmodel.robot.mjcf.placement.ground import lowest_point
 

@@ -17,7 +17,7 @@ from selfmodel.cli.rendering.film import Film, film_of
 from selfmodel.experiments.robots import robot_entry
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state.poses import POSE
+from selfmodel.robot.state import POSE
 from selfmodel.sandbox.budget import Budget
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour

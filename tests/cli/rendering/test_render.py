@@ -29,7 +29,7 @@ from selfmodel.logs.result_files import result_bytes
 from selfmodel.logs.writing.writer import write_trial
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state.poses import POSE
+from selfmodel.robot.state import POSE
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour

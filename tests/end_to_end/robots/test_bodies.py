@@ -23,7 +23,7 @@ from selfmodel.logs.writing.writer import write_trial
 from selfmodel.physical.reality_gap import draw_gap
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.recovery.scores.falls import first_falls
-from selfmodel.robot.anatomy.anatomy import Joint
+from selfmodel.robot.anatomy import Joint
 from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings

@@ -9,7 +9,7 @@ from selfmodel.cli.rendering.diagnosed import diagnosed
 from selfmodel.experiments.robots import robot_entry
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.logs.journal import DIAGNOSES, TRIALS, FolderJournal
-from selfmodel.robot.anatomy.anatomy import Anatomy
+from selfmodel.robot.anatomy import Anatomy
 from tests.fuzz.mutate import data as raw, jsons
 from tests.fuzz.seeds import DATA
 from tests.fuzz.target import Case, Make, Target

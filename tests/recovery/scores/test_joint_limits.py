@@ -10,8 +10,8 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.recovery.scores.joint_limits import upright_within
 from selfmodel.recovery.scores.upright import UPRIGHT
-from selfmodel.robot.anatomy.self_collision import penetration_depths
 from selfmodel.robot.robot import Robot
+from selfmodel.robot.self_collision import penetration_depths
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
 from tests.helpers.drivers import random_controllers

@@ -8,7 +8,7 @@ import pytest
 
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.robot.anatomy.actuator_ranges import command_ranges
+from selfmodel.robot.actuators import command_ranges
 from selfmodel.robot.mjcf.adaptation import adapt
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings, parse_setting, read_settings

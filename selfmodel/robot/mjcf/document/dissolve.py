@@ -13,7 +13,7 @@ import numpy as np
 
 from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.document.document import Document
-from selfmodel.robot.mjcf.mujoco_errors import compile_model
+from selfmodel.robot.mujoco_errors import compile_model
 
 _TOLERANCE = 1e-6
 """Largest difference of a pose, m and unit vectors; MuJoCo writes six digits."""

@@ -8,8 +8,8 @@ import numpy as np
 from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.document.dissolve import dissolve_frames
 from selfmodel.robot.mjcf.document.document import Document
-from selfmodel.robot.mjcf.mujoco_errors import compile_model, loading_a_model
 from selfmodel.robot.mjcf.untrusted import REFUSED_ELEMENTS, checked_model
+from selfmodel.robot.mujoco_errors import compile_model, loading_a_model
 from selfmodel.sandbox.budget import Budget
 
 _COPYING_ELEMENTS = ("replicate", "composite")

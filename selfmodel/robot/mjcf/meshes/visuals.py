@@ -5,7 +5,7 @@ from xml.etree import ElementTree as ET  # of checked texts
 import mujoco
 
 from selfmodel.errors import InputError
-from selfmodel.robot.anatomy.contacts import contact_pairs
+from selfmodel.robot.contacts import contact_pairs
 from selfmodel.robot.mjcf.document.document import Document
 from selfmodel.robot.mjcf.document.elements import geom_elements
 from selfmodel.robot.mjcf.document.expand import format_numbers, write_masses

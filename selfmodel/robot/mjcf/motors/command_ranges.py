@@ -3,10 +3,10 @@
 import mujoco
 
 from selfmodel.errors import InputError
-from selfmodel.robot.anatomy.actuator_ranges import command_ranges, has_command_range
+from selfmodel.robot.actuators import command_ranges, has_command_range
 from selfmodel.robot.mjcf.document.document import Document
-from selfmodel.robot.mjcf.mujoco_errors import compile_model
 from selfmodel.robot.mjcf.settings import MjcfSettings
+from selfmodel.robot.mujoco_errors import compile_model
 
 
 def add_command_ranges(document: Document, model: mujoco.MjModel, settings: MjcfSettings) -> None:

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.errors import InputError
-from selfmodel.robot.anatomy.actuator_ranges import command_ranges
+from selfmodel.robot.actuators import command_ranges
 from selfmodel.robot.mjcf.document.document import Document
 from selfmodel.robot.mjcf.document.expand import format_numbers
 from selfmodel.robot.mjcf.joint_values import JointValues, check_patterns, value_of

@@ -6,8 +6,12 @@ import mujoco
 import numpy as np
 
 from selfmodel.errors import InputError
-from selfmodel.robot.anatomy.reader import driven_joints
-from selfmodel.robot.base.root_body import common_carrier, floating_bodies, joints_of_body
+from selfmodel.robot.anatomy_reader import (
+    common_carrier,
+    driven_joints,
+    floating_bodies,
+    joints_of_body,
+)
 from selfmodel.robot.mjcf.document.body_frames import BodyFrames, write_frames
 from selfmodel.robot.mjcf.document.document import Document
 from selfmodel.robot.mjcf.document.expand import format_numbers

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.errors import InputError
-from selfmodel.robot.anatomy.contacts import contact_pairs
+from selfmodel.robot.contacts import contact_pairs
 from selfmodel.robot.mjcf.document.body_frames import BodyFrames, write_frames
 from selfmodel.robot.mjcf.document.document import Document
 from selfmodel.robot.mjcf.settings import FORWARD_DIRECTIONS, MjcfSettings

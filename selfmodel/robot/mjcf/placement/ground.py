@@ -6,13 +6,12 @@ import mujoco
 import numpy as np
 
 from selfmodel.errors import InputError
-from selfmodel.robot.anatomy.contacts import contacts_enabled, ground_contact_geoms, joined_mask
-from selfmodel.robot.anatomy.reader import driven_joints
-from selfmodel.robot.base.root_body import floating_bodies
+from selfmodel.robot.anatomy_reader import driven_joints, floating_bodies
+from selfmodel.robot.contacts import contacts_enabled, ground_contact_geoms, joined_mask
 from selfmodel.robot.mjcf.document.document import Document
 from selfmodel.robot.mjcf.document.expand import format_numbers
 from selfmodel.robot.mjcf.document.names import UniqueNames
-from selfmodel.robot.mjcf.mujoco_errors import compile_model
+from selfmodel.robot.mujoco_errors import compile_model
 
 _MAX_DISTANCE = 1e6
 """Largest measured distance of a geom from the ground plane, m."""

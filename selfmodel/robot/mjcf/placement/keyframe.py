@@ -5,12 +5,12 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.robot.editing.frames import turned_by_hinge
 from selfmodel.robot.mjcf.document.body_frames import BodyFrames, write_frames
 from selfmodel.robot.mjcf.document.document import Document
 from selfmodel.robot.mjcf.document.expand import format_numbers
-from selfmodel.robot.mjcf.mujoco_errors import compile_model, loading_a_model
 from selfmodel.robot.mjcf.settings import NO_KEYFRAME, MjcfSettings
+from selfmodel.robot.model_edits import turned_by_hinge
+from selfmodel.robot.mujoco_errors import compile_model, loading_a_model
 
 STANDING_KEYFRAMES = ("home", "stand", "standing")
 """Usual names of the keyframe in which a robot stands, in the order in which they are tried."""

@@ -1,1 +1,0 @@
-"""Base of a robot: its root body, and how that body moves."""

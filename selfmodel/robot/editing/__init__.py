@@ -1,1 +1,0 @@
-"""Edits of a robot's model: the copy that faults edit, and functions on compiled models."""

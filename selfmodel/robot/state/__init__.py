@@ -1,1 +1,0 @@
-"""MuJoCo's state of a robot: signals and sensor readings."""

@@ -1,0 +1,143 @@
+"""Tests of command ranges: read from a motor's attributes, or required in an error message."""
+
+import numpy as np
+import pytest
+
+from selfmodel.controllers.command_range import TARGET_RANGE
+from selfmodel.controllers.controller import draw_genomes
+from selfmodel.controllers.network import Network
+from selfmodel.errors import InputError
+from selfmodel.robot.actuators import command_ranges
+from selfmodel.robot.designs import cpg_for, network_for
+from selfmodel.robot.robot import Robot
+
+MJCF = """
+<mujoco>
+  <compiler angle="radian" autolimits="true"/>
+  <worldbody>
+    <body name="base"><freejoint/><geom size=".1"/>
+      <body name="leg">
+        <joint name="hip" axis="0 1 0" {joint}/>
+        <geom name="leg" type="capsule" fromto="0 0 0 0 0 -.2" size=".02"/>
+        <site name="foot"/>
+      </body>
+    </body>
+  </worldbody>
+  <tendon><fixed name="cord" range="-.1 .3"><joint joint="hip" coef=".1"/></fixed></tendon>
+  <actuator>{motor}</actuator>
+  <sensor><jointpos name="angle" joint="hip"/></sensor>
+</mujoco>
+"""
+LIMITED = 'range="-.5 .5"'
+
+
+def made_with(motor: str, joint: str = LIMITED) -> Robot:
+    return Robot("one-legged", MJCF.format(motor=motor, joint=joint), 0.01)
+
+
+def test_the_own_robots_have_the_range_of_the_paper_to_the_bit(robot: Robot):
+    paper = ((0.0, TARGET_RANGE),) * len(robot.anatomy.motors)
+
+    assert command_ranges(robot.model) == paper
+    assert network_for(robot) == Network(robot.anatomy.names.sensors, robot.anatomy.motors)
+    assert cpg_for(robot).ranges == paper
+
+
+@pytest.mark.parametrize(
+    ("motor", "low", "high"),
+    [
+        # What the motor says of its control.
+        ('<motor name="m" joint="hip" ctrlrange="-1 1" gear="50"/>', -1, 1),
+        ('<motor name="m" joint="hip" ctrlrange="0 2"/>', 0, 2),
+        ('<position name="m" joint="hip" kp="10" ctrlrange="-1.5 -.5"/>', -1.5, -0.5),
+        ('<velocity name="m" joint="hip" kv="1" ctrlrange="-3 5"/>', -3, 5),
+        # A position servo: where it holds the ends of the joint's range.
+        ('<position name="m" joint="hip" kp="10"/>', -0.5, 0.5),
+        ('<position name="m" joint="hip" kp="10" gear="2" forcerange="-3 3"/>', -1, 1),
+        ('<position name="m" tendon="cord" kp="10"/>', -0.1, 0.3),
+        (
+            '<general name="m" joint="hip" biastype="affine" gainprm="20" biasprm="4 -10 -1"/>',
+            -0.45,
+            0.05,
+        ),
+        # A motor: where its force, or the torque at its joint, ends.
+        ('<motor name="m" joint="hip" forcerange="-8 6"/>', -8, 6),
+        ('<general name="m" joint="hip" gainprm="4" gear="9" forcerange="-8 6"/>', -2, 1.5),
+        ('<velocity name="m" joint="hip" kv="2" forcerange="-8 6"/>', -4, 3),
+    ],
+)
+def test_a_range_follows_from_the_attributes_of_the_motor(motor: str, low: float, high: float):
+    ((centre, half),) = command_ranges(made_with(motor).model)
+
+    assert (centre - half, centre + half) == pytest.approx((low, high))
+
+
+def test_the_torque_limit_of_a_joint_bounds_a_motor_by_its_gear():
+    joint = f'{LIMITED} actuatorfrcrange="-30 60"'
+    ((centre, half),) = command_ranges(
+        made_with('<motor name="m" joint="hip" gear="-3"/>', joint).model
+    )
+
+    assert (centre - half, centre + half) == pytest.approx((-20, 10))
+
+
+@pytest.mark.parametrize(
+    "motor",
+    [
+        '<motor name="m" joint="hip"/>',
+        '<intvelocity name="m" joint="hip" kp="10" actrange="-1 1"/>',
+        '<general name="m" joint="hip" gainprm="0" forcerange="-1 1"/>',
+        '<motor name="m" site="foot"/>',
+    ],
+)
+def test_a_motor_without_a_range_is_refused_by_name(motor: str):
+    with pytest.raises(InputError, match=r"got none for the motor m: give it a ctrlrange"):
+        command_ranges(made_with(motor).model)
+
+
+def test_a_servo_of_an_unlimited_joint_is_refused_by_name():
+    model = made_with('<position name="m" joint="hip" kp="10"/>').model
+    model.jnt_limited[:] = 0
+    with pytest.raises(InputError, match=r"got none for the motor m: give it a ctrlrange"):
+        command_ranges(model)
+
+
+def test_a_robot_without_a_range_is_valid_until_a_controller_needs_it():
+    made = made_with('<motor name="m" joint="hip"/>')
+
+    assert made.anatomy.motors == ("m",)
+    with pytest.raises(InputError, match="got none for the motor m"):
+        _ = network_for(made)
+    with pytest.raises(InputError, match="got none for the motor m"):
+        _ = cpg_for(made)
+
+
+def test_a_network_s_outputs_span_the_range_of_each_motor():
+    ranges = ((0.0, 2.0), (-1.0, 0.5), (3.0, 1.0))
+    narrow = Network(("a",), ("x", "y", "z"), 3)
+    wide = Network(("a",), ("x", "y", "z"), 3, ranges)
+    genome = draw_genomes(np.random.default_rng(0), (wide.weights,))
+    commands = np.empty((2, 1, 3))
+    for network, command in zip((narrow, wide), commands, strict=True):
+        network.batch(genome[np.newaxis], [frozenset()]).step(command)
+    outputs = commands[0] / TARGET_RANGE
+
+    np.testing.assert_allclose(
+        commands[1], outputs * [2.0, 0.5, 1.0] + [0.0, -1.0, 3.0], rtol=1e-12
+    )
+    assert narrow != wide
+
+
+@pytest.mark.parametrize(
+    ("ranges", "match"),
+    [
+        (((0.0, 1.0),), "2 motors need a command range each, got 1"),
+        (((0.0, 1.0), (0.0, 0.0)), "motor y needs a finite command range"),
+        (((0.0, 1.0), (0.0, -1.0)), "motor y needs a finite command range"),
+        (((np.inf, 1.0), (0.0, 1.0)), "motor x needs a finite command range"),
+        (((0.0, np.nan), (0.0, 1.0)), "motor x needs a finite command range"),
+    ],
+)
+def test_an_invalid_range_is_refused(ranges: tuple, match: str):
+    with pytest.raises(ValueError, match=match):
+        Network(("a",), ("x", "y"), 3, ranges)

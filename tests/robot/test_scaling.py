@@ -1,0 +1,129 @@
+"""Promises of the scaled stiffness and damping of contacts."""
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from selfmodel.robot.scaling import scale_contacts
+
+TIMESTEP = 0.005
+BALL = """<mujoco><option timestep="{timestep}"/><worldbody>
+<geom name="ground" type="plane" size="1 1 1"/>
+<body pos="0 0 1"><freejoint/>
+<geom name="ball" size="0.1" mass="1" solref="{solref}" priority="1" solimp="0.9 0.9 0.01"/></body>
+</worldbody></mujoco>"""
+
+
+def ball(solref: str, timestep: float = TIMESTEP) -> mujoco.MjModel:
+    return mujoco.MjModel.from_xml_string(BALL.format(solref=solref, timestep=timestep))
+
+
+def contact_force(model: mujoco.MjModel, height: float, speed: float) -> float:
+    """Returns the force of the ground on the ball at a height and a speed, N."""
+    data = mujoco.MjData(model)
+    data.qpos[2], data.qvel[2] = height, speed
+    mujoco.mj_forward(model, data)
+    return float(data.efc_force.sum())
+
+
+@pytest.mark.parametrize("solref", ["-2000 -50", "0.04 0.5"])
+def test_the_force_of_a_slow_contact_grows_with_the_stiffness_alone(solref: str):
+    model = ball(solref)
+    before = contact_force(model, 0.098, 0.0)
+    scale_contacts(model, 1.0, 0.5)
+    damped = contact_force(model, 0.098, 0.0)
+    scale_contacts(model, 2.0, 1.0)
+    stiff = contact_force(model, 0.098, 0.0)
+
+    assert damped == pytest.approx(before)
+    # The force that holds the ball up is there without a penetration.
+    rest = contact_force(model, 0.1 - 1e-9, 0.0)
+    assert stiff - rest == pytest.approx(2 * (before - rest), rel=1e-3)
+
+
+@pytest.mark.parametrize("solref", ["-2000 -50", "0.04 0.5"])
+def test_the_force_of_an_impact_grows_with_the_damping_alone(solref: str):
+    model = ball(solref)
+    rest, before = (contact_force(model, 0.1 - 1e-9, speed) for speed in (0.0, -1.0))
+    scale_contacts(model, 3.0, 1.0)
+    stiff = contact_force(model, 0.1 - 1e-9, -1.0)
+    scale_contacts(model, 1.0, 0.5)
+    damped = contact_force(model, 0.1 - 1e-9, -1.0)
+
+    assert stiff == pytest.approx(before, rel=1e-3)
+    assert damped - rest == pytest.approx((before - rest) / 2, rel=1e-3)
+
+
+def reference(model: mujoco.MjModel) -> np.ndarray:
+    """Returns the stiffness and the damping that MuJoCo's contact has."""
+    data = mujoco.MjData(model)
+    data.qpos[2] = 0.099
+    mujoco.mj_forward(model, data)
+    return data.efc_KBIP[0, :2].copy()
+
+
+@pytest.mark.parametrize("timestep", [0.002, 0.005, 0.01])
+@pytest.mark.parametrize("solref", ["0.02 1", "0.01 1", "0.005 1", "0.001 0.5", "0.04 0.3"])
+@pytest.mark.parametrize("factors", [(1, 0.5), (4, 1), (0.25, 0.5), (1, 2), (2, 0.25), (4, 2)])
+def test_a_time_constant_that_mujoco_limits_has_the_scaled_stiffness_and_damping(
+    solref: str, timestep: float, factors: tuple[float, float]
+):
+    model = ball(solref, timestep)
+    stiffness, damping = reference(model)
+    width = 0.9
+    scale_contacts(model, *factors)
+    found = reference(model)
+
+    largest = np.maximum(stiffness, (1 / width / timestep) ** 2)
+    assert found[0] == pytest.approx(min(factors[0] * stiffness, largest))
+    assert found[1] == pytest.approx(min(factors[1] * damping, 1 / (width * timestep)))
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_contacts_that_mujoco_replaces_remain_as_they_are():
+    for solref in ("0.02 -1", "-5000 300", "0 1"):
+        model = ball(solref)
+        before = model.geom("ball").solref.copy()
+        scale_contacts(model, 2.0, 0.5)
+
+        assert model.geom("ball").solref.tobytes() == before.tobytes()
+
+
+@given(
+    stiffness=st.floats(0.2, 5),
+    damping=st.floats(0.2, 5),
+    solref=st.sampled_from([(-2000.0, -50.0), (0.04, 0.5), (-90000.0, -500.0), (0.02, 1.0)]),
+)
+@settings(max_examples=60, deadline=None)
+def test_a_step_can_integrate_scaled_contacts(
+    stiffness: float, damping: float, solref: tuple[float, float]
+):
+    model = ball(f"{solref[0]} {solref[1]}")
+    scale_contacts(model, stiffness, damping)
+    scaled = model.geom("ball").solref
+
+    assert np.sign(scaled).tolist() == np.sign(solref).tolist()
+    if solref[0] < 0:
+        own, limits = -np.array(solref), np.array([1 / TIMESTEP**2, 1 / TIMESTEP])
+        assert (-scaled <= np.maximum(own, limits) * (1 + 1e-12)).all()
+
+
+def test_factors_of_one_change_nothing_to_the_bit():
+    for solref in ("-90000 -500", "0.0123456789 0.7", "-5000 -300"):
+        model = ball(solref)
+        before = model.geom_solref.copy()
+        scale_contacts(model, 1.0, 1.0)
+
+        assert model.geom_solref.tobytes() == before.tobytes()
+
+
+def test_contact_pairs_are_scaled_too():
+    text = BALL.format(solref="-2000 -50", timestep=TIMESTEP).replace(
+        "</mujoco>",
+        '<contact><pair geom1="ground" geom2="ball" solref="-1000 -20"/></contact></mujoco>',
+    )
+    model = mujoco.MjModel.from_xml_string(text)
+    scale_contacts(model, 2.0, 0.5)
+
+    np.testing.assert_allclose(model.pair_solref, [[-2000, -10]])
