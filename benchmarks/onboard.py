@@ -29,7 +29,7 @@ from selfmodel.experiments.grid import (
 )
 from selfmodel.experiments.study.files import as_dicts
 from selfmodel.simulation.calibration import calibrate
-from selfmodel.trials.estimation.state_estimation import BASE
+from selfmodel.trials.estimation import BASE
 from selfmodel.trials.trial import Trial
 
 COMPARATOR = "segment-prediction-onboard"

@@ -17,7 +17,7 @@ from statistics import median
 from time import perf_counter
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT
-from selfmodel.controllers.command_source import CommandSource
+from selfmodel.controllers.controller import CommandSource
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.experiments.arguments import comparator_choice
 from selfmodel.faults.notation import parse

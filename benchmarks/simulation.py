@@ -10,8 +10,7 @@ from mujoco import rollout
 
 from benchmarks.facts import Facts
 from selfmodel import tasks
-from selfmodel.controllers.command_source import make_batch
-from selfmodel.controllers.controller import Controller, draw_genomes
+from selfmodel.controllers.controller import Controller, draw_genomes, make_batch
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot

@@ -11,8 +11,7 @@ from statistics import median
 import mujoco
 import numpy as np
 
-from selfmodel.controllers.command_source import make_batch
-from selfmodel.controllers.controller import Controller
+from selfmodel.controllers.controller import Controller, make_batch
 from selfmodel.experiments.grid import finished
 from selfmodel.experiments.study.gaits import FILE
 from selfmodel.faults.build import build

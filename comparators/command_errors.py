@@ -6,8 +6,7 @@ The comparison needs no physics, so a nonzero error is a fault of the controller
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.controllers.command_range import TARGET_RANGE
-from selfmodel.controllers.command_source import make_batch
+from selfmodel.controllers.controller import TARGET_RANGE, make_batch
 from selfmodel.controllers.playback import Playback
 from selfmodel.trials.trial import Trial
 

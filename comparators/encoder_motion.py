@@ -12,7 +12,7 @@ import numpy as np
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.comparators.loose_encoders import detached_hinges, stands
 from selfmodel.simulation.requests import END
-from selfmodel.trials.estimation.encoder_noise import standing_tolerance
+from selfmodel.trials.estimation import standing_tolerance
 
 ERROR_SCALE = 0.5
 """Error of the natural logarithm of a motion that counts as large: a factor of 1.6."""

@@ -9,8 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from selfmodel.arrays import FloatArray, IndexArray
-from selfmodel.trials.signal_scales import HINGE_ERROR_SCALES
-from selfmodel.trials.signals import Signal
+from selfmodel.trials.signals import HINGE_ERROR_SCALES, Signal
 
 
 def hinge_losses(

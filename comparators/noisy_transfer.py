@@ -10,9 +10,7 @@ from selfmodel.comparators.observed import observed_signals
 from selfmodel.comparators.windows import padded_windows
 from selfmodel.simulation.requests import Ensemble
 from selfmodel.trials.behaviour import Behaviour
-from selfmodel.trials.signal_difference import comparable
-from selfmodel.trials.signal_scales import ENSEMBLE_DEVIATION_FLOORS
-from selfmodel.trials.signals import Signal
+from selfmodel.trials.signals import ENSEMBLE_DEVIATION_FLOORS, Signal, comparable
 from selfmodel.trials.trial import Trial
 
 WINDOW = 25

@@ -24,15 +24,13 @@ from selfmodel.comparators.sensor_noise_level import noise_level_loss
 from selfmodel.diagnosis.comparator import TrialRefusedError
 from selfmodel.simulation.requests import Segments, command_steps, cut_segments
 from selfmodel.trials.behaviour import Behaviour
-from selfmodel.trials.estimation.state_estimation import (
+from selfmodel.trials.estimation import (
     ONBOARD,
     STATE,
     estimated_states,
     known_rows,
 )
-from selfmodel.trials.signal_difference import difference
-from selfmodel.trials.signal_scales import PREDICTION_ERROR_SCALES
-from selfmodel.trials.signals import Signal
+from selfmodel.trials.signals import PREDICTION_ERROR_SCALES, Signal, difference
 from selfmodel.trials.trial import Trial
 
 MIN_SEGMENTS = 4

@@ -11,9 +11,7 @@ from selfmodel.comparators.observed import observed_signals
 from selfmodel.comparators.windows import padded_windows
 from selfmodel.simulation.requests import ClosedLoop
 from selfmodel.trials.behaviour import Behaviour
-from selfmodel.trials.signal_difference import comparable
-from selfmodel.trials.signal_scales import SERIES_SPREAD_FLOORS
-from selfmodel.trials.signals import Signal
+from selfmodel.trials.signals import SERIES_SPREAD_FLOORS, Signal, comparable
 from selfmodel.trials.trial import Trial
 
 BLOCK = 5

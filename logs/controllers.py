@@ -18,8 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from selfmodel.controllers.command_range import Ranges, checked_ranges
-from selfmodel.controllers.controller import Controller, Design
+from selfmodel.controllers.controller import Controller, Design, Ranges, checked_ranges
 from selfmodel.controllers.cpg import Cpg
 from selfmodel.controllers.network import Network
 from selfmodel.errors import InputError

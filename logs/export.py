@@ -12,8 +12,7 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
 from selfmodel.logs.files import as_write_error, create_partial, publish
-from selfmodel.trials.behaviour import Behaviour
-from selfmodel.trials.columns import columns_of
+from selfmodel.trials.behaviour import Behaviour, columns_of
 
 Columns = Mapping[str, FloatArray]
 

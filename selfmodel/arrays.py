@@ -1,7 +1,13 @@
-"""Array types for signatures, and functions on arrays."""
+"""Array types for signatures, functions on arrays, and arrays as a data frame."""
+
+import importlib
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from selfmodel.errors import InputError
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -21,3 +27,49 @@ def columns(indices: list[int]) -> slice | list[int]:
     if indices == list(range(first, first + len(indices))):
         return slice(first, first + len(indices))
     return indices
+
+
+def mean_of_known(values: FloatArray, axis: int | tuple[int, ...], empty: float) -> FloatArray:
+    """Returns the mean of the finite values over some axes; ``empty`` where there are none."""
+    known = np.isfinite(values)
+    count = known.sum(axis=axis)
+    total = np.where(known, values, 0.0).sum(axis=axis)
+    return np.where(count > 0, total / np.maximum(count, 1), empty)
+
+
+def median_of_known(columns: FloatArray) -> FloatArray:
+    """Returns the median of the finite values of each column; NaN without any.
+
+    Args:
+        columns: ``(rows, columns)``.
+    """
+    known = (column[np.isfinite(column)] for column in columns.T)
+    return np.array([np.median(own) if len(own) else np.nan for own in known], dtype=np.float64)
+
+
+def held(values: FloatArray) -> FloatArray:
+    """Returns rows in which each NaN is the last number before it; a first NaN remains.
+
+    Args:
+        values: ``(rows, columns)``.
+    """
+    rows = np.arange(len(values))[:, np.newaxis]
+    last = np.maximum.accumulate(np.where(np.isnan(values), 0, rows), axis=0)
+    return np.asarray(np.take_along_axis(values, last, axis=0))
+
+
+def data_frame(
+    content: Sequence[Mapping[str, Any]] | Mapping[str, FloatArray],
+) -> Any:  # noqa: ANN401  # pandas is optional
+    """Returns a ``pandas.DataFrame`` of rows, with one column per key, or of columns by name.
+
+    Raises:
+        InputError: pandas is not installed.
+    """
+    try:
+        pandas = importlib.import_module("pandas")
+    except ImportError as error:
+        raise InputError(
+            "to_pandas() needs pandas, which is not installed: pip install 'selfmodel[tables]'"
+        ) from error
+    return pandas.DataFrame(content)

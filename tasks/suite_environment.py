@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.controllers.command_source import CommandSource
+from selfmodel.controllers.controller import CommandSource
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.physical.environment_robot import EnvironmentRobot

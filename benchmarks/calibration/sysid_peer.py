@@ -22,10 +22,8 @@ from selfmodel.robot.state import signal_fields, state_writer
 from selfmodel.simulation.calibration_segments import HORIZON, MAX_SEGMENTS
 from selfmodel.simulation.floating.fit import CANDIDATE_DELAYS, MAX_LOG_FACTOR
 from selfmodel.simulation.requests import LEAD
-from selfmodel.trials.estimation.state_estimation import STATE, estimated_states
-from selfmodel.trials.signal_difference import difference
-from selfmodel.trials.signal_scales import CALIBRATION_ERROR_SCALES
-from selfmodel.trials.signals import Signal
+from selfmodel.trials.estimation import STATE, estimated_states
+from selfmodel.trials.signals import CALIBRATION_ERROR_SCALES, Signal, difference
 from selfmodel.trials.trial import Trial
 
 Theirs = Any

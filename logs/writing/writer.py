@@ -7,7 +7,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from selfmodel.controllers.command_source import CommandSource
+from selfmodel.controllers.controller import CommandSource
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError, TrialError, describe
 from selfmodel.logs.atomic import partial_path

@@ -38,7 +38,7 @@ from selfmodel.experiments.arguments import AUTO, comparator_choice
 from selfmodel.files import file_digest
 from selfmodel.recovery.repertoire.model_digest import self_model_digest
 from selfmodel.sandbox.budget import Budget
-from selfmodel.trials.trial_names import trial_names
+from selfmodel.trials.trial import trial_names
 
 
 def diagnose(

@@ -39,7 +39,7 @@ from selfmodel.report.run_folder import REPORT, is_run, subject_of_run
 from selfmodel.report.subject import Subject
 from selfmodel.sandbox.budget import Budget
 from selfmodel.simulation.threads import thread_count
-from selfmodel.trials.trial_names import trial_names
+from selfmodel.trials.trial import trial_names
 
 
 def report(

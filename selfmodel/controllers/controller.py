@@ -1,5 +1,13 @@
-"""Controllers: a design, such as a network or a CPG, with the genome that sets its weights."""
+"""Controllers: a design, such as a network or a CPG, with the genome that sets its weights.
 
+Each design is one file: ``network.py``, ``cpg.py``. A further design needs three changes: its file
+with a ``Design`` and a ``ControllerBatch``, its row in ``selfmodel.robot.designs.DESIGNS`` (the
+names on the command line), and its row in ``selfmodel.logs.controllers.KINDS`` (the arrays of its
+``.npz`` file).
+"""
+
+import math
+from collections import Counter
 from collections.abc import Sequence, Set as AbstractSet
 from dataclasses import dataclass
 from typing import Protocol
@@ -7,8 +15,15 @@ from typing import Protocol
 import numpy as np
 
 from selfmodel.arrays import FloatArray, frozen
-from selfmodel.controllers.command_range import Ranges
+from selfmodel.controllers.playback import Playback, PlaybackBatch
 from selfmodel.errors import InputError
+
+TARGET_RANGE = np.pi / 4
+"""Half range of the paper's motor targets about 0, rad."""
+
+Ranges = tuple[tuple[float, float], ...]
+"""Centre and half width of the command range per motor, in the motor's unit: rad for a position
+servo, rad/s for a velocity servo, a fraction of the largest torque for many torque motors."""
 
 
 class ControllerBatch(Protocol):
@@ -157,3 +172,77 @@ def check_silent_neurons(design: Design, silent: AbstractSet[int]) -> None:
         f"{fault} does not apply to {design.description}, whose hidden neurons are 0 to "
         f"{design.hidden - 1}: leave {fault} out, or choose a larger network"
     )
+
+
+CommandSource = Controller | Playback
+"""Source of a robot's commands: a playback if other software controlled the robot."""
+
+
+def make_batch(
+    sources: Sequence[CommandSource], silent: Sequence[AbstractSet[int]], sensors: int
+) -> ControllerBatch:
+    """Returns the batch of the command sources of many robots, in their initial state.
+
+    Args:
+        sources: Command sources, one per robot: controllers of one design, or playbacks.
+        silent: Indices of the silent hidden neurons per robot; they do not affect a playback.
+        sensors: Number of sensors of a robot.
+
+    Raises:
+        ValueError: The sources are not all playbacks or all controllers of one design.
+        InputError: A silent hidden neuron does not exist in the design.
+    """
+    controllers = [source for source in sources if isinstance(source, Controller)]
+    playbacks = [source for source in sources if isinstance(source, Playback)]
+    designs = Counter(controller.design for controller in controllers)
+    if len(designs) + bool(playbacks) != 1:
+        counts = [f"{count} x {design.description}" for design, count in designs.items()]
+        counts.append(f"{len(playbacks)} playbacks")
+        raise ValueError(
+            f"the command sources of one batch must have one design, got {'; '.join(counts)}"
+        )
+    if playbacks:
+        return PlaybackBatch(playbacks, sensors)
+    (design,) = designs
+    for neurons in silent:
+        check_silent_neurons(design, neurons)
+    return design.batch(np.array([controller.genome for controller in controllers]), silent)
+
+
+def checked_ranges(motors: tuple[str, ...], ranges: Ranges) -> Ranges:
+    """Returns checked command ranges; the paper's range for every motor if ``ranges`` is empty.
+
+    Raises:
+        ValueError: The number of ranges is not the number of motors, or a range is not finite or
+            has no positive width.
+    """
+    if not ranges:
+        return ((0.0, TARGET_RANGE),) * len(motors)
+    if len(ranges) != len(motors):
+        raise ValueError(f"{len(motors)} motors need a command range each, got {len(ranges)}")
+    for motor, (centre, half) in zip(motors, ranges, strict=True):
+        if not (math.isfinite(centre) and math.isfinite(half) and half > 0):
+            raise ValueError(
+                f"the motor {motor} needs a finite command range of positive width, got "
+                f"{centre} plus and minus {half}"
+            )
+    return ranges
+
+
+class CommandScaler:
+    """Scales outputs in [-1, 1] to the command ranges of the motors.
+
+    Args:
+        ranges: Command range of each motor.
+    """
+
+    def __init__(self, ranges: Ranges) -> None:
+        self._half = np.array([half for _, half in ranges])
+        centre = np.array([middle for middle, _ in ranges])
+        self._centre = centre if centre.any() else None
+
+    def write(self, outputs: FloatArray, commands: FloatArray) -> None:
+        """Writes the commands for outputs in [-1, 1]; both arrays are ``(n, motors)``."""
+        np.multiply(outputs, self._half, out=commands)
+        if self._centre is not None:
+            commands += self._centre

@@ -17,7 +17,7 @@ from typing import ClassVar
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.controllers.command_range import CommandScaler, Ranges, checked_ranges
+from selfmodel.controllers.controller import CommandScaler, Ranges, checked_ranges
 
 MIN_FREQUENCY, MAX_FREQUENCY = 0.5, 4.0
 """Bounds of the stride frequency, Hz. A leg of 0.1 to 1 m has a natural pendulum frequency of 0.5

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.controllers.command_range import CommandScaler, Ranges, checked_ranges
+from selfmodel.controllers.controller import CommandScaler, Ranges, checked_ranges
 
 HIDDEN_NEURONS = 3
 """Hidden neurons of the paper's network."""

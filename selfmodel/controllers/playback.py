@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from selfmodel.arrays import FloatArray, frozen
+from selfmodel.arrays import FloatArray, frozen, held
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,9 +64,7 @@ def played_back(motors: tuple[str, ...], commands: FloatArray) -> Playback:
     Raises:
         ValueError: A command of the first step is missing.
     """
-    last = np.where(np.isnan(commands), 0, np.arange(len(commands))[:, np.newaxis])
-    np.maximum.accumulate(last, axis=0, out=last)
-    return Playback(motors, np.take_along_axis(commands, last, axis=0))
+    return Playback(motors, held(commands))
 
 
 class PlaybackBatch:

@@ -13,7 +13,7 @@ from selfmodel.diagnosis.comparator import (
 )
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments, recordable
 from selfmodel.trials.behaviour import Behaviour
-from selfmodel.trials.estimation.state_estimation import JOINTS
+from selfmodel.trials.estimation import JOINTS
 from selfmodel.trials.trial import Trial
 
 DEPENDS_ON_BATCH = (

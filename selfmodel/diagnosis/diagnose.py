@@ -27,9 +27,7 @@ from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.trial import Trial
-from selfmodel.trials.trial_names import trial_names
-from selfmodel.trials.trial_part import TrialPart
+from selfmodel.trials.trial import Trial, TrialPart, trial_names
 
 REFINEMENT_STARTS = 2
 """Hypotheses from the EA that the refinement starts from, best first."""

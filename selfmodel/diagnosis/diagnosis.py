@@ -5,14 +5,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from selfmodel.arrays import data_frame
 from selfmodel.diagnosis.verdicts.change_point import Change
 from selfmodel.diagnosis.verdicts.detectable import DetectableSeverity
 from selfmodel.diagnosis.verdicts.fit import Fit
 from selfmodel.diagnosis.verdicts.residual import Residual
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.trials.data_frame import data_frame
-from selfmodel.trials.trial import Trial
-from selfmodel.trials.trial_part import whole
+from selfmodel.trials.trial import Trial, whole
 
 Verdict = Literal["intact", "explained", "ambiguous", "unexplained"]
 """Verdicts on the best hypothesis.

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
-from selfmodel.controllers.command_source import CommandSource
+from selfmodel.controllers.controller import CommandSource
 from selfmodel.diagnosis.comparator import (
     Comparator,
     HingewiseTrial,
@@ -29,8 +29,7 @@ from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
-from selfmodel.trials.trial import Trial
-from selfmodel.trials.trial_part import TrialPart, whole
+from selfmodel.trials.trial import Trial, TrialPart, whole
 
 TrialContent = tuple[str, CommandSource]
 """See ``Trial.content``."""

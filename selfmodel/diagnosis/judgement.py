@@ -15,8 +15,7 @@ from selfmodel.diagnosis.verdicts.unsearched import best_unsearched_fault
 from selfmodel.diagnosis.verdicts.verdict import all_diverged, fit_of, verdict_of
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import FaultKind
-from selfmodel.trials.command_likeness import have_one_gait
-from selfmodel.trials.trial_part import whole
+from selfmodel.trials.trial import have_one_gait, whole
 
 EQUAL_DISTANCES = "equal distances"
 """Name of the test for a comparator with one distance per trial."""

@@ -9,9 +9,8 @@ from selfmodel.errors import InputError
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import BASE_SIGNALS, completed_trial
 from selfmodel.simulation.requests import Request, Segments, recordable
-from selfmodel.trials.magnitudes import check_magnitudes
 from selfmodel.trials.signals import Signal
-from selfmodel.trials.trial import Trial
+from selfmodel.trials.trial import Trial, check_magnitudes
 
 
 def prepared_trial(comparator: Comparator, robot: Robot, trial: Trial) -> PreparedTrial:

@@ -13,9 +13,7 @@ from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
 from selfmodel.diagnosis.search.observed_jams import observed_jams
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.hypothesis_space import HypothesisSpace
-from selfmodel.trials.observed_columns import observed_as
-from selfmodel.trials.trial import Trial
-from selfmodel.trials.trial_part import TrialPart, whole
+from selfmodel.trials.trial import Trial, TrialPart, observed_as, whole
 
 
 @dataclass(frozen=True, eq=False)

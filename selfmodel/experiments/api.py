@@ -4,8 +4,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from selfmodel.controllers.command_source import CommandSource
-from selfmodel.controllers.controller import Controller, Design
+from selfmodel.controllers.controller import CommandSource, Controller, Design
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.experiments import plugins

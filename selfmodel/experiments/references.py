@@ -5,8 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.controllers.command_source import CommandSource
-from selfmodel.controllers.controller import Controller, Design, draw_genomes
+from selfmodel.controllers.controller import CommandSource, Controller, Design, draw_genomes
 from selfmodel.errors import InputError
 from selfmodel.experiments.trial_logs import logs
 from selfmodel.faults.hypothesis import INTACT

@@ -10,7 +10,7 @@ import dm_env
 import numpy as np
 
 from selfmodel.arrays import FloatArray, IndexArray
-from selfmodel.controllers.command_source import CommandSource, make_batch
+from selfmodel.controllers.controller import CommandSource, make_batch
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError, TrialError
 from selfmodel.physical.cleanup import Cleanup

@@ -10,8 +10,7 @@ from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.anatomy_reader import joint_limits
 from selfmodel.robot.embodiment import WELD_ARMATURE, Embodiment
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.signal_scales import MEASUREMENT_FULL_SCALES
-from selfmodel.trials.signals import Signal
+from selfmodel.trials.signals import MEASUREMENT_FULL_SCALES, Signal
 
 
 class Measurement(Protocol):

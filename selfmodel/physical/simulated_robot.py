@@ -8,7 +8,7 @@ from functools import partial
 import mujoco
 import numpy as np
 
-from selfmodel.controllers.command_source import CommandSource, make_batch
+from selfmodel.controllers.controller import CommandSource, make_batch
 from selfmodel.errors import TrialError
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis

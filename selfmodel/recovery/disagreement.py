@@ -10,8 +10,7 @@ from itertools import combinations
 import numpy as np
 
 from selfmodel.arrays import FloatArray, IndexArray
-from selfmodel.controllers.command_source import CommandSource
-from selfmodel.controllers.controller import Controller
+from selfmodel.controllers.controller import CommandSource, Controller
 from selfmodel.controllers.playback import Playback
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
@@ -20,8 +19,7 @@ from selfmodel.simulation.cache import Cache
 from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
-from selfmodel.trials.signal_difference import difference
-from selfmodel.trials.signal_scales import DISAGREEMENT_SCALES
+from selfmodel.trials.signals import DISAGREEMENT_SCALES, difference
 
 EARLY_STEPS = 100
 """Control steps over which disagreement is computed. Later, contacts make any two predictions

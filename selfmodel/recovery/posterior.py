@@ -21,7 +21,7 @@ from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.conditions import Condition, Uncertainty, draw_conditions
 from selfmodel.simulation.model_distribution import Weighted
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.estimation.encoder_noise import encoder_noise
+from selfmodel.trials.estimation import encoder_noise
 from selfmodel.trials.rotation import directions
 from selfmodel.trials.trial import Trial
 

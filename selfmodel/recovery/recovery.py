@@ -5,12 +5,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from selfmodel.arrays import data_frame
 from selfmodel.diagnosis.comparator_choice import ChosenComparator
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
 from selfmodel.simulation.calibration import Calibration
-from selfmodel.trials.data_frame import data_frame
 from selfmodel.trials.trial import Trial
 
 

@@ -15,7 +15,7 @@ from selfmodel.simulation.conditions import Uncertainty
 from selfmodel.simulation.model_distribution import LogNormal, exact
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
-from selfmodel.trials.estimation.encoder_noise import encoder_noise
+from selfmodel.trials.estimation import encoder_noise
 from selfmodel.trials.rotation import directions
 from selfmodel.trials.trial import Trial
 

@@ -10,9 +10,7 @@ from selfmodel.diagnosis.preparation import prepared_trial
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.report.subject import Subject
 from selfmodel.simulation.requests import ClosedLoop, Segments
-from selfmodel.trials.signal_difference import difference
-from selfmodel.trials.signal_scales import PREDICTION_ERROR_SCALES
-from selfmodel.trials.signals import Signal
+from selfmodel.trials.signals import PREDICTION_ERROR_SCALES, Signal, difference
 from selfmodel.trials.trial import Trial
 
 SHOWN: tuple[tuple[Signal, str], ...] = (("sensors", ""), ("joint_positions", "encoder "))

@@ -12,8 +12,7 @@ from selfmodel.report.run_result import RunResult
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.trial import Trial
-from selfmodel.trials.trial_names import trial_names
+from selfmodel.trials.trial import Trial, trial_names
 
 TITLE = "{robot}: {name}"
 """Title of a report, of the name of the robot and that of the run or of the logs."""

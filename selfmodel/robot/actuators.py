@@ -5,7 +5,7 @@ import math
 import mujoco
 import numpy as np
 
-from selfmodel.controllers.command_range import Ranges
+from selfmodel.controllers.controller import Ranges
 from selfmodel.errors import InputError
 
 _TRN = mujoco.mjtTrn

@@ -12,7 +12,7 @@ from selfmodel.robot.base import Bind, DerivedSignal, ShiftedField, StateField, 
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Behaviour
-from selfmodel.trials.estimation.velocity_estimation import with_joint_velocities
+from selfmodel.trials.estimation import with_joint_velocities
 from selfmodel.trials.signals import Signal
 from selfmodel.trials.trial import Trial
 
@@ -193,14 +193,16 @@ BASE_SIGNALS: tuple[Signal, ...] = (
 
 
 def with_known_base(robot: Robot, behaviour: Behaviour) -> Behaviour:
-    """Returns a behaviour whose base is known at every step if the base is fixed.
+    """Returns a behaviour with its robot's physics steps, and a known base if the base is fixed.
 
-    Values that were observed are unchanged, and so is the behaviour of a robot with another base.
+    Values that were observed are unchanged.
 
     Args:
         robot: The robot of the behaviour.
         behaviour: Behaviour of one run.
     """
+    if behaviour.substeps != robot.substeps:
+        behaviour = dataclasses.replace(behaviour, substeps=robot.substeps)
     if not robot.has_fixed_base:
         return behaviour
     fields, data = signal_fields(robot), mujoco.MjData(robot.model)
@@ -215,16 +217,15 @@ def with_known_base(robot: Robot, behaviour: Behaviour) -> Behaviour:
 def completed_trial(robot: Robot, trial: Trial) -> Trial:
     """Returns a trial whose state is complete if the base is fixed, as far as it was logged.
 
-    The base is known, and joint velocities that were not logged are estimated. Trials of robots
-    with another base are returned unchanged.
+    The base is known, and joint velocities that were not logged are estimated.
 
     Args:
         robot: The robot of the trial.
         trial: A trial.
     """
-    if not robot.has_fixed_base:
-        return trial
-    behaviour = with_joint_velocities(with_known_base(robot, trial.behaviour))
+    behaviour = with_known_base(robot, trial.behaviour)
+    if robot.has_fixed_base:
+        behaviour = with_joint_velocities(behaviour)
     return dataclasses.replace(trial, behaviour=behaviour)
 
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from selfmodel.arrays import FloatArray
+from selfmodel.arrays import FloatArray, data_frame
 from selfmodel.errors import InputError
 from selfmodel.robot.parameters import Parameters, factor_names, nominal, with_parameters
 from selfmodel.robot.robot import Robot
@@ -42,7 +42,6 @@ from selfmodel.simulation.joints.calibration import (
 from selfmodel.simulation.joints.segments import JointSegments, joint_segments_of
 from selfmodel.simulation.losses import root_mean_square
 from selfmodel.simulation.outcome import SimulationStats
-from selfmodel.trials.data_frame import data_frame
 from selfmodel.trials.trial import Trial
 
 EXACT_ERROR = 0.01
@@ -230,7 +229,8 @@ def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> flo
 
 
 def _predictions(robot: Robot, trials: Sequence[Trial], threads: int) -> Predictions:
-    return Predictions(robot, [calibration_segments_of(trial) for trial in trials], threads)
+    known = [trial_with_known_base(robot, trial) for trial in trials]
+    return Predictions(robot, [calibration_segments_of(trial) for trial in known], threads)
 
 
 def _with_fitted_parameters(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibration:

@@ -9,16 +9,15 @@ from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.errors import InputError
 from selfmodel.simulation.requests import LEAD, Segments, command_steps, cut_segments
 from selfmodel.trials.behaviour import Behaviour
-from selfmodel.trials.estimation.state_estimation import (
+from selfmodel.trials.estimation import (
     JOINTS,
     ONBOARD,
     STATE,
     estimated_states,
     known_steps,
 )
-from selfmodel.trials.magnitudes import check_magnitudes
 from selfmodel.trials.signals import Signal
-from selfmodel.trials.trial import Trial
+from selfmodel.trials.trial import Trial, check_magnitudes
 
 MAX_SEGMENTS = 40
 """Largest number of segments of a trial in which the base was observed."""

@@ -5,9 +5,9 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state import bind_data, state_writer
+from selfmodel.robot.state import bind_data, state_writer, with_known_base
 from selfmodel.trials.behaviour import Behaviour
-from selfmodel.trials.estimation.state_estimation import STATE, estimated_states, known_steps
+from selfmodel.trials.estimation import STATE, estimated_states, known_steps
 from selfmodel.trials.rotation import directions
 
 MAX_GROUND_DISTANCE = 10.0
@@ -31,7 +31,7 @@ def ground_contact_points(robot: Robot, behaviour: Behaviour) -> FloatArray:
     ground, feet = _level_ground(model), _feet(robot)
     if ground is None or not feet:
         return np.empty((0, 3))
-    states = estimated_states(behaviour, STATE)
+    states = estimated_states(with_known_base(robot, behaviour), STATE)
     unknown = np.isnan(states["joint_positions"])
     chains = {column: _chain(robot, column) for column in feet}
     data = mujoco.MjData(model)

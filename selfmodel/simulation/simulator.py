@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray, IndexArray
-from selfmodel.controllers.command_source import CommandSource, make_batch
+from selfmodel.controllers.controller import CommandSource, make_batch
 from selfmodel.faults.build import apply_faults, build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.physical.measurement_noise import dead_sensors

@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from selfmodel.arrays import BoolArray, FloatArray
+from selfmodel.arrays import BoolArray, FloatArray, data_frame
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
-from selfmodel.trials.data_frame import data_frame
 from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.trial import Trial
 

@@ -1,13 +1,23 @@
 """Behaviour: the recorded signals of one run or a batch of runs (in the field: a trajectory)."""
 
+import dataclasses
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from selfmodel.arrays import BoolArray, FloatArray, frozen
-from selfmodel.trials.signals import Names, Signal
+from selfmodel.errors import InputError, unknown_name
+from selfmodel.trials.signals import SIGNALS, Names, Signal
+
+MAX_TIME_ERROR = 0.5
+"""Largest difference of the time of a row from its control step, control time steps."""
+
+MAX_LENGTH_ERROR = 1e-3
+"""Largest difference of the length of a quaternion from 1: float32 and printed digits round it."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +72,8 @@ class Behaviour:
         signals: Recorded signals, each ``(..., steps, width)``.
         late: Mask of the late steps, ``(steps,)``: the time since the previous row differs from the
             control time step; None for a robot without its own clock.
+        substeps: Physics steps of the robot's model per control step, by which positions are
+            integrated; the default is that of the paper's robots.
 
     Raises:
         ValueError: A shape is inconsistent with the names, or time does not increase.
@@ -71,6 +83,7 @@ class Behaviour:
     time: FloatArray
     signals: Mapping[Signal, FloatArray]
     late: BoolArray | None = None
+    substeps: int = 2
 
     def __post_init__(self) -> None:
         if self.time.ndim != 1 or not np.all(np.diff(self.time) > 0):
@@ -130,11 +143,15 @@ class Behaviour:
 
     def first(self, steps: int) -> "Behaviour":
         """Returns the behaviour of the first ``steps`` steps, at most all."""
-        return Behaviour(
-            names=self.names,
-            time=self.time[:steps],
-            signals={name: values[..., :steps, :] for name, values in self.signals.items()},
-            late=None if self.late is None else self.late[:steps],
+        return self.rows(slice(steps))
+
+    def rows(self, chosen: slice | BoolArray) -> "Behaviour":
+        """Returns the behaviour of some steps, given by a slice or a mask, ``(steps,)``."""
+        return dataclasses.replace(
+            self,
+            time=self.time[chosen],
+            signals={name: values[..., chosen, :] for name, values in self.signals.items()},
+            late=None if self.late is None else self.late[chosen],
         )
 
 
@@ -181,3 +198,189 @@ def forward_displacement(behaviour: Behaviour) -> FloatArray:
     x = behaviour["base_position"][..., 0]
     with np.errstate(invalid="ignore"):  # a log may contain infinity: the displacement is NaN
         return np.asarray(x[..., -1] - x[..., 0])
+
+
+class Parts(Protocol):
+    """Anatomy of a robot."""
+
+    @property
+    def names(self) -> Names:
+        """Column names of the signals."""
+
+
+class Described(Protocol):
+    """Robot of a trial; ``selfmodel.Robot`` is one."""
+
+    @property
+    def name(self) -> str:
+        """Name of the robot."""
+
+    @property
+    def control_timestep(self) -> float:
+        """Duration of a control step, s."""
+
+    @property
+    def anatomy(self) -> Parts:
+        """Parts of the robot."""
+
+
+def behaviour_of_arrays(
+    robot: Described,
+    arrays: Mapping[Signal, ArrayLike | None],
+    time: ArrayLike | None,
+    orders: Mapping[Signal, Sequence[str] | None],
+) -> Behaviour:
+    """Returns the behaviour of measured arrays; missing signals are NaN.
+
+    Args:
+        robot: The robot.
+        arrays: Signals, ``(steps, width)`` each; None for a signal that was not measured.
+        time: Times of the rows, ``(steps,)`` s; None for rows at every control step.
+        orders: Names of the columns of an array, where they are not in the robot's order.
+
+    Raises:
+        InputError: An array has another shape, infinite numbers or quaternions that are not of unit
+            length, the rows are not control steps, or a name is unknown, missing or listed twice.
+    """
+    if isinstance(robot, str):
+        raise InputError(
+            f"expected a robot, got its name {robot!r}: use selfmodel.load_robot({robot!r})"
+        )
+    names = robot.anatomy.names
+    given = {signal: _numbers(signal, values) for signal, values in arrays.items()}
+    lengths = {len(values) for values in given.values() if values is not None and values.ndim}
+    steps = max(lengths, default=0)
+    if steps < 2:
+        raise InputError("a trial needs at least two rows of joint_positions and of commands")
+    found: dict[Signal, FloatArray] = {}
+    for signal in SIGNALS:
+        values, width = given.get(signal), names.width(signal)
+        if values is None:
+            found[signal] = frozen(np.full((steps, width), np.nan))
+            continue
+        if values.shape != (steps, width):
+            raise InputError(
+                f"{signal} must have the shape (steps, {_columns(signal)}) = ({steps}, {width}), "
+                f"got {values.shape}: its columns are {', '.join(names.columns(signal))}"
+            )
+        _check_finite(signal, values)
+        found[signal] = frozen(_ordered(values, signal, names, orders.get(signal)))
+    _check_unit_length(found["base_orientation"])
+    _check_time(time, steps, robot.control_timestep)
+    scheduled = np.arange(steps, dtype=np.float64) * robot.control_timestep
+    return Behaviour(names, frozen(scheduled), found)
+
+
+def _numbers(signal: str, values: ArrayLike | None) -> FloatArray | None:
+    try:
+        return None if values is None else np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            f"{signal} must be an array of numbers, got {type(values).__name__}: {error}"
+        ) from error
+
+
+def _columns(signal: Signal) -> str:
+    return {"sensors": "sensors", "commands": "motors"}.get(
+        signal, "hinges" if signal.startswith("joint_") else "numbers"
+    )
+
+
+def _ordered(
+    values: FloatArray, signal: Signal, names: Names, order: Sequence[str] | None
+) -> FloatArray:
+    """Columns in the robot's order."""
+    known = names.columns(signal)
+    if order is None:
+        return values
+    for name in order:
+        if name not in known:
+            raise unknown_name(f"column of {signal}", name, known)
+    if sorted(order) != sorted(known):
+        raise InputError(
+            f"the names of the columns of {signal} must be each of {', '.join(known)} once, got "
+            f"{', '.join(order)}: correct the list"
+        )
+    return values[:, [list(order).index(name) for name in known]]
+
+
+def _check_time(time: ArrayLike | None, steps: int, timestep: float) -> None:
+    values = _numbers("time", time)
+    if values is None:
+        return
+    if values.shape != (steps,):
+        raise InputError(f"time must have the shape (steps,) = ({steps},), got {values.shape}")
+    expected = timestep * np.arange(steps)
+    wrong = np.flatnonzero(~(np.abs(values - values[0] - expected) <= MAX_TIME_ERROR * timestep))
+    if len(wrong):
+        k = int(wrong[0])
+        raise InputError(
+            f"the rows must be one control time step apart, {timestep:g} s, and row {k} is "
+            f"{values[k] - values[0]:g} s after row 0, not {expected[k]:g} s: load the robot with "
+            f"the time step of the rows, resample them, or import a file of them with `selfmodel "
+            f"logs import`, which resamples"
+        )
+
+
+def _check_finite(signal: str, values: FloatArray) -> None:
+    infinite = np.argwhere(np.isinf(values)).tolist()
+    if infinite:
+        raise InputError(
+            f"{signal} has an infinite number in row {infinite[0][0]}, column {infinite[0][1]}: "
+            f"set what was not measured to NaN"
+        )
+
+
+def _check_unit_length(orientations: FloatArray) -> None:
+    lengths = np.linalg.norm(orientations, axis=1)
+    wrong = np.flatnonzero(np.abs(lengths - 1) > MAX_LENGTH_ERROR)
+    if len(wrong):
+        raise InputError(
+            f"base_orientation must have unit quaternions, w x y z, got one of length "
+            f"{lengths[wrong[0]]:g} in row {wrong[0]}: normalise it, or set it to NaN"
+        )
+
+
+TIME = "time"
+"""Name of the time column, s."""
+
+PREFIXES: Mapping[Signal, str] = MappingProxyType(
+    {
+        "joint_positions": "position",
+        "joint_velocities": "velocity",
+        "joint_efforts": "effort",
+        "commands": "command",
+        "sensors": "sensor",
+        "base_position": "base_position",
+        "base_orientation": "base_orientation",
+        "base_linear_velocity": "base_linear_velocity",
+        "base_angular_velocity": "base_angular_velocity",
+    }
+)
+"""First part of the name of each signal's columns: ``position.front_left_knee``."""
+
+
+def column_names(names: Names, signal: Signal) -> tuple[str, ...]:
+    """Returns the names of a signal's columns in a table."""
+    return tuple(f"{PREFIXES[signal]}.{name}" for name in names.columns(signal))
+
+
+def columns_of(behaviour: Behaviour) -> dict[str, FloatArray]:
+    """Returns the columns of a behaviour by name, time first.
+
+    A joint, motor or sensor without any number has no column, and so the base's vectors.
+
+    Args:
+        behaviour: Behaviour of one run.
+
+    Returns:
+        Columns, ``(steps,)`` each, in the unit of their signal.
+    """
+    found: dict[str, FloatArray] = {TIME: behaviour.time}
+    for signal in (name for name in PREFIXES if name in behaviour.signals):
+        values, names = behaviour[signal], column_names(behaviour.names, signal)
+        known = np.asarray(~np.isnan(values).all(axis=0))
+        if signal.startswith("base_"):
+            known[:] = known.any()
+        found |= {name: values[:, k] for k, name in enumerate(names) if known[k]}
+    return found

@@ -1,7 +1,18 @@
-"""The signals of a run, and the names of their columns."""
+"""The signals of a run: their names and columns, their differences, and their scales.
 
+The tables of scales differ on purpose; the comment before each gives the reason. Their units are
+those of ``SIGNALS``; an orientation is compared as a rotation angle, rad, or as directions.
+"""
+
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Literal, get_args
+
+import numpy as np
+
+from selfmodel.arrays import FloatArray
+from selfmodel.trials.rotation import directions, rotation_between
 
 Signal = Literal[
     "sensors",
@@ -14,7 +25,6 @@ Signal = Literal[
     "base_linear_velocity",
     "base_angular_velocity",
 ]
-
 
 SIGNALS: tuple[Signal, ...] = get_args(Signal)
 """Every signal of a run, in the order of the trial log.
@@ -56,3 +66,140 @@ class Names:
             "joint_efforts": self.hinges,
             "base_orientation": ("w", "x", "y", "z"),
         }.get(signal, ("x", "y", "z"))
+
+
+def difference(signal: Signal, one: FloatArray, other: FloatArray) -> FloatArray:
+    """Returns ``one - other`` for values of a signal: the rotation between orientations.
+
+    Args:
+        signal: Name of the signal.
+        one: ``(..., width)``.
+        other: ``(..., width)``, broadcastable to the shape of ``one``.
+
+    Returns:
+        ``(..., width)`` in the signal's unit; ``(..., 3)``, rad, for an orientation.
+    """
+    if signal == "base_orientation":
+        return rotation_between(one, other)
+    return np.asarray(one - other)
+
+
+def comparable(signal: Signal, values: FloatArray) -> FloatArray:
+    """Returns the columns of a signal in a form that may be averaged and subtracted.
+
+    Args:
+        signal: Name of the signal.
+        values: ``(..., width)``.
+
+    Returns:
+        ``(..., columns)``: direction cosines for an orientation; otherwise the values.
+    """
+    return directions(values) if signal == "base_orientation" else values
+
+
+# About three times the scales of calibration: the robot is damaged, and the loss of the true
+# hypothesis must stay small in spite of the reality gap.
+PREDICTION_ERROR_SCALES: Mapping[Signal, float] = MappingProxyType(
+    {
+        "joint_positions": 0.1,
+        "joint_velocities": 3.0,
+        "base_position": 0.03,
+        "base_orientation": 0.1,
+        "base_linear_velocity": 0.3,
+        "base_angular_velocity": 1.0,
+        "sensors": 0.3,
+        "commands": 0.05,
+    }
+)
+"""Error of a short prediction that counts as large (``segment-prediction``).
+
+The scale of commands is for the paper's command range, and is multiplied by a motor's own range
+over the paper's."""
+
+# Those of the angles and velocities of calibration or smaller: losses are compared between
+# hypotheses about one joint, and with the losses of the same joint in healthy trials, so the error
+# of the model is on both sides.
+HINGE_ERROR_SCALES: Mapping[Signal, float] = MappingProxyType(
+    {
+        "joint_positions": 0.03,
+        "joint_velocities": 0.5,
+    }
+)
+"""Error of a short prediction of one hinge that counts as large (``hinge_errors``)."""
+
+# Smaller than the scales of diagnosis: a healthy robot differs from its model by parameters only,
+# and the fit is to find small differences.
+CALIBRATION_ERROR_SCALES: Mapping[Signal, float] = MappingProxyType(
+    {
+        "joint_positions": 0.03,
+        "joint_velocities": 1.0,
+        "base_position": 0.01,
+        "base_orientation": 0.03,
+        "base_linear_velocity": 0.1,
+        "base_angular_velocity": 0.3,
+    }
+)
+"""Error of a short prediction above which calibration counts it linearly, below quadratically.
+
+An impact that is predicted a step early or late has a large error and contains no information
+about masses."""
+
+# As large as the scales of diagnosis or larger, because two predictions are compared over 100 steps
+# instead of 12: a difference must exceed the effect of the reality gap.
+DISAGREEMENT_SCALES: Mapping[Signal, float] = MappingProxyType(
+    {
+        "sensors": 1.0,
+        "joint_positions": 0.3,
+        "base_position": 0.1,
+        "base_orientation": 0.3,
+        "base_linear_velocity": 0.3,
+        "base_angular_velocity": 1.0,
+    }
+)
+"""Difference of two predictions that counts as full disagreement.
+
+Larger differences count no more, so that a single outlier does not decide."""
+
+# Lower bounds of a spread measured in the trial, and not scales of errors: a column that hardly
+# moves in the trial must not make a small difference infinite.
+SERIES_SPREAD_FLOORS: Mapping[Signal, float] = MappingProxyType(
+    {
+        "sensors": 0.1,
+        "joint_positions": 0.05,
+        "base_orientation": 0.1,
+        "base_linear_velocity": 0.1,
+        "base_position": 0.05,
+    }
+)
+"""Lower bound of the standard deviation that scales a column (``sensor-series``)."""
+
+# Equal to the floors of the series where both have the signal. The base's position is left out: the
+# position is a sum over the trial, so early differences of the members remain until its end.
+ENSEMBLE_DEVIATION_FLOORS: Mapping[Signal, float] = MappingProxyType(
+    {
+        "sensors": 0.1,
+        "joint_positions": 0.05,
+        "base_orientation": 0.1,
+        "base_linear_velocity": 0.1,
+    }
+)
+"""Standard deviation added in squares to that of the members (``noisy-transfer``).
+
+It represents variation that the members do not have, such as measurement noise."""
+
+# Amplitudes of the signals of a walking robot, not errors of predictions: measurement noise is
+# proportional to the amplitude.
+MEASUREMENT_FULL_SCALES: Mapping[Signal, float] = MappingProxyType(
+    {
+        "joint_velocities": 2.0,
+        "joint_efforts": 5.0,
+        "base_position": 0.1,
+        "base_orientation": 0.1,
+        "base_linear_velocity": 0.5,
+        "base_angular_velocity": 0.5,
+    }
+)
+"""Full scale of each logged signal; the level of measurement noise is a fraction of it.
+
+The full scale of a joint position is half the range of its hinge. Commands have no noise: they
+are not measured."""

@@ -1,23 +1,30 @@
 """A trial: one logged run of the physical robot with one command source."""
 
+import dataclasses
 import hashlib
-from collections.abc import Sequence
+import math
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from pathlib import PurePath
+from typing import Any, Literal, get_args
 
+import numpy as np
 from numpy.typing import ArrayLike
 
-from selfmodel.controllers.command_source import CommandSource
+from selfmodel.arrays import FloatArray, data_frame
+from selfmodel.controllers.controller import CommandSource
 from selfmodel.controllers.playback import played_back
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.trials.arrays import Described, behaviour_of_arrays
-from selfmodel.trials.behaviour import Behaviour, forward_displacement
-from selfmodel.trials.columns import columns_of
-from selfmodel.trials.data_frame import data_frame
-
-if TYPE_CHECKING:
-    from selfmodel.trials.signals import Signal
+from selfmodel.trials.behaviour import (
+    Behaviour,
+    Described,
+    behaviour_of_arrays,
+    columns_of,
+    forward_displacement,
+)
+from selfmodel.trials.signals import Signal
 
 Stage = Literal["before", "after", "recovery", "single"]
 """Stage of a recovery: ``before`` (healthy robot), ``after`` (failed robot, old controller),
@@ -99,6 +106,11 @@ class Trial:
     robot: str
     behaviour: Behaviour
     path: str
+
+    @cached_property
+    def content(self) -> tuple[str, CommandSource]:
+        """What was run and observed, for look-ups: trials of equal content are the same trial."""
+        return _digest(self.behaviour), self.plan.controller
 
     @property
     def early_end(self) -> str:
@@ -217,11 +229,6 @@ class Trial:
         """Forward displacement, m."""
         return float(forward_displacement(self.behaviour))
 
-    @cached_property
-    def content(self) -> tuple[str, CommandSource]:
-        """What was run and observed, for look-ups: trials of equal content are the same trial."""
-        return _digest(self.behaviour), self.plan.controller
-
 
 def _digest(behaviour: Behaviour) -> str:
     """SHA-256 of the times, the late steps and the signals of a behaviour."""
@@ -230,3 +237,155 @@ def _digest(behaviour: Behaviour) -> str:
     for values in (behaviour.time, *late, *behaviour.signals.values()):
         digest.update(values.tobytes())
     return digest.hexdigest()
+
+
+@dataclass(frozen=True, eq=False)
+class TrialPart:
+    """A part of a trial: the pieces that lie between two times.
+
+    Attributes:
+        trial: The whole trial.
+        begin: First time of the part, s since the start of the trial.
+        end: Last time of the part, s since the start of the trial.
+    """
+
+    trial: Trial
+    begin: float = -math.inf
+    end: float = math.inf
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the part has no bounds."""
+        return self.begin == -math.inf and self.end == math.inf
+
+    @property
+    def rows(self) -> Trial:
+        """The trial with the rows of the part alone."""
+        behaviour = self.trial.behaviour
+        kept = (behaviour.time >= self.begin) & (behaviour.time <= self.end)
+        return dataclasses.replace(self.trial, behaviour=behaviour.rows(kept))
+
+
+def whole(trial: Trial | TrialPart) -> TrialPart:
+    """Returns a trial as a part without bounds; a part is returned unchanged."""
+    return trial if isinstance(trial, TrialPart) else TrialPart(trial)
+
+
+def trial_names(trials: Iterable[Trial]) -> dict[str, str]:
+    """Returns a name for each trial, by the trial's path.
+
+    The name is that of the log's file, without ``.mcap``, and not that of the plan: every imported
+    trial has the plan ``imported``. A trial without a log has the name of its plan. Where several
+    trials would have one name, each of them has its whole path.
+
+    Args:
+        trials: All trials of a diagnosis.
+    """
+    names = {trial.path: _name(trial) for trial in trials}
+    counts = Counter(names.values())
+    return {path: name if counts[name] == 1 else path for path, name in names.items()}
+
+
+def _name(trial: Trial) -> str:
+    file = PurePath(trial.path)
+    return file.stem if file.suffix.lower() == ".mcap" else trial.plan.name
+
+
+LOSABLE_SIGNALS: tuple[Signal, ...] = ("joint_positions", "joint_velocities", "sensors")
+"""Signals whose columns may be lost with an encoder."""
+
+
+def observed_as(trial: Trial, others: Sequence[Trial]) -> Trial:
+    """Returns a trial without the columns that were never observed in one of the others.
+
+    An unknown joint makes the prediction of the others worse. So the loss of a healthy trial is a
+    reference for a trial with a lost encoder only without the same encoder.
+
+    Args:
+        trial: The trial.
+        others: Trials of the same robot.
+
+    Returns:
+        The trial itself if the others lack nothing; otherwise a trial with NaN in these columns.
+    """
+    signals, is_lacking = dict(trial.behaviour.signals), False
+    for signal in LOSABLE_SIGNALS:
+        missing = np.zeros(signals[signal].shape[1], dtype=bool)
+        for other in others:
+            missing |= ~np.isfinite(other.behaviour[signal]).any(axis=0)
+        lost = missing & np.isfinite(signals[signal]).any(axis=0)
+        if lost.any():
+            is_lacking = True
+            signals[signal] = np.where(lost, np.nan, signals[signal])
+    if not is_lacking:
+        return trial
+    return dataclasses.replace(
+        trial, behaviour=dataclasses.replace(trial.behaviour, signals=signals)
+    )
+
+
+MAX_VALUE = 1e8
+"""Largest absolute value of a signal, in its SI unit. Coordinates of map projections reach 1e7 m;
+at 1e8 m, a number still resolves 1e-8 m."""
+
+
+def check_magnitudes(trial: Trial, signals: Iterable[Signal]) -> None:
+    """Checks that the observed values of some signals can be those of a robot.
+
+    Args:
+        trial: The logged trial.
+        signals: The signals to check.
+
+    Raises:
+        InputError: A value is infinite or above ``MAX_VALUE``; the message contains the first one.
+    """
+    for signal in signals:
+        values = trial.behaviour[signal]
+        wrong = np.argwhere(np.abs(values) > MAX_VALUE)
+        if len(wrong):
+            step, column = wrong[0].tolist()
+            name = trial.behaviour.names.columns(signal)[column]
+            raise InputError(
+                f"{trial.path}: {signal} {name} is {values[step, column]:g} at step {step}, "
+                f"expected at most {MAX_VALUE:g} in SI units, or NaN where nothing was observed: "
+                f"check the units and the odometry of the log, or leave this log out"
+            )
+
+
+MAX_DIFFERENCE = 0.4
+"""Largest difference of the commands of one gait. Recordings of another generator: at most 0.26 for
+the same gait, also of a network on a damaged robot, and at least 0.7 for different gaits."""
+
+
+def have_one_gait(trials: Sequence[Trial], others: Sequence[Trial]) -> bool:
+    """Returns whether for each trial one of the others has commands of the same gait.
+
+    Args:
+        trials: Trials of a robot.
+        others: Other trials of the same robot.
+    """
+    return all(
+        any(command_difference(one, other) <= MAX_DIFFERENCE for other in others) for one in trials
+    )
+
+
+def command_difference(one: Trial, other: Trial) -> float:
+    """Returns the difference of the distributions of the commands of two trials.
+
+    It is the mean over the motors of the differences of mean and standard deviation, relative to
+    the root mean square of the other trial's standard deviations; infinite without known commands.
+    The commands of a network differ in every step, and their distributions hardly.
+    """
+    first, second = _known(one), _known(other)
+    if not len(first) or not len(second):
+        return float("inf")
+    scale = float(np.sqrt(np.mean(second.var(axis=0))))
+    means = np.abs(first.mean(axis=0) - second.mean(axis=0))
+    deviations = np.abs(first.std(axis=0) - second.std(axis=0))
+    difference = float(np.mean(means + deviations))
+    return difference / scale if scale > 0 else (float("inf") if difference > 0 else 0.0)
+
+
+def _known(trial: Trial) -> FloatArray:
+    commands = trial.behaviour["commands"]
+    return np.asarray(commands[np.isfinite(commands).all(axis=1)])

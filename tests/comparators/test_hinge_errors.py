@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from selfmodel.comparators.hinge_errors import hinge_losses
-from selfmodel.trials.signal_scales import HINGE_ERROR_SCALES
-from selfmodel.trials.signals import Signal
+from selfmodel.trials.signals import HINGE_ERROR_SCALES, Signal
 
 SEGMENTS, HORIZON, HINGES = 3, 12, 4
 COMPARED = np.array([3, 6, 9, 12])

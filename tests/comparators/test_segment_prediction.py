@@ -8,8 +8,8 @@ from selfmodel.comparators.encoder_motion import encoder_motion_loss, logged_mot
 from selfmodel.comparators.segment_prediction import CONTRADICTION
 from selfmodel.diagnosis.comparator_contract import shown
 from selfmodel.trials.behaviour import Behaviour
-from selfmodel.trials.estimation.state_estimation import JOINTS
-from selfmodel.trials.signal_scales import PREDICTION_ERROR_SCALES
+from selfmodel.trials.estimation import JOINTS
+from selfmodel.trials.signals import PREDICTION_ERROR_SCALES
 from tests.helpers.gaits import changed, gait, logged
 
 TOUCH = 0

@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from selfmodel.controllers.command_range import TARGET_RANGE
-from selfmodel.controllers.command_source import make_batch
-from selfmodel.controllers.controller import Controller, draw_genomes
+from selfmodel.controllers.controller import TARGET_RANGE, Controller, draw_genomes, make_batch
 from selfmodel.controllers.cpg import (
     MAX_FEEDBACK,
     MAX_FREQUENCY,

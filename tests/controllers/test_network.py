@@ -4,9 +4,13 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from selfmodel.controllers.command_range import TARGET_RANGE
-from selfmodel.controllers.command_source import make_batch
-from selfmodel.controllers.controller import Controller, check_silent_neurons, draw_genomes
+from selfmodel.controllers.controller import (
+    TARGET_RANGE,
+    Controller,
+    check_silent_neurons,
+    draw_genomes,
+    make_batch,
+)
 from selfmodel.controllers.network import Network
 from selfmodel.errors import InputError
 from selfmodel.robot.designs import network_for

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from selfmodel.controllers.command_source import make_batch
+from selfmodel.controllers.controller import make_batch
 from selfmodel.controllers.playback import Playback, played_back
 from selfmodel.robot.robot import Robot
 from tests.helpers.drivers import random_controllers

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT, SEGMENT_PREDICTION, SENSOR_SERIES
-from selfmodel.controllers.command_source import CommandSource
+from selfmodel.controllers.controller import CommandSource
 from selfmodel.diagnosis.comparator import Comparator, PreparedTrial
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.evidence import Evidence

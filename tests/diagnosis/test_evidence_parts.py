@@ -17,8 +17,7 @@ from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.trial import Trial, TrialPlan
-from selfmodel.trials.trial_part import TrialPart
+from selfmodel.trials.trial import Trial, TrialPart, TrialPlan
 from tests.helpers.drivers import random_controllers
 from tests.helpers.hostile import exploding
 from tests.helpers.memory import in_memory

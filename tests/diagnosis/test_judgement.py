@@ -19,8 +19,7 @@ from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.trial import Trial, TrialPlan
-from selfmodel.trials.trial_names import trial_names
+from selfmodel.trials.trial import Trial, TrialPlan, trial_names
 from tests.helpers.drivers import random_controllers
 from tests.helpers.memory import in_memory
 

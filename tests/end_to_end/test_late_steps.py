@@ -24,7 +24,7 @@ from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS, load
 from selfmodel.tasks.walking import motion_capture
 from selfmodel.trials.behaviour import Behaviour, collect
-from selfmodel.trials.estimation.state_estimation import estimated_states
+from selfmodel.trials.estimation import estimated_states
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_motion

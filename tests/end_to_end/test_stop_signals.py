@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from typer.core import TyperGroup
 
-from selfmodel.controllers.command_source import CommandSource
+from selfmodel.controllers.controller import CommandSource
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.physical.stop_signals import STOP_SIGNALS
 from selfmodel.trials.behaviour import Sample

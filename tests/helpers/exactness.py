@@ -6,7 +6,7 @@ from xml.etree import ElementTree as ET
 import mujoco
 import numpy as np
 
-from selfmodel.controllers.command_source import CommandSource
+from selfmodel.controllers.controller import CommandSource
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.mjcf.hidden_state import MIN_ITERATIONS
@@ -14,7 +14,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.simulation.requests import cut_segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour, collect
-from selfmodel.trials.estimation.state_estimation import STATE
+from selfmodel.trials.estimation import STATE
 
 HORIZON = 12
 """Control steps of a segment, as in ``segment-prediction``."""

@@ -9,7 +9,7 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.estimation.state_estimation import JOINTS
+from selfmodel.trials.estimation import JOINTS
 from selfmodel.trials.signals import Signal
 from selfmodel.trials.trial import Trial
 

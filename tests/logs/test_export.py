@@ -14,8 +14,7 @@ from selfmodel.logs.recordings.importer import import_recording
 from selfmodel.logs.recordings.mapping.mapping_file import parse_mapping
 from selfmodel.logs.recordings.mapping.suggest import suggest
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.behaviour import Behaviour
-from selfmodel.trials.columns import columns_of
+from selfmodel.trials.behaviour import Behaviour, columns_of
 from selfmodel.trials.signals import SIGNALS
 from tests.logs.recordings.tables.tables import read_here
 

@@ -10,8 +10,7 @@ from hypothesis import given, strategies as st
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.comparators.command_errors import command_errors
-from selfmodel.controllers.command_source import make_batch
-from selfmodel.controllers.controller import Controller
+from selfmodel.controllers.controller import Controller, make_batch
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError, TrialError
 from selfmodel.experiments.arguments import comparator_choice

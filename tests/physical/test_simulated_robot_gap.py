@@ -22,8 +22,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour, collect
-from selfmodel.trials.signal_scales import MEASUREMENT_FULL_SCALES
-from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.signals import MEASUREMENT_FULL_SCALES, SIGNALS
 from selfmodel.trials.trial import TrialPlan
 from tests.helpers.command import SMALL, selfmodel
 from tests.helpers.drivers import random_controllers, random_motion

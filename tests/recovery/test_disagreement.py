@@ -25,8 +25,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.trials.behaviour import Behaviour
-from selfmodel.trials.signal_scales import DISAGREEMENT_SCALES
-from selfmodel.trials.signals import Names, Signal
+from selfmodel.trials.signals import DISAGREEMENT_SCALES, Names, Signal
 from tests.helpers.drivers import random_controllers
 
 NAMES = Names(sensors=("touch",), motors=("motor",), hinges=("hinge",))

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from selfmodel.controllers.command_range import TARGET_RANGE
-from selfmodel.controllers.controller import draw_genomes
+from selfmodel.controllers.controller import TARGET_RANGE, draw_genomes
 from selfmodel.controllers.network import Network
 from selfmodel.errors import InputError
 from selfmodel.robot.actuators import command_ranges

@@ -21,7 +21,7 @@ from selfmodel.simulation.requests import cut_segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.trial_replay import replay
 from selfmodel.trials.behaviour import collect
-from selfmodel.trials.estimation.state_estimation import STATE
+from selfmodel.trials.estimation import STATE
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trial import TrialPlan
 from tests.helpers.drivers import random_controllers, random_of

@@ -29,7 +29,7 @@ from selfmodel.simulation.outcome import SimulationResult, SimulationStats
 from selfmodel.simulation.prediction import predict
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import collect
-from selfmodel.trials.estimation.state_estimation import BASE
+from selfmodel.trials.estimation import BASE
 from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_motion

@@ -19,7 +19,7 @@ from selfmodel.simulation.calibration_segments import (
 from selfmodel.simulation.requests import LEAD
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import collect
-from selfmodel.trials.estimation.state_estimation import BASE, ONBOARD, STATE, estimated_states
+from selfmodel.trials.estimation import BASE, ONBOARD, STATE, estimated_states
 from selfmodel.trials.signals import Signal
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_motion

@@ -26,7 +26,7 @@ from selfmodel.simulation.ground_contacts import ground_contact_points
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import suite_bodies
 from selfmodel.trials.behaviour import Behaviour, collect
-from selfmodel.trials.estimation.state_estimation import JOINTS
+from selfmodel.trials.estimation import JOINTS
 from selfmodel.trials.trial import Trial, TrialPlan
 
 STEPS = 1500

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from selfmodel.controllers.command_source import CommandSource
+from selfmodel.controllers.controller import CommandSource
 from selfmodel.controllers.playback import played_back
 from selfmodel.errors import InputError
 from selfmodel.experiments import robots
@@ -23,7 +23,7 @@ from selfmodel.simulation.prediction import predict
 from selfmodel.simulation.requests import END, Segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour, collect
-from selfmodel.trials.estimation.state_estimation import JOINTS, ONBOARD, STATE
+from selfmodel.trials.estimation import JOINTS, ONBOARD, STATE
 from selfmodel.trials.rotation import rotation_between
 from selfmodel.trials.signals import SIGNALS, Signal
 from tests.helpers.drivers import random_motion

@@ -5,9 +5,7 @@ import pytest
 from dm_env import StepType
 
 from selfmodel import tasks
-from selfmodel.controllers.command_range import TARGET_RANGE
-from selfmodel.controllers.command_source import make_batch
-from selfmodel.controllers.controller import Controller
+from selfmodel.controllers.controller import TARGET_RANGE, Controller, make_batch
 from selfmodel.errors import InputError
 from selfmodel.faults.notation import parse
 from selfmodel.robot.designs import network_for

@@ -1,6 +1,7 @@
-"""Promises of a trial of arrays: every shape is checked, and it is worth as much as a log."""
+"""Promises of trials: those of arrays, which are checked; their names, parts and magnitudes."""
 
 import dataclasses
+import re
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,21 @@ from selfmodel import Trial
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.columns import columns_of
+from selfmodel.trials.behaviour import columns_of
+from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.trial import (
+    MAX_VALUE,
+    TrialPart,
+    check_magnitudes,
+    observed_as,
+    trial_names,
+    whole,
+)
+from tests.helpers.gaits import gait, logged
+from tests.helpers.hostile import with_value
 from tests.logs.conftest import biped  # noqa: F401 - a fixture
+
+WALK = logged(gait(steps=200))
 
 
 def arrays(robot: Robot, steps: int = 6) -> dict[str, Any]:
@@ -55,22 +69,6 @@ def test_trials_of_other_numbers_have_other_paths(biped: Robot):  # noqa: F811
     paths = [Trial.from_arrays(biped, **given).path for given in (first, first, second)]
 
     assert paths[0] == paths[1] != paths[2]
-
-
-def test_a_trial_is_known_by_what_was_run_and_observed_and_not_by_its_path(biped: Robot):  # noqa: F811
-    one = Trial.from_arrays(biped, **arrays(biped))
-    signals = dict(one.behaviour.signals)
-    signals["base_position"] = signals["base_position"] + 5.0
-    moved = dataclasses.replace(one.behaviour, signals=signals)
-    later = dataclasses.replace(one.behaviour, time=one.behaviour.time + 1)
-    silent = dataclasses.replace(
-        one.plan,
-        controller=Playback(biped.anatomy.motors, np.zeros((1, len(biped.anatomy.motors)))),
-    )
-
-    assert dataclasses.replace(one, path="elsewhere.mcap").content == one.content
-    for other in ({"behaviour": moved}, {"behaviour": later}, {"plan": silent}):
-        assert dataclasses.replace(one, **other).content != one.content
 
 
 @pytest.mark.parametrize(
@@ -163,3 +161,87 @@ def test_a_trial_of_arrays_is_diagnosed_calibrated_and_logged_as_its_log(tmp_pat
     again = selfmodel.read_log(selfmodel.write_log(trial, tmp_path / "b.mcap", robot)).trial
     for signal, values in logged.behaviour.signals.items():
         np.testing.assert_array_equal(again.behaviour[signal], values)
+
+
+def test_a_trial_is_known_by_what_was_run_and_observed_and_not_by_its_path(biped: Robot):  # noqa: F811
+    one = Trial.from_arrays(biped, **arrays(biped))
+    signals = dict(one.behaviour.signals)
+    signals["base_position"] = signals["base_position"] + 5.0
+    moved = dataclasses.replace(one.behaviour, signals=signals)
+    later = dataclasses.replace(one.behaviour, time=one.behaviour.time + 1)
+    silent = dataclasses.replace(
+        one.plan,
+        controller=Playback(biped.anatomy.motors, np.zeros((1, len(biped.anatomy.motors)))),
+    )
+
+    assert dataclasses.replace(one, path="elsewhere.mcap").content == one.content
+    for other in ({"behaviour": moved}, {"behaviour": later}, {"plan": silent}):
+        assert dataclasses.replace(one, **other).content != one.content
+
+
+@pytest.mark.parametrize(
+    ("paths", "names"),
+    [
+        (("runs/monday.mcap", "tuesday.2.MCAP"), ("monday", "tuesday.2")),
+        (("a/walk.mcap", "b/walk.mcap", "b/run.mcap"), ("a/walk.mcap", "b/walk.mcap", "run")),
+        (("made-up (0a1b)",), (WALK.plan.name,)),
+        (("made-up (0a1b)", "made-up (2c3d)"), ("made-up (0a1b)", "made-up (2c3d)")),
+    ],
+)
+def test_a_trial_has_the_name_of_its_file_or_plan_or_where_it_is_ambiguous_its_path(
+    paths: tuple[str, ...], names: tuple[str, ...]
+):
+    found = trial_names([dataclasses.replace(WALK, path=path) for path in paths])
+
+    assert found == dict(zip(paths, names, strict=True))
+
+
+def test_a_part_has_the_rows_between_its_times_with_both_ends_and_their_late_steps():
+    late = np.zeros(200, dtype=bool)
+    late[60] = True
+    own = logged(dataclasses.replace(WALK.behaviour, late=late))
+    rows = TrialPart(own, 0.5, 1.0).rows
+
+    for signal, values in WALK.behaviour.signals.items():
+        np.testing.assert_array_equal(rows.behaviour[signal], values[50:101])
+    assert np.flatnonzero(rows.behaviour.late).tolist() == [10]
+    assert (rows.plan, rows.path) == (own.plan, own.path)
+
+
+def test_a_part_is_whole_only_without_any_bound():
+    part = TrialPart(WALK, begin=0.0)
+
+    assert whole(WALK).is_whole
+    assert whole(part) is part
+    assert not part.is_whole
+    assert not TrialPart(WALK, end=1e300).is_whole
+
+
+@pytest.mark.parametrize("value", [np.inf, -np.inf, 1e308, -1.001 * MAX_VALUE])
+def test_the_first_number_that_no_robot_has_is_named_with_its_column_and_step(value: float):
+    wrong = with_value(WALK, "joint_velocities", 3, 2, value)
+    name = WALK.behaviour.names.hinges[2]
+    with pytest.raises(
+        InputError, match=re.escape(f"joint_velocities {name} is {value:g} at step 3, ")
+    ):
+        check_magnitudes(wrong, SIGNALS)
+    check_magnitudes(wrong, ("base_position", "commands"))
+
+
+@pytest.mark.parametrize("value", [np.nan, MAX_VALUE, -5e6])
+def test_what_was_not_observed_and_coordinates_of_maps_are_no_absurd_numbers(value: float):
+    check_magnitudes(with_value(WALK, "base_position", 0, 1, value), SIGNALS)
+
+
+@pytest.mark.parametrize("lost", [[2], [1, 3]])
+def test_a_reference_lacks_what_one_of_the_others_lacks(lost: list[int]):
+    angles = WALK.behaviour["joint_positions"].copy()
+    angles[:, lost] = np.nan
+    signals = {**WALK.behaviour.signals, "joint_positions": angles}
+    damaged = logged(dataclasses.replace(WALK.behaviour, signals=signals))
+    found = observed_as(WALK, [WALK, damaged])
+
+    known = np.isfinite(found.behaviour["joint_positions"]).all(axis=0)
+    assert np.flatnonzero(~known).tolist() == lost
+    assert observed_as(damaged, [damaged]) is damaged
+    assert observed_as(WALK, []) is WALK

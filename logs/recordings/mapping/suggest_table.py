@@ -14,7 +14,7 @@ from selfmodel.logs.recordings.tables.content import NO_TIME
 from selfmodel.logs.recordings.tables.table import read_table
 from selfmodel.robot.robot import Robot
 from selfmodel.sandbox.budget import Budget
-from selfmodel.trials.columns import PREFIXES, column_names
+from selfmodel.trials.behaviour import PREFIXES, column_names
 
 _LONGEST_PERIODS = {"s": 0.5, "ms": 500.0, "us": 5e5}
 """Longest usual period of the rows that is assumed of each unit of time."""

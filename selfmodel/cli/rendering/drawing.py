@@ -26,7 +26,7 @@ from selfmodel.sandbox.budget import Budget
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.threads import thread_count
 from selfmodel.simulation.trial_replay import replay
-from selfmodel.trials.magnitudes import check_magnitudes
+from selfmodel.trials.trial import check_magnitudes
 
 
 def draw_trial(

@@ -19,8 +19,7 @@ from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.diagnosis.loss_functions import Losses
 from selfmodel.diagnosis.verdicts.significance import is_better, paired_z
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.trials.trial import Trial
-from selfmodel.trials.trial_part import TrialPart
+from selfmodel.trials.trial import Trial, TrialPart
 
 MIN_PIECES = 8
 """Pieces before and after a change, at least: two of the surrogate comparator, with a third."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.robot.anatomy import Anatomy
-from selfmodel.trials.estimation.encoder_noise import PLAY, encoder_noise
+from selfmodel.trials.estimation import PLAY, encoder_noise
 from selfmodel.trials.trial import Trial
 
 NOISE_RATIO = 1.2

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from selfmodel.arrays import data_frame
 from selfmodel.errors import InputError
 from selfmodel.experiments.ablation.results import collect as collect_ablation
 from selfmodel.experiments.ablation.rows import AblationRow
@@ -27,7 +28,6 @@ from selfmodel.experiments.statistics import (
 from selfmodel.experiments.study.files import as_dicts, lines_of_csv, read_text, rows_of_csv
 from selfmodel.experiments.suite.results import collect as collect_suite
 from selfmodel.experiments.suite.rows import SuiteRow
-from selfmodel.trials.data_frame import data_frame
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

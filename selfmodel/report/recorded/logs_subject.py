@@ -13,7 +13,7 @@ from selfmodel.report.run_result import parsed
 from selfmodel.report.subject import Subject
 from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.simulation.threads import thread_count
-from selfmodel.trials.trial_names import trial_names
+from selfmodel.trials.trial import trial_names
 
 
 def subject_of_logs(

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.controllers.command_source import CommandSource
-from selfmodel.controllers.controller import Controller
+from selfmodel.controllers.controller import CommandSource, Controller
 from selfmodel.controllers.playback import Playback
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.logs.controllers import controller_bytes
@@ -17,7 +16,7 @@ from selfmodel.report.charts import Attachment, BarChart, Group, Table
 from selfmodel.report.document import Section
 from selfmodel.report.subject import Subject
 from selfmodel.settings import Settings
-from selfmodel.trials.signal_scales import DISAGREEMENT_SCALES
+from selfmodel.trials.signals import DISAGREEMENT_SCALES
 
 POPULATION = 20
 """Controllers per generation in the choice of the trial; a recovery takes the paper's 100."""

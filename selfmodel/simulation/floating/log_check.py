@@ -19,7 +19,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration_segments import CalibrationSegments
 from selfmodel.simulation.floating.predictions import Predictions
 from selfmodel.simulation.losses import is_better
-from selfmodel.trials.estimation.state_estimation import JOINTS
+from selfmodel.trials.estimation import JOINTS
 from selfmodel.trials.signals import Signal
 
 MAX_RATIO = 1.0

@@ -20,10 +20,8 @@ from selfmodel.simulation.outcome import SimulationStats
 from selfmodel.simulation.prediction import predict
 from selfmodel.simulation.requests import Segments
 from selfmodel.trials.behaviour import Behaviour
-from selfmodel.trials.estimation.state_estimation import BASE, JOINTS
-from selfmodel.trials.signal_difference import difference
-from selfmodel.trials.signal_scales import CALIBRATION_ERROR_SCALES
-from selfmodel.trials.signals import Signal
+from selfmodel.trials.estimation import BASE, JOINTS
+from selfmodel.trials.signals import CALIBRATION_ERROR_SCALES, Signal, difference
 
 MAX_ERROR = 1e6
 """Bound on the absolute error of a prediction, in ``CALIBRATION_ERROR_SCALES``: the error of a

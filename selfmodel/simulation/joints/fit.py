@@ -30,7 +30,7 @@ from selfmodel.simulation.joints.sets import NOMINAL, SETS, Basis, Point
 from selfmodel.simulation.losses import damped, is_better, root_mean_square
 from selfmodel.simulation.outcome import SimulationStats
 from selfmodel.simulation.prediction import predict
-from selfmodel.trials.signal_scales import CALIBRATION_ERROR_SCALES
+from selfmodel.trials.signals import CALIBRATION_ERROR_SCALES
 
 PRIOR_WEIGHT = 0.01
 """Weight of the prior relative to the data: all errors together count as 1 / PRIOR_WEIGHT**2

@@ -14,14 +14,15 @@ from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.errors import InputError
 from selfmodel.simulation.requests import LEAD, Segments, command_steps, cut_segments
 from selfmodel.trials.behaviour import Behaviour
-from selfmodel.trials.estimation.state_estimation import JOINTS, STATE, estimated_states
-from selfmodel.trials.estimation.velocity_estimation import (
+from selfmodel.trials.estimation import (
+    JOINTS,
+    STATE,
+    estimated_states,
     lacks_joint_velocities,
     with_joint_velocities,
 )
-from selfmodel.trials.magnitudes import check_magnitudes
 from selfmodel.trials.signals import Signal
-from selfmodel.trials.trial import Trial
+from selfmodel.trials.trial import Trial, check_magnitudes
 
 SEGMENT_SECONDS = 1.0
 """Length of a segment, s, in a trial that is long enough."""

@@ -32,7 +32,7 @@ from selfmodel.simulation.requests import Past, Segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import suite_bodies, walking
 from selfmodel.trials.behaviour import Behaviour, collect
-from selfmodel.trials.estimation.state_estimation import BASE, STATE
+from selfmodel.trials.estimation import BASE, STATE
 from selfmodel.trials.rotation import rotation_between
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trial import Trial, TrialPlan

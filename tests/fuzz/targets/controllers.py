@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from selfmodel.controllers.command_source import make_batch
+from selfmodel.controllers.controller import make_batch
 from selfmodel.errors import InputError
 from selfmodel.experiments.trial_logs import controller
 from selfmodel.logs.controllers import controller_bytes, load_controller, parse_controller

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from selfmodel.controllers.command_source import CommandSource
+from selfmodel.controllers.controller import CommandSource
 from selfmodel.controllers.playback import played_back
 from selfmodel.robot.robot import Robot
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from selfmodel.controllers.command_source import CommandSource
+from selfmodel.controllers.controller import CommandSource
 from selfmodel.controllers.playback import played_back
 from selfmodel.robot.robot import Robot
 

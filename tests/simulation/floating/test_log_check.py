@@ -11,7 +11,7 @@ from selfmodel.simulation.calibration_segments import calibration_segments_of
 from selfmodel.simulation.floating.log_check import Suspicion, suspicion
 from selfmodel.simulation.floating.predictions import Predictions
 from selfmodel.tasks import ROBOTS
-from selfmodel.trials.estimation.state_estimation import JOINTS
+from selfmodel.trials.estimation import JOINTS
 from selfmodel.trials.trial import Trial
 from tests.simulation.test_calibration import trial
 

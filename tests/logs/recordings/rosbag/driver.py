@@ -12,8 +12,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.controllers.command_source import make_batch
-from selfmodel.controllers.controller import Controller
+from selfmodel.controllers.controller import Controller, make_batch
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.robot.robot import Robot

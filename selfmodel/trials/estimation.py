@@ -1,10 +1,12 @@
-"""State estimation: smoothed positions from logged positions and velocities.
+"""Estimates from the logged signals of one run: smoothed positions, velocities, encoders' noise.
 
 Logged positions are noisy; the displacement between two steps is more accurate from the velocity.
 An estimated position is the mean of the positions of the neighbouring steps, each propagated by the
 velocities in between.
 """
 
+import dataclasses
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -80,7 +82,7 @@ def estimated_states(
     for position, velocity, half_width, smallest_noise in _SMOOTHED:
         if position in states:
             values = behaviour[position]
-            displacements = _integrated(behaviour[velocity], timestep)
+            displacements = _integrated(behaviour[velocity], timestep, behaviour.substeps)
             if behaviour.late is not None:
                 late = behaviour.late[1:, np.newaxis]
                 displacements = np.where(late, np.nan, displacements)
@@ -91,13 +93,15 @@ def estimated_states(
     return states
 
 
-def _integrated(velocities: FloatArray, timestep: float) -> FloatArray:
+def _integrated(velocities: FloatArray, timestep: float, substeps: int) -> FloatArray:
     """Returns displacements between successive steps from velocities, ``(steps - 1, width)``.
 
-    The integrator is semi-implicit: a physics step moves by the velocity at its end. For a control
-    step of two physics steps the weights of its first and last velocity are 1/4 and 3/4.
+    The integrator is semi-implicit: a physics step moves by the velocity at its end. Of velocities
+    that change evenly, those at the start and the end of a control step of s physics steps have the
+    weights (s - 1) / 2s and (s + 1) / 2s.
     """
-    return np.asarray((velocities[:-1] + 3 * velocities[1:]) / 4 * timestep)
+    weighted = (substeps - 1) * velocities[:-1] + (substeps + 1) * velocities[1:]
+    return np.asarray(weighted / (2 * substeps) * timestep)
 
 
 def _is_noise(residuals: FloatArray, smallest_noise: float) -> bool:
@@ -165,3 +169,115 @@ def _averaged(
 def _summed(values: FloatArray) -> FloatArray:
     """Returns the sums of the first k rows, ``(steps + 1, width)``, from k = 0."""
     return np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
+
+
+HALF_WIDTH = 0.05
+"""Half width of the smoother, s: long against encoder noise, short against a limb's motion."""
+
+_DEGREE = 3
+_MIN_HALF_WIDTH = 2
+"""Smallest half width of the smoother, in steps: a cubic has four coefficients."""
+
+
+def with_joint_velocities(behaviour: Behaviour) -> Behaviour:
+    """Returns a behaviour with joint velocities; a behaviour that has any is returned unchanged.
+
+    The velocity at a step is the slope of the cubic polynomial of least squares over the positions
+    within ``HALF_WIDTH`` (Savitzky & Golay 1964, Analytical Chemistry 36), with a window that is
+    shifted inwards at the ends of the behaviour.
+
+    Args:
+        behaviour: Behaviour of one run.
+
+    Returns:
+        The behaviour with estimated joint velocities. A velocity is NaN if a position in its window
+        is unknown, or a step in its window is late.
+    """
+    if not lacks_joint_velocities(behaviour):
+        return behaviour
+    velocities = _slopes(behaviour)
+    signals = {**behaviour.signals, "joint_velocities": velocities}
+    return dataclasses.replace(behaviour, signals=signals)
+
+
+def lacks_joint_velocities(behaviour: Behaviour) -> bool:
+    """Returns whether joint positions were observed and no joint velocity was."""
+    velocities = behaviour.signals.get("joint_velocities")
+    return bool(
+        np.isfinite(behaviour["joint_positions"]).any()
+        and (velocities is None or not np.isfinite(velocities).any())
+    )
+
+
+def _slopes(behaviour: Behaviour) -> FloatArray:
+    positions, steps = behaviour["joint_positions"], behaviour.steps
+    slopes = np.full(positions.shape, np.nan)
+    if steps <= 2 * _MIN_HALF_WIDTH:
+        return slopes
+    timestep = float(behaviour.time[1] - behaviour.time[0])
+    half = max(_MIN_HALF_WIDTH, min(round(HALF_WIDTH / timestep), (steps - 1) // 2))
+    offsets = np.arange(-half, half + 1)
+    known = np.isfinite(positions)
+    if behaviour.late is not None:
+        known &= ~behaviour.late[:, np.newaxis]
+    for step in range(steps):
+        centre = min(max(step, half), steps - 1 - half)
+        rows = centre + offsets
+        weights = _slope_weights(half, step - centre) / timestep
+        slopes[step] = np.where(known[rows].all(axis=0), weights @ positions[rows], np.nan)
+    return slopes
+
+
+def _slope_weights(half: int, position: int) -> FloatArray:
+    """Returns the weights of the positions of a window for the slope at one of them, per step."""
+    offsets = np.arange(-half, half + 1)
+    powers = np.vander(offsets / half, _DEGREE + 1, increasing=True)
+    at = position / half
+    slope = np.array([0.0, 1.0, 2 * at, 3 * at**2]) / half
+    return np.asarray(slope @ np.linalg.pinv(powers))
+
+
+PLAY = 0.01
+"""Motion of a jammed joint by elasticity and backlash, rad."""
+
+NOISE_FACTOR = 2.0
+"""Factor on an encoder's noise in the tolerance: noise alone must be a small part of it."""
+
+_ORDER = 4
+"""Order of the differences between neighbouring steps: it suppresses motion, and not noise."""
+
+_NORMAL_MEDIAN = 0.6745  # median of the absolute value of a standard normal variable
+
+
+def standing_tolerance(positions: FloatArray) -> FloatArray:
+    """Returns the root mean square motion up to which a hinge counts as standing, ``(hinges,)``.
+
+    Args:
+        positions: Logged joint positions, ``(steps, hinges)`` rad; NaN where unknown.
+    """
+    return np.hypot(PLAY, NOISE_FACTOR * encoder_noise(positions))
+
+
+def encoder_noise(positions: FloatArray) -> FloatArray:
+    """Returns the standard deviation of the noise of each encoder, ``(hinges,)``.
+
+    The larger of two estimates: white noise with the same median fourth difference, and the
+    rounding error of an encoder with steps as large as the smallest difference between two of its
+    values. The first alone is 0 for a hinge that stands between two steps of its encoder.
+
+    Args:
+        positions: Logged joint positions, ``(steps, hinges)`` rad; NaN where unknown.
+
+    Returns:
+        Noise levels, rad; 0 for a column of too few values, or of one value.
+    """
+    return np.array([_noise(column) for column in positions.T], dtype=np.float64)
+
+
+def _noise(column: FloatArray) -> float:
+    differences = np.abs(np.diff(column, _ORDER))
+    known = differences[np.isfinite(differences)]
+    white = float(np.median(known)) / _NORMAL_MEDIAN if len(known) else 0.0
+    steps = np.diff(np.unique(column[np.isfinite(column)]))
+    rounding = float(steps.min()) / math.sqrt(12) if len(steps) else 0.0
+    return max(white / math.sqrt(math.comb(2 * _ORDER, _ORDER)), rounding)

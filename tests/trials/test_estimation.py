@@ -1,26 +1,31 @@
-"""Promises of the estimated state: exact where there is no noise, closer to the truth where is."""
+"""Promises of estimates: states exact without noise, nearer to the truth with it; velocities."""
 
+import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from selfmodel.controllers.command_source import CommandSource
+from selfmodel.controllers.controller import CommandSource
 from selfmodel.controllers.playback import played_back
 from selfmodel.faults.notation import parse
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS, entry
 from selfmodel.trials.behaviour import Behaviour
-from selfmodel.trials.estimation.state_estimation import (
-    IMU,
+from selfmodel.trials.estimation import (
     JOINTS,
+    PLAY,
     STATE,
+    encoder_noise,
     estimated_states,
     known_steps,
+    lacks_joint_velocities,
+    standing_tolerance,
+    with_joint_velocities,
 )
-from selfmodel.trials.signals import SIGNALS, Signal
+from selfmodel.trials.signals import SIGNALS, Names, Signal
 from tests.helpers.drivers import random_controllers, random_motion
 
 QUADRUPED = ROBOTS["quadruped"].robot()
@@ -138,19 +143,9 @@ def test_what_was_never_observed_stays_unknown():
     assert states["joint_positions"].tobytes() == RUN["joint_positions"].tobytes()
 
 
-def test_only_what_is_asked_for_is_estimated():
-    assert set(estimated_states(RUN, JOINTS + IMU)) == set(JOINTS + IMU)
-
-
-def test_a_trial_of_one_step_is_its_own_state():
-    run = Behaviour(RUN.names, RUN.time[:1], {signal: RUN[signal][:1] for signal in SIGNALS})
-
-    assert all(estimated_states(run)[s].tobytes() == run[s].tobytes() for s in STATE)
-
-
 @pytest.mark.parametrize("hinge", [0, 5])
 def test_a_lost_encoder_leaves_the_estimates_of_the_others(hinge: int):
-    (run,) = runs(QUADRUPED, "intact", smooth(QUADRUPED, 1))
+    run = RUN
     noisy = run["joint_positions"] + np.random.default_rng(0).normal(0, 0.01, (300, 8))
     signals = {**run.signals, "joint_positions": noisy}
     complete = estimated_states(Behaviour(run.names, run.time, signals), JOINTS)
@@ -167,7 +162,7 @@ def test_a_lost_encoder_leaves_the_estimates_of_the_others(hinge: int):
 
 
 def test_a_position_without_a_velocity_is_the_logged_one():
-    (run,) = runs(QUADRUPED, "intact", smooth(QUADRUPED, 1))
+    run = RUN
     noisy = run["joint_positions"] + np.random.default_rng(0).normal(0, 0.01, (300, 8))
     velocities = run["joint_velocities"].copy()
     velocities[:, 3] = np.nan
@@ -187,3 +182,91 @@ def test_a_step_is_known_if_some_hinge_is(columns: set[int], step: int):
 
     base[step, 0] = np.nan
     assert not known_steps({"joint_positions": angles, "base_position": base})[step]
+
+
+@pytest.mark.parametrize("substeps", [1, 2, 4, 15])
+def test_noise_is_smoothed_with_any_number_of_physics_steps_in_a_control_step(substeps: int):
+    h = 0.01 / substeps
+    velocity = 8 * np.sin(np.arange(300 * substeps + 1)[:, np.newaxis] * h * 30 + np.arange(3))
+    position = np.cumsum(velocity[1:] * h, axis=0)  # the velocity at the end of a physics step
+    rng = np.random.default_rng(0)
+    true = position[substeps - 1 :: substeps]
+    logged = true + 0.004 * rng.standard_normal(true.shape)
+    names = Names((), (), ("a", "b", "c"))
+    signals = {"joint_positions": logged, "joint_velocities": velocity[substeps::substeps]}
+    run = Behaviour(names, 0.01 * np.arange(300), signals, substeps=substeps)
+
+    assert np.std(estimated_states(run, JOINTS)["joint_positions"] - true, axis=0).max() < 0.003
+
+
+TIME = np.arange(200) * 0.005
+NAMES = Names((), ("motor",), ("hinge", "other"))
+
+
+def behaviour(**more: object) -> Behaviour:
+    positions = np.stack([1 + 2 * TIME - 3 * TIME**2 + TIME**3, np.cos(6 * TIME)], axis=1)
+    return Behaviour(NAMES, TIME, {"joint_positions": positions}, **more)
+
+
+def test_the_velocity_of_a_cubic_is_exact():
+    found = with_joint_velocities(behaviour())["joint_velocities"]
+
+    np.testing.assert_allclose(found[:, 0], 2 - 6 * TIME + 3 * TIME**2, atol=1e-9)
+    np.testing.assert_allclose(found[:, 1], -6 * np.sin(6 * TIME), atol=0.1)
+
+
+def test_logged_velocities_are_kept():
+    logged = {**behaviour().signals, "joint_velocities": np.full((200, 2), np.nan)}
+    logged["joint_velocities"][7, 1] = 3.0
+    known = dataclasses.replace(behaviour(), signals=logged)
+
+    assert with_joint_velocities(known) is known
+    assert not lacks_joint_velocities(known)
+    assert lacks_joint_velocities(behaviour())
+
+
+def test_velocities_near_unknown_positions_and_late_steps_are_unknown():
+    late = np.zeros(200, dtype=bool)
+    late[150] = True
+    lost = behaviour(late=late)
+    lost.signals["joint_positions"][50, 0] = np.nan
+    unknown = np.isnan(with_joint_velocities(lost)["joint_velocities"])
+
+    assert np.flatnonzero(unknown[:, 0]).tolist() == [*range(40, 61), *range(140, 161)]
+    assert np.flatnonzero(unknown[:, 1]).tolist() == list(range(140, 161))
+
+
+STEPS = 1000
+SWING = 0.4 * np.sin(np.arange(STEPS) * 0.01 * 2 * np.pi * 1.5)
+
+
+@pytest.mark.parametrize("deviation", [0.003, 0.02])
+@pytest.mark.parametrize("motion", [np.zeros(STEPS), SWING])
+def test_white_noise_is_estimated_on_standing_and_on_moving_joints(
+    motion: np.ndarray, deviation: float
+):
+    noise = np.random.default_rng(0).normal(0, deviation, STEPS)
+
+    assert encoder_noise((motion + noise)[:, np.newaxis])[0] == pytest.approx(deviation, rel=0.15)
+
+
+def test_a_swinging_joint_without_noise_has_next_to_none():
+    assert encoder_noise(SWING[:, np.newaxis])[0] < 1e-3
+
+
+def test_an_encoder_that_flickers_between_two_steps_has_the_noise_of_rounding():
+    flickering = np.zeros((STEPS, 1))
+    flickering[::50] = 0.02
+
+    assert encoder_noise(flickering)[0] == pytest.approx(0.02 / np.sqrt(12))
+
+
+def test_unknown_angles_are_left_out_and_a_column_without_angles_has_no_noise():
+    angles = np.full((STEPS, 2), np.nan)
+    angles[:, 0] = 0.3 + np.random.default_rng(0).normal(0, 0.01, STEPS)
+    angles[::40, 0] = np.nan
+
+    known, unknown = encoder_noise(angles)
+    assert known == pytest.approx(0.01, rel=0.2)
+    assert unknown == 0
+    assert standing_tolerance(angles)[1] == PLAY

@@ -1,1 +1,0 @@
-"""Estimates from logged joint signals: noise of encoders, smoothed positions, velocities."""
