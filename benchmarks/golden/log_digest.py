@@ -10,6 +10,7 @@ import io
 from collections.abc import Iterator
 from pathlib import Path
 
+import mujoco
 import numpy as np
 from mcap.reader import make_reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -32,8 +33,9 @@ def log_digests(path: Path) -> dict[str, str]:
 
     Returns:
         By topic, the digest of all decoded messages with their log times; ``attachments``, the
-        digest of the names, and of the bytes or the arrays of an ``.npz``; ``metadata``, the digest
-        of the records' fields, without those that are digests of whole files.
+        digest of the names, and of the bytes, of the arrays of an ``.npz``, or of the fields of a
+        compiled MJCF; ``metadata``, the digest of the records' fields, without those that are
+        digests of whole files.
     """
     hashes: dict[str, hashlib._Hash] = {}
     store = get_typestore(Stores.EMPTY)
@@ -80,6 +82,18 @@ def _attachment(name: str, data: bytes) -> str:
             for array in sorted(arrays.files):
                 digest.update(f"{array} {arrays[array].dtype} {arrays[array].shape}".encode())
                 digest.update(np.ascontiguousarray(arrays[array]).tobytes())
+    elif name.endswith(".xml"):
+        # The text of a model may differ where its compiled fields are the same.
+        try:
+            model = mujoco.MjModel.from_xml_string(data.decode())
+        except ValueError:  # it names assets of its own
+            digest.update(data)
+        else:
+            for field in sorted(dir(model)):
+                value = getattr(model, field)
+                if isinstance(value, np.ndarray):
+                    digest.update(f"{field} {value.shape}".encode())
+                    digest.update(np.ascontiguousarray(value).tobytes())
     else:
         digest.update(data)
     return _short(digest)

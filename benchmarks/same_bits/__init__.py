@@ -1,1 +1,0 @@
-"""Comparison of the results of two versions of selfmodel to the last bit."""
