@@ -176,8 +176,8 @@ def _calibrations() -> Iterator[Scenario]:
     go2 = SAMPLES / "go2-stand" / "go2.xml"
     if go2.exists():
         settings = ("--set", "base=fixed", "--set", "kp=20", "--set", "kd=1.5")
-        gap = ("--gap", "0.1", "--steps", "400", "--controller", "cpg", "--seed", "3")
-        commands = {"before": _trial(str(go2), "before.mcap", *settings, *gap)}
+        trial = ("--gap", "0.1", "--steps", "400", "--controller", "cpg", "--seed", "3")
+        commands = {"before": _trial(str(go2), "before.mcap", *settings, *trial)}
         commands["calibrate"] = ("calibrate", "before.mcap", "--out", "model.xml", *COMMON)
         yield Scenario("calibrations/fixed-base", commands)
 
