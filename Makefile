@@ -86,9 +86,6 @@ $(BROWSER_READY): .ci/browser/package.json .ci/browser/package-lock.json
 	npm ci --prefix .ci/browser --ignore-scripts --no-audit --no-fund --silent
 	touch $@
 
-fuzz: $(READY) ## mutate the input of every reader 100,000 times; in about 25 minutes on two cores
-	$(BIN)/python -m tests.fuzz $(FUZZ)
-
 bench: $(READY) ## measure speed and memory; on a quiet machine
 	$(BIN)/python -m benchmarks.bench
 
@@ -105,4 +102,4 @@ foreign: $(READY) ## make recordings by an independent generator and score their
 	$(BIN)/python -m benchmarks.foreign score $(FOREIGN)
 	$(BIN)/python -m benchmarks.foreign table $(FOREIGN)/scores.jsonl
 
-.PHONY: help setup page browser demo test test-slow test-all docs lint types wheel viewers fuzz bench results foreign
+.PHONY: help setup page browser demo test test-slow test-all docs lint types wheel viewers bench results foreign

@@ -9,7 +9,6 @@ import numpy as np
 from selfmodel.logs.mcap.contents import Contents, read_contents
 from selfmodel.logs.reader import TrialLog, interpret
 from selfmodel.logs.records import HIDDEN, IMPORT, SALVAGE
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.trials.signals import SIGNALS, Signal
 
 
@@ -55,18 +54,17 @@ class Info:
     digest: str
 
 
-def read_info(path: Path, budget: Budget = DEFAULT_BUDGET) -> Info:
+def read_info(path: Path) -> Info:
     """Returns the summary of a log, without the hidden faults of a simulated robot.
 
     Args:
         path: The log.
-        budget: Memory that the file may take.
 
     Raises:
         LogError: The file is damaged, or not a trial log.
         InputError: The file does not exist.
     """
-    contents = read_contents(path, budget=budget)
+    contents = read_contents(path)
     log = interpret(path, contents)
     behaviour, driver = log.trial.behaviour, log.trial.plan.controller
     return Info(

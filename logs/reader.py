@@ -48,7 +48,6 @@ from selfmodel.logs.records import (
     sha256,
     trial_record,
 )
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.trial import Trial, TrialPlan
@@ -87,7 +86,7 @@ class TrialLog:
     imported: bool
 
 
-def read_log(path: str | Path, budget: Budget = DEFAULT_BUDGET) -> TrialLog:
+def read_log(path: str | Path) -> TrialLog:
     """Returns the content of a log.
 
     Verified are the checksums and counts of the file, the digests of its records, of the model and
@@ -102,14 +101,13 @@ def read_log(path: str | Path, budget: Budget = DEFAULT_BUDGET) -> TrialLog:
 
     Args:
         path: The log.
-        budget: Memory that the file may take.
 
     Raises:
         LogError: A check failed.
         InputError: The file does not exist.
     """
     path = Path(path)
-    return interpret(path, read_contents(path, (HIDDEN,), budget))
+    return interpret(path, read_contents(path, (HIDDEN,)))
 
 
 def interpret(path: Path, contents: Contents) -> TrialLog:

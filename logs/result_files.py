@@ -17,9 +17,8 @@ from typing import Any
 
 from selfmodel.errors import InputError
 from selfmodel.files import read_file
-from selfmodel.sandbox.budget import DEFAULT_BUDGET
 
-MAX_BYTES = DEFAULT_BUDGET.json_bytes
+MAX_BYTES = 16 * 2**20
 """Largest JSON file that is written and read, bytes."""
 
 MADE_WITH = "made_with"

@@ -6,15 +6,14 @@ from selfmodel.errors import InputError, WorkError
 from selfmodel.logs.errors import GOOD, SchemaMismatchError
 from selfmodel.logs.reader import TrialLog
 from selfmodel.robot.mjcf.adaptation import MAX_SUBSTEPS
-from selfmodel.robot.mjcf.rehearsal import rehearse
+from selfmodel.robot.mjcf.isolated_model import check_compiles
 from selfmodel.robot.mjcf.untrusted import checked_model
 from selfmodel.robot.mujoco_errors import MUJOCO_ERRORS, uncounted_warnings
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget, BudgetError
 from selfmodel.trials.signals import Names
 
 
-def robot_of(log: TrialLog, budget: Budget = DEFAULT_BUDGET) -> Robot:
+def robot_of(log: TrialLog) -> Robot:
     """Returns the robot of the model in a log.
 
     MuJoCo can read no files but the log's attachments. A child process compiles and steps the model
@@ -22,23 +21,18 @@ def robot_of(log: TrialLog, budget: Budget = DEFAULT_BUDGET) -> Robot:
 
     Args:
         log: The log.
-        budget: Memory and time that the model may take.
 
     Raises:
-        LogError: The model is invalid, names other files, exceeds the budget, or is of another
+        LogError: The model is invalid, names other files, or is of another
             robot than the messages.
         WorkError: The child process ended for a reason other than the model.
     """
     path = log.trial.path
     try:
-        checked = checked_model(log.mjcf, log.assets, budget)
-        rehearse(checked.mjcf, checked.files, log.control_timestep, budget)
+        checked = checked_model(log.mjcf, log.assets)
+        check_compiles(checked.mjcf, checked.files, log.control_timestep)
         with uncounted_warnings():
             robot = Robot(log.trial.robot, checked.mjcf, log.control_timestep, checked.files)
-    except BudgetError as error:
-        raise SchemaMismatchError(
-            path, f"its model cannot be loaded: {error}", good=GOOD, advice=""
-        ) from error
     except WorkError:  # a failure of this computer says nothing about the log
         raise
     except MUJOCO_ERRORS as error:
@@ -78,12 +72,11 @@ def describe_difference(names: Names, logged: Names) -> str:
     return "; ".join(differences) or "their parts have the same names"
 
 
-def common_robot(logs: Sequence[TrialLog], budget: Budget = DEFAULT_BUDGET) -> Robot:
+def common_robot(logs: Sequence[TrialLog]) -> Robot:
     """Returns the common robot of logs; see ``robot_of``.
 
     Args:
         logs: The logs.
-        budget: Memory and time that the model may take.
 
     Raises:
         InputError: There is no log, or two logs are of different robots.
@@ -103,7 +96,7 @@ def common_robot(logs: Sequence[TrialLog], budget: Budget = DEFAULT_BUDGET) -> R
                 f"the logs are {what}: {first.trial.path} is of {first.trial.robot!r}, "
                 f"{other.trial.path} of {other.trial.robot!r}; give logs of one robot"
             )
-    return robot_of(first, budget)
+    return robot_of(first)
 
 
 def _identity(log: TrialLog) -> tuple[object, ...]:

@@ -8,7 +8,6 @@ from selfmodel.logs.mcap.contents import read_contents
 from selfmodel.logs.mcap.provenance import UNTIED
 from selfmodel.logs.reader import TrialLog, interpret
 from selfmodel.robot.mjcf.untrusted import checked_model
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget, BudgetError
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,41 +26,38 @@ class Verified:
     digest: str
 
 
-def verify(path: Path, expected: str = "", budget: Budget = DEFAULT_BUDGET) -> Verified:
+def verify(path: Path, expected: str = "") -> Verified:
     """Verifies a log.
 
     Verified are the checks of ``read_log``; that the hidden faults of a simulated robot are those
     of the trial; that the model names no other files; and, if MuJoCo is installed, that the model
-    loads within the budget and is of the robot of the messages.
+    loads and is of the robot of the messages.
 
     Args:
         path: The log.
         expected: Digest that the log must have, or "".
-        budget: Memory and time that the file and its model may take.
 
     Raises:
         LogError: A check failed.
         InputError: The file does not exist.
     """
-    contents = read_contents(path, budget=budget)
+    contents = read_contents(path)
     log = interpret(path, contents)
     if expected and contents.digest != expected:
         has = f"the digest {contents.digest}" if contents.digest else f"no digest: {UNTIED}"
         what = f"expected the log with the digest {expected}; this log has {has}"
         raise CorruptError(path, what, advice="get the expected log from its origin again")
     try:
-        checked_model(log.mjcf, log.assets, budget)
-    except BudgetError as error:
-        raise SchemaMismatchError(path, str(error), good=GOOD, advice="") from error
+        checked_model(log.mjcf, log.assets)
     except ValueError as error:
         raise SchemaMismatchError(path, str(error), good=GOOD) from error
-    return Verified(log, _load(log, budget), contents.digest)
+    return Verified(log, _load(log), contents.digest)
 
 
-def _load(log: TrialLog, budget: Budget) -> bool:
+def _load(log: TrialLog) -> bool:
     try:
         from selfmodel.logs.robots import robot_of  # noqa: PLC0415  # it needs MuJoCo
     except ImportError:
         return False
-    robot_of(log, budget)
+    robot_of(log)
     return True

@@ -22,7 +22,6 @@ from .physical.environment_robot import EnvironmentRobot as EnvironmentRobot
 from .physical.interface import PhysicalRobot as PhysicalRobot
 from .recovery.recovery import Recovery as Recovery
 from .robot.robot import Robot as Robot
-from .sandbox.budget import Budget as Budget
 from .settings import Settings as Settings
 from .simulation.simulator import Simulator as Simulator
 from .trials.behaviour import Behaviour as Behaviour

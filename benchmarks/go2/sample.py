@@ -20,7 +20,6 @@ from selfmodel.robot.control_delay import split_delay
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import checked_settings
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import DEFAULT_BUDGET
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trial import Trial, TrialPlan
@@ -41,7 +40,7 @@ def robot_on_stand(sample: Path = SAMPLE) -> Robot:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "go2-stand.xml"
         path.write_text(text, encoding="utf-8")
-        return load_mjcf(path, checked_settings(_SETTINGS), DEFAULT_BUDGET)
+        return load_mjcf(path, checked_settings(_SETTINGS))
 
 
 def positions_and_commands(robot: Robot, sample: Path = SAMPLE) -> tuple[FloatArray, FloatArray]:

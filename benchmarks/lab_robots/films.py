@@ -20,8 +20,6 @@ COLUMNS, TILE = 4, (360, 232)
 CAPTION = 26
 """Height of the captions of a film, pixels."""
 
-BUDGET = ("--budget", "memory=2GB,time=10min")
-
 
 def main() -> None:
     """Draws the films and the contact sheet."""
@@ -49,7 +47,7 @@ def _draw(model: Path, controller: str, log: Path) -> None:
         (strip, ("render", str(log), "-o", str(strip))),
     ):
         if not made.exists():
-            subprocess.run((sys.executable, "-m", "selfmodel", *command, *BUDGET), check=True)
+            subprocess.run((sys.executable, "-m", "selfmodel", *command), check=True)
 
 
 def _contact_sheet(films: list[Path]) -> None:

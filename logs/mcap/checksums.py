@@ -30,34 +30,29 @@ from selfmodel.logs.mcap.framing import (
     parse,
     unpack,
 )
-from selfmodel.logs.mcap.meter import Meter
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 
 
-def verified_records(data: bytes, budget: Budget = DEFAULT_BUDGET) -> Iterator[McapRecord]:
+def verified_records(data: bytes) -> Iterator[McapRecord]:
     """Yields the records of a file, including those within chunks, with all checksums verified.
 
     The file is intact if the iteration ends without an exception.
 
     Args:
         data: Bytes of the file.
-        budget: Limits of the file.
 
     Raises:
         Exception: One of ``selfmodel.logs.mcap.framing.FAILURES``: the file is damaged.
     """
     _check_start(data)
-    counts, meter = _Counts(), Meter(budget)
+    counts = _Counts()
     end = len(MAGIC)
     for frame in frames(data):
-        meter.frame(frame.opcode, len(frame.body))
         outer = parse(frame)
         if isinstance(outer, DataEnd):
             _check_data(data, frame, outer)
         elif isinstance(outer, Footer):
             _check_summary(data, frame, outer)
-        for record in _opened(outer, meter):
-            meter.name(record)
+        for record in _opened(outer):
             counts.add(record)
             yield record
         end = frame.end
@@ -82,11 +77,11 @@ def _check_end(data: bytes, end: int) -> None:
         raise ContradictionError("bytes follow its end")
 
 
-def _opened(record: McapRecord | None, meter: Meter) -> list[McapRecord]:
+def _opened(record: McapRecord | None) -> list[McapRecord]:
     """Records of a chunk, then the record itself."""
     if record is None:
         return []
-    return [*unpack(record, meter), record] if isinstance(record, Chunk) else [record]
+    return [*unpack(record), record] if isinstance(record, Chunk) else [record]
 
 
 def _check_data(data: bytes, frame: Frame, end: DataEnd) -> None:

@@ -29,12 +29,11 @@ from selfmodel.logs.mcap.framing import (
     UncheckedError,
     UnknownCompressionError,
 )
-from selfmodel.logs.mcap.meter import ExcessError
 from selfmodel.logs.mcap.provenance import PROVENANCE, SEAL_TYPE, topic_key
 from selfmodel.logs.records import DIGEST, OWN, without_digest
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 
-MORE_MEMORY = "allow more with --budget memory=..., if the file is from a source that you trust"
+MAX_BYTES = 2**32
+"""Largest size of a log, bytes; a quadruped's trial of 10 s takes 0.5 MB."""
 
 _Item = TypeVar("_Item")
 
@@ -88,30 +87,27 @@ class Contents:
         return f"{sum(counts)} messages on {len(counts)} topics before that are complete"
 
 
-def read_contents(
-    path: Path, unread: Collection[str] = (), budget: Budget = DEFAULT_BUDGET
-) -> Contents:
+def read_contents(path: Path, unread: Collection[str] = ()) -> Contents:
     """Returns the contents of a file after all its checksums have been verified.
 
     Args:
         path: The file.
         unread: Names of metadata records to ignore.
-        budget: Limits of the file.
 
     Raises:
         LogError: The file is damaged, not MCAP, or contains unsupported records.
         InputError: The file does not exist, or cannot be opened.
     """
     contents = Contents()
-    data = read_bytes(path, budget)
+    data = read_bytes(path)
     try:
-        _gather(verified_records(data, budget), contents, unread)
+        _gather(verified_records(data), contents, unread)
     except FAILURES as failure:
         raise _explain(path, data, failure, contents) from failure
     return contents
 
 
-def read_bytes(path: Path, budget: Budget) -> bytes:
+def read_bytes(path: Path) -> bytes:
     """Returns the bytes of a file.
 
     Raises:
@@ -119,10 +115,7 @@ def read_bytes(path: Path, budget: Budget) -> bytes:
         InputError: The file does not exist, or cannot be opened.
     """
     check_regular(path, "a log file")
-    if path.stat().st_size > budget.file_bytes:
-        what = f"expected at most {budget.file_bytes} bytes, got more"
-        raise UnsupportedError(path, what, advice=MORE_MEMORY)
-    return read_file(path, "a log file", budget.file_bytes)
+    return read_file(path, "a log file", MAX_BYTES)
 
 
 def _add_once(items: dict[str, _Item], name: str, item: _Item) -> None:
@@ -187,9 +180,8 @@ def _explain(path: Path, data: bytes, failure: Exception, contents: Contents) ->
     good = contents.good
     if isinstance(failure, InvalidMagic):
         return NotMcapError(path, "this is not an MCAP file", advice=ANOTHER)
-    if isinstance(failure, (UnknownCompressionError, ExcessError)):
-        advice = MORE_MEMORY if isinstance(failure, ExcessError) else "pack it again with zstd"
-        return UnsupportedError(path, str(failure), good=good, advice=advice)
+    if isinstance(failure, UnknownCompressionError):
+        return UnsupportedError(path, str(failure), good=good, advice="pack it again with zstd")
     if isinstance(failure, UncheckedError):
         what = f"{failure}: selfmodel did not write this file"
         return UnsupportedError(path, what, good=good, advice=IMPORT_IT)

@@ -35,9 +35,10 @@ from mcap.records import (
 )
 from mcap.stream_reader import get_chunk_data_stream
 
-from selfmodel.logs.mcap.meter import Meter
-
 MAGIC = b"\x89MCAP0\r\n"
+
+MAX_CHUNK = 2**28
+"""Largest decompressed size of a chunk, bytes; those written have 256 KiB."""
 
 FRAME = 1 + 8
 """Size of the opcode and the length before a record's content, bytes."""
@@ -125,36 +126,32 @@ def parse(frame: Frame) -> McapRecord | None:
     return read(stream) if read else None
 
 
-def unpack(chunk: Chunk, meter: Meter) -> list[McapRecord]:
+def unpack(chunk: Chunk) -> list[McapRecord]:
     """Returns the records in a chunk.
 
     Args:
         chunk: Chunk, which is decompressed in place.
-        meter: Counters of the file.
 
     Raises:
-        Exception: One of ``FAILURES``: the chunk is damaged, has more than ``Budget.chunk_bytes``
-            when decompressed, or has no checksum.
+        Exception: One of ``FAILURES``: the chunk is damaged, or has no checksum.
     """
-    if chunk.uncompressed_size > (limit := meter.budget.chunk_bytes):
+    if chunk.uncompressed_size > MAX_CHUNK:
         raise ContradictionError(
-            f"a chunk claims {chunk.uncompressed_size} bytes, more than {limit}"
+            f"a chunk claims {chunk.uncompressed_size} bytes, more than {MAX_CHUNK}"
         )
     if chunk.uncompressed_crc == 0 and chunk.uncompressed_size:
         raise UncheckedError("a chunk has no checksum")
-    meter.chunk(chunk.uncompressed_size)
     unpack_chunk(chunk)
     get_chunk_data_stream(chunk, validate_crc=True)
-    return _records(chunk.data, meter)
+    return _records(chunk.data)
 
 
-def _records(data: bytes, meter: Meter) -> list[McapRecord]:
-    """Splits a chunk as the library does, but raises if there are too many records."""
+def _records(data: bytes) -> list[McapRecord]:
+    """Splits a chunk as the library does."""
     found: list[McapRecord] = []
     offset = 0
     while offset < len(data):
         opcode, length = struct.unpack_from("<BQ", data, offset)
-        meter.record(opcode, length)
         start = offset + FRAME
         if length > len(data) - start:
             raise EndOfFile

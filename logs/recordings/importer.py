@@ -42,14 +42,13 @@ from selfmodel.logs.recordings.tables.tracks import rows_of, table_tracks
 from selfmodel.logs.records import Imported, TrialHeader
 from selfmodel.logs.writing.writer import write_trial
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget, more_memory
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Behaviour, samples_of
 from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.trial import TrialPlan
 
-MESSAGES_PER_STEP = 10
-"""Upper limit of the messages that a control step takes in a log."""
+MAX_STEPS = 100_000
+"""Largest number of control steps of a trial: its log has up to ten messages a step."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,28 +110,24 @@ class Found:
     sources: tuple[Source, ...]
 
 
-def import_recording(
-    path: Path, mapping: RecordingMapping, robot: Robot, budget: Budget = DEFAULT_BUDGET
-) -> Recording:
+def import_recording(path: Path, mapping: RecordingMapping, robot: Robot) -> Recording:
     """Returns the trial in a recording.
 
     Args:
         path: Folder or file of a bag, or a table; see ``is_table``.
         mapping: Mapping from topics or columns to roles.
         robot: Robot that the mapping names.
-        budget: Memory and time for the files.
 
     Raises:
         LogError: The recording is damaged.
-        BudgetError: The recording takes more than the budget allows.
         InputError: The recording cannot be read, or the mapping does not fit it or the robot.
     """
     anatomy = robot.anatomy
     touches = [sensor.name for sensor in anatomy.sensors if sensor.kind == "touch"]
     check_names(mapping, anatomy.hinges, anatomy.motors, touches, anatomy.names.sensors)
-    found = (_table if is_table(path) else _bag)(path, mapping, budget)
+    found = (_table if is_table(path) else _bag)(path, mapping)
     tracks = converted(mapping, found.tracks)
-    steps = _steps(mapping, tracks, robot.control_timestep, budget)
+    steps = _steps(mapping, tracks, robot.control_timestep)
     behaviour = _behaviour(mapping, tracks, robot, steps)
     qualities = _qualities(mapping, found, steps.origin)
     return Recording(
@@ -145,30 +140,28 @@ def import_recording(
     )
 
 
-def _bag(path: Path, mapping: RecordingMapping, budget: Budget) -> Found:
+def _bag(path: Path, mapping: RecordingMapping) -> Found:
     if mapping.time is not None:
         raise mapping.document.error(
             ("time",),
             f"[time] is for tables ({', '.join(FORMATS)}), got the bag {path}: make a mapping of "
             f"it with --suggest",
         )
-    bag = read_bag(path, {role.topic for role in mapping.roles}, budget)
+    bag = read_bag(path, {role.topic for role in mapping.roles})
     check_topics(mapping, bag)
     check_columns(mapping, bag.series)
     clocks = _clocks(mapping, bag.series)
     return Found(bag_tracks(mapping, bag.series, clocks), bag.series, clocks, bag.sources)
 
 
-def _table(path: Path, mapping: RecordingMapping, budget: Budget) -> Found:
+def _table(path: Path, mapping: RecordingMapping) -> Found:
     if mapping.time is None:
         raise mapping.document.error(
             (),
             f"the mapping of a table needs [time] and the names of columns, and has none for "
             f"{path}: make one with --suggest",
         )
-    table = read_table(
-        path, {name for _, name in mapping.columns}, budget, exact=mapping.time.column
-    )
+    table = read_table(path, {name for _, name in mapping.columns}, exact=mapping.time.column)
     check_table(mapping, table.names)
     rows = rows_of(table, mapping.time)
     return Found(
@@ -219,7 +212,7 @@ def _clocks(mapping: RecordingMapping, series: Mapping[str, Series]) -> dict[str
     return found
 
 
-def _steps(mapping: RecordingMapping, tracks: Tracks, timestep: float, budget: Budget) -> Steps:
+def _steps(mapping: RecordingMapping, tracks: Tracks, timestep: float) -> Steps:
     """Control steps at which every role has data."""
     needed = required(mapping, tracks)
     for role, part, track in needed:
@@ -246,12 +239,10 @@ def _steps(mapping: RecordingMapping, tracks: Tracks, timestep: float, budget: B
             f"{mapping.start:g} s after the first of these data and {max(steps, 2)} steps of "
             f"{timestep:g} s: reduce start or duration, or omit the role with the least data",
         )
-    most = budget.records // MESSAGES_PER_STEP  # of a log that can be read with the same budget
-    if not 2 <= steps <= most:
+    if not 2 <= steps <= MAX_STEPS:
         raise mapping.document.error(
             ("duration",),
-            f"a trial has 2 to {most} steps, got {steps}: set another duration, or "
-            f"{more_memory(budget)}",
+            f"a trial has 2 to {MAX_STEPS} steps, got {steps}: set another duration",
         )
     return Steps(origin, np.rint(np.arange(steps) * period).astype(np.int64))
 

@@ -39,7 +39,6 @@ from selfmodel.logs.salvage.steps import (
     missing_frames,
 )
 from selfmodel.logs.writing.logfile import LogFile
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import forward_displacement
 
@@ -73,13 +72,12 @@ class Salvaged:
     discarded: tuple[Discarded, ...]
 
 
-def salvage(path: Path, out: Path, budget: Budget = DEFAULT_BUDGET) -> Salvaged:
+def salvage(path: Path, out: Path) -> Salvaged:
     """Writes all complete data of a damaged or unfinished log into a new, valid one.
 
     Args:
         path: The log; it is only read.
         out: The new log, whose status is ``interrupted``.
-        budget: Limits of the file.
 
     Raises:
         LogError: The first records, the model, or every step is lost.
@@ -87,37 +85,36 @@ def salvage(path: Path, out: Path, budget: Budget = DEFAULT_BUDGET) -> Salvaged:
         LogWriteError: The disk is full, or failed.
     """
     refuse_existing(out)
-    _refuse_sound(path, budget)
-    contents, saved = _saved(path, budget)
+    _refuse_sound(path)
+    contents, saved = _saved(path)
     _write(out, contents, result_record(contents.metadata[RESULT]))
     return dataclasses.replace(saved, log=str(out))
 
 
-def salvageable_steps(path: Path, budget: Budget = DEFAULT_BUDGET) -> int:
+def salvageable_steps(path: Path) -> int:
     """Returns the number of complete steps that ``salvage`` would write.
 
     Args:
         path: The log; it is only read.
-        budget: Limits of the file.
 
     Raises:
         InputError: The file does not exist.
     """
     try:
-        return _saved(path, budget)[1].steps
+        return _saved(path)[1].steps
     except LogError:
         return 0
 
 
-def _saved(path: Path, budget: Budget) -> tuple[Contents, Salvaged]:
+def _saved(path: Path) -> tuple[Contents, Salvaged]:
     """Contents of the new log, checked as a reader would check them."""
-    rescued = rescue(path, budget)
+    rescued = rescue(path)
     contents = rescued.contents
     drop_foreign_displays(contents)
     record, replaced = _with_what_is_left(path, contents)
     lost = (*replaced, *(name for name in rescued.absent if name not in replaced))
     controller = read_controller(path, contents, record)
-    every, whole = complete_steps(path, contents, record, rescued.discarded, budget)
+    every, whole = complete_steps(path, contents, record, rescued.discarded)
     span = max(whole) + 1
     missing = {topic.name: fill(contents, topic, span, record) for topic in every}
     cut(contents, {topic.name for topic in every}, span, record)
@@ -129,7 +126,7 @@ def _saved(path: Path, budget: Budget) -> tuple[Contents, Salvaged]:
     contents.metadata[RESULT] = result.texts()
     contents.metadata[SALVAGE] = {
         "source": encodable(path.name),
-        "source_sha256": sha256(read_bytes(path, budget)),
+        "source_sha256": sha256(read_bytes(path)),
         "complete_steps": str(len(whole)),
         TIED: "yes" if tied else "no",
     }
@@ -148,9 +145,9 @@ def _saved(path: Path, budget: Budget) -> tuple[Contents, Salvaged]:
     return contents, saved
 
 
-def _refuse_sound(path: Path, budget: Budget) -> None:
+def _refuse_sound(path: Path) -> None:
     try:
-        status = read_log(path, budget).status
+        status = read_log(path).status
     except LogError:
         return
     raise InputError(

@@ -7,26 +7,20 @@ from typing import Annotated, Any
 
 import typer
 
-from selfmodel.cli.arguments.confirmation import confirm_time
 from selfmodel.cli.arguments.inputs import check_folder
 from selfmodel.cli.arguments.options import (
-    DEFAULT_BUDGET,
-    FileBudget,
     Json,
     LogFiles,
     SelfModel,
     Threads,
-    Yes,
 )
 from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_json, print_lines, print_notes
 from selfmodel.cli.output.tables import show
 from selfmodel.errors import InputError
 from selfmodel.experiments import trial_logs
-from selfmodel.experiments.expected_time import calibration_seconds
 from selfmodel.logs.files import as_write_error, create_partial, publish, refuse_existing
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import Budget
 from selfmodel.simulation.calibration import EXACT_ERROR, UNDETERMINED, calibrate as fit_to
 from selfmodel.simulation.floating.fit import FACTORS
 from selfmodel.simulation.joints.sets import NOMINAL
@@ -44,8 +38,6 @@ def calibrate(
     ],
     robot: SelfModel = None,
     threads: Threads = 0,
-    budget: FileBudget = DEFAULT_BUDGET,
-    yes: Yes = False,
     as_json: Json = False,
 ) -> None:
     """Fit masses, friction, damping, motors, delay and contacts of the self-model to trials.
@@ -60,13 +52,10 @@ def calibrate(
         raise InputError(f"--out needs a name that ends in .xml, got {str(out)!r}")
     check_folder(out)
     refuse_existing(out)
-    allowed = Budget.parse(budget)
-    logs = trial_logs.logs(files, allowed)
-    before = trial_logs.robot_of_logs(logs, robot, allowed)
+    logs = trial_logs.logs(files)
+    before = trial_logs.robot_of_logs(logs, robot)
     _refuse_assets(before, robot or str(files[0]))
     trials = [log.trial for log in logs]
-    expected = calibration_seconds(before, trials, threads=threads, budget=allowed)
-    confirm_time(expected, allowed, yes=yes)
     fit = fit_to(before, trials, thread_count(threads))
     with create_partial(out) as file, as_write_error(out):
         file.write(fit.robot.mjcf.encode())

@@ -5,11 +5,9 @@ from time import perf_counter
 from typing import Any
 
 from selfmodel.cli.arguments.options import (
-    DEFAULT_BUDGET,
     DEFAULT_KIND_NAMES,
     Calibrated,
     ComparatorName,
-    FileBudget,
     Json,
     KindNames,
     LogFiles,
@@ -18,7 +16,6 @@ from selfmodel.cli.arguments.options import (
     LoggedSeed,
     SelfModel,
     Threads,
-    Yes,
 )
 from selfmodel.cli.diagnosed_logs import diagnose_logs
 from selfmodel.cli.output.plain import counted
@@ -37,7 +34,6 @@ from selfmodel.experiments import plugins
 from selfmodel.experiments.arguments import AUTO, comparator_choice
 from selfmodel.files import file_digest
 from selfmodel.recovery.repertoire.model_digest import self_model_digest
-from selfmodel.sandbox.budget import Budget
 from selfmodel.trials.trial import trial_names
 
 
@@ -52,8 +48,6 @@ def diagnose(
     generations: LoggedGenerations = None,
     seed: LoggedSeed = None,
     threads: Threads = 0,
-    budget: FileBudget = DEFAULT_BUDGET,
-    yes: Yes = False,
     as_json: Json = False,
 ) -> None:
     """Rank hypotheses by how well they predict logged trials, without a robot.
@@ -73,8 +67,6 @@ def diagnose(
         generations=generations,
         seed=seed,
         threads=threads,
-        budget=Budget.parse(budget),
-        yes=yes,
     )
     found, diagnosis = made.inputs, made.diagnosis
     result = {

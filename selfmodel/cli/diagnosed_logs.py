@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from selfmodel.cli.arguments.confirmation import confirm_time
 from selfmodel.cli.output.display import display
 from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_notes
@@ -14,13 +13,11 @@ from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.comparator_choice import ComparatorChoice
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.experiments import trial_logs
-from selfmodel.experiments.expected_time import diagnosis_seconds
 from selfmodel.experiments.log_diagnosis import LogDiagnosis, by_stage, set_up_diagnosis
 from selfmodel.faults.kind import FaultKind
 from selfmodel.logs import TrialLog
 from selfmodel.recovery.sequential_diagnosis import diagnose_trials
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import Budget
 from selfmodel.settings import Settings
 
 
@@ -57,8 +54,6 @@ def diagnose_logs(
     generations: int | None,
     seed: int | None,
     threads: int,
-    budget: Budget,
-    yes: bool,
 ) -> DiagnosedLogs:
     """Returns the diagnosis of logs; prints notes and progress on standard error.
 
@@ -72,15 +67,12 @@ def diagnose_logs(
         generations: Generations; None for the number in the first log.
         seed: Seed of all random numbers; None for that of the first log.
         threads: Threads of the physics; 0 for all processors.
-        budget: Memory and time that the logs may take.
-        yes: Whether a longer time is allowed.
 
     Raises:
         InputError: A log cannot be used, or no comparator can judge all trials.
-        BudgetError: The expected time is above the budget.
     """
-    logs = trial_logs.logs(files, budget)
-    model = trial_logs.robot_of_logs(logs, robot, budget)
+    logs = trial_logs.logs(files)
+    model = trial_logs.robot_of_logs(logs, robot)
     failed, healthy = by_stage([log.trial for log in logs])
     used = [log for log in logs if log.trial in failed]
     set_up = partial(
@@ -93,12 +85,7 @@ def diagnose_logs(
         settings=_settings(used[0].settings, population, generations),
         seed=seed,
         threads=threads,
-        budget=budget,
     )
-    expected = diagnosis_seconds(
-        model, set_up(calibrate=False), calibrate=calibrate, threads=threads, budget=budget
-    )
-    confirm_time(expected, budget, yes=yes)
     found = set_up(calibrate=calibrate)
     print_notes(*(f"note: {note}" for note in _notes(used)))
     with display() as on_event:

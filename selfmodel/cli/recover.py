@@ -10,14 +10,12 @@ import typer
 
 from selfmodel.cli.arguments import inputs
 from selfmodel.cli.arguments.options import (
-    DEFAULT_BUDGET,
     DEFAULT_KIND_NAMES,
     Calibrated,
     Case,
     ComparatorName,
     ControllerKind,
     Damage,
-    FileBudget,
     GapLevel,
     Generations,
     Json,
@@ -60,7 +58,6 @@ from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
 from selfmodel.report.progress import ProgressRecorder
 from selfmodel.report.run_folder import subject_of_run
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import Budget
 from selfmodel.settings import Settings
 from selfmodel.simulation.threads import thread_count
 from selfmodel.trials.trial import Trial
@@ -103,7 +100,6 @@ def recover(
         ),
     ] = None,
     threads: Threads = 0,
-    budget: FileBudget = DEFAULT_BUDGET,
     report: Annotated[
         bool,
         typer.Option(
@@ -119,8 +115,7 @@ def recover(
     The physical robot is a simulated one with the failure of --case or --damage, which the
     algorithm does not read. Every physical trial becomes a log in the folder of the run.
     """
-    limits = Budget.parse(budget)
-    entry = robots.robot_entry(robot, model_settings or (), limits)
+    entry = robots.robot_entry(robot, model_settings or ())
     considered = plugins.kinds(kinds)
     damaged = inputs.case_notation(entry.cases, case, damage)
     made = entry.robot()
@@ -140,7 +135,6 @@ def recover(
         max_speed=max_joint_speed,
         max_torque=max_joint_torque,
         max_self_collision=max_self_collision,
-        budget=limits,
     )
     if chosen.gait is not None:
         print_notes(
@@ -170,7 +164,7 @@ def recover(
         search=search,
         repertoire=gaits,
     )
-    options = ("--comparator", comparator, "--kinds", kinds, "--budget", budget)
+    options = ("--comparator", comparator, "--kinds", kinds)
     with followed(experiment.folder, made.name, options) if report else nullcontext() as live:
         with display(partial(_described, made, chosen.score)) as on_event:
             progress = ProgressRecorder(both(on_event, live) if live else on_event)
@@ -187,9 +181,7 @@ def recover(
             else:
                 print_report(found, experiment.folder)
         if live:
-            subject = subject_of_run(
-                experiment.folder, experiment.threads, limits, comparator, considered
-            )
+            subject = subject_of_run(experiment.folder, experiment.threads, comparator, considered)
             leave_report(live, experiment.folder, subject)
 
 

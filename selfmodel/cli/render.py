@@ -7,14 +7,11 @@ import typer
 
 from selfmodel.cli.arguments.inputs import check_folder
 from selfmodel.cli.arguments.options import (
-    DEFAULT_BUDGET,
-    FileBudget,
     Json,
     LogFile,
     NamedKinds,
     SelfModel,
     Threads,
-    Yes,
 )
 from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_json, print_lines
@@ -22,7 +19,6 @@ from selfmodel.cli.rendering import gl, video
 from selfmodel.cli.rendering.diagnosed import diagnosed
 from selfmodel.errors import InputError
 from selfmodel.logs.files import refuse_existing
-from selfmodel.sandbox.budget import Budget
 
 STRIPS = (".png", ".svg", ".pdf")
 """File extensions of a strip of pictures."""
@@ -69,8 +65,6 @@ def render(
         int, typer.Option(min=2, max=50, metavar="N", help="Pictures of a strip.")
     ] = 6,
     threads: Threads = 0,
-    budget: FileBudget = DEFAULT_BUDGET,
-    yes: Yes = False,
     as_json: Json = False,
 ) -> None:
     """Draw a logged trial beside a simulation of the same controller.
@@ -99,8 +93,6 @@ def render(
         pictures=None if out.suffix.lower() in FILMS else pictures,
         sticks=library is None,
         threads=threads,
-        budget=Budget.parse(budget),
-        yes=yes,
     )
     result |= {"drawn_by": "matplotlib" if library is None else "mujoco", "gl": library}
     if as_json:

@@ -8,15 +8,12 @@ import mujoco
 import typer
 
 from selfmodel.cli.arguments.options import (
-    DEFAULT_BUDGET,
-    FileBudget,
     HypothesisText,
     Json,
     LogFile,
     NamedKinds,
     SelfModel,
     Threads,
-    Yes,
 )
 from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_json, print_lines
@@ -25,7 +22,6 @@ from selfmodel.cli.output.tables import show
 from selfmodel.cli.replayed_log import replayed_log
 from selfmodel.errors import InputError
 from selfmodel.logs import TrialLog
-from selfmodel.sandbox.budget import Budget
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.threads import thread_count
 from selfmodel.simulation.trial_replay import Replay, replay as simulate
@@ -60,20 +56,17 @@ def replay(
         ),
     ] = None,
     threads: Threads = 0,
-    budget: FileBudget = DEFAULT_BUDGET,
-    yes: Yes = False,
     as_json: Json = False,
 ) -> None:
     """Simulate a logged trial again from its log, and compare the two bit by bit."""
     if out is not None:
         check_figure(out)
-    allowed = Budget.parse(budget)
-    given = replayed_log(file, hypothesis, kinds=kinds, model=model, budget=allowed, yes=yes)
+    given = replayed_log(file, hypothesis, kinds=kinds, model=model)
     log, robot, assumed = given.log, given.robot, given.hypothesis
     logged = log.software.get("mujoco", "unknown")
     exact = logged == mujoco.__version__ and not log.imported
     tolerance = 0.0 if exact else TOLERANCE
-    simulator = Simulator(robot, thread_count(threads), budget=allowed)
+    simulator = Simulator(robot, thread_count(threads))
     found = simulate(log.trial, assumed, simulator, tolerance)
     if not found.observed:
         raise InputError(

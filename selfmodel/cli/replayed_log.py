@@ -3,14 +3,11 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from selfmodel.cli.arguments.confirmation import confirm_time
 from selfmodel.experiments import plugins, trial_logs
-from selfmodel.experiments.expected_time import replay_seconds
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.logs import TrialLog
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import Budget
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,25 +25,19 @@ class ReplayedLog:
     hypothesis: Hypothesis
 
 
-def replayed_log(
-    file: Path, hypothesis: str, *, kinds: str, model: str | None, budget: Budget, yes: bool
-) -> ReplayedLog:
-    """Returns a log whose trial can be simulated in the time that the budget allows.
+def replayed_log(file: Path, hypothesis: str, *, kinds: str, model: str | None) -> ReplayedLog:
+    """Returns a log, and what its trial is simulated with.
 
     Args:
         file: Log of the trial.
         hypothesis: Notation of the hypothesis.
         kinds: Fault kinds that the notation may name, as in ``--kinds``.
         model: Self-model instead of the log's, as in ``--robot``.
-        budget: Memory and time that the log may take.
-        yes: Whether a longer time is allowed.
 
     Raises:
         InputError: The log, the hypothesis or the model cannot be used.
-        BudgetError: The simulation takes longer than the budget, and this is not allowed.
     """
-    (log,) = trial_logs.logs([file], budget)
-    robot = trial_logs.robot_of_logs([log], model, budget)
+    (log,) = trial_logs.logs([file])
+    robot = trial_logs.robot_of_logs([log], model)
     assumed = HypothesisSpace(robot.anatomy, plugins.kinds(kinds)).parse(hypothesis)
-    confirm_time(replay_seconds(robot, log.trial, budget), budget, yes=yes)
     return ReplayedLog(log, robot, assumed)

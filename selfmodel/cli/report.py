@@ -8,11 +8,9 @@ import typer
 
 from selfmodel.cli.arguments.inputs import check_folder
 from selfmodel.cli.arguments.options import (
-    DEFAULT_BUDGET,
     DEFAULT_KIND_NAMES,
     Calibrated,
     ComparatorName,
-    FileBudget,
     Json,
     KindNames,
     LoggedGenerations,
@@ -20,7 +18,6 @@ from selfmodel.cli.arguments.options import (
     LoggedSeed,
     SelfModel,
     Threads,
-    Yes,
 )
 from selfmodel.cli.diagnosed_logs import diagnose_logs
 from selfmodel.cli.output.printing import print_json, print_lines, print_notes
@@ -37,7 +34,6 @@ from selfmodel.report.html import html_of, template
 from selfmodel.report.recorded.logs_subject import subject_of_logs
 from selfmodel.report.run_folder import REPORT, is_run, subject_of_run
 from selfmodel.report.subject import Subject
-from selfmodel.sandbox.budget import Budget
 from selfmodel.simulation.threads import thread_count
 from selfmodel.trials.trial import trial_names
 
@@ -76,8 +72,6 @@ def report(
     generations: LoggedGenerations = None,
     seed: LoggedSeed = None,
     threads: Threads = 0,
-    budget: FileBudget = DEFAULT_BUDGET,
-    yes: Yes = False,
     as_json: Json = False,
 ) -> None:
     """Write a report of a run, of logs or of a campaign: one HTML file, which needs no network.
@@ -101,16 +95,15 @@ def report(
     check_folder(out)
     refuse_existing(out)
     template()  # a missing page is an error before any work is done
-    limits, searched = Budget.parse(budget), plugins.kinds(kinds)
+    searched = plugins.kinds(kinds)
     if folder is not None:
-        made = _of_folder(folder, thread_count(threads), limits, comparator, searched)
+        made = _of_folder(folder, thread_count(threads), comparator, searched)
     elif diagnosis is not None:
         subject = subject_of_logs(
             sources,
             diagnosis,
             robot=robot,
             threads=threads,
-            budget=limits,
             comparator=comparator,
             kinds=searched,
         )
@@ -127,8 +120,6 @@ def report(
             generations=generations,
             seed=seed,
             threads=threads,
-            budget=limits,
-            yes=yes,
         )
         made = report_of(
             Subject(
@@ -155,11 +146,9 @@ def report(
     _print(made, out, len(data), as_json=as_json)
 
 
-def _of_folder(
-    folder: Path, threads: int, budget: Budget, comparator: str, kinds: Sequence[FaultKind]
-) -> Report:
+def _of_folder(folder: Path, threads: int, comparator: str, kinds: Sequence[FaultKind]) -> Report:
     if is_run(folder):
-        return report_of(subject_of_run(folder, threads, budget, comparator, kinds))
+        return report_of(subject_of_run(folder, threads, comparator, kinds))
     if is_campaign(folder):
         return report_of_campaign(folder)
     raise InputError(

@@ -4,13 +4,12 @@ from typing import Annotated, Any
 
 import typer
 
-from selfmodel.cli.arguments.options import DEFAULT_BUDGET, FileBudget, Json, ModelSettings
+from selfmodel.cli.arguments.options import Json, ModelSettings
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.robot_parts import parts, print_parts
 from selfmodel.cli.output.tables import folding, print_tables
 from selfmodel.experiments.robots import is_model, notes_on, robot_entry
 from selfmodel.robot.designs import network_for
-from selfmodel.sandbox.budget import Budget
 from selfmodel.tasks import ROBOTS, Entry
 
 
@@ -21,7 +20,6 @@ def robots(
     ] = None,
     *,
     model_settings: ModelSettings = None,
-    budget: FileBudget = DEFAULT_BUDGET,
     as_json: Json = False,
 ) -> None:
     """List the robots; with ROBOT, its joints, sensors, motors, faults and cases of Table I."""
@@ -32,8 +30,8 @@ def robots(
         else:
             _print_all(every)
         return
-    entry = robot_entry(robot, model_settings or (), Budget.parse(budget))
-    notes = notes_on(robot, model_settings or (), Budget.parse(budget)) if is_model(robot) else ()
+    entry = robot_entry(robot, model_settings or ())
+    notes = notes_on(robot, model_settings or ()) if is_model(robot) else ()
     facts = {**_facts(entry), **parts(entry.robot()), "notes": list(notes)}
     if as_json:
         print_json(facts)

@@ -7,10 +7,8 @@ import numpy as np
 
 from selfmodel.cli.arguments import inputs
 from selfmodel.cli.arguments.options import (
-    DEFAULT_BUDGET,
     ControllerSource,
     Damage,
-    FileBudget,
     GapLevel,
     Json,
     ModelSettings,
@@ -33,7 +31,6 @@ from selfmodel.logs.atomic import partial_path
 from selfmodel.logs.physical_trial import run_trial
 from selfmodel.logs.records import TrialHeader
 from selfmodel.robot.designs import DESIGNS
-from selfmodel.sandbox.budget import Budget
 from selfmodel.settings import Settings
 from selfmodel.trials.trial import TrialPlan
 
@@ -52,12 +49,11 @@ def trial(
     steps: Steps = 1000,
     stage: StageName = "single",
     seed: Seed = 0,
-    budget: FileBudget = DEFAULT_BUDGET,
     as_json: Json = False,
 ) -> None:
     """Run one trial of the simulated physical robot and write its log."""
     kind = "network" if controller is None else str(controller)
-    made = robots.robot_entry(robot, model_settings or (), Budget.parse(budget)).robot()
+    made = robots.robot_entry(robot, model_settings or ()).robot()
     inputs.check_log_name(out)
     hidden = HypothesisSpace(made.anatomy, plugins.kinds(kinds)).parse(
         "intact" if damage is None else damage

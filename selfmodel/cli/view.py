@@ -8,15 +8,12 @@ import typer
 
 from selfmodel.cli.arguments.inputs import check_folder
 from selfmodel.cli.arguments.options import (
-    DEFAULT_BUDGET,
-    FileBudget,
     HypothesisText,
     Json,
     LogFile,
     NamedKinds,
     SelfModel,
     Threads,
-    Yes,
 )
 from selfmodel.cli.output.printing import print_json, print_lines, print_notes
 from selfmodel.cli.rendering.film import film_of
@@ -33,7 +30,6 @@ from selfmodel.cli.viewing.rerun_view import (
 from selfmodel.errors import InputError
 from selfmodel.logs.files import refuse_existing
 from selfmodel.robot.state import POSE
-from selfmodel.sandbox.budget import Budget
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.threads import thread_count
 from selfmodel.simulation.trial_replay import Replay, replay
@@ -64,8 +60,6 @@ def view(
         ),
     ] = PORT,
     threads: Threads = 0,
-    budget: FileBudget = DEFAULT_BUDGET,
-    yes: Yes = False,
     as_json: Json = False,
 ) -> None:
     """Open a logged trial in Rerun: the body as logged, and as simulated under a hypothesis.
@@ -78,11 +72,10 @@ def view(
     else:
         check_display()
     import_rerun()  # a missing package is an error before any work is done
-    allowed = Budget.parse(budget)
-    given = replayed_log(file, hypothesis, kinds=kinds, model=model, budget=allowed, yes=yes)
+    given = replayed_log(file, hypothesis, kinds=kinds, model=model)
     log, robot, assumed = given.log, given.robot, given.hypothesis
     check_magnitudes(log.trial, POSE)
-    found = replay(log.trial, assumed, Simulator(robot, thread_count(threads), budget=allowed))
+    found = replay(log.trial, assumed, Simulator(robot, thread_count(threads)))
     if found.diverged:
         print_notes("note: the simulation diverged: with this hypothesis the model is unstable")
     written = _show(given, found, out, port)

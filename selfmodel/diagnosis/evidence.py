@@ -272,11 +272,9 @@ class Evidence:
     def _batches(
         self, prepared: PreparedTrial, trial: Trial, hypotheses: Sequence[Hypothesis]
     ) -> list[list[Hypothesis]]:
-        """Returns the hypotheses in batches that the memory of the budget allows."""
+        """Returns the hypotheses in batches that the memory allows."""
         simulator = self._simulator
-        size = largest_batch(
-            simulator.robot, prepared.request, trial.behaviour.steps, simulator.budget
-        )
+        size = largest_batch(simulator.robot, prepared.request, trial.behaviour.steps)
         listed = list(hypotheses)
         return [listed[first : first + size] for first in range(0, len(listed), size)]
 

@@ -43,7 +43,6 @@ from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
 from selfmodel.recovery.scores.upright import UPRIGHT
 from selfmodel.recovery.sequential_diagnosis import diagnose_trials
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.settings import Settings
 from selfmodel.simulation import calibration, trial_replay
 from selfmodel.simulation.calibration import Calibration
@@ -181,7 +180,6 @@ def calibrate(
     robot: RobotSource,
     *,
     threads: int = 0,
-    budget: Budget = DEFAULT_BUDGET,
 ) -> Calibration:
     """Returns the self-model of a robot, fitted to trials of the healthy robot.
 
@@ -200,13 +198,12 @@ def calibrate(
         trials: Trials of the healthy robot, or paths of their logs, at least one.
         robot: The nominal robot, its name, or the path of its MJCF or URDF file.
         threads: Threads of the physics; 0 for all processors.
-        budget: Memory that each log may take.
 
     Raises:
         InputError: There are no trials, a log is unusable, or a trial lacks the signals that a fit
             needs.
     """
-    return calibration.calibrate(robot_of(robot), trials_of(trials, budget), thread_count(threads))
+    return calibration.calibrate(robot_of(robot), trials_of(trials), thread_count(threads))
 
 
 def replay(
@@ -216,7 +213,6 @@ def replay(
     *,
     tolerance: float = 0.0,
     threads: int = 0,
-    budget: Budget = DEFAULT_BUDGET,
 ) -> Replay:
     """Returns the comparison of a trial with its simulation under a hypothesis.
 
@@ -231,15 +227,14 @@ def replay(
         robot: The nominal robot, its name, or the path of its MJCF or URDF file.
         tolerance: Largest difference of two numbers that count as equal, in their unit.
         threads: Threads of the physics; 0 for all processors.
-        budget: Memory that each log may take.
 
     Raises:
         InputError: The log is unusable, the robot is unknown, or the notation is invalid.
     """
-    (logged,) = trials_of([trial], budget)
+    (logged,) = trials_of([trial])
     robot = robot_of(robot)
     assumed = hypothesis_of(hypothesis, robot)
-    return trial_replay.replay(logged, assumed, Simulator(robot, threads, budget=budget), tolerance)
+    return trial_replay.replay(logged, assumed, Simulator(robot, threads), tolerance)
 
 
 def diagnose(
@@ -253,7 +248,6 @@ def diagnose(
     calibrate: bool = True,
     seed: int | None = None,
     threads: int = 0,
-    budget: Budget = DEFAULT_BUDGET,
     on_event: Callable[[Event], None] = _ignore,
 ) -> Diagnosis:
     """Returns the hypotheses that explain logged trials, ranked, with a verdict.
@@ -283,7 +277,6 @@ def diagnose(
         calibrate: Whether the self-model is fitted to the healthy trials.
         seed: Seed of all random numbers; None for that of the first trial.
         threads: Threads of the physics; 0 for all processors.
-        budget: Memory that each log, and a batch of simulations, may take.
         on_event: Called with the progress of the diagnosis.
 
     Raises:
@@ -301,7 +294,6 @@ def diagnose(
         seed=seed,
         calibrate=calibrate,
         threads=threads,
-        budget=budget,
     )
     on_event(found.comparator)
     if found.calibration is not None:

@@ -23,7 +23,6 @@ from selfmodel.recovery.repertoire.repertoire import Repertoire
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.trials.trial import Trial
 
 AUTO = "auto"
@@ -39,9 +38,7 @@ KindSource = str | Sequence[str | FaultKind]
 """Names of fault kinds separated by commas, or a sequence of names and fault kinds."""
 
 
-def load_robot(
-    name: str | Path, settings: MjcfSettings | None = None, budget: Budget = DEFAULT_BUDGET
-) -> Robot:
+def load_robot(name: str | Path, settings: MjcfSettings | None = None) -> Robot:
     """Returns a robot by name, or the robot of an MJCF or URDF file.
 
     Example:
@@ -53,14 +50,13 @@ def load_robot(
         name: ``quadruped``, ``hexapod``, ``suite-DOMAIN-TASK``, or the path of an MJCF or URDF
             file.
         settings: Settings of the file; None for those of the TOML file beside it.
-        budget: Memory and time that the model of a file may take.
 
     Raises:
         InputError: The name is unknown, the file is no valid robot, or settings are given for a
             robot by name.
     """
     if is_model(str(name)):
-        return load_mjcf(name, settings, budget)
+        return load_mjcf(name, settings)
     if settings is not None:
         raise InputError(
             f"settings are for an MJCF or URDF file: {str(name)!r} is the name of a robot"
@@ -164,21 +160,18 @@ def sources_of(given: TrialSource | Sequence[TrialSource]) -> tuple[TrialSource,
     return tuple(given)
 
 
-def trials_of(
-    given: TrialSource | Sequence[TrialSource], budget: Budget = DEFAULT_BUDGET
-) -> tuple[Trial, ...]:
+def trials_of(given: TrialSource | Sequence[TrialSource]) -> tuple[Trial, ...]:
     """Returns trials, given as themselves or as paths of their logs.
 
     Args:
         given: The trials.
-        budget: Memory that each log may take.
 
     Raises:
         InputError: A log is unusable or given twice, or an item has another type.
     """
     sources = sources_of(given)
     paths = [Path(one) for one in sources if not isinstance(one, Trial)]
-    logs = iter(trial_logs.logs(paths, budget))
+    logs = iter(trial_logs.logs(paths))
     return tuple(one if isinstance(one, Trial) else next(logs).trial for one in sources)
 
 

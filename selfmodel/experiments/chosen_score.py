@@ -19,7 +19,6 @@ from selfmodel.recovery.scores.joint_limits import upright_within
 from selfmodel.recovery.scores.tracking import TRACKING, tracking
 from selfmodel.recovery.scores.upright import UPRIGHT
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.tasks import Entry
 
 
@@ -49,7 +48,6 @@ def choose_score(
     max_speed: float | None = None,
     max_torque: float | None = None,
     max_self_collision: float | None = None,
-    budget: Budget = DEFAULT_BUDGET,
 ) -> ChosenScore:
     """Returns the score of that name for a robot.
 
@@ -67,7 +65,6 @@ def choose_score(
         max_torque: Largest torque of a joint, N m; None for no limit.
         max_self_collision: Largest depth to which two bodies penetrate each other, m; None for no
             limit.
-        budget: Memory and time that the file may take.
 
     Raises:
         InputError: The name is unknown or the robot has no such score, a reference or a limit is
@@ -84,7 +81,7 @@ def choose_score(
     if name != TRACKING:
         return ChosenScore(plugins.score(name, robot.name, entry), gait)
     if reference is not None:
-        return ChosenScore(tracking(read_reference(reference, robot, budget), robot), gait)
+        return ChosenScore(tracking(read_reference(reference, robot), robot), gait)
     first = gait or random_controller(design, seed)
     motion = simulated_reference(robot, first, steps)
     check_moving(motion)

@@ -12,7 +12,6 @@ from selfmodel.experiments.arguments import TrialSource
 from selfmodel.experiments.fitting import fitted
 from selfmodel.faults.kind import FaultKind
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.simulator import Simulator
@@ -52,7 +51,6 @@ def set_up_diagnosis(
     seed: int | None,
     calibrate: bool,
     threads: int,
-    budget: Budget = DEFAULT_BUDGET,
 ) -> LogDiagnosis:
     """Returns the inputs of a diagnosis: reads the logs, calibrates, and sets up the search.
 
@@ -68,7 +66,6 @@ def set_up_diagnosis(
         seed: Seed of all random numbers; None for that of the first trial to explain.
         calibrate: Whether the self-model is fitted to the healthy trials.
         threads: Threads of the physics; 0 for all processors.
-        budget: Memory that each log, and a batch of simulations, may take.
 
     Raises:
         InputError: There are no trials, a log is unusable, or a trial has no log and no robot is
@@ -77,16 +74,14 @@ def set_up_diagnosis(
     if not trials:
         raise InputError("expected at least one trial to explain, got none")
     sources = [*trials, *healthy]
-    read = {log.trial.path: log for log in trial_logs.logs(_paths(sources), budget)}
+    read = {log.trial.path: log for log in trial_logs.logs(_paths(sources))}
     found = [s if isinstance(s, Trial) else read[str(Path(s))].trial for s in sources]
     if robot is None and len(read) < len(found):
         raise InputError(
             "a trial without a log has no model of its robot: give robot=, such as "
             'selfmodel.load_robot("quadruped")'
         )
-    nominal = (
-        trial_logs.robot_of_logs(list(read.values()), None, budget) if robot is None else robot
-    )
+    nominal = trial_logs.robot_of_logs(list(read.values()), None) if robot is None else robot
     to_explain, reference = found[: len(trials)], found[len(trials) :]
     if not reference:
         to_explain, reference = by_stage(to_explain)
@@ -96,7 +91,7 @@ def set_up_diagnosis(
     chosen = choose_comparator(nominal, [*reference, *to_explain])
     count = thread_count(threads)
     fit = fitted(nominal, reference, count) if calibrate and reference else None
-    simulator = Simulator(fit.robot if fit else nominal, count, budget=budget)
+    simulator = Simulator(fit.robot if fit else nominal, count)
     return LogDiagnosis(
         damaged=tuple(to_explain),
         healthy=tuple(reference),

@@ -13,7 +13,6 @@ from selfmodel.logs.recordings.tables.table import FORMATS, is_table, read_table
 from selfmodel.recovery.random_streams import repair_stream
 from selfmodel.recovery.scores.tracking import Reference
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
 
@@ -24,27 +23,26 @@ TIME = "time"
 """Name of the column of a table with the time of each row, s."""
 
 
-def read_reference(path: Path, robot: Robot, budget: Budget = DEFAULT_BUDGET) -> Reference:
+def read_reference(path: Path, robot: Robot) -> Reference:
     """Returns the reference trajectory in a file, which begins at time 0.
 
     Args:
         path: A trial's log, or a table with a column ``time``, s, and columns with the names of
             hinges, rad. Other columns are ignored.
         robot: The robot that is to follow the trajectory.
-        budget: Memory and time that the file may take.
 
     Raises:
         InputError: The file cannot be read, or has no column of the robot.
     """
     if path.suffix.lower() == ".mcap":
-        (log,) = logs([path], budget)
+        (log,) = logs([path])
         return _reference_of(log.trial.behaviour, str(path))
     if not is_table(path):
         raise InputError(
             f"{path}: expected a log (.mcap) or a table ({', '.join(FORMATS)}) as reference"
         )
     hinges = robot.anatomy.hinges
-    table = read_table(path, (TIME, *hinges), budget)
+    table = read_table(path, (TIME, *hinges))
     found = tuple(name for name in hinges if name in table.columns)
     if TIME not in table.columns or not found:
         raise InputError(

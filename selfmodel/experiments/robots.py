@@ -7,25 +7,24 @@ from pathlib import Path
 from selfmodel.errors import InputError
 from selfmodel.files import encodable, read_file
 from selfmodel.robot.mjcf.adaptation import adapt
+from selfmodel.robot.mjcf.isolated_model import check_compiles
 from selfmodel.robot.mjcf.load import load_mjcf
-from selfmodel.robot.mjcf.rehearsal import rehearse
 from selfmodel.robot.mjcf.settings import MjcfSettings, parse_setting, read_settings
+from selfmodel.robot.mjcf.untrusted import MAX_TEXT
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.tasks import Entry, entry
 
 _MODEL_ENDINGS = (".xml", ".urdf", ".xacro")
 """Endings of models; a xacro is refused with the remedy."""
 
 
-def robot_entry(name: str, settings: Iterable[str] = (), budget: Budget = DEFAULT_BUDGET) -> Entry:
+def robot_entry(name: str, settings: Iterable[str] = ()) -> Entry:
     """Returns a robot, its cases and its tasks, by name or by MJCF or URDF file.
 
     Args:
         name: Name of a robot of selfmodel, or the path of an MJCF or URDF file.
         settings: Settings of the file, such as ``forward=-x``; they override those of the
             TOML file beside it.
-        budget: Memory and time that the model may take.
 
     Raises:
         InputError: The name is unknown (the message has the nearest names), the file is no valid
@@ -33,7 +32,7 @@ def robot_entry(name: str, settings: Iterable[str] = (), budget: Budget = DEFAUL
     """
     given = tuple(settings)
     if is_model(name):
-        made = load_mjcf(Path(name), _settings(name, given), budget)
+        made = load_mjcf(Path(name), _settings(name, given))
         return Entry(robot=lambda: made)
     if given:
         raise InputError(
@@ -44,11 +43,9 @@ def robot_entry(name: str, settings: Iterable[str] = (), budget: Budget = DEFAUL
     return entry(name)
 
 
-def notes_on(
-    name: str, settings: Iterable[str], budget: Budget = DEFAULT_BUDGET
-) -> tuple[str, ...]:
+def notes_on(name: str, settings: Iterable[str]) -> tuple[str, ...]:
     """Returns the changes that made an MJCF or URDF file a robot; see ``robot_entry``."""
-    return adapt(Path(name), _settings(name, settings), budget).notes
+    return adapt(Path(name), _settings(name, settings)).notes
 
 
 def _settings(name: str, given: Iterable[str]) -> MjcfSettings:
@@ -61,9 +58,7 @@ def is_model(name: str) -> bool:
     return Path(name).suffix.lower() in _MODEL_ENDINGS
 
 
-def recorded_robot(
-    name: str, control_timestep: float | None, budget: Budget = DEFAULT_BUDGET
-) -> Robot:
+def recorded_robot(name: str, control_timestep: float | None) -> Robot:
     """Returns the robot of a recording: by name, or of a model file, adapted as for a trial.
 
     A model that a calibration wrote is a robot already, and is not adapted.
@@ -72,7 +67,6 @@ def recorded_robot(
         name: Name of a robot of selfmodel, or the path of a model file.
         control_timestep: Duration of a control step of a model file, s; None for that of its
             settings.
-        budget: Memory and time that the model may take.
 
     Raises:
         InputError: The name is unknown, or the model is unusable.
@@ -82,22 +76,21 @@ def recorded_robot(
     path = Path(name)
     if control_timestep is not None and path.suffix.lower() == ".xml":
         try:
-            raw = robot(name, control_timestep, budget)
+            raw = robot(name, control_timestep)
         except InputError:
             raw = None
         if raw is not None and raw.is_calibrated:
             return raw
     step = {} if control_timestep is None else {"control_timestep": control_timestep}
-    return load_mjcf(path, read_settings(path, step), budget)
+    return load_mjcf(path, read_settings(path, step))
 
 
-def robot(name: str, control_timestep: float, budget: Budget = DEFAULT_BUDGET) -> Robot:
+def robot(name: str, control_timestep: float) -> Robot:
     """Returns a robot by name, or the robot of an unadapted MJCF file.
 
     Args:
         name: Name of a robot of selfmodel, or a path that ends in ``.xml``.
         control_timestep: Duration of a control step of an MJCF file, s.
-        budget: Memory and time that the model may take.
 
     Raises:
         InputError: The name is unknown, or the model is unusable.
@@ -107,9 +100,9 @@ def robot(name: str, control_timestep: float, budget: Budget = DEFAULT_BUDGET) -
         return robot_entry(name).robot()
     if path.suffix.lower() != ".xml":
         raise InputError(f"{path}: expected an MJCF file, ROBOT.xml, that needs no adaptation")
-    data = read_file(path, "an MJCF file", budget.model_text)
+    data = read_file(path, "an MJCF file", MAX_TEXT)
     try:
-        rehearse(data.decode(), {}, control_timestep, budget)
+        check_compiles(data.decode(), {}, control_timestep)
         return Robot(encodable(path.stem), data.decode(), control_timestep)
     except (ValueError, KeyError) as error:
         reason = " ".join(str(error).split())

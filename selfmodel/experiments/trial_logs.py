@@ -14,21 +14,19 @@ from selfmodel.robot.designs import DESIGNS
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import read_settings
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 
 
-def logs(paths: Sequence[Path], budget: Budget = DEFAULT_BUDGET) -> list[TrialLog]:
+def logs(paths: Sequence[Path]) -> list[TrialLog]:
     """Returns the trials in log files.
 
     Args:
         paths: The logs.
-        budget: Memory that each file may take.
 
     Raises:
         InputError: A log is unusable, or is given twice.
     """
     try:
-        found = [read_log(path, budget) for path in paths]
+        found = [read_log(path) for path in paths]
     except LogError as error:
         raise InputError(str(error)) from error
     digests: dict[str, Path] = {}
@@ -39,27 +37,24 @@ def logs(paths: Sequence[Path], budget: Budget = DEFAULT_BUDGET) -> list[TrialLo
     return found
 
 
-def robot_of_logs(
-    found: Sequence[TrialLog], override: str | None, budget: Budget = DEFAULT_BUDGET
-) -> Robot:
+def robot_of_logs(found: Sequence[TrialLog], override: str | None) -> Robot:
     """Returns the robot of logs.
 
     Args:
         found: At least one log.
         override: Name of a robot, or an MJCF or URDF file, that replaces the model in the logs.
-        budget: Memory and time that each model may take.
 
     Raises:
         InputError: The logs have different robots, their model is unusable, or the replacement has
             other sensors, motors or hinges.
     """
     try:
-        own = common_robot(found, budget)
+        own = common_robot(found)
     except LogError as error:
         raise InputError(str(error)) from error
     if override is None:
         return own
-    chosen = _override(override, own, budget)
+    chosen = _override(override, own)
     if chosen.anatomy.names != own.anatomy.names:
         raise InputError(
             f"{override} is another robot than that of {found[0].trial.path}: "
@@ -68,19 +63,19 @@ def robot_of_logs(
     return chosen
 
 
-def _override(name: str, own: Robot, budget: Budget) -> Robot:
+def _override(name: str, own: Robot) -> Robot:
     """Returns the robot that replaces the model in a log; a file is adapted or unchanged."""
     if not is_model(name):
         return robot_entry(name).robot()
     try:
-        raw = robot(name, own.control_timestep, budget)
+        raw = robot(name, own.control_timestep)
     except InputError:
         raw = None
     if raw is not None and raw.is_calibrated:
         return raw
     path = Path(name)
     settings = read_settings(path, {"control_timestep": own.control_timestep})
-    ready = load_mjcf(path, settings, budget)
+    ready = load_mjcf(path, settings)
     names = own.anatomy.names
     if raw is not None and ready.anatomy.names != names == raw.anatomy.names:
         return raw

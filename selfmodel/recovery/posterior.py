@@ -17,6 +17,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.recovery.uncertainty import estimated_uncertainty
 from selfmodel.settings import Settings
+from selfmodel.simulation.batch_memory import batch_bytes
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.conditions import Condition, Uncertainty, draw_conditions
 from selfmodel.simulation.model_distribution import Weighted
@@ -176,7 +177,7 @@ def _paths(
 
     The path of a simulation that diverged is NaN. The models of a batch take bounded memory.
     """
-    affordable = simulator.budget.models_bytes // int(simulator.robot.model.nbuffer)
+    affordable = batch_bytes() // int(simulator.robot.model.nbuffer)
     size = max(1, min(max(BATCH, simulator.threads), affordable))
     paths = []
     for first in range(0, len(conditions), size):

@@ -175,7 +175,7 @@ def recover(
 
 def _fitted(simulator: Simulator, calibration: Calibration) -> Simulator:
     """Returns a simulator of the calibrated self-model, with the same statistics."""
-    return Simulator(calibration.robot, simulator.threads, simulator.stats, simulator.budget)
+    return Simulator(calibration.robot, simulator.threads, simulator.stats)
 
 
 def _judged(

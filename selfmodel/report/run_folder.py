@@ -23,7 +23,6 @@ from selfmodel.report.recorded.plug_ins import comparator_name, recorded_space
 from selfmodel.report.run_result import RESULT, RunResult, parsed, read_run_result
 from selfmodel.report.subject import Subject
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.trials.trial import Trial
 
@@ -39,7 +38,6 @@ def is_run(folder: Path) -> bool:
 def subject_of_run(
     folder: Path,
     threads: int = 0,
-    budget: Budget = DEFAULT_BUDGET,
     comparator: str = AUTO,
     kinds: Sequence[FaultKind] = (),
 ) -> Subject:
@@ -52,7 +50,6 @@ def subject_of_run(
     Args:
         folder: Folder of the run.
         threads: Threads of the physics; 0 for all processors.
-        budget: Memory that each log may take.
         comparator: Name of the comparator of the run, which may be ``package.module:object``;
             ``auto`` for that of its result.
         kinds: Fault kinds of the run that are no entry points.
@@ -63,8 +60,8 @@ def subject_of_run(
     paths = sorted((folder / TRIALS).glob("*.mcap"), key=trial_order)
     if not paths:
         raise InputError(f"{folder}: expected the folder of a run with logs in {TRIALS}, got none")
-    logs = trial_logs.logs(paths, budget)
-    robot = trial_logs.robot_of_logs(logs, None, budget)
+    logs = trial_logs.logs(paths)
+    robot = trial_logs.robot_of_logs(logs, None)
     result = read_run_result(folder)
     space = recorded_space(folder / RESULT, robot, result.kinds if result else (), kinds)
     diagnoses = read_diagnoses(folder, space)

@@ -17,7 +17,6 @@ from types import MappingProxyType
 import mujoco
 
 from selfmodel.errors import InputError
-from selfmodel.sandbox.budget import BudgetError
 
 _TIME = re.compile(r" *Time = [^ ]*\.$")
 _NUMBER = re.compile(r"\d+(\.\d+)?")
@@ -87,7 +86,6 @@ def mujoco_errors_as_input_errors(task: str) -> Iterator[None]:
 
     Raises:
         InputError: MuJoCo raised an exception.
-        BudgetError: MuJoCo is out of memory.
     """
     configure()
     try:
@@ -97,9 +95,8 @@ def mujoco_errors_as_input_errors(task: str) -> Iterator[None]:
             raise
         message = " ".join(str(error).split()).removeprefix("Error: ")
         if isinstance(error, MemoryError) or any(part in message for part in _OUT_OF_MEMORY):
-            raise BudgetError(
-                f"MuJoCo cannot {task}, for lack of memory: to go on, raise the memory with "
-                f"--budget memory=..."
+            raise InputError(
+                f"MuJoCo cannot {task}, for lack of memory: make the model smaller"
             ) from error
         raise InputError(f"MuJoCo cannot {task}: {message}") from error
 

@@ -1,10 +1,16 @@
-"""Memory of a batch of simulations, and the size of a batch that fits into a budget."""
+"""Memory of a batch of simulations, and the size of a batch that the free memory allows."""
 
 import mujoco
 
+from selfmodel.isolation import available_memory
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import Budget, memory_error
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
+
+MAX_BATCH = 512 * 2**20
+"""Largest memory of a batch, bytes; a larger one is not faster."""
+
+_FREE_SHARE = 0.25
+"""Share of the available memory that a batch may take: other processes may run studies beside."""
 
 _NUMBER_BYTES = 8
 _BODY_NUMBERS = 16
@@ -14,26 +20,20 @@ _COPIES = 3
 """Arrays of a recorded signal at one time: during the run, its result, and a comparison."""
 
 
-def largest_batch(robot: Robot, request: Request, steps: int, budget: Budget) -> int:
-    """Returns the largest number of hypotheses whose simulations fit into a budget together.
+def batch_bytes() -> int:
+    """Returns the memory that the models, simulations and signals of a batch may take, bytes."""
+    return min(MAX_BATCH, int(_FREE_SHARE * available_memory()))
+
+
+def largest_batch(robot: Robot, request: Request, steps: int) -> int:
+    """Returns the largest number of hypotheses to simulate together; at least one.
 
     Args:
         robot: The robot.
         request: Simulation of each hypothesis.
         steps: Control steps of the trial.
-        budget: Memory of the models, the simulations and their signals.
-
-    Raises:
-        BudgetError: The simulation of one hypothesis does not fit.
     """
-    needed = hypothesis_bytes(robot, request, steps)
-    if needed > budget.models_bytes:
-        raise memory_error(
-            f"the simulation of one hypothesis takes {needed / 1e9:.2g} GB of memory, more than "
-            f"{budget.models_bytes / 1e9:.2g} GB",
-            budget,
-        )
-    return budget.models_bytes // needed
+    return max(1, batch_bytes() // hypothesis_bytes(robot, request, steps))
 
 
 def hypothesis_bytes(robot: Robot, request: Request, steps: int) -> int:

@@ -19,8 +19,8 @@ from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.mujoco_errors import uncounted_warnings
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.simulation.batch import EarlyStop, LiveBatch, live_signals, new_batch
+from selfmodel.simulation.batch_memory import batch_bytes
 from selfmodel.simulation.conditions import (
     Condition,
     ReadingNoise,
@@ -39,7 +39,7 @@ Run = tuple[Hypothesis, CommandSource]
 """A simulation: faults of the robot, and the source of its commands."""
 
 MAX_CACHED_EMBODIMENTS = 1024
-"""Largest number of cached models, if the budget does not limit it."""
+"""Largest number of cached models, if the memory does not limit it."""
 
 MAX_CACHED_TRIALS = 16
 """Trials with cached ground contact points."""
@@ -70,7 +70,6 @@ class Simulator:
         robot: The healthy robot.
         threads: Threads of MuJoCo's steps, including the caller's; 0 for all processors.
         stats: Statistics that are updated; new ones by default.
-        budget: Memory of the models and results of a batch.
     """
 
     def __init__(
@@ -78,14 +77,12 @@ class Simulator:
         robot: Robot,
         threads: int = 0,
         stats: SimulationStats | None = None,
-        budget: Budget = DEFAULT_BUDGET,
     ) -> None:
         self.robot = robot
         self.threads = thread_count(threads)
         self.stats = SimulationStats() if stats is None else stats
-        self.budget = budget
         # A quadruped or hexapod has 0.3 MB, a dog with its meshes 5 MB.
-        affordable = int(CACHED_SHARE * budget.models_bytes) // int(robot.model.nbuffer)
+        affordable = int(CACHED_SHARE * batch_bytes()) // int(robot.model.nbuffer)
         self._embodiment = lru_cache(max(1, min(MAX_CACHED_EMBODIMENTS, affordable)))(
             partial(build, robot)
         )

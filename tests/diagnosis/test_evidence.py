@@ -19,8 +19,8 @@ from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.settings import Settings
+from selfmodel.simulation import batch_memory
 from selfmodel.simulation.batch_memory import hypothesis_bytes
 from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
@@ -44,8 +44,8 @@ CLOSED_LOOP = ClosedLoop(("base_position",))
 class CountingSimulator(Simulator):
     """Counts how often each hypothesis is simulated for each driver or each set of segments."""
 
-    def __init__(self, robot: Robot, budget: Budget = DEFAULT_BUDGET) -> None:
-        super().__init__(robot, threads=1, budget=budget)
+    def __init__(self, robot: Robot) -> None:
+        super().__init__(robot, threads=1)
         self.times: Counter = Counter()
         self.calls = 0
 
@@ -128,13 +128,18 @@ REQUESTS = [
 
 
 @pytest.mark.parametrize("comparator", REQUESTS)
-def test_losses_are_the_same_in_batches_that_fit_into_a_small_budget(
-    comparator: Comparator, quadruped: Robot, trials: list[Trial], three: list[Hypothesis]
+def test_losses_are_the_same_in_small_batches(
+    comparator: Comparator,
+    quadruped: Robot,
+    trials: list[Trial],
+    three: list[Hypothesis],
+    monkeypatch: pytest.MonkeyPatch,
 ):
     whole = Evidence(Simulator(quadruped, 1), comparator).losses(three, trials)
     request = comparator.prepare(trials[0]).request
     needed = hypothesis_bytes(quadruped, request, STEPS)
-    small = CountingSimulator(quadruped, Budget(memory=4 * needed))  # two hypotheses in a batch
+    monkeypatch.setattr(batch_memory, "batch_bytes", lambda: 2 * needed)
+    small = CountingSimulator(quadruped)
     batched = Evidence(small, comparator).losses(three, trials)
 
     assert small.calls == 2 * len(trials)

@@ -1,94 +1,60 @@
-"""Tasks for the tests of isolation: each is one thing that a child process may do."""
+"""Tasks for the tests of isolation: each runs in a child process."""
 
-import ctypes
 import os
-import resource
-import socket
-import stat
+import signal
+import sys
+import tempfile
+import time
 from pathlib import Path
 
 from selfmodel.errors import InputError
-from selfmodel.logs.errors import CorruptError
-from selfmodel.sandbox.budget import Budget
-from selfmodel.sandbox.message import Message
+from selfmodel.isolation import Message
+from selfmodel.logs import CorruptError
 
 
-def echo(message: Message, _: Budget, __: Path) -> Message:
-    return Message({"facts": dict(message.facts)}, message.blobs)
+def echo(request: Message) -> Message:
+    """Prints, which must not reach the answer."""
+    sys.stdout.write("noise\n")
+    os.write(1, b"more noise")
+    return request
 
 
-def allocate(message: Message, _: Budget, __: Path) -> Message:
-    return Message({"bytes": len(bytearray(message.facts["bytes"]))})
+def crash(_: Message) -> Message:
+    os.kill(os.getpid(), signal.SIGSEGV)
+    return Message({})
 
 
-def loop(_: Message, __: Budget, ___: Path) -> Message:
+def allocate(request: Message) -> Message:
+    return Message({"bytes": len(bytearray(request.header["bytes"]))})
+
+
+def loop(_: Message) -> Message:
     while True:
         pass
 
 
-def cpu_limit(_: Message, __: Budget, ___: Path) -> Message:
-    return Message({"seconds": resource.getrlimit(resource.RLIMIT_CPU)[0]})
-
-
-def wait(_: Message, __: Budget, ___: Path) -> Message:
-    left, right = socket.socketpair()
-    with left, right:
-        left.recv(1)  # for ever
+def wait(_: Message) -> Message:
+    time.sleep(1000)
     return Message({})
 
 
-def crash(_: Message, __: Budget, ___: Path) -> Message:
-    ctypes.string_at(0)
-    return Message({})
+def nest(request: Message) -> Message:
+    return nest(request)
 
 
-def refuse(_: Message, __: Budget, ___: Path) -> Message:
-    raise InputError("expected a robot, got a chair")
+def refuse(_: Message) -> Message:
+    raise InputError("no robot")
 
 
-def refuse_log(_: Message, __: Budget, ___: Path) -> Message:
-    raise CorruptError("a.mcap", "it is damaged", advice="make it again")
+def refuse_log(_: Message) -> Message:
+    raise CorruptError("walk.bag", "it is damaged", advice="record it again")
 
 
-def fail(_: Message, __: Budget, ___: Path) -> Message:
-    raise ZeroDivisionError("a mistake")
+def fail(_: Message) -> Message:
+    raise KeyError("a defect")
 
 
-def nest(_: Message, __: Budget, ___: Path) -> Message:
-    def deeper() -> None:
-        deeper()
-
-    deeper()
-    return Message({})
-
-
-def write(message: Message, _: Budget, scratch: Path) -> Message:
-    (scratch / "own").write_text("allowed")
-    results = []
-    for path in map(Path, message.facts["paths"]):
-        try:
-            path.write_text("changed")
-            results.append("changed")
-        except OSError as error:
-            results.append(type(error).__name__)
-    return Message({"results": results})
-
-
-def fill_disk(message: Message, _: Budget, scratch: Path) -> Message:
-    with (scratch / "big").open("wb") as file:
-        file.truncate(message.facts["bytes"])
-    return Message({})
-
-
-def answer(message: Message, _: Budget, __: Path) -> Message:
-    return Message({"text": "x" * message.facts["characters"]})
-
-
-def sockets(_: Message, __: Budget, ___: Path) -> Message:
-    found = 0
-    for descriptor in range(64):
-        try:
-            found += stat.S_ISSOCK(os.fstat(descriptor).st_mode)
-        except OSError:
-            continue
-    return Message({"sockets": found})
+def scratch(_: Message) -> Message:
+    folder = tempfile.gettempdir()
+    Path(folder, "left.over").touch()
+    return Message({"folder": folder})

@@ -50,7 +50,6 @@ from selfmodel.logs.records import (
     with_digest,
     without_digest,
 )
-from selfmodel.sandbox.budget import Budget
 
 CASES = Path(__file__).parents[3] / "shared" / "samples" / "mcap-conformance"
 Change = Callable[[McapRecord], McapRecord | None]
@@ -308,8 +307,8 @@ def test_the_hidden_record_may_say_anything_or_be_missing(log: Path):
 def test_the_hidden_record_does_not_reach_the_reader(log: Path, monkeypatch: pytest.MonkeyPatch):
     reached = []
 
-    def watched(path: Path, unread: Collection[str], budget: Budget) -> Contents:
-        contents = read_contents(path, unread, budget)
+    def watched(path: Path, unread: Collection[str]) -> Contents:
+        contents = read_contents(path, unread)
         reached.append(HIDDEN in contents.metadata)
         return contents
 

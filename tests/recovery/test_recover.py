@@ -30,7 +30,6 @@ from selfmodel.recovery.recover import recover
 from selfmodel.recovery.recovery import Recovery
 from selfmodel.recovery.repair.paper_repair import RepairSearch
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import Budget
 from selfmodel.settings import Settings
 from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.simulator import Run, Simulator
@@ -333,9 +332,9 @@ def test_each_trial_is_read_from_its_log_once_and_is_all_that_is_known(
     reads: Counter[str] = Counter()
     read_contents = reader.read_contents
 
-    def counted(path: Path, unread: Collection[str], budget: Budget) -> Contents:
+    def counted(path: Path, unread: Collection[str]) -> Contents:
         reads[path.name] += 1
-        return read_contents(path, unread, budget)
+        return read_contents(path, unread)
 
     monkeypatch.setattr(reader, "read_contents", counted)
     truth = parse("break:back_left_knee", quadruped.anatomy)

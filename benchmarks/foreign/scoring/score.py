@@ -89,7 +89,7 @@ def diagnosed(folder: Path, question: Question) -> dict[str, Any]:
         kinds = ["--kinds", question.kinds] if question.kinds else []
         found = _selfmodel(
             ["diagnose", *(f"{name}.mcap" for name in names), *kinds, *question.options],
-            ["--json", "--yes", "--threads", "1"],
+            ["--json", "--threads", "1"],
             cwd=Path(made),
         )
         row["seconds"] = time.perf_counter() - start

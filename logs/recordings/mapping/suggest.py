@@ -10,12 +10,9 @@ from selfmodel.logs.recordings.mapping.suggest_bag import suggest_for_bag
 from selfmodel.logs.recordings.mapping.suggest_table import suggest_for_table
 from selfmodel.logs.recordings.tables.table import is_table
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 
 
-def suggest(
-    path: Path, robot: Robot, name: str, *, with_timestep: bool, budget: Budget = DEFAULT_BUDGET
-) -> str:
+def suggest(path: Path, robot: Robot, name: str, *, with_timestep: bool) -> str:
     """Returns the suggestion of a mapping, as TOML.
 
     Args:
@@ -23,11 +20,9 @@ def suggest(
         robot: Robot of the recording.
         name: Name of the robot in the mapping, or its MJCF or URDF file.
         with_timestep: Whether the mapping must contain the control time step.
-        budget: Memory and time for the recording.
 
     Raises:
         LogError: The recording is damaged.
-        BudgetError: The recording takes more than the budget allows.
         InputError: The recording cannot be read.
     """
     lines = [
@@ -42,6 +37,6 @@ def suggest(
     lines += [
         '# controller = "gait.npz"  # controller of the robot, if known',
         '# stage = "before"  # of the healthy robot',
-        *(suggest_for_table if is_table(path) else suggest_for_bag)(path, robot, budget),
+        *(suggest_for_table if is_table(path) else suggest_for_bag)(path, robot),
     ]
     return "\n".join(lines).rstrip() + "\n"

@@ -18,28 +18,25 @@ from selfmodel.logs.recordings.rosbag.message_types import (
 )
 from selfmodel.logs.recordings.series import Series, Topic
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import Budget
 
 _COMMANDED = ("command", "cmd", "target", "desired", "setpoint", "goal", "reference")
 
 
-def suggest_for_bag(path: Path, robot: Robot, budget: Budget) -> Iterator[str]:
+def suggest_for_bag(path: Path, robot: Robot) -> Iterator[str]:
     """Yields the lines of a suggested mapping of a bag, without its robot.
 
     Args:
         path: Folder or file of the bag.
         robot: Robot of the recording.
-        budget: Memory and time for the bag.
 
     Raises:
         LogError: The bag is damaged.
-        BudgetError: The bag takes more than the budget allows.
         InputError: The bag cannot be read.
     """
-    bag = read_bag(path, (), budget)
+    bag = read_bag(path, ())
     hinges, motors = robot.anatomy.hinges, robot.anatomy.motors
     joints, commands = _able(bag, "joints"), _able(bag, "commands")
-    series = read_bag(path, {topic.name for topic in (*joints, *commands)}, budget).series
+    series = read_bag(path, {topic.name for topic in (*joints, *commands)}).series
     joints = [topic for topic in joints if not _is_command(topic)]
     joints.sort(key=lambda topic: -_fit(series[topic.name], hinges))
     commands = [topic for topic in commands if topic not in joints[:1]]

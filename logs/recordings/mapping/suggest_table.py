@@ -13,7 +13,6 @@ from selfmodel.logs.recordings.mapping.suggest_bag import TRIAL_LINES
 from selfmodel.logs.recordings.tables.content import NO_TIME
 from selfmodel.logs.recordings.tables.table import read_table
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import Budget
 from selfmodel.trials.behaviour import PREFIXES, column_names
 
 _LONGEST_PERIODS = {"s": 0.5, "ms": 500.0, "us": 5e5}
@@ -22,23 +21,21 @@ _LONGEST_PERIODS = {"s": 0.5, "ms": 500.0, "us": 5e5}
 _MOST_LISTED = 50
 
 
-def suggest_for_table(path: Path, robot: Robot, budget: Budget) -> Iterator[str]:
+def suggest_for_table(path: Path, robot: Robot) -> Iterator[str]:
     """Yields the lines of a suggested mapping of a table, without its robot.
 
     Args:
         path: The table.
         robot: Robot of the recording.
-        budget: Memory and time for the table.
 
     Raises:
-        BudgetError: The table takes more than the budget allows.
         InputError: The table cannot be read.
     """
-    names = read_table(path, (), budget).names
+    names = read_table(path, ()).names
     found = classified(names)
     anatomy = robot.anatomy
     yield from TRIAL_LINES
-    yield from _time(path, found, names, budget)
+    yield from _time(path, found, names)
     yield "[joints]"
     yield f"unit = {_unit(found)}"
     positions = found.parts.get("position") or _similar(anatomy.hinges, found.others)
@@ -62,7 +59,7 @@ def suggest_for_table(path: Path, robot: Robot, budget: Budget) -> Iterator[str]
         yield from _touches(touches, found.others)
 
 
-def _time(path: Path, found: Classified, names: Sequence[str], budget: Budget) -> Iterator[str]:
+def _time(path: Path, found: Classified, names: Sequence[str]) -> Iterator[str]:
     yield "[time]"
     if not found.times:
         yield f'column = "{UNKNOWN}"  # CHANGE: the table has {_listed(names)}'
@@ -76,12 +73,12 @@ def _time(path: Path, found: Classified, names: Sequence[str], budget: Budget) -
     if unit:
         yield f"unit = {quoted(unit)}"
     else:
-        yield f"unit = {quoted(_guessed_unit(path, name, budget))}  # CHECK: s, ms, us or ns"
+        yield f"unit = {quoted(_guessed_unit(path, name))}  # CHECK: s, ms, us or ns"
     yield ""
 
 
-def _guessed_unit(path: Path, name: str, budget: Budget) -> str:
-    times = read_table(path, {name}, budget, exact=name).columns[name]
+def _guessed_unit(path: Path, name: str) -> str:
+    times = read_table(path, {name}, exact=name).columns[name]
     known = times[np.isfinite(times) & (times != NO_TIME)].astype(np.float64)
     periods = np.abs(np.diff(known))
     usual = float(np.median(periods)) if len(periods) else 0.0

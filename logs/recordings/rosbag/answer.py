@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from selfmodel.arrays import FloatArray
+from selfmodel.isolation import Message
 from selfmodel.logs.recordings.series import Layout, Series, Source, Topic, columns_of
-from selfmodel.sandbox.message import Message
 
 Rows = tuple[tuple[str, ...], FloatArray]
 """Names in a message, and a row of numbers for each, ``(names, width)``."""
@@ -51,45 +51,47 @@ def answer(
         sources: Files of the bag.
         decoded: Messages by wanted topic.
     """
-    blobs: dict[str, bytes] = {}
+    buffers: dict[str, bytes] = {}
     layouts: dict[str, list[tuple[str, ...]]] = {}
     for topic, found in decoded.items():
-        blobs[f"stamps {topic}"] = np.array(found.stamps, dtype=np.int64).tobytes()
-        blobs[f"logged {topic}"] = np.array(found.logged, dtype=np.int64).tobytes()
+        buffers[f"stamps {topic}"] = np.array(found.stamps, dtype=np.int64).tobytes()
+        buffers[f"logged {topic}"] = np.array(found.logged, dtype=np.int64).tobytes()
         layouts[topic] = [names for names in found.layouts if names]
         for k, names in enumerate(layouts[topic]):
             indices, rows = found.layouts[names]
-            blobs[f"index {k} {topic}"] = np.array(indices, dtype=np.int64).tobytes()
-            blobs[f"values {k} {topic}"] = b"".join(row.tobytes() for row in rows)
-    facts = {
+            buffers[f"index {k} {topic}"] = np.array(indices, dtype=np.int64).tobytes()
+            buffers[f"values {k} {topic}"] = b"".join(row.tobytes() for row in rows)
+    header = {
         "topics": [(topic.name, topic.type, topic.encoding, topic.count) for topic in topics],
         "sources": [(source.name, source.sha256) for source in sources],
         "layouts": layouts,
         "refused": {topic: found.refused for topic, found in decoded.items()},
     }
-    return Message(facts, blobs)
+    return Message(header, buffers)
 
 
 def parse_answer(
-    facts: Mapping[str, Any], blobs: Mapping[str, bytes]
+    header: Mapping[str, Any], buffers: Mapping[str, bytes]
 ) -> tuple[dict[str, Topic], tuple[Source, ...], dict[str, Series]]:
     """Returns the topics by name, the files, and the messages by wanted topic."""
-    topics = {name: Topic(name, *rest) for name, *rest in facts["topics"]}
+    topics = {name: Topic(name, *rest) for name, *rest in header["topics"]}
     return (
         topics,
-        tuple(Source(*source) for source in facts["sources"]),
+        tuple(Source(*source) for source in header["sources"]),
         {
             topic: Series(
                 topics[topic],
-                np.frombuffer(blobs[f"stamps {topic}"], dtype=np.int64),
-                np.frombuffer(blobs[f"logged {topic}"], dtype=np.int64),
+                np.frombuffer(buffers[f"stamps {topic}"], dtype=np.int64),
+                np.frombuffer(buffers[f"logged {topic}"], dtype=np.int64),
                 columns_of(
-                    _layout(tuple(names), blobs[f"index {k} {topic}"], blobs[f"values {k} {topic}"])
+                    _layout(
+                        tuple(names), buffers[f"index {k} {topic}"], buffers[f"values {k} {topic}"]
+                    )
                     for k, names in enumerate(layouts)
                 ),
-                facts["refused"][topic],
+                header["refused"][topic],
             )
-            for topic, layouts in facts["layouts"].items()
+            for topic, layouts in header["layouts"].items()
         },
     )
 

@@ -8,6 +8,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from selfmodel.isolation import RECORDING_SECONDS, Message, run_isolated
 from selfmodel.logs.errors import (
     CorruptError,
     IncompleteError,
@@ -17,9 +18,6 @@ from selfmodel.logs.errors import (
 )
 from selfmodel.logs.recordings.rosbag.answer import parse_answer
 from selfmodel.logs.recordings.series import Series, Source, Topic
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
-from selfmodel.sandbox.isolation import run_isolated
-from selfmodel.sandbox.message import Message
 
 _ERRORS = (CorruptError, IncompleteError, NotMcapError, TruncatedError, UnsupportedError)
 
@@ -41,18 +39,16 @@ class Bag:
     series: Mapping[str, Series]
 
 
-def read_bag(path: Path, wanted: Collection[str], budget: Budget = DEFAULT_BUDGET) -> Bag:
+def read_bag(path: Path, wanted: Collection[str]) -> Bag:
     """Returns a bag, after a check of all its files.
 
     Args:
         path: Folder of a rosbag2 bag, with or without ``metadata.yaml``, or one of its files; or
             a ROS 1 bag.
         wanted: Names of the topics whose messages are decoded.
-        budget: Memory and time of the child process, and limits of its answer.
 
     Raises:
         LogError: A file is damaged, missing, or not a recording.
-        BudgetError: The bag takes more memory or time than the budget allows.
         InputError: The bag does not exist, or cannot be read.
     """
     request = {"path": str(path), "folder": str(Path.cwd()), "wanted": sorted(wanted)}
@@ -60,7 +56,7 @@ def read_bag(path: Path, wanted: Collection[str], budget: Budget = DEFAULT_BUDGE
         "selfmodel.logs.recordings.rosbag.child:read",
         Message(request),
         what=str(path),
-        budget=budget,
+        seconds=RECORDING_SECONDS,
         errors=_ERRORS,
     )
-    return Bag(path, *parse_answer(found.facts, found.blobs))
+    return Bag(path, *parse_answer(found.header, found.buffers))

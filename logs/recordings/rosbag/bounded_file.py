@@ -9,7 +9,7 @@ class BoundedFile(BufferedReader):
     """File whose ``read`` allocates no more than the rest of the file, for any requested size.
 
     ``BufferedReader`` allocates the requested size first, so a damaged length would exhaust the
-    memory: the damage would be reported as a lack of budget.
+    memory: the damage would be reported as a lack of memory.
 
     Args:
         path: The file.

@@ -1,4 +1,4 @@
-"""Gathering of a bag's records into arrays, up to the limits of the budget."""
+"""Gathering of a bag's records into arrays."""
 
 from collections import Counter
 from collections.abc import Collection
@@ -16,7 +16,6 @@ from selfmodel.logs.recordings.rosbag.messages import (
 from selfmodel.logs.recordings.rosbag.storage import unpacked
 from selfmodel.logs.recordings.rosbag.stored import Announced, Stored
 from selfmodel.logs.recordings.series import Topic
-from selfmodel.sandbox.budget import Budget, BudgetError, memory_error
 
 LONGEST_NAME = 1000
 """Maximum length of a name in a bag, characters."""
@@ -25,38 +24,29 @@ LONGEST_NAME = 1000
 class Gathering:
     """Topics of a bag, and the decoded messages of some of them.
 
-    The limits bound the answer of the child process, and so the memory of the process that
-    receives it: ``Budget.names`` topics and distinct names in messages, and ``Budget.file_bytes``
-    of numbers.
-
     Args:
         path: Path of the bag from the user.
         wanted: Names of the topics whose messages are decoded.
-        budget: The budget.
     """
 
-    def __init__(self, path: Path, wanted: Collection[str], budget: Budget) -> None:
+    def __init__(self, path: Path, wanted: Collection[str]) -> None:
         self._path = path
         self._wanted = frozenset(wanted)
-        self._budget = budget
         self._announced: dict[str, dict[Announced, None]] = {}
         self._counts: Counter[str] = Counter()
         self._decoded: dict[str, Decoded] = {}
-        self._names = 0
-        self._numbers = 0
 
     def add(self, item: Announced | Stored) -> None:
         """Adds a record.
 
         Raises:
             CorruptError: The message is damaged.
-            BudgetError: The bag has more names or numbers than the budget allows.
         """
         if isinstance(item, Announced):
             known = self._announced.setdefault(item.topic, {})
             if item not in known:
                 known[item] = None
-                self._count_names(1, [item.topic, item.type, item.encoding], "of topics")
+                self._check_names([item.topic, item.type, item.encoding], "of topics")
             return
         name = item.announced.topic
         self._counts[name] += 1
@@ -111,28 +101,15 @@ class Gathering:
                 self._path, f"a message on {name} is damaged: {failure}", advice="record it again"
             ) from failure
         else:
-            names, values = rows
+            names, _ = rows
             if names not in messages.layouts:
-                self._count_names(len(names), names, f"in the messages on {name}")
-            self._count_numbers(values.size + 2)  # and the two times
+                self._check_names(names, f"in the messages on {name}")
             messages.add(stamp, item.time, rows)
 
-    def _count_names(self, count: int, texts: Collection[str], where: str) -> None:
-        self._names += count
-        if self._names > self._budget.names:
-            raise self._beyond(f"{self._budget.names} names, those {where} included")
+    def _check_names(self, texts: Collection[str], where: str) -> None:
         if any(len(text) > LONGEST_NAME for text in texts):
             raise CorruptError(
                 self._path,
                 f"a name {where} has more than {LONGEST_NAME} characters",
                 advice="record it again",
             )
-
-    def _count_numbers(self, count: int) -> None:
-        self._numbers += count
-        most = self._budget.file_bytes // 8
-        if self._numbers > most:
-            raise self._beyond(f"{most} numbers on the topics of the mapping")
-
-    def _beyond(self, what: str) -> BudgetError:
-        return memory_error(f"{self._path} has more than {what}", self._budget)

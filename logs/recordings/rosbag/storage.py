@@ -1,6 +1,6 @@
 """Content of one file of a bag, in any format, compressed or not."""
 
-import errno
+import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -14,7 +14,6 @@ from selfmodel.logs.recordings.rosbag.stored import Announced, Stored
 from selfmodel.logs.recordings.rosbag.stored_mcap import read_mcap
 from selfmodel.logs.recordings.rosbag.stored_ros1 import ROS1_MAGIC, read_ros1
 from selfmodel.logs.recordings.rosbag.stored_sqlite import SQLITE_MAGIC, read_sqlite
-from selfmodel.sandbox.budget import Budget, memory_error
 
 AGAIN = "record it again, or unpack its intact part with the tool of its format"
 
@@ -27,25 +26,22 @@ _READERS: Mapping[bytes, Callable[[Path, Path], Iterator[Announced | Stored]]] =
 """Readers by the first bytes of a file."""
 
 
-def read_storage(name: Path, scratch: Path, budget: Budget) -> Iterator[Announced | Stored]:
+def read_storage(name: Path) -> Iterator[Announced | Stored]:
     """Yields the records of a file.
 
     Args:
         name: The file.
-        scratch: Folder for the decompressed file, which is removed at the end.
-        budget: The budget; the decompressed file has at most ``Budget.unpacked_bytes``.
 
     Raises:
         LogError: The file is damaged, or not a recording.
-        BudgetError: The decompressed file is too large.
         OSError: The file cannot be read.
     """
     if not _begins(name, ZSTD_MAGIC):
         yield from _read(name, name)
         return
-    place = scratch / "unpacked"
+    place = Path(tempfile.gettempdir()) / "unpacked"
     try:
-        _unpack_file(name, place, budget)
+        _unpack_file(name, place)
         yield from _read(place, name)
     finally:
         place.unlink(missing_ok=True)
@@ -73,17 +69,12 @@ def unpacked(payload: bytes, name: Path, topic: str) -> bytes:
         ) from failure
 
 
-def _unpack_file(name: Path, place: Path, budget: Budget) -> None:
+def _unpack_file(name: Path, place: Path) -> None:
     try:
         with name.open("rb") as source, place.open("wb") as target:
             zstandard.ZstdDecompressor().copy_stream(source, target)
     except zstandard.ZstdError as failure:
         raise CorruptError(name, f"it cannot be unpacked: {failure}", advice=AGAIN) from failure
-    except OSError as failure:
-        if failure.errno != errno.EFBIG:
-            raise
-        what = f"{name} unpacks to more than {budget.unpacked_bytes} bytes"
-        raise memory_error(what, budget) from failure
 
 
 def _begins(path: Path, magic: bytes) -> bool:

@@ -1,4 +1,4 @@
-"""Content of a table's file, within the limits of the budget."""
+"""Content of a table's file."""
 
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from selfmodel.errors import InputError
 from selfmodel.files import check_regular, file_digest
-from selfmodel.sandbox.budget import Budget, memory_error
-from selfmodel.sandbox.message import Message
+from selfmodel.isolation import Message
+
+MAX_COLUMNS = 10_000
+"""Largest number of columns."""
 
 LONGEST_NAME = 1000
 """Maximum length of a column's name, characters."""
@@ -44,25 +46,20 @@ class Request:
         path: The file.
         wanted: Names of the columns to read.
         exact: Name of the column whose integers are not rounded.
-        budget: Limits of names and numbers.
     """
 
     path: Path
     wanted: frozenset[str]
     exact: str
-    budget: Budget
 
     def check_names(self, names: Sequence[str]) -> None:
         """Checks the names of the columns.
 
         Raises:
-            BudgetError: There are more than the budget allows.
             InputError: A name is too long, or occurs twice.
         """
-        if len(names) > self.budget.names:
-            raise memory_error(
-                f"{self.path} has more than {self.budget.names} columns", self.budget
-            )
+        if len(names) > MAX_COLUMNS:
+            raise InputError(f"{self.path} has more than {MAX_COLUMNS} columns")
         seen: dict[str, int] = {}
         for number, name in enumerate(names, start=1):
             if len(name) > LONGEST_NAME:
@@ -77,37 +74,23 @@ class Request:
                 )
             seen[name] = number
 
-    def check_numbers(self, count: int) -> None:
-        """Checks the number of values of the wanted columns.
 
-        Raises:
-            BudgetError: There are more than the budget allows.
-        """
-        most = self.budget.file_bytes // 8
-        if count > most:
-            raise memory_error(
-                f"{self.path} has more than {most} numbers in the wanted columns", self.budget
-            )
-
-
-def answer(message: Message, budget: Budget, read: Callable[[Request], Content]) -> Message:
+def answer(message: Message, read: Callable[[Request], Content]) -> Message:
     """Returns the answer of the child process that reads a table.
 
     Args:
         message: ``path``, ``folder`` that a relative path begins in, ``wanted`` and ``exact``.
-        budget: Limits of the content.
         read: Reader of the format.
 
     Raises:
-        BudgetError: The content is too large.
         InputError: The file cannot be read.
     """
-    facts = message.facts
-    os.chdir(facts["folder"])
-    path = Path(facts["path"])
+    header = message.header
+    os.chdir(header["folder"])
+    path = Path(header["path"])
     check_regular(path, "a table")
     try:
-        found = read(Request(path, frozenset(facts["wanted"]), facts["exact"], budget))
+        found = read(Request(path, frozenset(header["wanted"]), header["exact"]))
         digest = file_digest(path)
     except OSError as failure:
         raise InputError(

@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 from selfmodel.errors import InputError
 from selfmodel.logs.npz import NPZ_FAILURES
 from selfmodel.logs.recordings.tables.content import (
+    MAX_COLUMNS,
     Content,
     Numbers,
     Request,
     as_numbers,
     reason_of,
 )
-from selfmodel.sandbox.budget import memory_error
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,6 @@ def read_npz(request: Request) -> Content:
     """Returns the wanted columns of an NPZ file.
 
     Raises:
-        BudgetError: An array, or the number of columns, is larger than the budget allows.
         InputError: The file is no NPZ file.
         OSError: The file cannot be read.
     """
@@ -63,20 +62,17 @@ def read_npz(request: Request) -> Content:
 
 
 def _content(request: Request, archive: zipfile.ZipFile) -> Content:
-    members = [_member(archive, info) for info in archive.infolist()[: request.budget.names + 1]]
+    members = [_member(archive, info) for info in archive.infolist()]
     found = [member for member in members if member is not None]
-    texts = {m.name: _read(archive, m) for m in found if _is_text(request, m)}
+    texts = {m.name: _read(archive, m) for m in found if _is_text(m)}
     labels = {name: tuple(map(str, array.tolist())) for name, array in texts.items()}
     numeric = [m for m in found if m.dtype.kind in "fiubmM" and m.shape and len(m.shape) <= 2]
-    total = sum(m.shape[1] if len(m.shape) == 2 else 1 for m in numeric)
-    if total > request.budget.names:
-        what = f"{request.path} has more than {request.budget.names} columns"
-        raise memory_error(what, request.budget)
+    if sum(m.shape[1] if len(m.shape) == 2 else 1 for m in numeric) > MAX_COLUMNS:
+        raise InputError(f"{request.path} has more than {MAX_COLUMNS} columns")
     named = [(member, _names(member, labels)) for member in numeric]
     names = [name for _, some in named for name in some]
     request.check_names(names)
     needed = [(m, some) for m, some in named if not request.wanted.isdisjoint(some)]
-    request.check_numbers(sum(prod(member.shape) for member, _ in needed))
     columns: dict[str, Numbers] = {}
     for member, some in needed:
         array = _read(archive, member).reshape(member.shape[0], prod(member.shape[1:]))
@@ -103,8 +99,8 @@ def _header(file: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
     return shape, dtype
 
 
-def _is_text(request: Request, member: _Member) -> bool:
-    few = len(member.shape) == 1 and member.shape[0] <= request.budget.names
+def _is_text(member: _Member) -> bool:
+    few = len(member.shape) == 1 and member.shape[0] <= MAX_COLUMNS
     return few and member.dtype.kind == "U" and member.dtype.itemsize <= 4 * 1000
 
 

@@ -13,11 +13,9 @@ from types import MappingProxyType
 import numpy as np
 
 from selfmodel.errors import InputError
+from selfmodel.isolation import RECORDING_SECONDS, Message, run_isolated
 from selfmodel.logs.recordings.series import Source
 from selfmodel.logs.recordings.tables.content import Numbers
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
-from selfmodel.sandbox.isolation import run_isolated
-from selfmodel.sandbox.message import Message
 
 FORMATS: Mapping[str, str] = MappingProxyType(
     {".csv": "CSV", ".tsv": "CSV", ".npz": "NPZ", ".parquet": "Parquet"}
@@ -51,19 +49,15 @@ def is_table(path: Path) -> bool:
     return path.suffix.lower() in FORMATS
 
 
-def read_table(
-    path: Path, wanted: Collection[str], budget: Budget = DEFAULT_BUDGET, *, exact: str = ""
-) -> Table:
+def read_table(path: Path, wanted: Collection[str], *, exact: str = "") -> Table:
     """Returns a table.
 
     Args:
         path: A file with a suffix of ``FORMATS``.
         wanted: Names of the columns to read; a name that the table does not have is left out.
-        budget: Memory and time of the child process, and limits of its answer.
         exact: Name of the column whose integers are not rounded to float64: times in ns.
 
     Raises:
-        BudgetError: The table takes more memory or time than the budget allows.
         InputError: The file cannot be read, or a wanted column has no numbers.
     """
     form = FORMATS[path.suffix.lower()]
@@ -80,13 +74,13 @@ def read_table(
         f"selfmodel.logs.recordings.tables.{module}:read",
         Message(request),
         what=str(path),
-        budget=budget,
+        seconds=RECORDING_SECONDS,
     )
     columns = {
-        name: _numbers(found.blobs[name], kind) for name, kind in found.facts["kinds"].items()
+        name: _numbers(found.buffers[name], kind) for name, kind in found.header["kinds"].items()
     }
-    source = Source(path.name, found.facts["sha256"])
-    return Table(path, form, tuple(found.facts["names"]), columns, (source,))
+    source = Source(path.name, found.header["sha256"])
+    return Table(path, form, tuple(found.header["names"]), columns, (source,))
 
 
 def _numbers(data: bytes, kind: str) -> Numbers:

@@ -9,9 +9,7 @@ from typing import Annotated
 
 import typer
 
-from selfmodel.errors import InputError
 from selfmodel.faults.registry import ALL_KINDS, DEFAULT_KINDS, KIND_SETS, PAPER_KINDS
-from selfmodel.sandbox.budget import Budget
 from selfmodel.trials.trial import STAGES
 
 FAILURE = "Failure"
@@ -347,27 +345,3 @@ NewLog = Annotated[
     typer.Option(*("--out", "-o"), metavar="NEW.mcap", help="Log to write; it must not exist."),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
-
-
-def _budget(text: str) -> str:
-    try:
-        Budget.parse(text)
-    except InputError as error:
-        raise typer.BadParameter(str(error)) from error
-    return text
-
-
-DEFAULT_BUDGET = "memory=1GB,time=3min"
-FileBudget = Annotated[
-    str,
-    typer.Option(
-        "--budget",
-        metavar="memory=1GB,time=3min",
-        help="Memory that a file may take, and estimated time from which a command asks.",
-        callback=_budget,
-        show_default=False,
-    ),
-]
-Yes = Annotated[
-    bool, typer.Option("--yes", help="Go on although the expected time is above the budget.")
-]

@@ -5,13 +5,12 @@ from typing import Annotated
 
 import typer
 
-from selfmodel.cli.arguments.options import DEFAULT_BUDGET, FileBudget, Json
+from selfmodel.cli.arguments.options import Json
 from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.experiments import trial_logs
 from selfmodel.logs.export import export as write_table, writer_of
 from selfmodel.logs.files import refuse_existing
-from selfmodel.sandbox.budget import Budget
 
 
 def export(
@@ -25,13 +24,12 @@ def export(
             help="Table to write, .csv, .npz or .parquet; it must not exist.",
         ),
     ],
-    budget: FileBudget = DEFAULT_BUDGET,
     as_json: Json = False,
 ) -> None:
     """Write the signals of a trial log as a table: one row per control step."""
     writer_of(out)
     refuse_existing(out)
-    (found,) = trial_logs.logs([log], Budget.parse(budget))
+    (found,) = trial_logs.logs([log])
     behaviour = found.trial.behaviour
     names = write_table(out, behaviour)
     if as_json:

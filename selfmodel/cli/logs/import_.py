@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from selfmodel.cli.arguments.inputs import check_log_name
-from selfmodel.cli.arguments.options import DEFAULT_BUDGET, FileBudget, Json
+from selfmodel.cli.arguments.options import Json
 from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.tables import show
@@ -20,7 +20,6 @@ from selfmodel.logs.recordings.mapping.mapping import RecordingMapping
 from selfmodel.logs.recordings.mapping.mapping_file import read_mapping
 from selfmodel.logs.recordings.mapping.suggest import suggest as suggest_mapping
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import Budget
 
 
 def import_(
@@ -49,17 +48,15 @@ def import_(
             metavar="ROBOT", help="Robot of --suggest: a robot's name, or its MJCF or URDF."
         ),
     ] = None,
-    budget: FileBudget = DEFAULT_BUDGET,
     as_json: Json = False,
 ) -> None:
     """Import a recording of a robot as a trial log: a bag of ROS, without ROS, or a table."""
-    allowed = Budget.parse(budget)
     if suggest:
         if robot is None or out or mapping or as_json:
             raise InputError(
                 "--suggest needs --robot ROBOT, and excludes --out, --mapping and --json"
             )
-        lines = _suggestion(recording, robot, allowed).removesuffix("\n").split("\n")
+        lines = _suggestion(recording, robot).removesuffix("\n").split("\n")
         print_lines(*lines)
         return
     if robot is not None:
@@ -70,20 +67,20 @@ def import_(
             "--suggest --robot ROBOT prints a mapping to edit"
         )
     check_log_name(out)
-    _import(recording, out, mapping, allowed, as_json=as_json)
+    _import(recording, out, mapping, as_json=as_json)
 
 
-def _suggestion(recording: Path, name: str, budget: Budget) -> str:
-    made = robots.recorded_robot(name, None, budget)
-    return suggest_mapping(recording, made, name, with_timestep=is_model(name), budget=budget)
+def _suggestion(recording: Path, name: str) -> str:
+    made = robots.recorded_robot(name, None)
+    return suggest_mapping(recording, made, name, with_timestep=is_model(name))
 
 
-def _import(source: Path, out: Path, path: Path, budget: Budget, *, as_json: bool) -> None:
+def _import(source: Path, out: Path, path: Path, *, as_json: bool) -> None:
     refuse_existing(out)
     mapping = read_mapping(path)
-    made = _mapped_robot(mapping, path.parent, budget)
+    made = _mapped_robot(mapping, path.parent)
     controller = _controller(mapping, path.parent, made)
-    recording = import_recording(source, mapping, made, budget)
+    recording = import_recording(source, mapping, made)
     write_recording(out, made, recording, mapping, controller)
     if as_json:
         print_json(_facts(out, mapping, recording))
@@ -91,7 +88,7 @@ def _import(source: Path, out: Path, path: Path, budget: Budget, *, as_json: boo
         _print(out, recording)
 
 
-def _mapped_robot(mapping: RecordingMapping, folder: Path, budget: Budget) -> Robot:
+def _mapped_robot(mapping: RecordingMapping, folder: Path) -> Robot:
     """Returns the robot of a mapping: one of selfmodel's, or of a model file beside the mapping."""
     name, timestep = mapping.robot, mapping.control_timestep
     own = not is_model(name)
@@ -104,7 +101,7 @@ def _mapped_robot(mapping: RecordingMapping, folder: Path, budget: Budget) -> Ro
             ("robot",), f"{name} has no control time step: add control_timestep, s"
         )
     try:
-        return robots.recorded_robot(name if own else str(folder / name), timestep, budget)
+        return robots.recorded_robot(name if own else str(folder / name), timestep)
     except InputError as error:
         raise mapping.document.error(("robot",), str(error)) from error
 

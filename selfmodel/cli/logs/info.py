@@ -6,7 +6,7 @@ from typing import Any
 
 import typer
 
-from selfmodel.cli.arguments.options import DEFAULT_BUDGET, FileBudget, Json, LogFiles
+from selfmodel.cli.arguments.options import Json, LogFiles
 from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.tables import show
@@ -16,16 +16,14 @@ from selfmodel.logs import LogError, TrialLog
 from selfmodel.logs.info import Info, has_truth, read_info
 from selfmodel.logs.mcap.provenance import UNTIED
 from selfmodel.logs.salvage import salvageable_steps
-from selfmodel.sandbox.budget import Budget
 
 
-def info(files: LogFiles, *, budget: FileBudget = DEFAULT_BUDGET, as_json: Json = False) -> None:
+def info(files: LogFiles, *, as_json: Json = False) -> None:
     """Show what logs contain, and how to open them in a viewer.
 
     The exit status is 1 if a log is damaged.
     """
-    allowed = Budget.parse(budget)
-    found = [_facts(path, allowed) for path in files]
+    found = [_facts(path) for path in files]
     if as_json:
         print_json({"files": found})
     else:
@@ -44,11 +42,11 @@ def _viewers() -> tuple[str, ...]:
     )
 
 
-def _facts(path: Path, budget: Budget) -> dict[str, Any]:
+def _facts(path: Path) -> dict[str, Any]:
     try:
-        return _as_object(path, read_info(path, budget))
+        return _as_object(path, read_info(path))
     except LogError as error:
-        return _damage(path, error, salvageable_steps(path, budget))
+        return _damage(path, error, salvageable_steps(path))
     except InputError as error:
         return _damage(path, error, 0)
 

@@ -7,24 +7,22 @@ from typing import Annotated
 import typer
 
 from selfmodel.cli.arguments.inputs import check_log_name
-from selfmodel.cli.arguments.options import DEFAULT_BUDGET, FileBudget, Json, NewLog
+from selfmodel.cli.arguments.options import Json, NewLog
 from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.logs.mcap.provenance import UNTIED
 from selfmodel.logs.salvage import Discarded, salvage as save
-from selfmodel.sandbox.budget import Budget
 
 
 def salvage(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Damaged log, or NAME.mcap.part.")],
     *,
     out: NewLog,
-    budget: FileBudget = DEFAULT_BUDGET,
     as_json: Json = False,
 ) -> None:
     """Save all complete data of a truncated or damaged log in a new, valid one."""
     check_log_name(out)
-    saved = save(file, out, Budget.parse(budget))
+    saved = save(file, out)
     if as_json:
         print_json({"source": str(file), **dataclasses.asdict(saved)}, indent=None)
         return

@@ -5,14 +5,13 @@ from typing import Annotated, Any
 
 import typer
 
-from selfmodel.cli.arguments.options import DEFAULT_BUDGET, FileBudget, Json, LogFiles
+from selfmodel.cli.arguments.options import Json, LogFiles
 from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError
 from selfmodel.logs.mcap.provenance import UNTIED
 from selfmodel.logs.verify import verify as check
-from selfmodel.sandbox.budget import Budget
 
 Expect = Annotated[
     str,
@@ -24,7 +23,6 @@ def verify(
     files: LogFiles,
     *,
     expect: Expect = "",
-    budget: FileBudget = DEFAULT_BUDGET,
     as_json: Json = False,
 ) -> None:
     """Verify checksums, counts, digests, layout, times, names and the model of logs.
@@ -33,8 +31,7 @@ def verify(
     """
     if expect and len(files) > 1:
         raise InputError(f"--expect is the digest of one log: give one log, got {len(files)}")
-    allowed = Budget.parse(budget)
-    checked = [_checked(path, expect.lower(), allowed) for path in files]
+    checked = [_checked(path, expect.lower()) for path in files]
     if as_json:
         print_json({"ok": all(one["ok"] for one in checked), "files": checked}, indent=None)
     else:
@@ -42,9 +39,9 @@ def verify(
     raise typer.Exit(0 if all(one["ok"] for one in checked) else 1)
 
 
-def _checked(path: Path, expected: str, budget: Budget) -> dict[str, Any]:
+def _checked(path: Path, expected: str) -> dict[str, Any]:
     try:
-        found = check(path, expected, budget)
+        found = check(path, expected)
     except (LogError, InputError) as error:
         return {"file": str(path), "ok": False, "error": str(error), "kind": type(error).__name__}
     return {

@@ -22,7 +22,6 @@ from selfmodel.logs.errors import LogWriteError
 from selfmodel.logs.files import replace_file
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import POSE
-from selfmodel.sandbox.budget import Budget
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.threads import thread_count
 from selfmodel.simulation.trial_replay import replay
@@ -39,8 +38,6 @@ def draw_trial(
     pictures: int | None,
     sticks: bool,
     threads: int,
-    budget: Budget,
-    yes: bool,
 ) -> dict[str, Any]:
     """Draws a logged trial beside its simulation; returns the facts of the drawing as JSON values.
 
@@ -53,14 +50,12 @@ def draw_trial(
         pictures: Pictures of a strip; None for a film.
         sticks: Draws with matplotlib instead of MuJoCo.
         threads: Threads of the physics; 0 for one per processor.
-        budget: Memory and time that the log may take.
-        yes: Whether a longer time is allowed.
 
     Raises:
         InputError: The log, the hypothesis or the model cannot be used.
         WorkError: The file could not be written.
     """
-    given = replayed_log(file, hypothesis, kinds=kinds, model=model, budget=budget, yes=yes)
+    given = replayed_log(file, hypothesis, kinds=kinds, model=model)
     robot = given.robot
     film, facts = _filmed(given.log, robot, given.hypothesis, pictures, thread_count(threads))
     print_notes(*(f"note: {note}" for note in facts["notes"]))

@@ -7,10 +7,8 @@ import typer
 
 from selfmodel.cli.arguments.inputs import check_folder
 from selfmodel.cli.arguments.options import (
-    DEFAULT_BUDGET,
     SEARCH,
     ControllerKind,
-    FileBudget,
     Json,
     ModelSettings,
     Neurons,
@@ -28,7 +26,6 @@ from selfmodel.logs.files import refuse_existing
 from selfmodel.logs.repertoires import save_repertoire
 from selfmodel.recovery.repertoire.evaluation import simulated_evaluation
 from selfmodel.recovery.repertoire.make import EVALUATIONS, Filling, make_repertoire
-from selfmodel.sandbox.budget import Budget
 from selfmodel.simulation.simulator import Simulator
 
 NOTES = 10
@@ -65,7 +62,6 @@ def make(
     steps: Steps = 1000,
     seed: Seed = 0,
     threads: Threads = 0,
-    budget: FileBudget = DEFAULT_BUDGET,
     as_json: Json = False,
 ) -> None:
     """Search for gaits with diverse duty factors of the feet, and keep the best of each cell.
@@ -76,7 +72,7 @@ def make(
         raise InputError(f"--out needs a name that ends in .npz, got {str(out)!r}")
     check_folder(out)
     refuse_existing(out)
-    made = robots.robot_entry(robot, model_settings or (), Budget.parse(budget)).robot()
+    made = robots.robot_entry(robot, model_settings or ()).robot()
     simulator = Simulator(made, threads)
     repertoire = make_repertoire(
         made,

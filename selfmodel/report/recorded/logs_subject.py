@@ -11,7 +11,6 @@ from selfmodel.report.recorded.diagnosis_file import REMEDY, WHAT, read_diagnosi
 from selfmodel.report.recorded.plug_ins import comparator_name, recorded_space
 from selfmodel.report.run_result import parsed
 from selfmodel.report.subject import Subject
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 from selfmodel.simulation.threads import thread_count
 from selfmodel.trials.trial import trial_names
 
@@ -22,7 +21,6 @@ def subject_of_logs(
     *,
     robot: str | None = None,
     threads: int = 0,
-    budget: Budget = DEFAULT_BUDGET,
     comparator: str = AUTO,
     kinds: Sequence[FaultKind] = (),
 ) -> Subject:
@@ -33,7 +31,6 @@ def subject_of_logs(
         diagnosis: Output of ``selfmodel diagnose --json``, or the ``result.json`` of a recovery.
         robot: Self-model instead of that in the logs, as in ``--robot`` of the diagnosis.
         threads: Threads of the physics; 0 for all processors.
-        budget: Memory that each log may take.
         comparator: ``auto`` for the comparator that the file names; its name, such as
             ``package.module:object``, if it is no entry point.
         kinds: Fault kinds of the diagnosis that are no entry points.
@@ -44,8 +41,8 @@ def subject_of_logs(
     """
     file = read_diagnosis_file(diagnosis)
     explained, intact = file.matched(paths)
-    logs = trial_logs.logs([*explained, *intact], budget)
-    model = trial_logs.robot_of_logs(logs, robot, budget)
+    logs = trial_logs.logs([*explained, *intact])
+    model = trial_logs.robot_of_logs(logs, robot)
     file.check_self_model(model)
     found = file.diagnosis(recorded_space(diagnosis, model, file.kinds, kinds))
     trials = [log.trial for log in logs]

@@ -14,6 +14,7 @@ import mujoco
 
 from selfmodel.errors import InputError
 from selfmodel.files import encodable, read_file
+from selfmodel.isolation import Message, run_isolated
 from selfmodel.robot.mjcf.document.document import Document, parse_xml, read_document
 from selfmodel.robot.mjcf.document.expand import check_loggable, expand
 from selfmodel.robot.mjcf.document.files import Files, InMemory, robot_folder
@@ -28,18 +29,15 @@ from selfmodel.robot.mjcf.placement.base import carry_hinges, fix_base, free_bas
 from selfmodel.robot.mjcf.placement.forward import turn_forward
 from selfmodel.robot.mjcf.placement.ground import add_ground
 from selfmodel.robot.mjcf.placement.keyframe import bake_keyframe
-from selfmodel.robot.mjcf.rehearsal import run_on_model
 from selfmodel.robot.mjcf.reserved_memory import drop_large_reservations
 from selfmodel.robot.mjcf.sensors import add_sensors
 from selfmodel.robot.mjcf.settings import MAX_CONTROL_TIMESTEP, MjcfSettings, checked_settings
-from selfmodel.robot.mjcf.untrusted import checked_model
+from selfmodel.robot.mjcf.untrusted import MAX_TEXT, checked_model
 from selfmodel.robot.mjcf.usability import check_usable
 from selfmodel.robot.mujoco_errors import compile_model, mujoco_errors_as_input_errors
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.urdf.conversion import convert
 from selfmodel.robot.urdf.reading import read_urdf
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
-from selfmodel.sandbox.message import Message
 
 MIN_CONTROL_TIMESTEP = 0.01
 """Lower bound of the default control time step, s."""
@@ -67,22 +65,21 @@ class AdaptedMjcf:
     notes: tuple[str, ...]
 
 
-def adapt(path: Path, settings: MjcfSettings, budget: Budget = DEFAULT_BUDGET) -> AdaptedMjcf:
+def adapt(path: Path, settings: MjcfSettings) -> AdaptedMjcf:
     """Returns the adapted MJCF of a file; MuJoCo compiles the file in a child process.
 
     Args:
         path: The file, which may include and name files of its folder, of the folder above in a
             usual layout (``root_around``), and of the folder ``assets`` of the settings.
         settings: Properties that the file does not contain.
-        budget: Limits of memory and time.
 
     Raises:
         InputError: The file cannot be a robot; the message has the reason and the remedy.
     """
-    data = read_file(path, "an MJCF or URDF file", budget.model_text)
+    data = read_file(path, "an MJCF or URDF file", MAX_TEXT)
     try:
         files = robot_folder(path.parent, settings.assets)
-        document = _read(data, files, path.name, settings, budget)
+        document = _read(data, files, path.name, settings)
         facts = {
             "name": encodable(path.stem),
             "model": document.text,
@@ -91,37 +88,38 @@ def adapt(path: Path, settings: MjcfSettings, budget: Budget = DEFAULT_BUDGET) -
             "missing": document.missing,
         }
         request = Message(facts, document.assets)
-        found = run_on_model("selfmodel.robot.mjcf.adaptation:adapt_message", request, budget)
+        task = "selfmodel.robot.mjcf.adaptation:adapt_message"
+        found = run_isolated(task, request, what="the model")
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
-    notes = tuple(found.facts["notes"])
-    return AdaptedMjcf(**{**found.facts, "notes": notes, "assets": found.blobs})
+    notes = tuple(found.header["notes"])
+    return AdaptedMjcf(**{**found.header, "notes": notes, "assets": found.buffers})
 
 
-def _read(data: bytes, files: Files, name: str, settings: MjcfSettings, budget: Budget) -> Document:
+def _read(data: bytes, files: Files, name: str, settings: MjcfSettings) -> Document:
     """Returns the document of an MJCF or of a URDF; see ``read_document`` and ``read_urdf``."""
     root = parse_xml(data)
     if root.tag == "robot":
-        return read_urdf(root, files, budget)
+        return read_urdf(root, files)
     if settings.effort or settings.pose:
         raise InputError(
             "effort and pose are settings for a URDF: in an MJCF, motors have a forcerange, and a "
             "<key> in <keyframe> has the pose"
         )
-    return read_document(data, files, name, budget)
+    return read_document(data, files, name)
 
 
-def adapt_message(message: Message, budget: Budget, _scratch: Path) -> Message:
+def adapt_message(message: Message) -> Message:
     """Task of a child process: adapts the document in a message, and checks the robot of it."""
-    facts = message.facts
+    facts = message.header
     root = ET.fromstring(facts["model"])  # noqa: S314  # checked
-    document = Document(root, dict(message.blobs), list(facts["notes"]), facts["missing"])
+    document = Document(root, dict(message.buffers), list(facts["notes"]), facts["missing"])
     given = {name: value for name, value in facts["settings"].items() if value is not None}
     settings = checked_settings(given)
     if root.tag == "robot":
         document = convert(document, settings)
         settings = replace(settings, kp={}, kd={})  # its motors are servos with these gains
-    adapted = _adapted(facts["name"], document, settings, budget)
+    adapted = _adapted(facts["name"], document, settings)
     with mujoco_errors_as_input_errors("use the model"):
         Robot(adapted.name, adapted.mjcf, adapted.control_timestep, adapted.assets)
     result = {
@@ -149,13 +147,13 @@ def adapt_text(
     """
     try:
         document = read_document(mjcf.encode(), InMemory(files))
-        return _adapted(name, document, settings, DEFAULT_BUDGET)
+        return _adapted(name, document, settings)
     except InputError as error:
         raise InputError(f"{name}: {error}") from error
 
 
-def _adapted(name: str, document: Document, settings: MjcfSettings, budget: Budget) -> AdaptedMjcf:
-    check_loggable(document, budget)
+def _adapted(name: str, document: Document, settings: MjcfSettings) -> AdaptedMjcf:
+    check_loggable(document)
     drop_large_reservations(document)
     expand(document)
     name_parts(document)
@@ -180,7 +178,7 @@ def _adapted(name: str, document: Document, settings: MjcfSettings, budget: Budg
         limit_reach(document, compile_model(document.text, document.assets), settings.reach)
     add_command_ranges(document, compile_model(document.text, document.assets), settings)
     try:
-        checked = checked_model(document.text, document.assets, budget)
+        checked = checked_model(document.text, document.assets)
     except ValueError as error:
         raise InputError(f"a log cannot contain the model: {error}") from error
     return AdaptedMjcf(

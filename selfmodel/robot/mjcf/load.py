@@ -6,25 +6,21 @@ from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.adaptation import AdaptedMjcf, adapt
 from selfmodel.robot.mjcf.settings import MjcfSettings, read_settings
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 
 
-def load_mjcf(
-    path: Path | str, settings: MjcfSettings | None = None, budget: Budget = DEFAULT_BUDGET
-) -> Robot:
+def load_mjcf(path: Path | str, settings: MjcfSettings | None = None) -> Robot:
     """Returns the robot that an MJCF or URDF file describes; see docs/reference/mjcf.md.
 
     Args:
         path: The file, which is read only. It may name the files that ``adapt`` describes.
         settings: Properties that the file does not contain; None for the settings of the TOML file
             of the same name.
-        budget: Limits of memory and time.
 
     Raises:
         InputError: The file cannot be a robot; the message has the reason and the remedy.
     """
     file = Path(path)
-    adapted = adapt(file, read_settings(file) if settings is None else settings, budget)
+    adapted = adapt(file, read_settings(file) if settings is None else settings)
     return robot_from(adapted, str(file))
 
 

@@ -1,7 +1,7 @@
 """Checks of an untrusted model before MuJoCo compiles the model: it names no other files.
 
 A log may come from any source, and MuJoCo would read any file that the model names. The memory and
-the time of the model are limited by the child process that compiles it first (``rehearsal``).
+the time of the model are limited by the child process that compiles it first (``isolated_model``).
 """
 
 import re
@@ -11,7 +11,11 @@ from types import MappingProxyType
 from xml.etree import ElementTree as ET  # _Checker refuses document types and deep trees
 from xml.parsers import expat  # the same
 
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget, memory_error
+MAX_TEXT = 2_000_000
+"""Largest length of a model's text, characters: MuJoCo takes up to 200 bytes for each."""
+
+MAX_FILE = 128 * 2**20
+"""Largest size of a file that a model names, bytes."""
 
 MAX_DEPTH = 200
 """Largest number of XML elements within each other."""
@@ -50,24 +54,19 @@ class CheckedModel:
     files: Mapping[str, bytes]
 
 
-def checked_model(
-    mjcf: str, attached: Mapping[str, bytes], budget: Budget = DEFAULT_BUDGET
-) -> CheckedModel:
+def checked_model(mjcf: str, attached: Mapping[str, bytes]) -> CheckedModel:
     """Returns the model of a log after all checks.
 
     Args:
         mjcf: The MJCF in the log.
         attached: Contents of the attachments of the log, by name.
-        budget: Limit of the text.
 
     Raises:
-        BudgetError: The text is too long.
         ValueError: The model is no XML, is nested too deeply, or names other files; the message
             contains the element.
     """
-    if len(mjcf) > budget.model_text:
-        what = f"the model has {len(mjcf)} characters, more than {budget.model_text}"
-        raise memory_error(what, budget)
+    if len(mjcf) > MAX_TEXT:
+        raise ValueError(f"the model has {len(mjcf)} characters, more than {MAX_TEXT}")
     checker = _Checker(attached)
     try:
         checker.check(mjcf)

@@ -12,10 +12,10 @@ from xml.etree import ElementTree as ET  # of checked texts
 from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.document.document import Document
 from selfmodel.robot.mjcf.document.files import Files
+from selfmodel.robot.mjcf.untrusted import MAX_FILE
 from selfmodel.robot.model_checks import MAX_NUMBER
 from selfmodel.robot.urdf.meshes import READABLE, Meshes
 from selfmodel.robot.urdf.tree import check_tree, check_types, quoted
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
 
 _ORIGIN = ("xyz", "rpy")
 _KEPT: Mapping[str, tuple[str, ...]] = MappingProxyType(
@@ -57,13 +57,12 @@ _COUNTS: Mapping[str, int] = MappingProxyType(
 _XACRO = "xacro"
 
 
-def read_urdf(root: ET.Element, files: Files, budget: Budget = DEFAULT_BUDGET) -> Document:
+def read_urdf(root: ET.Element, files: Files) -> Document:
     """Returns the document of a URDF, with its meshes read.
 
     Args:
         root: The ``<robot>`` element.
         files: Source of the files that the URDF names.
-        budget: Limits of the sizes of the files.
 
     Raises:
         InputError: The URDF is a xacro, its links form no tree, or the mesh of a collision is
@@ -84,7 +83,7 @@ def read_urdf(root: ET.Element, files: Files, budget: Budget = DEFAULT_BUDGET) -
     check_types(document.root)
     _fix_rangeless(document)
     _drop_empty_shapes(document)
-    _read_meshes(document, Meshes(files, budget.file_bytes, document))
+    _read_meshes(document, Meshes(files, MAX_FILE, document))
     return document
 
 

@@ -12,8 +12,7 @@ from selfmodel.faults.build import apply_faults
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.robot.parameters import Parameters, model_with_parameters
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import DEFAULT_BUDGET
-from selfmodel.simulation.batch_memory import hypothesis_bytes
+from selfmodel.simulation.batch_memory import batch_bytes, hypothesis_bytes
 from selfmodel.simulation.calibration_segments import CalibrationSegments
 from selfmodel.simulation.losses import damped
 from selfmodel.simulation.outcome import SimulationStats
@@ -117,7 +116,7 @@ class Predictions:
         """
         stats = SimulationStats() if stats is None else stats
         needed = max(hypothesis_bytes(self.robot, own.segments, steps=0) for own in self.data)
-        size = max(1, DEFAULT_BUDGET.models_bytes // needed)
+        size = max(1, batch_bytes() // needed)
         batches = [models[first : first + size] for first in range(0, len(models), size)]
         return np.concatenate([self._batch_errors(batch, stats) for batch in batches], axis=1)
 

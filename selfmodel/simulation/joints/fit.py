@@ -23,8 +23,7 @@ from selfmodel.robot.joint_parameters import (
     names_of,
 )
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import DEFAULT_BUDGET
-from selfmodel.simulation.batch_memory import hypothesis_bytes
+from selfmodel.simulation.batch_memory import batch_bytes, hypothesis_bytes
 from selfmodel.simulation.joints.segments import JointSegments
 from selfmodel.simulation.joints.sets import NOMINAL, SETS, Basis, Point
 from selfmodel.simulation.losses import damped, is_better, root_mean_square
@@ -275,7 +274,7 @@ class Experiment:
         The points have one control delay. A step without a known state has an error of 0.
         """
         needed = max(hypothesis_bytes(self._robot, own.segments, steps=0) for own in self._data)
-        size = max(1, DEFAULT_BUDGET.models_bytes // needed)
+        size = max(1, batch_bytes() // needed)
         batches = [points[first : first + size] for first in range(0, len(points), size)]
         return np.concatenate([self._batch_errors(batch) for batch in batches])
 

@@ -18,7 +18,6 @@ from selfmodel.experiments.robots import robot_entry
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import POSE
-from selfmodel.sandbox.budget import Budget
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
 from tests.helpers.drivers import random_controllers
@@ -52,7 +51,7 @@ def _robot(name: str, layouts: dict[str, Path]) -> Robot:
     """Returns a robot by its name, its file, or ``LAYOUT:FILE`` of Menagerie-like packages."""
     layout, colon, file = name.partition(":")
     path = str(layouts[layout] / "go" / "xml" / file) if colon else name
-    return robot_entry(path, budget=Budget(memory=3 * 10**9)).robot()
+    return robot_entry(path).robot()
 
 
 def robot_pixels(robot: Robot) -> list[int]:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.lab_robots.models import BUDGET, MODELS, write_models
+from benchmarks.lab_robots.models import MODELS, write_models
 from selfmodel.experiments.robots import robot_entry
 from selfmodel.faults.notation import parse
 from tests.helpers.drivers import random_cpgs
@@ -39,7 +39,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 @pytest.mark.parametrize("name", MODELS)
 def test_a_model_of_a_laboratory_is_exact_at_no_gap(name: str, files: dict[str, Path]):
-    entry = robot_entry(str(files[name]), budget=BUDGET)
+    entry = robot_entry(str(files[name]))
     robot = entry.robot()
     driver = random_cpgs(robot, 1)[0]
     lost_leg, and_jam = (parse(entry.cases[case], robot.anatomy) for case in (2, 7))

@@ -5,12 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from selfmodel.isolation import Message
 from selfmodel.logs.recordings.importer import Recording, import_recording
 from selfmodel.logs.recordings.mapping.mapping_file import parse_mapping
 from selfmodel.logs.recordings.rosbag.child import read
 from selfmodel.robot.robot import Robot
-from selfmodel.sandbox.budget import DEFAULT_BUDGET
-from selfmodel.sandbox.message import Message
 from tests.logs.conftest import biped  # noqa: F401 - a fixture
 from tests.logs.recordings.rosbag.bags import (
     T0,
@@ -103,8 +102,8 @@ def imported(path: Path, robot: Robot, mapping: str = MAPPING) -> Recording:
     return import_recording(path, parse_mapping(mapping, "MAP.toml"), robot)
 
 
-def decoded(path: Path, scratch: Path) -> Message:
+def decoded(path: Path) -> Message:
     """Reads all topics of a bag as the child process does, in this process."""
     wanted = [topic for topic, _, _ in recorded(0.02)]
     request = {"path": str(path), "folder": str(Path.cwd()), "wanted": sorted(set(wanted))}
-    return read(Message(request), DEFAULT_BUDGET, scratch)
+    return read(Message(request))

@@ -213,13 +213,6 @@ AWKWARD: dict[str, Awkward] = {
         ),
         "ball",
     ),
-    "a billion copies": Awkward(
-        mjcf(
-            legs='<replicate count="1000"><replicate count="1000"><replicate count="1000">'
-            f"{LEGS}</replicate></replicate></replicate>"
-        ),
-        "--budget",
-    ),
     "an attached model": Awkward(
         mjcf(more='<asset><model name="o" file="o.xml"/></asset>'), "<model>", {"o.xml": mjcf()}
     ),
@@ -228,10 +221,6 @@ AWKWARD: dict[str, Awkward] = {
             more='<asset><hfield name="h" nrow="4" ncol="4" size="2 2 .1 .1"/></asset>',
             world='<geom type="hfield" hfield="h"/>',
         )
-    ),
-    "a height field without end": Awkward(
-        mjcf(more='<asset><hfield name="h" nrow="90000" ncol="90000" size="2 2 .1 .1"/></asset>'),
-        "--budget",
     ),
     "frames and copies": Awkward(
         mjcf(legs=f'<frame pos="0 0 .01" euler="0 0 5">{LEGS}</frame>', more="")
@@ -258,9 +247,6 @@ AWKWARD: dict[str, Awkward] = {
         mjcf(more='<default><geom contype="0" conaffinity="0"/></default>'), "touch"
     ),
     "no ground": Awkward(mjcf(world="")),
-    "ten thousand bodies": Awkward(
-        mjcf(legs=LEGS + '<body><geom size=".01"/></body>' * 10_000), "--budget"
-    ),
     "two thousand joints": Awkward(
         mjcf(legs="".join(LEG.format(f"leg{k}", f"{k / 100}") for k in range(2000))), "left_hip"
     ),

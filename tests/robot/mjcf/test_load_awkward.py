@@ -10,7 +10,6 @@ import pytest
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.robot.mjcf.load import load_mjcf
-from selfmodel.sandbox.budget import Budget
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.signals import SIGNALS
 from tests.helpers.drivers import random_controllers
@@ -24,12 +23,6 @@ STEPS = 20
 ROUNDING = 1e-9
 """Largest error of a prediction from a logged state: the base of a planar robot is logged as a
 position and a quaternion."""
-
-SHORT = Budget(time=9)
-"""Half a second of processor time for a model."""
-
-SLOW = ("a billion copies", "ten thousand bodies")
-"""Cases that take all of it."""
 
 
 @pytest.mark.parametrize("what", [what for what, case in AWKWARD.items() if not case.sentence])
@@ -51,17 +44,13 @@ def test_an_awkward_but_valid_file_gives_a_robot_that_moves(what: str, tmp_path:
 
 @pytest.mark.parametrize(
     "what",
-    [
-        pytest.param(what, marks=[pytest.mark.process] if what in SLOW else [])
-        for what, case in AWKWARD.items()
-        if case.sentence
-    ],
+    [what for what, case in AWKWARD.items() if case.sentence],
 )
 def test_an_invalid_file_is_refused_in_one_sentence(what: str, tmp_path: Path):
     path = AWKWARD[what].write(tmp_path)
 
     with pytest.raises(InputError) as refusal:
-        load_mjcf(path, budget=SHORT)
+        load_mjcf(path)
 
     said = str(refusal.value)
     assert said.startswith(str(path.parent))

@@ -10,8 +10,7 @@ from xml.parsers import expat  # the same
 
 from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.document.files import Files
-from selfmodel.robot.mjcf.untrusted import MAX_DEPTH
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
+from selfmodel.robot.mjcf.untrusted import MAX_DEPTH, MAX_FILE, MAX_TEXT
 
 _FOLDER_ATTRIBUTES = {"meshdir": ("mesh", "skin", "flex", "hfield"), "texturedir": ("texture",)}
 _NAMED_BY_FILE = ("mesh", "texture", "hfield")
@@ -60,28 +59,25 @@ class Document:
         return [body for world in self.root.findall("worldbody") for body in world.iter("body")]
 
 
-def read_document(
-    mjcf: bytes, files: Files, name: str = "", budget: Budget = DEFAULT_BUDGET
-) -> Document:
+def read_document(mjcf: bytes, files: Files, name: str = "") -> Document:
     """Returns the document of an MJCF, with includes inserted and all named files read.
 
     Args:
         mjcf: The MJCF.
         files: Source of the files that the MJCF includes and names.
         name: Name of the MJCF among the files, which it cannot include.
-        budget: Limits of the sizes of the files.
 
     Raises:
         InputError: A file is missing, too large, outside the folder, or no MJCF.
     """
-    if len(mjcf) > budget.model_text:
-        raise InputError(f"expected an MJCF of at most {budget.model_text} bytes, got {len(mjcf)}")
+    if len(mjcf) > MAX_TEXT:
+        raise InputError(f"expected an MJCF of at most {MAX_TEXT} bytes, got {len(mjcf)}")
     root = parse_xml(mjcf)
     if root.tag != "mujoco":
         raise InputError(f"expected an MJCF, which begins with <mujoco>, got <{root.tag[:40]}>")
-    _include(root, files, "", {normpath(name)}, budget.model_text)
+    _include(root, files, "", {normpath(name)}, MAX_TEXT)
     document = Document(root)
-    _read_assets(document, files, budget.file_bytes)
+    _read_assets(document, files, MAX_FILE)
     return document
 
 

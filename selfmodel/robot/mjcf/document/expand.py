@@ -10,19 +10,18 @@ from selfmodel.robot.mjcf.document.dissolve import dissolve_frames
 from selfmodel.robot.mjcf.document.document import Document
 from selfmodel.robot.mjcf.untrusted import REFUSED_ELEMENTS, checked_model
 from selfmodel.robot.mujoco_errors import compile_model, loading_a_model
-from selfmodel.sandbox.budget import Budget
 
 _COPYING_ELEMENTS = ("replicate", "composite")
 
 
-def check_loggable(document: Document, budget: Budget) -> None:
+def check_loggable(document: Document) -> None:
     """Checks that a log can contain the model, before MuJoCo compiles the model.
 
     Raises:
         InputError: The model reads other models, runs other code, or is too long.
     """
     try:
-        checked_model(document.text, document.assets, budget)
+        checked_model(document.text, document.assets)
     except ValueError as error:
         raise InputError(
             f"the log of a trial contains the robot's model, and cannot contain this model: {error}"

@@ -8,9 +8,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from selfmodel.isolation import Message
 from selfmodel.logs.recordings.tables import child, parquet_child
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget
-from selfmodel.sandbox.message import Message
 
 HINGES = ("left_hip_x", "left_hip_y", "right_hip_x", "right_hip_y")
 
@@ -88,15 +87,13 @@ def write_parquet(path: Path, found: Mapping[str, np.ndarray]) -> Path:
 WRITERS = {"csv": write_csv, "npz": write_npz, "parquet": write_parquet}
 
 
-def read_here(
-    path: Path, *wanted: str, exact: str = "", budget: Budget = DEFAULT_BUDGET
-) -> tuple[list[str], dict[str, np.ndarray]]:
+def read_here(path: Path, *wanted: str, exact: str = "") -> tuple[list[str], dict[str, np.ndarray]]:
     """Reads a table as the child process does, in this process."""
     request = {"path": str(path), "folder": str(Path.cwd()), "wanted": wanted, "exact": exact}
     read = (parquet_child if path.suffix == ".parquet" else child).read
-    answer = read(Message(request), budget, path.parent)
+    answer = read(Message(request))
     found = {
-        name: np.frombuffer(answer.blobs[name], np.int64 if kind == "i" else np.float64)
-        for name, kind in answer.facts["kinds"].items()
+        name: np.frombuffer(answer.buffers[name], np.int64 if kind == "i" else np.float64)
+        for name, kind in answer.header["kinds"].items()
     }
-    return list(answer.facts["names"]), found
+    return list(answer.header["names"]), found

@@ -7,7 +7,6 @@ import pytest
 
 from selfmodel.errors import InputError
 from selfmodel.logs.recordings.tables.content import NO_TIME
-from selfmodel.sandbox.budget import Budget, BudgetError
 from tests.logs.recordings.tables.tables import read_here
 
 
@@ -91,13 +90,3 @@ def test_other_dates_are_refused(text: str, tmp_path: Path):
 def test_an_error_names_line_and_column(text: str | bytes, message: str, tmp_path: Path):
     with pytest.raises(InputError, match=message):
         read_here(written(tmp_path, text), "time", "q")
-
-
-def test_columns_beyond_the_budget_are_refused(tmp_path: Path):
-    budget = Budget(memory=10**6)
-    many = ",".join(f"c{k}" for k in range(11))
-
-    with pytest.raises(BudgetError, match="more than 10 columns"):
-        read_here(written(tmp_path, f"{many}\n"), "c1", budget=budget)
-    with pytest.raises(BudgetError, match="numbers in the wanted columns"):
-        read_here(written(tmp_path, "q\n" + "1\n" * 20_000), "q", budget=budget)

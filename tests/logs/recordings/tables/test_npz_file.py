@@ -8,7 +8,6 @@ import pytest
 
 from selfmodel.errors import InputError
 from selfmodel.logs.recordings.tables.content import NO_TIME
-from selfmodel.sandbox.budget import DEFAULT_BUDGET, Budget, BudgetError
 from tests.logs.recordings.tables.tables import read_here
 
 
@@ -105,16 +104,6 @@ def test_a_damaged_array_is_refused(tmp_path: Path):
         read_here(path, "q")
 
 
-def test_a_bomb_is_refused_by_its_header(tmp_path: Path):
-    path = tmp_path / "t.npz"
-    np.savez_compressed(path, q=np.zeros((5, 3)), bomb=np.zeros(10**6))
-    small = Budget(memory=2 * 10**6)
-
-    with pytest.raises(BudgetError, match="numbers in the wanted columns"):
-        read_here(path, "bomb", budget=small)
-    assert read_here(path, "q.1", budget=small)[1]["q.1"].tolist() == [0.0] * 5
-
-
 def test_labels_of_many_characters_are_no_labels(tmp_path: Path):
     path = tmp_path / "t.npz"
     np.savez(path, q=np.zeros((2, 2)), q_names=["a", "b" * 1001])
@@ -140,4 +129,4 @@ def test_a_header_that_promises_more_than_the_file_has_is_refused(tmp_path: Path
         with zipfile.ZipFile(path, "w") as archive:
             archive.writestr("q.npy", b"\x93NUMPY\x01\x00\x76\x00" + text + bytes(72))
         with pytest.raises(InputError, match=message):
-            read_here(path, "q", budget=DEFAULT_BUDGET)
+            read_here(path, "q")

@@ -10,7 +10,6 @@ import pytest
 
 from selfmodel.errors import InputError
 from selfmodel.logs.recordings.tables.content import NO_TIME
-from selfmodel.sandbox.budget import Budget, BudgetError
 from tests.logs.recordings.tables.tables import columns, read_here, write_parquet
 
 
@@ -56,19 +55,3 @@ def test_damage_is_refused(place: int, tmp_path: Path):
 
     with pytest.raises(InputError, match="expected a Parquet file, got: "):
         read_here(path, *columns())
-
-
-def test_a_bomb_is_refused_by_its_number_of_rows(tmp_path: Path):
-    path = write_parquet(tmp_path / "t.parquet", {"q": np.zeros(10**6)})
-    assert path.stat().st_size < 10_000
-
-    with pytest.raises(BudgetError, match="numbers in the wanted columns"):
-        read_here(path, "q", budget=Budget(memory=10**6))
-
-
-def test_columns_beyond_the_budget_are_refused_whatever_their_type(tmp_path: Path):
-    path = tmp_path / "t.parquet"
-    pq.write_table(pa.table({f"c{k}": ["text"] for k in range(11)}), path)
-
-    with pytest.raises(BudgetError, match="more than 10 columns"):
-        read_here(path, "c1", budget=Budget(memory=10**6))

@@ -1,4 +1,4 @@
-"""Promises of a table: the child process reads it, within the budget."""
+"""Promises of a table: the child process reads it."""
 
 import os
 import zipfile
@@ -10,7 +10,6 @@ import pytest
 from selfmodel.errors import InputError
 from selfmodel.logs.recordings.tables import table
 from selfmodel.logs.recordings.tables.table import is_table, read_table
-from selfmodel.sandbox.budget import Budget, BudgetError
 from tests.logs.recordings.tables.tables import WRITERS, columns
 
 
@@ -44,26 +43,6 @@ def test_a_missing_package_is_a_command(tmp_path: Path, monkeypatch: pytest.Monk
 
     with pytest.raises(InputError, match=r"needs pyarrow: pip install 'selfmodel\[tables\]'"):
         read_table(tmp_path / "t.parquet", ())
-
-
-@pytest.mark.process
-def test_a_line_without_end_is_refused_within_the_budget(tmp_path: Path):
-    path = tmp_path / "t.csv"
-    with path.open("wb") as file:
-        for _ in range(300):
-            file.write(b"a," * 10**6)
-
-    with pytest.raises(InputError, match=r"without a line end|takes more than"):
-        read_table(path, ["a"])
-
-
-@pytest.mark.process
-def test_many_labels_do_not_fill_the_memory(tmp_path: Path):
-    path = tmp_path / "t.npz"
-    np.savez_compressed(path, names=np.array(["x"] * 10**6), q=np.zeros((1, 10**6)))
-
-    with pytest.raises(BudgetError, match="more than 100 columns"):
-        read_table(path, ["q.0"], Budget(memory=10**7))
 
 
 @pytest.mark.process
