@@ -6,24 +6,25 @@ Usage:
 
 from typing import TYPE_CHECKING
 
-from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
+from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.robot.anatomy import Anatomy
 
 if TYPE_CHECKING:
     from selfmodel.robot.embodiment import Embodiment
 
 
-def fall(embodiment: "Embodiment", _anatomy: Anatomy, fault: Fault) -> None:
-    """Sets the acceleration of free fall."""
-    embodiment.model.opt.gravity[2] = -fault.severity
+class Gravity(FaultKind):
+    """Another acceleration of free fall."""
+
+    def apply(self, embodiment: "Embodiment", _anatomy: Anatomy, fault: Fault) -> None:
+        """Sets the acceleration."""
+        embodiment.model.opt.gravity[2] = -fault.severity
 
 
-GRAVITY = FaultKind(
+GRAVITY = Gravity(
     name="gravity",
-    keyword="gravity",
-    apply=fall,
-    severity_bounds=uniform_bounds(0.0, 30.0),
-    levels=uniform_levels(1.0, 1.6, 2.5, 3.7, 5.0, 6.0, 7.0, 8.0, 9.0, 11.0, 12.5, 25.0),
+    bounds=(0.0, 30.0),
+    levels=(1.0, 1.6, 2.5, 3.7, 5.0, 6.0, 7.0, 8.0, 9.0, 11.0, 12.5, 25.0),
     degenerates_to={9.81: None},
     unit="m/s^2",
 )

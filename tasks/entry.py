@@ -6,7 +6,7 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.faults.table_one import cases_of
+from selfmodel.faults.registry import cases_of
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery.scores.fitness import Score
 from selfmodel.robot.legs import reaches_ground

@@ -10,7 +10,7 @@ import mujoco
 from selfmodel.errors import InputError
 from selfmodel.faults.build import apply_faults
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.faults.kinds.neuron import SILENT_NEURON
+from selfmodel.faults.sensors import SILENT_NEURON
 from selfmodel.physical.reality_gap import draw_gap_of, perturbed_model
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.anatomy_reader import read_anatomy
@@ -141,7 +141,7 @@ def _check_effect(name: str, hypothesis: Hypothesis) -> None:
         InputError: The hypothesis has such a fault.
     """
     for fault in hypothesis.faults:
-        if not fault.kind.affects_dynamics or fault.kind is SILENT_NEURON:
+        if not fault.kind.affects_dynamics or fault.kind == SILENT_NEURON:
             raise InputError(
                 f"{Hypothesis((fault,))} has no effect in {name}: its observations are "
                 f"the suite's, not the readings of the robot's sensors; leave the fault out"
@@ -163,18 +163,18 @@ def _compiled(
     Raises:
         InputError: The suite's specification is not available for the task.
     """
-    edits = [(fault, fault.kind.edit_spec) for fault in hypothesis.faults if fault.kind.edit_spec]
+    edits = hypothesis.spec_part.faults
     if not edits:
         return own
     if task not in suite_bodies.DOMAINS.get(domain, ()):
         raise InputError(
-            f"{edits[0][0].kind.name} replaces flat ground, and {domain} {task} has other ground "
+            f"{edits[0].kind.name} replaces flat ground, and {domain} {task} has other ground "
             f"or further bodies: use it with a task of {', '.join(suite_bodies.DOMAINS)} that "
             f"selfmodel suite list names"
         )
     spec = suite_bodies.specification(domain, task)
-    for fault, edit in edits:
-        edit(spec, fault, seed)
+    for fault in edits:
+        fault.kind.edit_specification(spec, fault, seed)
     with mujoco_errors_as_input_errors(f"compile the model of {hypothesis}"):
         return spec.compile()
 

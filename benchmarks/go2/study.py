@@ -17,11 +17,9 @@ from selfmodel.diagnosis.evidence import Evidence
 from selfmodel.diagnosis.verdicts.significance import is_better
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
+from selfmodel.faults.joints import BROKEN, JAMMED, WEAK_MOTOR
 from selfmodel.faults.kind import Fault
-from selfmodel.faults.kinds.broken import BROKEN
-from selfmodel.faults.kinds.jammed import JAMMED
-from selfmodel.faults.kinds.motor import WEAK_MOTOR
-from selfmodel.faults.kinds.sensor import FAILED_SENSOR
+from selfmodel.faults.sensors import FAILED_SENSOR
 from selfmodel.robot.joint_parameters import (
     QUANTITIES,
     JointParameters,

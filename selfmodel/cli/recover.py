@@ -52,7 +52,7 @@ from selfmodel.experiments.chosen_score import choose_score
 from selfmodel.experiments.experiment import Experiment, run
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.hypothesis_space import HypothesisSpace
-from selfmodel.faults.kinds.neuron import silent_neurons
+from selfmodel.faults.sensors import silent_neurons
 from selfmodel.logs.files import replace_file
 from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
 from selfmodel.report.progress import ProgressRecorder

@@ -26,7 +26,7 @@ from selfmodel.controllers.controller import Controller, check_silent_neurons, d
 from selfmodel.experiments import plugins, robots, trial_logs
 from selfmodel.experiments.reality import draw_reality
 from selfmodel.faults.hypothesis_space import HypothesisSpace
-from selfmodel.faults.kinds.neuron import silent_neurons
+from selfmodel.faults.sensors import silent_neurons
 from selfmodel.logs.atomic import partial_path
 from selfmodel.logs.physical_trial import run_trial
 from selfmodel.logs.records import TrialHeader

@@ -50,27 +50,26 @@ def check_fault_kind(kind: FaultKind, robot: Robot) -> None:
         if kind.absorbs(fault, fault, robot.anatomy):
             raise ValueError(f"{fault} absorbs itself, so no hypothesis can contain it")
     for other in kind.degenerate_kinds:
-        if other.severity_bounds is not None or (kind.searchable and not other.searchable):
+        if other.bounds is not None or (kind.searchable and not other.searchable):
             raise ValueError(
                 f"{kind.name} degenerates to {other.name}, which must be a searchable kind "
                 f"without severities"
             )
     _check_edits(kind, candidates, robot)
     _check_batch(kind, robot)
-    if kind.adapt_to_contacts is not None:
+    if kind.adapts_to_contacts:
         _check_contacts(kind, candidates, robot)
     _check_parts(kind, candidates, robot)
     _check_contradictions(kind, candidates, robot)
 
 
 def _check_severity(fault: Fault, robot: Robot) -> None:
-    if fault.kind.severity_bounds is None:
+    bounds = fault.kind.bounds_at(robot.anatomy, fault.part)
+    if bounds is None:
         if fault.severity != 0:
-            raise ValueError(
-                f"{fault} has the level {fault.severity}, but its kind has no severity_bounds"
-            )
+            raise ValueError(f"{fault} has the level {fault.severity}, but its kind has no bounds")
         return
-    lowest, highest = fault.kind.severity_bounds(robot.anatomy, fault.part)
+    lowest, highest = bounds
     if not lowest <= fault.severity <= highest:
         raise ValueError(f"the level of {fault} is not between {lowest} and {highest}")
 
@@ -127,8 +126,7 @@ def _check_contacts(kind: FaultKind, candidates: tuple[Fault, ...], robot: Robot
         for points in (on_a_step, np.empty((0, 3))):
             before, own = points.copy(), build(robot, Hypothesis((fault,)))
             size = mujoco.mj_sizeModel(own.model)
-            if kind.adapt_to_contacts is not None:
-                kind.adapt_to_contacts(own, fault, points)
+            kind.adapt_to_contacts(own, fault, points)
             if mujoco.mj_sizeModel(own.model) != size or not np.array_equal(points, before):
                 raise ValueError(f"{kind.name} changes the contact points, or a model's layout")
 
@@ -142,7 +140,7 @@ def _check_parts(kind: FaultKind, candidates: tuple[Fault, ...], robot: Robot) -
 
 def _check_contradictions(kind: FaultKind, candidates: tuple[Fault, ...], robot: Robot) -> None:
     """Checks that the log of a robot with a fault does not contradict the fault."""
-    if kind.contradicted is None:
+    if type(kind).contradicted is FaultKind.contradicted:
         return
     network = network_for(robot)
     controller = Controller(network, np.linspace(-1, 1, network.weights))

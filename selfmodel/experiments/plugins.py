@@ -155,7 +155,7 @@ def kinds(names: str) -> tuple[FaultKind, ...]:
     chosen = [_kind(name) for name in kind_names(names).split(",")]
     taken: dict[object, FaultKind] = {}
     for kind in (*KINDS.values(), *chosen):
-        for key in (kind.name, (kind.keyword, kind.prefix, kind.severity_bounds is None)):
+        for key in (kind.name, (kind.keyword, kind.prefix, kind.bounds is None)):
             if taken.setdefault(key, kind) is not kind:
                 raise InputError(
                     f"two fault kinds have the name {kind.name!r}, or {kind.keyword!r} in "

@@ -6,6 +6,7 @@ import mujoco
 from mujoco import MjModel, MjSpec
 
 from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.faults.joints import BROKEN, JAMMED, JAMMED_AT_ANGLE
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.mujoco_errors import mujoco_errors_as_input_errors
@@ -62,8 +63,7 @@ def compile_model(
         return robot.model
     spec = robot.specification()
     for fault in faults:
-        if fault.kind.edit_spec:
-            fault.kind.edit_spec(spec, fault, seed)
+        fault.kind.edit_specification(spec, fault, seed)
     for edit in edits:
         edit(spec)
     with mujoco_errors_as_input_errors(f"compile the model of {hypothesis}"):
@@ -104,3 +104,37 @@ def _mean_inertia(model: MjModel, data: mujoco.MjData) -> float:
     mujoco.mj_resetData(model, data)
     mujoco.mj_fwdPosition(model, data)
     return float(data.M[model.M_rowadr + model.M_rownnz - 1].mean())
+
+
+def detached_bodies(anatomy: Anatomy, model: MjModel, hypothesis: Hypothesis) -> frozenset[int]:
+    """Returns the ids of the bodies that a hypothesis detaches.
+
+    Args:
+        anatomy: The robot's parts.
+        model: Model with the robot's bodies.
+        hypothesis: The hypothesis.
+    """
+    names = (
+        name
+        for fault in hypothesis.faults
+        if fault.kind == BROKEN
+        for name in anatomy.joint(fault.part).bodies
+    )
+    return frozenset(int(model.body(name).id) for name in names)
+
+
+def jammed_bodies(anatomy: Anatomy, model: MjModel, hypothesis: Hypothesis) -> frozenset[int]:
+    """Returns the ids of the bodies at the joints that a hypothesis jams.
+
+    Args:
+        anatomy: The robot's parts.
+        model: Model with the robot's hinges.
+        hypothesis: The hypothesis.
+    """
+    hinges = (
+        hinge
+        for fault in hypothesis.faults
+        if fault.kind in (JAMMED, JAMMED_AT_ANGLE)
+        for hinge in anatomy.joint(fault.part).hinges
+    )
+    return frozenset(int(model.joint(hinge).bodyid[0]) for hinge in hinges)

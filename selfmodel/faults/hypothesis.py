@@ -41,7 +41,7 @@ class Hypothesis:
     @property
     def spec_part(self) -> "Hypothesis":
         """The faults that edit the specification before it is compiled."""
-        return Hypothesis(tuple(fault for fault in self.faults if fault.kind.edit_spec))
+        return Hypothesis(tuple(fault for fault in self.faults if fault.kind.edits_specification))
 
 
 INTACT = Hypothesis()

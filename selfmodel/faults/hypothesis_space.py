@@ -84,12 +84,11 @@ class HypothesisSpace:
 
     def levels(self, fault: Fault) -> tuple[float, ...]:
         """Returns the severity levels of a fault's kind at its part."""
-        return fault.kind.levels(self.anatomy, fault.part)
+        return fault.kind.levels_at(self.anatomy, fault.part)
 
     def severity_bounds(self, fault: Fault) -> tuple[float, float] | None:
         """Returns the lowest and highest severity at a fault's part; None without severities."""
-        bounds = fault.kind.severity_bounds
-        return bounds(self.anatomy, fault.part) if bounds else None
+        return fault.kind.bounds_at(self.anatomy, fault.part)
 
     @cached_property
     def coarse_candidates(self) -> tuple[Fault, ...]:
@@ -103,7 +102,7 @@ class HypothesisSpace:
             for kind in self.kinds
             for part in kind.parts(self.anatomy)
             if (kind, part) not in known
-            for levels in (kind.levels(self.anatomy, part),)
+            for levels in (kind.levels_at(self.anatomy, part),)
             for i in _evenly_spaced(len(levels))
         )
         return (*spaced, *(fault for fault in self.observed if fault.kind in self.kinds))
@@ -120,7 +119,7 @@ class HypothesisSpace:
                 kind = self.kinds[int(kind_value * len(self.kinds))]
                 parts = kind.parts(self.anatomy)
                 part = parts[int(part_value * len(parts))]
-                levels = kind.levels(self.anatomy, part)
+                levels = kind.levels_at(self.anatomy, part)
                 faults.append(Fault(kind, part, levels[int(severity_value * len(levels))]))
         return self.canonical(faults)
 

@@ -1,9 +1,11 @@
-"""A fault, and the record of callables that defines a kind of fault or of environment."""
+"""A fault, and the base class of the kinds of faults and environments."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import partial
-from typing import TYPE_CHECKING, TypeVar
+from functools import total_ordering
+from typing import TYPE_CHECKING, Optional
+
+import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.robot.anatomy import Anatomy
@@ -14,54 +16,17 @@ if TYPE_CHECKING:
 
     from selfmodel.robot.embodiment import Embodiment
 
-Values = TypeVar("Values")
-
 ENVIRONMENT = ""
 """Part of the kinds that apply to the world or to the whole robot; notation omits it."""
 
 
-def joints(anatomy: Anatomy) -> tuple[str, ...]:
-    """Returns the names of the joints that can fail."""
-    return tuple(joint.name for joint in anatomy.joints)
-
-
-def joints_with_motors(anatomy: Anatomy) -> tuple[str, ...]:
-    """Returns the joints with motors; a motor of several joints belongs to the first joint."""
-    return tuple(joint.name for joint in anatomy.joints if joint.motors)
-
-
-def joints_with_servos(anatomy: Anatomy) -> tuple[str, ...]:
-    """Returns the joints with motors with position feedback."""
-    return tuple(joint.name for joint in anatomy.joints if joint.servos)
-
-
-def environment_part(_anatomy: Anatomy) -> tuple[str, ...]:
-    """Returns the only part of an environment kind."""
-    return (ENVIRONMENT,)
-
-
-def absorbs_nothing(_fault: "Fault", _other: "Fault", _anatomy: Anatomy) -> bool:
-    """Returns False: every other fault keeps its effect."""
-    return False
-
-
-def uniform_bounds(lowest: float, highest: float) -> Callable[[Anatomy, str], tuple[float, float]]:
-    """Returns ``severity_bounds`` that are the same for all parts."""
-    return partial(_same_for_all, (lowest, highest))
-
-
-def uniform_levels(*levels: float) -> Callable[[Anatomy, str], tuple[float, ...]]:
-    """Returns ``levels`` that are the same for all parts."""
-    return partial(_same_for_all, levels)
-
-
-def _same_for_all(values: Values, _anatomy: Anatomy, _part: str) -> Values:
-    return values
-
-
-@dataclass(frozen=True, order=True, kw_only=True)
+@total_ordering
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class FaultKind:
     """A kind of fault or of environment; compared, sorted and hashed by its name.
+
+    A kind is an object of a subclass, which overrides ``apply`` and as many of the other methods as
+    it needs.
 
     In notation, a fault is ``keyword``, ``keyword:part``, ``keyword=severity`` or
     ``keyword:part=severity``, with the prefix in front of the severity's number. Two kinds may
@@ -70,29 +35,16 @@ class FaultKind:
 
     Attributes:
         name: Name on the command line, such as ``sensor-gain``.
-        keyword: First word in notation, such as ``sensor``.
-        apply: Edits an embodiment: its model, readings or neurons. The layout of the model stays.
-            Faults are applied in the order of their kinds' names.
-        edit_spec: Optional hook: edits the robot's specification before it is compiled, given the
-            seed of the random parts, for changes that a compiled model does not allow. The sizes
-            of MjData stay.
-        adapt_to_contacts: Optional hook: adapts an embodiment to the contact points observed in a
-            trial, ``(n, 3)``, world frame, m, before segments of that trial are predicted.
-        contradicted: Optional hook: returns a mask of the steps of a log that the fault excludes,
-            ``(steps,)``, such as those in which a failed sensor reads something.
-        parts: Names of the parts that the kind applies to, in the order of a gene's third value;
-            ``ENVIRONMENT`` alone for an environment.
-        absorbs: Returns whether the first fault, of this kind, removes any effect of the second.
-        severity_bounds: Lowest and highest severity at a part; None for a kind without severities.
-        levels: Severities at a part that the search proposes, in the order of a gene's fourth
-            value.
+        keyword: First word in notation, such as ``sensor``; "" for the name.
+        prefix: Letters in front of the severity's number in notation.
+        bounds: Lowest and highest severity; None for a kind without severities.
+        levels: Severities that the search proposes, in the order of a gene's fourth value.
+        unit: Unit of the severity.
         degenerates_to: Severities at which the fault is equivalent to one of another kind, without
             a severity, or to no fault (None).
         degenerates_alone_to: Severities at which the fault is equivalent to one of another kind,
             without a severity, unless the hypothesis has a fault that the equivalent would absorb:
             a sensor with a gain of 0 has failed, but with a gain of 0 and a bias it is stuck.
-        prefix: Letters in front of the severity's number in notation.
-        unit: Unit of the severity.
         affects_dynamics: Whether the fault changes the robot's motion under given commands. If
             not, it changes readings only and shares the simulation of the same commands.
         is_of_joint: Whether the parts are joints, and the fault shows in the motion of the joint
@@ -103,41 +55,97 @@ class FaultKind:
     """
 
     name: str
-    keyword: str = field(compare=False)
-    apply: Callable[["Embodiment", Anatomy, "Fault"], None] = field(compare=False, repr=False)
-    edit_spec: Callable[["MjSpec", "Fault", int], None] | None = field(
-        default=None, compare=False, repr=False
-    )
-    adapt_to_contacts: Callable[["Embodiment", "Fault", FloatArray], None] | None = field(
-        default=None, compare=False, repr=False
-    )
-    contradicted: Callable[["Fault", Behaviour], BoolArray] | None = field(
-        default=None, compare=False, repr=False
-    )
-    parts: Callable[[Anatomy], tuple[str, ...]] = field(
-        default=environment_part, compare=False, repr=False
-    )
-    absorbs: Callable[["Fault", "Fault", Anatomy], bool] = field(
-        default=absorbs_nothing, compare=False, repr=False
-    )
-    severity_bounds: Callable[[Anatomy, str], tuple[float, float]] | None = field(
-        default=None, compare=False, repr=False
-    )
-    levels: Callable[[Anatomy, str], tuple[float, ...]] = field(
-        default=uniform_levels(0.0), compare=False, repr=False
-    )
-    degenerates_to: Mapping[float, "FaultKind | None"] = field(
-        default_factory=dict, compare=False, repr=False
-    )
-    degenerates_alone_to: Mapping[float, "FaultKind"] = field(
-        default_factory=dict, compare=False, repr=False
-    )
-    prefix: str = field(default="", compare=False, repr=False)
-    unit: str = field(default="", compare=False, repr=False)
-    affects_dynamics: bool = field(default=True, compare=False, repr=False)
-    is_of_joint: bool = field(default=False, compare=False, repr=False)
-    is_single: bool = field(default=False, compare=False, repr=False)
-    searchable: bool = field(default=True, compare=False, repr=False)
+    keyword: str = ""
+    prefix: str = ""
+    bounds: tuple[float, float] | None = None
+    levels: tuple[float, ...] = (0.0,)
+    unit: str = ""
+    degenerates_to: Mapping[float, Optional["FaultKind"]] = field(default_factory=dict)
+    degenerates_alone_to: Mapping[float, "FaultKind"] = field(default_factory=dict)
+    affects_dynamics: bool = True
+    is_of_joint: bool = False
+    is_single: bool = False
+    searchable: bool = True
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "keyword", self.keyword or self.name)
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.name}>"
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, FaultKind) and self.name == other.name
+
+    def __lt__(self, other: "FaultKind") -> bool:
+        return self.name < other.name
+
+    def __hash__(self) -> int:
+        return hash(self.name)
+
+    def parts(self, _anatomy: Anatomy) -> tuple[str, ...]:
+        """Returns the names of the parts that the kind applies to.
+
+        They are in the order of a gene's third value; ``ENVIRONMENT`` alone for an environment.
+        """
+        return (ENVIRONMENT,)
+
+    def bounds_at(self, _anatomy: Anatomy, _part: str) -> tuple[float, float] | None:
+        """Returns ``bounds`` at one part."""
+        return self.bounds
+
+    def levels_at(self, _anatomy: Anatomy, _part: str) -> tuple[float, ...]:
+        """Returns ``levels`` at one part."""
+        return self.levels
+
+    def apply(self, embodiment: "Embodiment", anatomy: Anatomy, fault: "Fault") -> None:
+        """Edits an embodiment: its model, readings or neurons. The layout of the model stays.
+
+        Faults are applied in the order of their kinds' names.
+        """
+        raise NotImplementedError
+
+    def edit_specification(self, spec: "MjSpec", fault: "Fault", seed: int) -> None:
+        """Edits the robot's specification before it is compiled; by default, not at all.
+
+        It is for changes that a compiled model does not allow. The sizes of MjData stay.
+
+        Args:
+            spec: The specification, edited in place.
+            fault: A fault of this kind.
+            seed: Seed of the random parts.
+        """
+
+    def adapt_to_contacts(
+        self, embodiment: "Embodiment", fault: "Fault", points: FloatArray
+    ) -> None:
+        """Adapts an embodiment to a trial before its segments are predicted; by default, not.
+
+        Args:
+            embodiment: The embodiment, edited in place.
+            fault: A fault of this kind.
+            points: Contact points observed in the trial, ``(n, 3)``, world frame, m.
+        """
+
+    def contradicted(self, _fault: "Fault", behaviour: Behaviour) -> BoolArray:
+        """Returns a mask of the steps of a log that a fault excludes, ``(steps,)``.
+
+        Such as those in which a failed sensor reads something; by default none.
+        """
+        return np.zeros(behaviour.steps, dtype=np.bool_)
+
+    def absorbs(self, _fault: "Fault", _other: "Fault", _anatomy: Anatomy) -> bool:
+        """Returns whether a fault of this kind removes any effect of another; by default, not."""
+        return False
+
+    @property
+    def edits_specification(self) -> bool:
+        """Whether the kind has ``edit_specification``."""
+        return type(self).edit_specification is not FaultKind.edit_specification
+
+    @property
+    def adapts_to_contacts(self) -> bool:
+        """Whether the kind has ``adapt_to_contacts``."""
+        return type(self).adapt_to_contacts is not FaultKind.adapt_to_contacts
 
     @property
     def degenerate_severities(self) -> tuple[float, ...]:
@@ -160,7 +168,7 @@ class FaultKind:
         return tuple(
             Fault(self, part, severity)
             for part in self.parts(anatomy)
-            for severity in self.levels(anatomy, part)
+            for severity in self.levels_at(anatomy, part)
         )
 
 
@@ -180,11 +188,8 @@ class Fault:
 
     def __str__(self) -> str:
         term = f"{self.kind.keyword}:{self.part}" if self.part else self.kind.keyword
-        return (
-            term
-            if self.kind.severity_bounds is None
-            else f"{term}={self.kind.prefix}{self.severity!r}"
-        )
+        graded = self.kind.bounds is not None
+        return f"{term}={self.kind.prefix}{self.severity!r}" if graded else term
 
     @property
     def canonical(self) -> "Fault | None":

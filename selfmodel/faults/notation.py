@@ -76,9 +76,8 @@ def _fault(term: str, text: str, anatomy: Anatomy, kinds: tuple[FaultKind, ...])
         if parts == (ENVIRONMENT,):
             raise InputError(f"the term {term!r} names a part, but {word} has none: write no ':'")
         raise unknown_name(f"part in the term {term!r} of {text!r}: for {word}", part, parts)
-    if kind.severity_bounds is None:
-        return Fault(kind, part)
-    return Fault(kind, part, _severity(term, kind, part, value, anatomy))
+    bounds = kind.bounds_at(anatomy, part)
+    return Fault(kind, part, _severity(term, kind, bounds, value) if bounds else 0.0)
 
 
 def _unreadable(term: str, text: str, kinds: tuple[FaultKind, ...]) -> InputError:
@@ -91,13 +90,13 @@ def _unreadable(term: str, text: str, kinds: tuple[FaultKind, ...]) -> InputErro
 
 def _plain(named: list[FaultKind]) -> FaultKind:
     """Returns the kind of a term without a severity, if any; otherwise the first kind."""
-    return next((kind for kind in named if kind.severity_bounds is None), named[0])
+    return next((kind for kind in named if kind.bounds is None), named[0])
 
 
 def _graded(term: str, named: list[FaultKind], value: str) -> FaultKind:
     """Returns the kind of a term with a severity, by the prefix of the severity."""
     graded = sorted(
-        (kind for kind in named if kind.severity_bounds),
+        (kind for kind in named if kind.bounds),
         key=lambda kind: len(kind.prefix),
         reverse=True,
     )
@@ -112,10 +111,8 @@ def _graded(term: str, named: list[FaultKind], value: str) -> FaultKind:
     raise InputError(f"the term {term!r} needs {prefixes} after '=' and then a number")
 
 
-def _severity(term: str, kind: FaultKind, part: str, value: str, anatomy: Anatomy) -> float:
-    if kind.severity_bounds is None:
-        raise ValueError(f"{kind.name} has no severities")
-    lowest, highest = kind.severity_bounds(anatomy, part)
+def _severity(term: str, kind: FaultKind, bounds: tuple[float, float], value: str) -> float:
+    lowest, highest = bounds
     number = value.removeprefix(kind.prefix)
     try:
         severity = float(number)

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.faults.kinds.broken import BROKEN
+from selfmodel.faults.joints import BROKEN
 from selfmodel.physical.reality_gap import DEBRIS_PREFIX
 from selfmodel.robot.robot import Robot
 

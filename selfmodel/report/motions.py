@@ -8,8 +8,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray, IndexArray
-from selfmodel.faults.affected_bodies import detached_bodies, jammed_bodies
-from selfmodel.faults.build import build
+from selfmodel.faults.build import build, detached_bodies, jammed_bodies
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.report.encoding import quantised
 from selfmodel.report.scene import bodies_of

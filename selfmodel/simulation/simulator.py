@@ -143,16 +143,12 @@ class Simulator:
         self, embodiment: Embodiment, hypothesis: Hypothesis, observed: Behaviour
     ) -> Embodiment:
         """Returns an embodiment adapted to the ground contacts of a trial."""
-        hooks = [
-            (fault.kind.adapt_to_contacts, fault)
-            for fault in hypothesis.faults
-            if fault.kind.adapt_to_contacts
-        ]
-        if not hooks:
+        faults = [fault for fault in hypothesis.faults if fault.kind.adapts_to_contacts]
+        if not faults:
             return embodiment
         own = copy.deepcopy(embodiment)  # the argument is in the cache
-        for adapt_to_contacts, fault in hooks:
-            adapt_to_contacts(own, fault, self._contact_points(observed))
+        for fault in faults:
+            fault.kind.adapt_to_contacts(own, fault, self._contact_points(observed))
         return own
 
     def run_ensemble(

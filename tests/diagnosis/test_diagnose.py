@@ -24,8 +24,7 @@ from selfmodel.diagnosis.serialization import (
 )
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.faults.kinds.broken import BROKEN
-from selfmodel.faults.kinds.jammed import JAMMED
+from selfmodel.faults.joints import BROKEN, JAMMED
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.recovery.repair.paper_repair import RepairSearch

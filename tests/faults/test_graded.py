@@ -10,14 +10,14 @@ import pytest
 from selfmodel.errors import InputError
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.faults.kinds.terrain import (
+from selfmodel.faults.notation import parse
+from selfmodel.faults.terrain import (
     CELL_SIZE,
     CELLS_PER_BUMP,
     FLAT_RADIUS,
     HALF_EXTENT,
     unit_heights,
 )
-from selfmodel.faults.notation import parse
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
 from selfmodel.simulation.simulator import Simulator

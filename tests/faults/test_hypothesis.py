@@ -7,9 +7,9 @@ from hypothesis import given, strategies as st
 
 from selfmodel.faults.hypothesis import INTACT, canonical
 from selfmodel.faults.kind import Fault
-from selfmodel.faults.kinds.payload import PAYLOAD
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import KINDS
+from selfmodel.faults.world import PAYLOAD
 from selfmodel.tasks import ROBOTS
 from tests.helpers.strategies import faults
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 import importlib.util
+from collections.abc import Callable
 from itertools import permutations
 from pathlib import Path
 from types import ModuleType
@@ -16,7 +17,7 @@ from selfmodel.experiments import plugins, robots
 from selfmodel.experiments.arguments import kinds_of
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
+from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import (
     ALL_KINDS,
@@ -56,12 +57,12 @@ def test_the_registry_knows_each_kind_by_its_name():
     assert set(KINDS.values()) - set(ALL_KINDS) == {KINDS["neuron"]}
 
 
-@pytest.mark.parametrize("name", [kind.name for kind in ALL_KINDS if kind.severity_bounds])
+@pytest.mark.parametrize("name", [kind.name for kind in ALL_KINDS if kind.bounds])
 def test_a_kind_of_degree_proposes_a_few_levels(name: str, robot: Robot):
     kind = KINDS[name]
 
     for part in kind.parts(robot.anatomy):
-        levels = kind.levels(robot.anatomy, part)
+        levels = kind.levels_at(robot.anatomy, part)
         assert 3 <= len(levels) <= 16
         assert list(levels) == sorted(set(levels))
 
@@ -94,57 +95,52 @@ def test_what_a_joint_absorbs_would_not_move_the_robot(robot: Robot):
         np.testing.assert_allclose(said, meant, atol=1e-9, rtol=0, err_msg=str(pair))
 
 
-def nothing(_embodiment: Embodiment, _anatomy: Anatomy, _fault: Fault) -> None:
-    """Edits nothing."""
+GRADED = dataclasses.replace(GRAVITY, name="odd", keyword="odd", bounds=(0, 2), levels=(1.0,))
+CALLS = iter(range(1, 1000))
 
 
-def heavier_each_time(_embodiment: Embodiment, _anatomy: Anatomy, _fault: Fault) -> None:
+def with_methods(**methods: Callable[..., object]) -> FaultKind:
+    """``GRADED`` with other methods, which are functions without ``self``."""
+    own = {name: staticmethod(method) for name, method in methods.items()}
+    fields = {f.name: getattr(GRADED, f.name) for f in dataclasses.fields(GRADED)}
+    return type("Odd", (type(GRADED),), own)(**fields)
+
+
+def heavier_each_time(embodiment: Embodiment, _anatomy: Anatomy, _fault: Fault) -> None:
     """Edits the model differently at each call."""
-    heavier_each_time.times += 1
-    _embodiment.model.body_mass[1] += heavier_each_time.times
-
-
-heavier_each_time.times = 0
-
-GRADED = FaultKind(
-    name="odd",
-    keyword="odd",
-    apply=GRAVITY.apply,
-    severity_bounds=uniform_bounds(0, 2),
-    levels=uniform_levels(1.0),
-)
+    embodiment.model.body_mass[1] += next(CALLS)
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("kind", "said"),
     [
-        ({"name": "two words"}, "needs a name without spaces"),
-        ({"keyword": "a:b"}, "needs a keyword without spaces"),
-        ({"parts": lambda _anatomy: ()}, "nothing can be proposed"),
-        ({"levels": uniform_levels()}, "nothing can be proposed"),
-        ({"levels": uniform_levels(3.0)}, "not between 0 and 2"),
-        ({"severity_bounds": None}, "its kind has no severity_bounds"),
-        ({"degenerates_to": {1.0: None}}, "its canonical form is intact"),
-        ({"keyword": "friction"}, "is parsed as friction=1.0"),
-        ({"absorbs": lambda _fault, _other, _anatomy: True}, "absorbs itself"),
-        ({"apply": nothing}, "changes nothing about a robot"),
-        ({"apply": heavier_each_time}, "does not make the same robot every time"),
+        (dataclasses.replace(GRADED, name="two words"), "needs a name without spaces"),
+        (dataclasses.replace(GRADED, keyword="a:b"), "needs a keyword without spaces"),
+        (with_methods(parts=lambda _anatomy: ()), "nothing can be proposed"),
+        (dataclasses.replace(GRADED, levels=()), "nothing can be proposed"),
+        (dataclasses.replace(GRADED, levels=(3.0,)), "not between 0 and 2"),
+        (dataclasses.replace(GRADED, bounds=None), "its kind has no bounds"),
+        (dataclasses.replace(GRADED, degenerates_to={1.0: None}), "its canonical form is intact"),
+        (dataclasses.replace(GRADED, keyword="friction"), "is parsed as friction=1.0"),
+        (with_methods(absorbs=lambda _fault, _other, _anatomy: True), "absorbs itself"),
+        (with_methods(apply=lambda *_: None), "changes nothing about a robot"),
+        (with_methods(apply=heavier_each_time), "does not make the same robot every time"),
         (
-            {"adapt_to_contacts": lambda _own, _fault, points: points.fill(0)},
+            with_methods(adapt_to_contacts=lambda _own, _fault, points: points.fill(0)),
             "changes the contact points",
         ),
         (
-            {"contradicted": lambda _fault, log: log["sensors"][:, 0] == log["sensors"][:, 0]},
+            with_methods(contradicted=lambda _, log: log["sensors"][:, 0] == log["sensors"][:, 0]),
             "the log of a robot with .* contradicts the fault",
         ),
-        ({"contradicted": lambda _fault, _log: np.zeros(3)}, "a mask of the 20 steps"),
+        (with_methods(contradicted=lambda _fault, _log: np.zeros(3)), "a mask of the 20 steps"),
     ],
 )
-def test_the_contract_kit_sees_each_way_to_break_it(change: dict, said: str, quadruped: Robot):
+def test_the_contract_kit_sees_each_way_to_break_it(kind: FaultKind, said: str, quadruped: Robot):
     check_fault_kind(GRADED, quadruped)
 
     with pytest.raises((ValueError, InputError), match=said):
-        check_fault_kind(dataclasses.replace(GRADED, **change), quadruped)
+        check_fault_kind(kind, quadruped)
 
 
 def test_the_contract_kit_sees_a_kind_of_joints_with_other_parts(quadruped: Robot):
@@ -161,7 +157,7 @@ def test_the_contract_kit_sees_a_kind_that_edits_the_robot_itself():
         robot.model.body_mass[1] = 5.0
 
     with pytest.raises(ValueError, match=r"does not make the same robot|changes the robot itself"):
-        check_fault_kind(dataclasses.replace(GRADED, apply=wrong), robot)
+        check_fault_kind(with_methods(apply=wrong), robot)
 
 
 def test_kinds_are_chosen_by_name(monkeypatch: pytest.MonkeyPatch):

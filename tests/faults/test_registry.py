@@ -10,7 +10,7 @@ from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.kind_contract import check_fault_kind
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis_space import HypothesisSpace
-from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
+from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import (
     ALL_KINDS,
@@ -67,14 +67,9 @@ def test_a_kind_that_no_diagnosis_may_propose_is_refused(robot: Robot):
 
 def test_kinds_that_a_fault_is_of_at_some_degree_can_be_named(quadruped: Robot):
     """Diagnoses in a journal are parsed with these kinds."""
-    sticky = FaultKind(name="sticky", keyword="sticky", apply=apply)
-    stick = FaultKind(
-        name="stick",
-        keyword="stick",
-        apply=apply,
-        severity_bounds=uniform_bounds(0, 2),
-        levels=uniform_levels(1.0, 2.0),
-        degenerates_to={0.0: sticky, 0.5: None},
+    sticky = Stick(name="sticky")
+    stick = Stick(
+        name="stick", bounds=(0, 2), levels=(1.0, 2.0), degenerates_to={0.0: sticky, 0.5: None}
     )
 
     check_fault_kind(stick, quadruped)
@@ -85,9 +80,12 @@ def test_kinds_that_a_fault_is_of_at_some_degree_can_be_named(quadruped: Robot):
             check_fault_kind(dataclasses.replace(stick, degenerates_to={0.0: wrong}), quadruped)
 
 
-def apply(embodiment: Embodiment, _anatomy: Anatomy, fault: Fault) -> None:
-    """Adds friction to every joint."""
-    embodiment.model.dof_frictionloss[6:] += 0.1 + fault.severity
+class Stick(FaultKind):
+    """Friction in every joint."""
+
+    def apply(self, embodiment: Embodiment, _anatomy: Anatomy, fault: Fault) -> None:
+        """Adds the friction."""
+        embodiment.model.dof_frictionloss[6:] += 0.1 + fault.severity
 
 
 def test_a_recovery_of_a_robot_with_nothing_to_strike_is_refused_before_any_trial(tmp_path: Path):

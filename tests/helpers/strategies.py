@@ -24,11 +24,10 @@ def hypotheses(
 
 def _fault(kind: FaultKind, anatomy: Anatomy) -> st.SearchStrategy[Fault]:
     parts = st.sampled_from(kind.parts(anatomy))
-    if kind.severity_bounds is None:
+    if kind.bounds is None:
         return parts.map(lambda part: Fault(kind, part))
-    severities = kind.severity_bounds
     return parts.flatmap(
-        lambda part: st.floats(*severities(anatomy, part)).map(
+        lambda part: st.floats(*kind.bounds_at(anatomy, part)).map(
             lambda severity: Fault(kind, part, severity + 0.0)
         )
     )

@@ -247,7 +247,7 @@ def test_diagnoses_are_json_without_surprises(journal: FolderJournal, biped: Rob
 
 
 def test_rivals_of_a_third_party_s_kind_are_read_back(biped: Robot, tmp_path: Path):
-    load = FaultKind(name="load", keyword="load", apply=lambda *_: None)
+    load = FaultKind(name="load")
     loaded = canonical([Fault(load, ENVIRONMENT)], biped.anatomy)
     journal = create_journal(tmp_path / "run", biped.anatomy, [load], calibrated=True)
     told = dataclasses.replace(diagnosis(biped), indistinguishable=(loaded,))

@@ -145,8 +145,8 @@ def test_every_level_of_every_kind_is_within_the_bounds_of_its_part():
         anatomy = make().anatomy
         for kind in KINDS.values():
             for fault in kind.candidates(anatomy):
-                if kind.severity_bounds is not None:
-                    low, high = kind.severity_bounds(anatomy, fault.part)
+                if kind.bounds is not None:
+                    low, high = kind.bounds_at(anatomy, fault.part)
                     assert low <= fault.severity <= high
 
 

@@ -10,7 +10,8 @@ from selfmodel.comparators import SEGMENT_PREDICTION
 from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.evidence import Evidence
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.faults.kinds.terrain import (
+from selfmodel.faults.notation import parse
+from selfmodel.faults.terrain import (
     CELL_SIZE,
     HALF_EXTENT,
     MIN_CELL_CONTACTS,
@@ -18,7 +19,6 @@ from selfmodel.faults.kinds.terrain import (
     estimated_heights,
     unit_heights,
 )
-from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated_robot import OWN_SEED, SimulatedRobot
 from selfmodel.robot.designs import cpg_for
 from selfmodel.robot.robot import Robot

@@ -16,7 +16,7 @@ from dm_env import specs
 from selfmodel import tasks
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
+from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import KINDS
 from selfmodel.robot.anatomy import Anatomy
@@ -100,16 +100,11 @@ def test_every_time_step_is_finite_and_in_its_specs(domain: str, task: str, hypo
 
 
 def test_a_robot_may_have_a_fault_of_a_kind_of_ones_own():
-    def lighter(embodiment: Embodiment, _anatomy: Anatomy, fault: Fault) -> None:
-        embodiment.model.body_mass[1] *= fault.severity
+    class Lighter(FaultKind):
+        def apply(self, embodiment: Embodiment, _anatomy: Anatomy, fault: Fault) -> None:
+            embodiment.model.body_mass[1] *= fault.severity
 
-    kind = FaultKind(
-        name="lighter",
-        keyword="lighter",
-        apply=lighter,
-        severity_bounds=uniform_bounds(0.1, 0.9),
-        levels=uniform_levels(0.5),
-    )
+    kind = Lighter(name="lighter", bounds=(0.1, 0.9), levels=(0.5,))
     robot = ROBOTS["quadruped"].robot()
     made = parse("lighter=0.5", robot.anatomy, (*KINDS.values(), kind))
     whole, light = (

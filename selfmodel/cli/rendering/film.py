@@ -7,8 +7,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
-from selfmodel.faults.affected_bodies import detached_bodies, jammed_bodies
-from selfmodel.faults.build import build
+from selfmodel.faults.build import build, detached_bodies, jammed_bodies
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import poses_of, with_known_base

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from selfmodel.arrays import FloatArray
+from selfmodel.faults.joints import JAMMED_AT_ANGLE
 from selfmodel.faults.kind import Fault
-from selfmodel.faults.kinds.jammed import JAMMED_AT_ANGLE
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.simulation.requests import END
 from selfmodel.trials.trial import Trial

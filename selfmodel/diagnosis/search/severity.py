@@ -65,7 +65,7 @@ def with_fitted_severity(
     severities = [fault.severity, *space.levels(fault)]
     # A kind that edits the specification has no severities between its levels: each severity
     # needs a compiled model.
-    for _ in range(1 if fault.kind.edit_spec else 1 + zooms):
+    for _ in range(1 if fault.kind.edits_specification else 1 + zooms):
         tried = [space.with_severity(hypothesis, index, severity) for severity in severities]
         chosen = int(np.argmin(losses(tried).sum(axis=1)))
         severity, best = severities[chosen], tried[chosen]
@@ -102,7 +102,7 @@ def _averaged(
 ) -> Hypothesis:
     fault = hypothesis.faults[index]
     bounds = space.severity_bounds(fault)
-    if bounds is None or fault.kind.edit_spec:
+    if bounds is None or fault.kind.edits_specification:
         return hypothesis
     known = [fault.severity, *space.levels(fault)]
     severities = sorted({*known, *_around(fault.severity, known, bounds)})

@@ -31,8 +31,7 @@ def contradiction_losses(
     losses = np.zeros((len(hypotheses), len(piece_steps)))
     for row, hypothesis in zip(losses, hypotheses, strict=True):
         for fault in hypothesis.faults:
-            if fault.kind.contradicted is not None:
-                steps = np.append(0, np.cumsum(fault.kind.contradicted(fault, behaviour)))
-                is_contradicted = steps[piece_steps[:, 1] + 1] > steps[piece_steps[:, 0]]
-                row[is_contradicted] += CONTRADICTION
+            steps = np.append(0, np.cumsum(fault.kind.contradicted(fault, behaviour)))
+            is_contradicted = steps[piece_steps[:, 1] + 1] > steps[piece_steps[:, 0]]
+            row[is_contradicted] += CONTRADICTION
     return losses

@@ -83,7 +83,7 @@ def detectable_severities(
     faults = [
         Fault(kind, part)
         for kind in space.kinds
-        if kind.severity_bounds is not None and kind.edit_spec is None
+        if kind.bounds is not None and not kind.edits_specification
         for part in kind.parts(space.anatomy)
         if part not in faulty
     ]

@@ -27,7 +27,7 @@ def undetectable_faults(
     Returns:
         Hypotheses sorted by total loss; none if the simulation of the best hypothesis diverged.
     """
-    faults = [fault for fault in space.coarse_candidates if fault.kind.severity_bounds is None]
+    faults = [fault for fault in space.coarse_candidates if fault.kind.bounds is None]
     distinct = dict.fromkeys(space.canonical([*best.faults, fault]) for fault in faults)
     larger = [one for one in distinct if len(one) > len(best)]
     candidates = _indistinguishable(best, larger, losses.surrogate)

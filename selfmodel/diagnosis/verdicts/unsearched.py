@@ -69,7 +69,7 @@ def unsearched_space(space: HypothesisSpace) -> HypothesisSpace:
     Args:
         space: The searched hypotheses.
     """
-    kinds = [kind for kind in ALL_KINDS if kind not in space.kinds and kind.edit_spec is None]
+    kinds = [kind for kind in ALL_KINDS if kind not in space.kinds and not kind.edits_specification]
     return HypothesisSpace(space.anatomy, tuple(kinds), space.observed)
 
 

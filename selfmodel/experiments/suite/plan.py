@@ -16,9 +16,9 @@ from selfmodel.experiments.study.files import check_keys, key_of
 from selfmodel.experiments.study.gaits import gait_cell
 from selfmodel.experiments.study.planned_robots import planned
 from selfmodel.experiments.study.repairs import check_repair, repair_parameters, score_name
-from selfmodel.faults.kinds.neuron import silent_neurons
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
+from selfmodel.faults.sensors import silent_neurons
 from selfmodel.physical.reality_gap import MAX_GAP_LEVEL
 from selfmodel.settings import Settings
 from selfmodel.tasks import Entry

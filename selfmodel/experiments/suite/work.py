@@ -15,8 +15,8 @@ from selfmodel.experiments.study.gaits import read_gait
 from selfmodel.experiments.study.planned_robots import planned_entry
 from selfmodel.experiments.suite.rows import SuiteRow
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
-from selfmodel.faults.kinds.neuron import silent_neurons
 from selfmodel.faults.notation import parse
+from selfmodel.faults.sensors import silent_neurons
 from selfmodel.recovery.scores.upright import falls_of
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings

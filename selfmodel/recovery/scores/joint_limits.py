@@ -5,8 +5,7 @@ import math
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
-from selfmodel.faults.affected_bodies import detached_bodies
-from selfmodel.faults.build import build
+from selfmodel.faults.build import build, detached_bodies
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.recovery.scores.falls import first_lasting, steps_of
 from selfmodel.recovery.scores.fitness import Score

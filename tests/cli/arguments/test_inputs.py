@@ -36,7 +36,7 @@ from selfmodel.errors import InputError
         ("--damages", "brek:front_left_knee", "did you mean break?"),
         (
             "--kinds",
-            "selfmodel.faults.kinds.neuron:SILENT_NEURON",
+            "selfmodel.faults.sensors:SILENT_NEURON",
             "no diagnosis may propose neuron: leave neuron out",
         ),
         (

@@ -10,11 +10,10 @@ from selfmodel.diagnosis.verdicts.detectable import DetectableSeverity, detectab
 from selfmodel.faults import BROKEN, FRICTION
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
+from selfmodel.faults.joints import JAMMED, WEAK_MOTOR
 from selfmodel.faults.kind import ENVIRONMENT, Fault
-from selfmodel.faults.kinds.jammed import JAMMED
-from selfmodel.faults.kinds.motor import WEAK_MOTOR
-from selfmodel.faults.kinds.payload import PAYLOAD
 from selfmodel.faults.registry import KINDS
+from selfmodel.faults.world import PAYLOAD
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import ROBOTS
 

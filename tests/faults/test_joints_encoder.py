@@ -7,7 +7,7 @@ import pytest
 from selfmodel.controllers.playback import Playback
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
-from selfmodel.faults.kinds.encoder import ENCODER_OFFSET, ENCODER_SLIP
+from selfmodel.faults.joints import ENCODER_OFFSET, ENCODER_SLIP
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated_robot import SimulatedRobot
 from selfmodel.robot.robot import Robot

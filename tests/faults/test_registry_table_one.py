@@ -7,7 +7,7 @@ from functools import partial
 import pytest
 
 from selfmodel.faults.notation import parse
-from selfmodel.faults.table_one import cases_of
+from selfmodel.faults.registry import cases_of
 from selfmodel.robot.legs import reaches_ground
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.robot import Robot

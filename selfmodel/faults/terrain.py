@@ -7,7 +7,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
-from selfmodel.faults.kind import Fault, FaultKind, uniform_bounds, uniform_levels
+from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.trials.rotation import rotated
 
@@ -68,30 +68,6 @@ def _interpolate(drawn: FloatArray, count: int) -> FloatArray:
     return rows
 
 
-def _edit_spec(spec: "MjSpec", fault: Fault, seed: int) -> None:
-    """Replaces every ground plane by the terrain."""
-    import mujoco  # noqa: PLC0415  # faults/ imports without MuJoCo
-
-    planes = [geom for geom in spec.worldbody.geoms if geom.type == mujoco.mjtGeom.mjGEOM_PLANE]
-    if not planes:
-        raise InputError("roughness replaces a ground plane, and the model's world has none")
-    heights = fault.severity * unit_heights(seed)
-    low, high = float(heights.min()), float(heights.max())
-    spec.add_hfield(
-        name=TERRAIN_NAME,
-        nrow=heights.shape[0],
-        ncol=heights.shape[1],
-        # The last size is the thickness below the lowest point.
-        size=[*HALF_EXTENT, high - low, 1.0],
-        userdata=((heights - low) / (high - low)).ravel(),
-    )
-    for plane in planes:
-        plane.type = mujoco.mjtGeom.mjGEOM_HFIELD
-        plane.hfieldname = TERRAIN_NAME
-        # The centre of an infinite plane is arbitrary; that of the field is the initial position.
-        plane.pos = [0.0, 0.0, plane.pos[2] + low]
-
-
 def estimated_heights(points: FloatArray) -> FloatArray:
     """Returns the terrain of roughness 1 estimated from contact points; see ``unit_heights``.
 
@@ -135,35 +111,55 @@ def estimated_heights(points: FloatArray) -> FloatArray:
     return np.asarray(level[tuple(nearest)])
 
 
-def _adapt_to_contacts(embodiment: "Embodiment", fault: Fault, points: FloatArray) -> None:
-    """Sets the height field to the estimated terrain, scaled by the severity."""
-    import mujoco  # noqa: PLC0415  # faults/ imports without MuJoCo
+class Roughness(FaultKind):
+    """Rough ground; the severity is the maximum deviation of the ground from its mean height, m."""
 
-    model = embodiment.model
-    field = model.hfield(TERRAIN_NAME)
-    fields = model.geom_type == mujoco.mjtGeom.mjGEOM_HFIELD
-    (geom, *_) = np.flatnonzero(fields & (model.geom_dataid == field.id))
-    inverse = model.geom_quat[geom] * (1.0, -1.0, -1.0, -1.0)
-    in_field_frame = rotated(points - model.geom_pos[geom], inverse)
-    # The data is a fraction of the field's height above the lowest drawn height.
-    lowest = fault.severity * float(unit_heights(embodiment.seed).min())
-    parts = (fault.severity * estimated_heights(in_field_frame) - lowest) / field.size[2]
-    field.data[:] = np.clip(parts, 0, 1)
+    def apply(self, _embodiment: "Embodiment", _anatomy: Anatomy, _fault: Fault) -> None:
+        """Does nothing: ``edit_specification`` has added the terrain."""
+
+    def edit_specification(self, spec: "MjSpec", fault: Fault, seed: int) -> None:
+        """Replaces every ground plane by the terrain."""
+        import mujoco  # noqa: PLC0415  # faults/ imports without MuJoCo
+
+        planes = [geom for geom in spec.worldbody.geoms if geom.type == mujoco.mjtGeom.mjGEOM_PLANE]
+        if not planes:
+            raise InputError("roughness replaces a ground plane, and the model's world has none")
+        heights = fault.severity * unit_heights(seed)
+        low, high = float(heights.min()), float(heights.max())
+        spec.add_hfield(
+            name=TERRAIN_NAME,
+            nrow=heights.shape[0],
+            ncol=heights.shape[1],
+            # The last size is the thickness below the lowest point.
+            size=[*HALF_EXTENT, high - low, 1.0],
+            userdata=((heights - low) / (high - low)).ravel(),
+        )
+        for plane in planes:
+            plane.type = mujoco.mjtGeom.mjGEOM_HFIELD
+            plane.hfieldname = TERRAIN_NAME
+            # A plane's centre is arbitrary; that of the field is the initial position.
+            plane.pos = [0.0, 0.0, plane.pos[2] + low]
+
+    def adapt_to_contacts(self, embodiment: "Embodiment", fault: Fault, points: FloatArray) -> None:
+        """Sets the height field to the estimated terrain, scaled by the severity."""
+        import mujoco  # noqa: PLC0415  # faults/ imports without MuJoCo
+
+        model = embodiment.model
+        field = model.hfield(TERRAIN_NAME)
+        fields = model.geom_type == mujoco.mjtGeom.mjGEOM_HFIELD
+        (geom, *_) = np.flatnonzero(fields & (model.geom_dataid == field.id))
+        inverse = model.geom_quat[geom] * (1.0, -1.0, -1.0, -1.0)
+        in_field_frame = rotated(points - model.geom_pos[geom], inverse)
+        # The data is a fraction of the field's height above the lowest drawn height.
+        lowest = fault.severity * float(unit_heights(embodiment.seed).min())
+        parts = (fault.severity * estimated_heights(in_field_frame) - lowest) / field.size[2]
+        field.data[:] = np.clip(parts, 0, 1)
 
 
-def _apply(_embodiment: "Embodiment", _anatomy: Anatomy, _fault: Fault) -> None:
-    """Does nothing: ``edit_spec`` has added the terrain."""
-
-
-ROUGHNESS = FaultKind(
+ROUGHNESS = Roughness(
     name="roughness",
-    keyword="roughness",
-    apply=_apply,
-    edit_spec=_edit_spec,
-    adapt_to_contacts=_adapt_to_contacts,
-    severity_bounds=uniform_bounds(0.0, 0.1),
-    levels=uniform_levels(0.01, 0.02, 0.04),
+    bounds=(0.0, 0.1),
+    levels=(0.01, 0.02, 0.04),
     degenerates_to={0.0: None},
     unit="m",
 )
-"""Maximum deviation of the ground from its mean height."""

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from selfmodel.faults.build import build
-from selfmodel.faults.kinds.grip import LOST_GRIP
+from selfmodel.faults.joints import LOST_GRIP
 from selfmodel.faults.notation import parse
 from selfmodel.robot.robot import Robot
 from tests.faults.test_build import follow

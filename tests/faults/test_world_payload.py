@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from selfmodel.faults.build import build
-from selfmodel.faults.kinds.payload import PAYLOAD
 from selfmodel.faults.notation import parse
+from selfmodel.faults.world import PAYLOAD
 from selfmodel.robot.robot import Robot
 from tests.faults.test_build import assert_same_paths, follow
 

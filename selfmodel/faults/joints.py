@@ -1,0 +1,303 @@
+"""Fault kinds of joints, their motors and encoders, and of feet."""
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from selfmodel.faults.kind import Fault, FaultKind
+from selfmodel.faults.sensors import FAILED_SENSOR, SENSOR_GAIN
+from selfmodel.robot.anatomy import Anatomy, Joint
+
+if TYPE_CHECKING:
+    from selfmodel.robot.embodiment import Embodiment
+
+ANGLE_LEVELS = 12
+"""Levels of the angle of a jam, evenly spaced inside the joint's range: 0.09 rad apart for 60
+degrees."""
+
+
+class BrokenJoint(FaultKind):
+    """A joint with the bodies beyond it detached."""
+
+    def parts(self, anatomy: Anatomy) -> tuple[str, ...]:
+        """Returns the joints whose bodies all have names: faults refer to bodies by name."""
+        return tuple(joint.name for joint in anatomy.joints if "" not in joint.bodies)
+
+    def apply(self, embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+        """Detaches the bodies of the limb and zeroes the readings of its sensors."""
+        detached = anatomy.joint(fault.part).bodies
+        for name in detached:
+            embodiment.detach_body(name)
+        for column, sensor in enumerate(anatomy.sensors):
+            if sensor.body in detached:
+                embodiment.fix_reading(column, 0.0)
+
+    def absorbs(self, fault: Fault, other: Fault, anatomy: Anatomy) -> bool:
+        """Returns whether the other fault is at a detached part, or of a motor without a load."""
+        if other.part == fault.part:
+            return other.kind != fault.kind
+        broken = anatomy.joint(fault.part)
+        if other.kind == WEAK_MOTOR and broken.motors_lost_if_broken.issuperset(
+            anatomy.joint(other.part).motors
+        ):
+            return True
+        return other.part in broken.descendants
+
+
+class JointFault(FaultKind):
+    """A fault of any joint."""
+
+    def parts(self, anatomy: Anatomy) -> tuple[str, ...]:
+        """Returns the names of the joints that can fail."""
+        return tuple(joint.name for joint in anatomy.joints)
+
+
+class MotorFault(FaultKind):
+    """A fault of a joint with motors."""
+
+    def parts(self, anatomy: Anatomy) -> tuple[str, ...]:
+        """Returns the joints with motors; a motor of several joints belongs to the first joint."""
+        return tuple(joint.name for joint in anatomy.joints if joint.motors)
+
+
+class JammedAtAngle(FaultKind):
+    """A joint whose hinges are welded at one angle, rad."""
+
+    def parts(self, anatomy: Anatomy) -> tuple[str, ...]:
+        """Returns the joints with a common angle of all hinges other than that of ``JAMMED``."""
+        return tuple(joint.name for joint in anatomy.joints if self.levels_at(anatomy, joint.name))
+
+    def bounds_at(self, anatomy: Anatomy, part: str) -> tuple[float, float]:
+        """Returns the range that all hinges of a joint have, rad."""
+        limits = anatomy.joint(part).limits
+        return max(low for low, _ in limits), min(high for _, high in limits)
+
+    def levels_at(self, anatomy: Anatomy, part: str) -> tuple[float, ...]:
+        """Returns angles inside the range of a joint, without 0, rad."""
+        low, high = self.bounds_at(anatomy, part)
+        if low >= high:
+            return ()
+        angles = (low + (high - low) * (k + 0.5) / ANGLE_LEVELS for k in range(ANGLE_LEVELS))
+        return tuple(dict.fromkeys(round(angle, 3) + 0.0 for angle in angles if round(angle, 3)))
+
+    def apply(self, embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+        """Welds the hinges at the angle of the severity."""
+        hinges = anatomy.joint(fault.part).hinges
+        _weld(embodiment, anatomy, dict.fromkeys(hinges, fault.severity))
+
+    def absorbs(self, fault: Fault, other: Fault, anatomy: Anatomy) -> bool:
+        """Returns whether a fault of the joint's resistance or motor has no further effect.
+
+        The motors of a welded joint have no effect unless they move another joint too.
+        """
+        if other.part != fault.part:
+            return False
+        if other.kind in (DAMPED_JOINT, JOINT_FRICTION):
+            return True
+        if other.kind != WEAK_MOTOR:
+            return False
+        joint = anatomy.joint(fault.part)
+        return joint.motors_lost_if_jammed.issuperset(joint.motors)
+
+
+class Jammed(JointFault):
+    """A joint whose hinges are welded at 0, or at the limit nearest to 0."""
+
+    def apply(self, embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+        """Welds the hinges."""
+        _weld(embodiment, anatomy, _nearest_to_zero(anatomy.joint(fault.part)))
+
+    def absorbs(self, fault: Fault, other: Fault, anatomy: Anatomy) -> bool:
+        """Returns whether a fault of the joint's sensor, motor or angle has no further effect.
+
+        A sensor of the welded hinge that reads 0 reads 0 if it fails or with any gain. A joint
+        jammed at 0 and at another angle is jammed at 0.
+        """
+        if other.kind in (FAILED_SENSOR, SENSOR_GAIN):
+            sensor, angles = anatomy.sensor(other.part), _nearest_to_zero(anatomy.joint(fault.part))
+            return sensor.hinge in angles and sensor.reading(angles[sensor.hinge]) == 0
+        if other.part == fault.part and other.kind == JAMMED_AT_ANGLE:
+            return True
+        return JAMMED_AT_ANGLE.absorbs(fault, other, anatomy)
+
+
+def _weld(embodiment: "Embodiment", anatomy: Anatomy, angles: Mapping[str, float]) -> None:
+    for hinge, angle in angles.items():
+        embodiment.weld_hinge(hinge, angle)
+    for column, sensor in enumerate(anatomy.sensors):
+        if sensor.hinge in angles:
+            offset = embodiment.encoder_offset[anatomy.hinges.index(sensor.hinge)]
+            embodiment.fix_reading(column, sensor.reading(angles[sensor.hinge] + offset))
+
+
+def _nearest_to_zero(joint: Joint) -> dict[str, float]:
+    return {
+        hinge: min(max(low, 0.0), high)
+        for hinge, (low, high) in zip(joint.hinges, joint.limits, strict=True)
+    }
+
+
+class WeakMotor(MotorFault):
+    """A joint whose motors' torque is scaled by a factor below 1."""
+
+    def apply(self, embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+        """Scales the forces and the force limits of the motors."""
+        motors = [anatomy.motors.index(motor) for motor in anatomy.joint(fault.part).motors]
+        embodiment.weaken_motors(motors, fault.severity)
+
+
+class DampedJoint(JointFault):
+    """A joint whose viscous damping is scaled by a factor.
+
+    The severity is a factor from 0 to 100; 1 is nominal. A joint without damping in the model gets
+    ``factor - 1`` times the damping that slows it with a time constant of 1 s. The velocity gain of
+    a servo is no part of the damping. The search proposes larger damping only: smaller damping has
+    hardly an effect beside the velocity gain of a servo. A jammed joint, and a broken joint at or
+    before the joint, absorb its damping.
+    """
+
+    def apply(self, embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+        """Scales the damping of the hinges."""
+        for hinge in anatomy.joint(fault.part).hinges:
+            embodiment.scale_damping(hinge, fault.severity)
+
+
+class JointFriction(MotorFault):
+    """A joint with dry friction, which stops it below a threshold of torque.
+
+    The severity is a fraction of the largest torque of the joint's motors, from 0 to 1, in addition
+    to the dry friction in the model; 0 is nominal. Only joints with motors have the fault. A jammed
+    joint, and a broken joint at or before the joint, absorb its friction. A weak motor does not
+    change it.
+    """
+
+    def apply(self, embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+        """Adds the friction to the hinges."""
+        for hinge in anatomy.joint(fault.part).hinges:
+            embodiment.add_dry_friction(hinge, fault.severity)
+
+
+class EncoderOffset(JointFault):
+    """A joint whose encoder measures its angle plus a constant.
+
+    The severity is the measured minus the true angle from -1 to 1 rad; 0 is nominal. It shifts the
+    logged joint positions and the readings of the angle sensors of the joint. A prediction begins
+    at the true angle, which is the logged angle minus the offset. The servo has a measurement of
+    its own and is not affected. Faults of both encoder kinds at one joint add up.
+
+    A broken joint at or before the joint absorbs the fault; a jammed joint does not, because its
+    constant angle is measured with the offset.
+    """
+
+    def apply(self, embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+        """Shifts what the encoders of the joint measure."""
+        hinges = anatomy.joint(fault.part).hinges
+        for hinge in hinges:
+            embodiment.encoder_offset[anatomy.hinges.index(hinge)] += fault.severity
+        for column, sensor in enumerate(anatomy.sensors):
+            if sensor.hinge in hinges:
+                embodiment.shift_reading(column, fault.severity / sensor.half_range)
+
+
+class EncoderSlip(EncoderOffset):
+    """A joint whose encoder, which its servo uses, measures its angle plus a constant.
+
+    Under the same commands, the true angle is lower by the offset. A joint without a servo, such as
+    one with a torque motor, has an encoder offset only. Motors that move a jammed joint only have
+    no force, so both kinds are equal there. A weak motor scales the force that the slip adds, as
+    all of its force.
+    """
+
+    def parts(self, anatomy: Anatomy) -> tuple[str, ...]:
+        """Returns the joints with motors with position feedback."""
+        return tuple(joint.name for joint in anatomy.joints if joint.servos)
+
+    def apply(self, embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+        """Shifts what the encoders of the joint measure, and the feedback of its servos."""
+        super().apply(embodiment, anatomy, fault)
+        for hinge in anatomy.joint(fault.part).hinges:
+            embodiment.shift_feedback(hinge, fault.severity)
+
+
+class LostGrip(FaultKind):
+    """A foot whose sliding friction is scaled by a factor.
+
+    The severity is a factor from 0 to 1 of the friction of every contact of the foot; 1 is nominal.
+    The foot is what the last joint of a limb moves, and has the name of that joint. The friction of
+    the ground, ``friction``, applies to all feet, and the factor to what results. A broken joint at
+    or before the foot absorbs the fault.
+    """
+
+    def parts(self, anatomy: Anatomy) -> tuple[str, ...]:
+        """Returns the last joints of the limbs."""
+        names = {joint.name for joint in anatomy.joints}
+        return tuple(
+            joint.name
+            for joint in anatomy.joints
+            if "" not in joint.bodies and not joint.descendants & names
+        )
+
+    def apply(self, embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+        """Scales the friction of the bodies of the foot."""
+        embodiment.scale_grip(sorted(anatomy.joint(fault.part).bodies), fault.severity)
+
+
+BROKEN = BrokenJoint(name="break")
+JAMMED = Jammed(name="jam", is_of_joint=True)
+JAMMED_AT_ANGLE = JammedAtAngle(
+    name="jam-angle",
+    keyword="jam",
+    bounds=(-math.inf, math.inf),  # narrower at each joint
+    degenerates_to={0.0: JAMMED},
+    unit="rad",
+    is_of_joint=True,
+)
+WEAK_MOTOR = WeakMotor(
+    name="motor",
+    bounds=(0.0, 1.0),
+    levels=(0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9),
+    degenerates_to={1.0: None},
+    unit="of its torque",
+    is_of_joint=True,
+)
+DAMPED_JOINT = DampedJoint(
+    name="damping",
+    bounds=(0.0, 100.0),
+    levels=(3.0, 10.0, 30.0),
+    degenerates_to={1.0: None},
+    unit="times",
+    is_of_joint=True,
+)
+JOINT_FRICTION = JointFriction(
+    name="joint-friction",
+    bounds=(0.0, 1.0),
+    levels=(0.1, 0.2, 0.4),
+    degenerates_to={0.0: None},
+    unit="of the motors' largest torque",
+    is_of_joint=True,
+)
+ENCODER_OFFSET = EncoderOffset(
+    name="encoder-offset",
+    bounds=(-1.0, 1.0),
+    levels=(-0.3, -0.1, 0.1, 0.3),
+    degenerates_to={0.0: None},
+    unit="rad",
+    is_of_joint=True,
+)
+ENCODER_SLIP = EncoderSlip(
+    name="encoder-slip",
+    keyword="encoder-offset",
+    prefix="slip",
+    bounds=(-1.0, 1.0),
+    levels=(-0.3, -0.1, 0.1, 0.3),
+    degenerates_to={0.0: None},
+    unit="rad",
+    is_of_joint=True,
+)
+LOST_GRIP = LostGrip(
+    name="grip",
+    bounds=(0.0, 1.0),
+    levels=(0.1, 0.2, 0.4),
+    degenerates_to={1.0: None},
+    unit="of its friction",
+)

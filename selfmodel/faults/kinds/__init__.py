@@ -1,1 +1,0 @@
-"""The fault kinds, one file per kind or group of kinds."""
