@@ -145,7 +145,7 @@ def injected_faults(
             for level in (
                 (0.95, 0.9, 0.8, 0.7, 0.6, 0.4, 0.2, 0.0)
                 if kind == WEAK_MOTOR
-                else kind.levels(robot.anatomy, part)
+                else kind.levels_at(robot.anatomy, part)
             )
         )
     )
