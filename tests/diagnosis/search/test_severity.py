@@ -59,7 +59,7 @@ def test_degrees_are_found_between_those_that_are_proposed():
 
 def test_every_part_is_proposed_at_few_degrees_of_the_whole_range():
     proposed = {fault.severity for fault in DEGREES if fault.part == "front_left_knee"}
-    levels = WEAK_MOTOR.levels(ANATOMY, "front_left_knee")
+    levels = WEAK_MOTOR.levels_at(ANATOMY, "front_left_knee")
 
     assert len(proposed) <= COARSE_LEVELS
     assert {min(levels), max(levels)} <= proposed <= set(levels)
@@ -162,7 +162,7 @@ def test_where_nothing_can_be_told_the_mean_is_that_of_all_degrees():
         )
         for start in (0.2, 0.5, 0.9)
     ]
-    levels = FRICTION.levels(ANATOMY, ENVIRONMENT)
+    levels = FRICTION.levels_at(ANATOMY, ENVIRONMENT)
 
     assert means == pytest.approx([(levels[0] + levels[-1]) / 2] * 3, abs=1e-3)
 

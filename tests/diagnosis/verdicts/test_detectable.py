@@ -53,7 +53,7 @@ def test_the_largest_torque_that_shows_is_named_and_a_part_that_never_shows_has_
 @settings(max_examples=60)
 @given(limit=st.floats(0.01, 1.2))
 def test_the_bisection_finds_the_same_severity_as_a_scan_of_the_levels(limit: float):
-    levels = sorted(WEAK_MOTOR.levels(ANATOMY, KNEE), reverse=True)
+    levels = sorted(WEAK_MOTOR.levels_at(ANATOMY, KNEE), reverse=True)
     below = [level for level in levels if level < 1.0]
     scanned = [(1.0 + below[0]) / 2, *below]
     expected = next((level for level in scanned if 1.0 - level >= limit), None)
@@ -74,13 +74,13 @@ def test_a_bisection_asks_for_few_of_the_severities():
     detectable_severities(INTACT, space, losses)
     own = {one for one in asked if any(fault.part == KNEE for fault in one.faults)}
 
-    assert 0 < len(own) <= np.ceil(np.log2(len(WEAK_MOTOR.levels(ANATOMY, KNEE)) + 2))
+    assert 0 < len(own) <= np.ceil(np.log2(len(WEAK_MOTOR.levels_at(ANATOMY, KNEE)) + 2))
 
 
 def test_both_sides_of_a_nominal_severity_have_a_limit():
     slope = KINDS["slope"]
     rows = found(shows(ENVIRONMENT, 0.1, 0.0), slope)
-    levels = slope.levels(ANATOMY, ENVIRONMENT)
+    levels = slope.levels_at(ANATOMY, ENVIRONMENT)
 
     assert [(one.kind, one.part) for one in rows] == [("slope", ENVIRONMENT)]
     assert rows[0].above == min(level for level in levels if level >= 0.1)
@@ -90,7 +90,7 @@ def test_both_sides_of_a_nominal_severity_have_a_limit():
 @pytest.mark.parametrize("true", [0.5, 0.8])
 def test_the_nominal_friction_is_the_level_with_the_smallest_loss(true: float):
     """The model has its own friction, which no severity of the kind is nominal for."""
-    levels = sorted(FRICTION.levels(ANATOMY, ENVIRONMENT))
+    levels = sorted(FRICTION.levels_at(ANATOMY, ENVIRONMENT))
     nominal = min(levels, key=lambda level: abs(level - true))
 
     def effect(fault: Fault) -> float:
@@ -123,7 +123,7 @@ def test_kinds_without_a_severity_and_kinds_that_edit_the_specification_are_left
 def test_a_severity_that_diverges_shows_and_a_best_that_diverges_shows_nothing():
     rows = found(lambda fault: np.inf if fault.severity < 0.5 else 0.0, WEAK_MOTOR)
     assert {one.below for one in rows} == {
-        max(level for level in WEAK_MOTOR.levels(ANATOMY, KNEE) if level < 0.5)
+        max(level for level in WEAK_MOTOR.levels_at(ANATOMY, KNEE) if level < 0.5)
     }
 
     space = HypothesisSpace.of([WEAK_MOTOR], ANATOMY)
